@@ -47,6 +47,7 @@ coverage-all: $(VENV)/.tested
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
+	$(BIN)/python .ci/counters.py
 
 format: $(VENV)/.tested
 	$(BIN)/ruff check --fix .
@@ -58,9 +59,9 @@ $(VENV)/built: $(VENV)/.tested
 	rm -rf $@
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --target $@ .
 
-# the studies, which no wheel holds, beside the package
+# evidence and reproduction, which no wheel holds, beside the package
 types: $(VENV)/built
-	cp -r studies $(VENV)/built/windwrench/
+	cp -r evidence reproduction $(VENV)/built/windwrench/
 	cd $(VENV)/built && MYPYPATH=. $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml -p windwrench
 
 docs: $(VENV)/built

@@ -15,7 +15,6 @@ from .commands.demo import demo
 from .commands.diagnosing import diagnose
 from .commands.estimating import estimate
 from .commands.exporting import export_c
-from .commands.fleets import fleet
 from .commands.flying import fly, record
 from .commands.identifying import identify
 from .commands.learning import train
@@ -23,6 +22,7 @@ from .commands.live import live
 from .commands.looking import is_path, look
 from .commands.output import prepare_output
 from .commands.paper import reproduce
+from .commands.profiling import profile
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
 from .commands.warming import warm
@@ -35,7 +35,7 @@ class _Commands(TyperGroup):
     """Takes a log in place of a command, and names the nearest command where one is mistyped."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command that the first argument names, or that looks at the log."""
+        """Return the command named by the first argument, or ``look`` for a log."""
         name = args[0] if args else ""
         if name and not name.startswith("-") and name not in self.commands:
             if not is_path(name):
@@ -55,7 +55,7 @@ app = typer.Typer(
     "file, or output that cannot be written, with a one-line message; 130 interrupted; 143 live "
     "terminated, with its summary. NO_COLOR=1 disables colours.",
 )
-_UsageError: Any = typer.BadParameter.__base__  # an option or argument that typer cannot use
+_UsageError: Any = typer.BadParameter.__base__  # an option or argument unfit for typer
 
 
 def _version(wanted: bool) -> None:
@@ -93,15 +93,14 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     compare,
     live,
     identify,
-    fleet,
+    profile,
     export_c,
     record,
     reproduce,
     train,
 )
-# what an option of a command was called before: it is taken, and not shown
+# earlier names of commands' options: taken, and not shown
 _EARLIER: dict[str, dict[str, str]] = {
-    "estimate": {"film": "gif", "from": "film-from"},
     "live": {"view": "browser"},
 }
 for command in (look, warm):
@@ -141,11 +140,11 @@ def main() -> None:
 
 
 def _refused(error: Any) -> int:
-    """Say what the user's mistake was; return the exit code."""
+    """Print the user's mistake; return the exit code."""
     text = str(error) if isinstance(error, InputError) else error.format_message()
     for one in getattr(error.__cause__, "errors", list)()[:1]:  # pydantic's, behind typer's
         text += f", got {one['input']!r}"
-    # what a parser says may take several lines
+    # a parser's message may take several lines
     errors.print(
         f"error: {' '.join(printable(text).split())}",
         style="red",

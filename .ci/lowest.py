@@ -13,7 +13,7 @@ for requirement in [
     *project["dependencies"],
     *extras["parquet"],
     *extras["logs"],
-    *extras["paper"],
+    *extras["reproduction"],
 ]:
     found = re.fullmatch(r"([\w.-]+)(?:\[[\w,-]+\])?>=([\d.]+)", requirement)
     if found is None:

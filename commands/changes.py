@@ -9,7 +9,7 @@ from typing import Any
 from typer.core import TyperCommand
 
 from ..runtime.errors import InputError
-from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import console, results_folder, say, show_table
 
 _AGAINST = "--against"
@@ -24,7 +24,7 @@ def compare(
     against: list[Path] | None = None,
     by_folder: bool = False,
     example: bool = False,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     out: Path = Path("results/compare"),
 ) -> dict[str, Any]:
     """Find what changed between two sets of flights. Which rotor, which side: no model has to be
@@ -73,12 +73,12 @@ def compare(
 
 
 class LogsAgainstLogs(TyperCommand):
-    """A command in which ``--against`` takes every log up to the next option, where logs stand
-    before it too; where they come behind it alone, one log.
+    """A command whose ``--against`` takes every log up to the next option. With logs behind
+    ``--against`` alone, it takes one.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Return what is left of the words of a command line."""
+        """Return the rest of the words of a command line."""
         options = (one for one in self.params if not getattr(one, "is_flag", True))
         valued = {name for one in options for name in one.opts}
         return super().parse_args(ctx, list(_each_against(args, valued)))
@@ -88,14 +88,14 @@ def _each_against(words: Sequence[str], valued: Collection[str]) -> Iterator[str
     """Yield the words with ``--against`` before each log of its list; ``valued`` options have a
     value.
     """
-    found, in_list, option = False, False, ""
+    has_logs, in_list, option = False, False, ""
     for word in words:
         if option:  # its value
-            in_list, option = found and option == _AGAINST, ""
+            in_list, option = has_logs and option == _AGAINST, ""
         elif word.startswith("-"):
             in_list, option = False, word if word in valued else ""
         elif in_list:
             yield _AGAINST
         else:
-            found = True
+            has_logs = True
         yield word

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
-from .flight_logs import AS_THEY_ARE, Reading
+from .flight_logs import AS_THEY_ARE, LogOptions
 from .terminal import console, note, results_folder, say, show_table, working
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def check(
     log: Path,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     write_map: Path | None = None,
     write: Path | None = None,
     out: Path = Path("results/check"),
@@ -33,7 +33,7 @@ def check(
     model = None if reading.vehicle is None else load_vehicle(reading.vehicle)
     try:
         with working("reading"):
-            found = check_log(log, reading.reader, model, reading.map, reading.piece)
+            checked = check_log(log, reading.reader, model, reading.map, reading.piece)
     except UnreadLogError as error:
         if write_map is None:
             console.print(error.map_text, soft_wrap=True, highlight=False)
@@ -45,18 +45,18 @@ def check(
         raise InputError(
             f"{error}. The map so far {where}: edit it, then windwrench check {log} --map {name}"
         ) from error
-    if write_map is not None and not found.map_text:
+    if write_map is not None and not checked.map_text:
         raise InputError(
-            f"--write-map {write_map}: {log} is read by {found.read_by} and needs no map"
+            f"--write-map {write_map}: {log} is read by {checked.read_by} and needs no map"
         )
-    flight = found.log
+    flight = checked.log
     said = "" if write is None else _write(flight, log, write)
     folder = results_folder(out)
-    picture = plot_channels(flight.name, found.channels, folder / "check.png")
+    picture = plot_channels(flight.name, checked.channels, folder / "check.png")
     if write_map is not None:
-        write_text(found.map_text, write_map)
-    console.print(f"{flight.name}: {found.sentence()}")
-    show_table(("what flew", "", "by"), found.what_flew())
+        write_text(checked.map_text, write_map)
+    console.print(f"{flight.name}: {checked.sentence()}")
+    show_table(("what flew", "", "by"), checked.what_flew())
     show_table(
         ("channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit"),
         [
@@ -69,32 +69,32 @@ def check(
                 f"{c.high:.4g}",
                 c.unit,
             )
-            for c in found.channels
+            for c in checked.channels
         ],
     )
-    if found.guess is not None:
+    if checked.guess is not None:
         show_table(
             ("field", "", "why"),
             [
                 (f"{r.section} {r.field}".strip(), "certain" if r.certain else "GUESS", r.why)
-                for r in found.guess.reasons
+                for r in checked.guess.reasons
             ],
         )
         if write_map is None:
-            console.print(found.map_text, soft_wrap=True, highlight=False)
+            console.print(checked.map_text, soft_wrap=True, highlight=False)
     for text in flight.notes:
         if not text.startswith("warning"):
             console.print(text)
-    for text in found.doubts:
+    for text in checked.doubts:
         note(f"warning: {text.removeprefix('warning: ')}")
     if said:
         note(said)
     say(*(path for path in (write, picture, write_map) if path is not None))
-    return found.as_dict()
+    return checked.as_dict()
 
 
 def _write(flight: "FlightLog", log: Path, path: Path) -> str:
-    """Write a flight in the kit's own format; return what is to be said of it."""
+    """Write a flight in the kit's own format; return the lines to print."""
     import numpy as np
 
     from ..identification.logs.flight_log import write_log
@@ -103,7 +103,7 @@ def _write(flight: "FlightLog", log: Path, path: Path) -> str:
         raise InputError(f"--write {path}: is the log itself; expected another file")
     said = ""
     if flight.commanded and flight.command is not None:
-        # what a command makes is the vehicle's to say each time the log is read
+        # the vehicle gives the result of a command, each time the log is read
         flight = replace(flight, rotor_speeds=np.full_like(flight.rotor_speeds, np.nan))
         said = "the motor commands are written, and not the rotor speeds that follow them"
     with working("writing"):

@@ -18,7 +18,7 @@ def demo(
     vehicle: str = "ardrone2",
     effect: str = "constant_torque:tz=0.01",
     episodes: int = 3,
-    seed: int = 5,  # of a fan that moves: on a still one there is nothing to follow
+    seed: int = 5,  # a moving fan: behind a still one there is nothing to follow
     no_open: bool = False,
     out: Path = Path("results/demo"),
 ) -> dict[str, Any]:
@@ -40,6 +40,7 @@ def demo(
         from ..demo.steps import Step, write_page
         from ..demo.story import LAWS, Story
         from ..dynamics.vehicle_file import load_vehicle
+        from ..evaluation.benchmark import Request
         from ..evaluation.tasks import task_of
 
         model = load_vehicle(vehicle)
@@ -55,9 +56,10 @@ def demo(
         with working(text) as progress:
             new = part(progress)
         _tell(steps, new)
-    worlds, board = list(task_of("FanTracking").defaults), folder / "leaderboard"
-    with working("comparing controllers", len(LAWS) * len(worlds) * episodes) as progress:
-        rows, _ = write_board(board, LAWS, worlds, episodes, seed, progress, jobs=1)
+    board = folder / "leaderboard"
+    request = Request(LAWS, task_of("FanTracking").defaults, episodes, seed)
+    with working("comparing controllers", request.flights()) as progress:
+        rows, _ = write_board(board, request, progress, jobs=1)
     _tell(steps, story.compare(rows, board))
     page = folder / "demo.html"
     seconds = time.monotonic() - begun
@@ -75,8 +77,8 @@ def demo(
     show_page(page, not no_open)
     return {
         "effect": story.effect_words,
-        "found": [e.name for e in story.found.effects],
-        "verdict": story.found.verdict,
+        "found": [e.name for e in story.diagnosis.effects],
+        "verdict": story.diagnosis.verdict,
         "steps": [
             {"title": s.title, "sentences": s.sentences, "command": s.command} for s in steps
         ],
@@ -86,7 +88,7 @@ def demo(
 
 
 def _tell(steps: list[Any], new: Iterable[Any]) -> None:
-    """Add steps to those that were told, and tell them."""
+    """Add and print steps."""
     for step in new:
         steps.append(step)
         words = " ".join(step.sentences[1:])

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
-from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import command_line, console, results_folder, say, show_page, show_table, working
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ _STAGES = {"looking at the logs": 0.0, "predicting the flights": 0.96}
 
 
 def staged(progress: Callable[..., None]) -> Callable[[str], None]:
-    """Return what takes the stages of a diagnosis and tells their progress."""
+    """Return a function of the stages of a diagnosis that tells their progress."""
     return lambda text: progress(_STAGES.get(text), text)
 
 
@@ -28,7 +28,7 @@ def diagnose(
     example: bool = False,
     no_open: bool = False,
     test: list[Path] | None = None,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     rotor_faults: bool = False,
     without: list[str] | None = None,
     out: Path = Path("results/diagnose"),
@@ -49,7 +49,7 @@ def diagnose(
             console.print(f"{flight.what} ({flight.source})\nKnown before the diagnosis:")
             for why in (*(known.why for known in flight.known), flight.unknown):
                 console.print(f"  * {why}")
-            read = read_flights([flight.log], Reading(vehicle=flight.vehicle))
+            read = read_flights([flight.log], LogOptions(vehicle=flight.vehicle))
             result = _diagnose(read, [flight.log], without, out)
         result["known"] = confronted(flight, result["effects"])
         show_page(out / "report.html", not no_open)
@@ -66,8 +66,8 @@ def diagnose(
 
 
 def confronted(example: "Example", effects: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Say which effects that are known were found, by name or as what cannot be told from one, and
-    which others were named; return the former. Effects are as ``report.json`` names them.
+    """Print the known effects found, by name or as one not told apart, and the others named; return
+    the former. Effects are as ``report.json`` names them.
     """
     rows, others = [], [str(effect["name"]) for effect in effects]
     for known in example.known:
@@ -94,9 +94,9 @@ def _diagnose(
     """Find the effects that a vehicle's model lacks; write the report.
 
     Args:
-        read: flights and their vehicle; those after the paths' own are test flights.
-        paths: of the logs to which effects are fitted.
-        without: effects that are left out of the library.
+        read: flights and their vehicle; flights after the paths' own are test flights.
+        paths: paths of the logs for the fit.
+        without: effects left out of the library.
         out: folder for the report.
     """
     from ..identification.diagnosis import diagnose as run
@@ -107,50 +107,55 @@ def _diagnose(
     (every, model), count = read, len(paths)
     folder = results_folder(out)
     with working("looking at the logs") as progress:
-        found = run(every[:count], model, every[count:], without or (), staged(progress))
-    found = _with_rotor_faults(found, paths, every[:count])
+        diagnosis = run(every[:count], model, every[count:], without or (), staged(progress))
+    diagnosis = _with_rotor_faults(diagnosis, paths, every[:count])
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
-    written = write_report(found, folder, command_line())
-    log_notes(found.notes)
-    faults = [data["headline"] for data in found.rotor_faults if data["rotor"] is not None]
-    sentences = (headline(found), *error_sentences(found), remainder_sentence(found), *faults)
+    written = write_report(diagnosis, folder, command_line())
+    log_notes(diagnosis.notes)
+    faults = [data["headline"] for data in diagnosis.rotor_faults if data["rotor"] is not None]
+    sentences = (
+        headline(diagnosis),
+        *error_sentences(diagnosis),
+        remainder_sentence(diagnosis),
+        *faults,
+    )
     for sentence in (f"vehicle: {model.name}", *sentences):
         console.print(sentence)
-    _show(found)
-    for line in found.advice:
+    _show(diagnosis)
+    for line in diagnosis.advice:
         console.print(line)
     say(*written)
-    return report_data(found)
+    return report_data(diagnosis)
 
 
-def _show(found: "Diagnosis") -> None:
+def _show(diagnosis: "Diagnosis") -> None:
     """Print the tables of effects and of the error before and after."""
     from ..identification.report.amounts import amount
     from ..identification.report.page import error_table
     from ..identification.report.words import chance, name_in_words
 
-    stated = found.probabilities.names
+    stated = diagnosis.probabilities.names
     rows: list[tuple[str, ...]] = []
-    for effect in found.effects:
+    for effect in diagnosis.effects:
         head = [name_in_words(effect), *([chance(stated[effect.name])] if stated else [])]
         for name in effect.coefficients:
-            acts = amount(effect, name, found.declared)
+            acts = amount(effect, name, diagnosis.declared)
             rows.append((head[0], name, f"{acts} {acts.when}".rstrip(), *head[1:]))
             head = [""] * len(head)
     if rows:
         last = ("probability",) if stated else ()
         show_table(("effect", "", "what it does", *last), rows)
     rows = []
-    for row in error_table(found):
+    for row in error_table(diagnosis):
         unit = f" ({row['unit']})" if row["unit"] else ""
         rows.append((f"{row['what']}{unit}", row["before"], row["after"], row["floor"]))
     show_table(("error on held-out data", "before", "after", "noise floor"), rows)
 
 
 def _with_rotor_faults(
-    found: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
+    diagnosis: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
 ) -> "Diagnosis":
-    """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
+    """Add losses of a rotor's thrust during a flight, for logs fit to show one."""
     from ..identification.comparison.fault_channels import read_channels
     from ..identification.comparison.fault_detection import find_fault
     from ..identification.comparison.words import fault_data
@@ -163,10 +168,10 @@ def _with_rotor_faults(
             except InputError:
                 continue  # no gyro, no accelerometer, no command, or too little flight
     notes = tuple(data["headline"] for data in faults if data["rotor"] is not None)
-    return replace(found, rotor_faults=tuple(faults), notes=(*found.notes, *notes))
+    return replace(diagnosis, rotor_faults=tuple(faults), notes=(*diagnosis.notes, *notes))
 
 
-def _rotor_faults(logs: Sequence[Path], reading: Reading, out: Path) -> dict[str, Any]:
+def _rotor_faults(logs: Sequence[Path], reading: LogOptions, out: Path) -> dict[str, Any]:
     """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
     from ..dynamics.vehicle_file import load_vehicle
     from ..identification.comparison.fault_channels import read_channels
@@ -176,17 +181,17 @@ def _rotor_faults(logs: Sequence[Path], reading: Reading, out: Path) -> dict[str
     model = None if reading.vehicle is None else load_vehicle(reading.vehicle)
     read = [read_channels(path, reading.reader, model, reading.map) for path in logs]
     folder = results_folder(out)
-    found = []
+    faults = []
     with working("looking for a rotor that lost thrust") as progress:
         for i, (channels, _) in enumerate(read):
             progress(i / len(read))
-            found.append(find_fault(channels))
-    written = write_faults(found, folder)
+            faults.append(find_fault(channels))
+    written = write_faults(faults, folder)
     log_notes(text for _, notes in read for text in notes)
-    for fault in found:
+    for fault in faults:
         samples = fault.samples
         ended = f"; nothing later: {samples.ended}" if samples.ended else ""
         console.print(f"{samples.channels.name}: {fault.seconds:.1f} s in flight{ended}")
         console.print(fault_headline(fault))
     say(*written)
-    return {"rotor_faults": [fault_data(fault) for fault in found]}
+    return {"rotor_faults": [fault_data(fault) for fault in faults]}

@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
 from ..runtime.extras import need
-from .flight_logs import AS_THEY_ARE, Reading, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
 from .terminal import (
     console,
-    film_kinds,
     gate_of,
     note,
     result_file,
@@ -25,13 +24,12 @@ if TYPE_CHECKING:
     from ..estimator.consistency import Consistency
     from ..identification.logs.flight_log import FlightLog
 
-# endings of the wrench's file, with the library that writes it and the extra that brings it
+# endings of the wrench's file, with their library and its extra
 _TRACKS: dict[str, tuple[str, str] | None] = {
     ".csv": None,
     ".mcap": ("rosbags", "logs"),
-    ".rrd": ("rerun", "rerun"),
 }
-# what innovations that agree within a second say, of a given and of a fitted tuning
+# sentences for innovations in agreement within a second, of a given and of a fitted tuning
 _TOO_SLOW = (
     "warning: innovations agree with each other within a second: the wrench changes faster than "
     "the tuning says. It is late, and its deviations are too small. Leave out --no-tune and "
@@ -43,23 +41,16 @@ _TOO_SLOW = (
 
 def estimate(
     log: Path,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     smooth: bool | None = None,
     gate: float | None = None,
     tune: bool | None = None,
     tuning: Path | None = None,
-    video: bool = False,
-    gif: bool = False,
-    rrd: bool = False,
-    view: bool = False,
-    film_from: float = 0.0,
-    film_seconds: float = 30.0,
     out: Path = Path("results/estimate"),
 ) -> dict[str, Any]:
-    """Estimate the wrench on a logged flight. Write wrench.csv and a picture, and a film of the
-    flight on request.
+    """Estimate the wrench on a logged flight. Write wrench.csv and a picture.
 
-    Example: windwrench estimate flight.csv --vehicle crazyflie --gif
+    Example: windwrench estimate flight.csv --vehicle crazyflie
     """
     import numpy as np
 
@@ -74,18 +65,15 @@ def estimate(
         write_wrench,
     )
     from ..identification.wrench_track import write_mcap
-    from .log_film import draw_film, flight_of, shown_rows
     from .tuning_file import load_tuning, save_tuning
 
     level = gate_of(gate)
-    kinds = film_kinds(view, video, gif)
     (flight,), model = read_flights([log], reading)
-    rows = shown_rows(flight, log, film_from, film_seconds) if kinds or view else None
     track = result_file(out, "wrench.csv", _TRACKS)
     if needed := _TRACKS[track.suffix]:
         need(*needed, f"--out {out}")
     folder = results_folder(track.parent)
-    begin = f"{track.stem}." if track == out else ""  # of the names of what lies beside it
+    begin = f"{track.stem}." if track == out else ""  # part of the names of the files beside
     run.record = folder / f"{begin}run.json"
     if smooth is None:
         smooth = (flight.gyro is None) == (flight.accelerometer is None)
@@ -96,19 +84,11 @@ def estimate(
         series = estimate_log(flight, model, fit.tuning if fit else given, progress, smooth, level)
     if track.suffix == ".csv":
         write_wrench(series, track)
-    elif track.suffix == ".mcap":
+    else:
         write_mcap(series, track)
-    recordings = [track] * (track.suffix == ".rrd") + [folder / "film.rrd"] * rrd
-    for path in recordings:
-        from ..envs.rerun_export import write_rrd
-
-        write_rrd(flight_of(flight, series), model, path)
     written = [track, plot_wrench(series, flight, track.with_suffix(".png"))]
-    written += [folder / f"{begin}tuning.yaml", *(p for p in recordings if p != track)]
+    written.append(folder / f"{begin}tuning.yaml")
     save_tuning(series.tuning, flight.period, written[2])
-    if rows is not None:
-        title, whole = f"{flight.name}: {model.name}", flight_of(flight, series)
-        written += draw_film(title, model, whole, rows, folder, kinds, view)
     log_notes(series.notes)
     seconds = float(flight.t[-1] - flight.t[0])
     console.print(f"{flight.name}: {len(flight.t)} samples, {seconds:.1f} s, vehicle {model.name}")
@@ -155,8 +135,8 @@ def estimate(
 def _tuned(
     flight: "FlightLog", model: "Vehicle", given: "UKFTuning | None", wanted: bool
 ) -> "tuple[NoiseFit | None, Consistency | None, str]":
-    """Return the fitted tuning, if that is wanted and can be had; what the innovations say of the
-    tuning that is used, if there are enough; and a sentence on both.
+    """Return the fitted tuning, if wanted and possible; the innovations' judgement of the tuning in
+    use, if there are enough; and a sentence on both.
     """
     from ..identification.wrench_series import consistency_with_log, tune_to_log
 

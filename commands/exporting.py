@@ -9,7 +9,7 @@ from .terminal import command_line, console, gate_of, results_folder, say, worki
 
 def export_c(
     vehicle: str,
-    estimator: str = "ekf",
+    estimator: str = "ukf",
     effects: str = "declared",
     policy: str | None = None,
     rate: float | None = None,
@@ -22,7 +22,7 @@ def export_c(
     """Write the filter as C for a flight controller. One header and one C99 source, in single
     precision unless said otherwise, and without a heap; with an example and a CMake file.
 
-    Example: windwrench export-c --vehicle ardrone2 --estimator ekf --out filter
+    Example: windwrench export-c --vehicle ardrone2 --estimator ukf --out filter
     """
     from dataclasses import replace
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Reading:
+class LogOptions:
     """How logs are read: the options of every command that reads some."""
 
     reader: str | None = None
@@ -25,17 +25,17 @@ class Reading:
     vehicle: str | None = None
 
 
-AS_THEY_ARE = Reading()
+AS_THEY_ARE = LogOptions()
 
 
 def read_flights(
-    paths: Sequence[Path], reading: Reading = AS_THEY_ARE
+    paths: Sequence[Path], reading: LogOptions = AS_THEY_ARE
 ) -> "tuple[list[FlightLog], Vehicle]":
-    """Read flights of one vehicle, the one given or the one that the logs name.
+    """Read flights of one vehicle, given or named by the logs.
 
     Raises:
-        InputError: a log cannot be read; or no vehicle is given, and the logs name none, none that
-            comes with the kit, or several.
+        InputError: an unreadable log; or no given vehicle, and the logs name none, an unknown one,
+            or several.
     """
     from ..dynamics.vehicle_file import load_vehicle, named_vehicle
 
@@ -54,9 +54,9 @@ def read_flights(
 
 
 def read_logs(
-    paths: Iterable[Path], reading: Reading, vehicle: "Vehicle | None" = None
+    paths: Iterable[Path], reading: LogOptions, vehicle: "Vehicle | None" = None
 ) -> "list[FlightLog]":
-    """Read flight logs. What a reader warns of stands in the notes of its log.
+    """Read flight logs. A reader's warnings stand in the notes of its log.
 
     Raises:
         InputError: a log cannot be read.
@@ -70,6 +70,6 @@ def read_logs(
 
 
 def log_notes(texts: Iterable[str]) -> None:
-    """Print each note once on standard error, with its count where it came more than once."""
+    """Print each note once on standard error, with its count where repeated."""
     for text, count in Counter(texts).items():
         note(text if count == 1 else f"{text} ({count} times)")

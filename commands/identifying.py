@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..runtime.errors import InputError
-from .flight_logs import Reading, log_notes, read_logs
+from .flight_logs import LogOptions, log_notes, read_logs
 from .terminal import console, result_file, run, say, show_table, working
 
 _WINDOW = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
@@ -49,11 +49,18 @@ def identify(
 
     Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
     """
-    from ..identification.prediction import QUANTITIES, prediction_errors
+    from ..identification.prediction import errors_of_models
     from ..identification.vehicle_fit.exports import EXPORTS
     from ..identification.vehicle_fit.geometry import parse_geometry
+    from ..identification.vehicle_fit.held_out import models_of
     from ..identification.vehicle_fit.identify import identify as fit
-    from ..identification.vehicle_fit.report import headline, identified_data, write_identified
+    from ..identification.vehicle_fit.report import (
+        headline,
+        identified_data,
+        table_of,
+        use_of,
+        write_identified,
+    )
 
     out = result_file(out, "vehicle.yaml")
     if out.suffix not in (".yaml", ".yml"):
@@ -65,21 +72,26 @@ def identify(
     if not common[0] < common[1]:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
-    flights = read_logs([path for path, _ in parts], Reading(reader, map, piece))
+    flights = read_logs([path for path, _ in parts], LogOptions(reader, map, piece))
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
-        found = fit(flights, mass, where, windows[: len(logs)], out.stem, report=progress)
+        identified = fit(flights, mass, where, windows[: len(logs)], out.stem, report=progress)
     if unseen:
         with working("predicting"):
             parts_of = [[window] for window in windows[len(logs) :]]
-            errors = prediction_errors(unseen, found.vehicle, windows=parts_of)
-        found = replace(found, predicted={**found.predicted, "prediction": errors})
+            models = identified.vehicle, models_of(identified.vehicle)[2]
+            errors, simplest = errors_of_models(unseen, models, windows=parts_of)
+        identified = replace(
+            identified,
+            predicted={**identified.predicted, "prediction": errors},
+            simplest={**identified.simplest, "prediction": simplest},
+        )
     run.record = out.with_name(f"{out.stem}.run.json")
-    written = write_identified(found, out)
-    log_notes([*(text for flight in flights for text in flight.notes), *found.notes])
-    seconds = found.fit.balance.seconds
-    console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.")
+    written = write_identified(identified, out)
+    log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
+    seconds = identified.fit.balance.seconds
+    console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {headline(identified)}.")
     show_table(
         ("quantity", "value", "95 % interval", "unit", ""),
         [
@@ -90,25 +102,27 @@ def identify(
                 e.unit,
                 e.status,
             )
-            for e in found.estimates.values()
+            for e in identified.estimates.values()
         ],
     )
-    for e in found.estimates.values():
+    for e in identified.estimates.values():
         if e.status in ("assumed", "not identifiable"):
             console.print(f"{e.name}: {e.status}: {e.how}")
-    for line in found.advice:
+    for line in identified.advice:
         console.print(line)
-    for of, errors in found.predicted.items():
-        ends = zip(QUANTITIES.items(), errors.model[:, -1], errors.still[:, -1], strict=True)
+    for of, errors in identified.predicted.items():
+        beside = identified.simplest.get(of)
         after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
         console.print(f"{of.replace('_', ' ')}: {after}, by what was not fitted to them:")
+        simple = () if beside is None else ("thrust and drag",)
         show_table(
-            ("mean error", "of the vehicle", "if nothing changes", "unit"),
-            [(name, f"{x:.3g}", f"{y:.3g}", unit) for (name, unit), x, y in ends],
+            ("mean error", "of the vehicle", *simple, "if nothing changes", "unit"),
+            table_of(errors, beside),
         )
-    result = identified_data(found)
+    console.print(use_of(identified))
+    result = identified_data(identified)
     if export is not None:
-        text = EXPORTS[export](found)
+        text = EXPORTS[export](identified)
         console.print(text, soft_wrap=True)
         result["export"] = {export: text}
     say(*written)

@@ -1,103 +1,100 @@
 """Learning: policies trained, and the gains of designed controllers tuned."""
 
-from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..controllers.registry import STANDARD_TASK
 from ..runtime.errors import InputError
 from ..runtime.extras import need
+from ..runtime.workers import every
 from .running import expensive
-from .terminal import command_line, console, results_folder, say, show_table, working
-
-if TYPE_CHECKING:
-    from ..training.sweep import Job
+from .terminal import command_line, console, results_folder, say, working
 
 
 @expensive
 def train(
     algorithm: str,
-    scenario: str = "base",
+    scenario: str | None = None,
+    task: str | None = None,
+    reward: str | None = None,
+    imports: list[str] | None = None,
     seed: int = 0,
     steps: int | None = None,
     setting: list[str] | None = None,
     config: Path | None = None,
-    seeds: int = 1,
-    search: list[str] | None = None,
     cluster: str | None = None,
     out: Path = Path("results/train"),
 ) -> dict[str, Any]:
     """Train a policy, or tune a designed controller. An interrupted run resumes from its last
-    checkpoint, or, of imitation and tune, starts anew.
+    checkpoint; tune starts anew.
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
+    from ..evaluation.rewards import find_reward
+    from ..evaluation.tasks import import_files, task_of
     from ..training.configuration import load_config
-    from ..training.sweep import jobs_of
+    from ..training.training_envs import check_training_env
 
     need("stable_baselines3", "rl")
     if algorithm == "recurrent-ppo":
         need("sb3_contrib", "rl")
-    overrides = [*(setting or []), *([f"steps={steps}"] if steps else [])]
-    several = seeds > 1 or bool(search or cluster)
+    import_files(imports or ())
+    known = task_of(task or STANDARD_TASK)
+    if reward is not None:
+        find_reward(reward)
+    values = [*(setting or []), *([f"steps={steps}"] if steps else [])]
     if algorithm == "tune":
-        if several:
-            raise InputError("train tune: expected no --seeds, --search or --cluster")
-        return _tune(load_config("tune", overrides, config), scenario, seed, out)
-    from ..training.training_envs import check_training_env
-
-    check_training_env(scenario)
-    told = f"{algorithm}, {scenario}"
-    if not several:
-        return _learn(load_config(algorithm, overrides, config), told, scenario, seed, out)
+        if cluster or reward is not None:
+            raise InputError("train tune: expected no --cluster and no --reward")
+        values = [*([f"task={task}"] if task else []), *values]
+        return _tune(load_config(algorithm, values, config), scenario or "base", seed, out)
+    given = load_config(algorithm, values, config, task=task)
+    scenario = scenario or known.flown_in
+    check_training_env(scenario, task or STANDARD_TASK)
     if cluster:
         need("ray", "cluster")
-    runs = range(seed, seed + seeds)
-    jobs = jobs_of(algorithm, scenario, runs, overrides, search or [], config)
-    return _sweep(jobs, told, cluster, out)
+    what = {"task": task or STANDARD_TASK, "reward": reward, "imports": tuple(imports or ())}
+    return _learn(given, scenario, seed, cluster, out, what)
 
 
-def _sweep(jobs: "Sequence[Job]", told: str, cluster: str | None, out: Path) -> dict[str, Any]:
-    from ..training.sweep import run_jobs
-
-    folder = results_folder(out, runs=[job.name for job in jobs], cluster=cluster)
-    with working(told, len(jobs)) as progress:
-        found = run_jobs(jobs, folder, cluster, advance=lambda: progress(more=1))
-    best_first = sorted(found, key=lambda run: float(run["validation_rmse_m"]))
-    show_table(
-        ("run", "validation RMSE (m)", "minutes"),
-        [
-            (run["run"], f"{run['validation_rmse_m']:.3f}", f"{run['seconds'] / 60:.1f}")
-            for run in best_first
-        ],
-    )
-    say(*(Path(one["policy"]) for one in found))
-    return {"runs": found}
-
-
-def _learn(given: dict[str, Any], told: str, scenario: str, seed: int, out: Path) -> dict[str, Any]:
+def _learn(
+    given: dict[str, Any],
+    scenario: str,
+    seed: int,
+    cluster: str | None,
+    out: Path,
+    what: dict[str, Any],
+) -> dict[str, Any]:
     from ..training.run import Progress, read_progress
     from ..training.train import train
 
     folder = results_folder(
         out,
         algorithm=given["algorithm"],
+        **what,
         scenario=scenario,
         seed=seed,
         decisions=given["steps"],
         config=given,
     )
+    told = f"{given['algorithm']}, {scenario}"
     with working(told, given["steps"]) as progress:
 
         def report(now: Progress) -> None:
-            error = f"validation RMSE {now.rmse_m[-1]:.3f} m"
-            progress(text=f"{told}: {error}")
-            console.print(f"{now.steps[-1]:8d} decisions: {error}, {now.lost[-1]} lost")
+            progress(text=f"{told}: validation {now.words(-1)}")
+            figures = f"validation {now.words(-1)}, {now.lost[-1]} lost"
+            console.print(f"{now.steps[-1]:8d} decisions: {figures}")
 
-        path = train(given, scenario, seed, folder, progress, report)
+        if cluster:  # a run whose worker is lost resumes elsewhere, from its last checkpoint
+            there = partial(train, given, scenario, seed, **what)
+            ((_, path),) = every(there, [folder.resolve()], cluster=cluster)
+        else:
+            path = train(given, scenario, seed, folder, progress, report, **what)
     done = read_progress(folder)
     assert done is not None
     console.print(
-        f"best: {done.best_rmse:.3f} m at {done.steps[done.best]} decisions; {done.seconds:.0f} s",
+        f"best: {done.words(done.best)} at {done.steps[done.best]} decisions; {done.seconds:.0f} s",
     )
     say(path, path.with_suffix(".json"), folder / "last.npz", folder / "progress.json")
     return {
@@ -120,12 +117,12 @@ def _tune(given: dict[str, Any], scenario: str, seed: int, out: Path) -> dict[st
         out, task=task, controller=law, scenario=scenario, trials=trials, episodes=episodes
     )
     with working(f"{law}, {scenario}", trials) as progress:
-        found = tune(law, scenario, trials, episodes, seed, progress, task)
-    keep_gains(found, folder / "tuned.yaml", command_line())
-    gains = ", ".join(f"{name} {value:.3g}" for name, value in found["gains"].items())
+        result = tune(law, scenario, trials, episodes, seed, progress, task)
+    keep_gains(result, folder / "tuned.yaml", command_line())
+    gains = ", ".join(f"{name} {value:.3g}" for name, value in result["gains"].items())
     console.print(
-        f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation "
-        f"episodes (first gains: {found['default_rmse_m']:.3f} m)",
+        f"{law} on {scenario}: {gains}: {result['rmse_m']:.3f} m over {episodes} validation "
+        f"episodes (first gains: {result['default_rmse_m']:.3f} m)",
     )
     say(folder / "tuned.yaml")
-    return found
+    return result

@@ -11,7 +11,7 @@ from rich.live import Live
 
 from ..runtime.errors import InputError
 from ..runtime.interrupts import INTERRUPTED, TERMINATED, taken, terminable
-from .flight_logs import Reading
+from .flight_logs import LogOptions
 from .terminal import console, errors, gate_of, note, run, working
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _PAGES = 5.0  # a second
 _NOT_WRITTEN = 2  # exit code
-_SIMULATED = "ardrone2"  # that flies in a simulation where nothing else is said
+_SIMULATED = "ardrone2"  # default vehicle of a simulation
 
 
 def live(
@@ -78,7 +78,7 @@ def live(
         telling = Outlet[Output](
             Lines(sys.stdout),
             tallies,
-            # who alone read the estimates has enough of them
+            # the only reader of the estimates is gone
             failed=lambda: None if stream.answers or recorder or browser else session.stop(),
         )
     session = Session(stream, settings, recording, telling)
@@ -103,14 +103,14 @@ def live(
             raise InputError("--diagnose-after: nothing was recorded to diagnose")
         from .diagnosing import diagnose
 
-        result["diagnosis"] = diagnose([recorder.path], reading=Reading(vehicle=flown), out=out)
+        result["diagnosis"] = diagnose([recorder.path], reading=LogOptions(vehicle=flown), out=out)
     if interrupted:
         run.code = TERMINATED if terminated() else INTERRUPTED
     return result
 
 
 def _watch(session: "Session") -> bool:
-    """Show a stream until it ends; return whether the user ended it.
+    """Show a stream until its end; return whether the user ended the stream.
 
     Raises:
         InputError: as ``Session.run``.
@@ -143,28 +143,23 @@ def _watch(session: "Session") -> bool:
     return interrupted
 
 
-def _noise(session: "Session") -> dict[str, float] | None:
-    """Return the noise of poses as multiples of the declared one; None: not known."""
-    scales = session.watch.noise_scales
-    return None if scales is None else dict(zip(("attitude", "position"), scales, strict=True))
-
-
 def _say(session: "Session") -> None:
-    """Say what is new to its user, of a link or a failure."""
+    """Print new lines on links and failures."""
     for line in session.tallies.news():
         style = "yellow" if line.startswith("warning") else "dim"
         errors.print(line, style=style, markup=False, soft_wrap=True)
 
 
 def _summary(session: "Session") -> dict[str, Any]:
-    """Say what came and what became of it; return it."""
+    """Print and return the counts, rates and means of the stream."""
     import numpy as np
 
     from ..live.terminal_page import counts_words, tuning_words
 
     _say(session)
-    tallies, restarts = session.tallies, session.filter.restarts
+    tallies, restarts, scales = session.tallies, session.filter.restarts, session.watch.noise_scales
     median, most = tallies.latency.median_and_most
+    noise = {} if scales is None else dict(zip(("attitude", "position"), scales, strict=True))
     mean, square = tallies.wrench / max(session.estimates, 1)
     deviation = np.sqrt(np.maximum(square - mean**2, 0.0))
     result: dict[str, Any] = {
@@ -178,7 +173,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         "consistency": tallies.consistency.as_dict() if tallies.consistency.seconds else None,
         "period_s": session.filter.period,
         "clock_drift_ppm": session.clocks.drift,
-        "noise_scale": _noise(session),
+        "noise_scale": noise or None,
         "poses": session.watch.poses,
         "poses_too_late": session.watch.too_late,
         "latency_ms": {"median": median, "p99": most},

@@ -1,4 +1,4 @@
-"""All that a log allows, in one go: ``windwrench LOG``."""
+"""All results of a log, in one go: ``windwrench LOG``."""
 
 import shlex
 from collections.abc import Callable, Mapping
@@ -8,7 +8,7 @@ from typing import Any
 
 from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
-from .flight_logs import AS_THEY_ARE, Reading
+from .flight_logs import AS_THEY_ARE, LogOptions
 from .terminal import (
     command_line,
     console,
@@ -32,7 +32,7 @@ def is_path(word: str) -> bool:
 
 def look(
     log: Path,
-    reading: Reading = AS_THEY_ARE,
+    reading: LogOptions = AS_THEY_ARE,
     no_open: bool = False,
     out: Path = Path("results/log"),
 ) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def look(
     own_map = folder / "map.yaml"
     try:
         with silently():
-            found = check(log, reading, out=folder)
+            checked = check(log, reading, out=folder)
     except InputError as refused:
         unread = refused.__cause__
         if not isinstance(unread, UnreadLogError):
@@ -60,18 +60,18 @@ def look(
         raise InputError(
             f"{unread}. The map so far is {own_map}: edit it, then windwrench {log} --map {own_map}"
         ) from unread
-    if found["fields"]:  # its map was guessed
-        write_text(found["map"], own_map)
+    if checked["fields"]:  # its map was guessed
+        write_text(checked["map"], own_map)
         reading = replace(reading, map=str(own_map))
-        for text in found["doubts"]:
+        for text in checked["doubts"]:
             note(f"warning: {text}")
-    drawn, said = folder / "check.png", _what_it_holds(found)
+    drawn, said = folder / "check.png", _what_it_holds(checked)
     steps = [Step("What the log holds", said, _typed("check", log, reading), drawn)]
     _tell(steps[0])
     sentence, then = f"{steps[0].sentences[0]} No vehicle is known.", ""
-    if reading.vehicle is None and found["vehicle"] in preset_names():
-        reading = replace(reading, vehicle=found["vehicle"])
-    results: dict[str, Any] = {"check": found}
+    if reading.vehicle is None and checked["vehicle"] in preset_names():
+        reading = replace(reading, vehicle=checked["vehicle"])
+    results: dict[str, Any] = {"check": checked}
     if reading.vehicle is None:
         then = _MAKE_A_VEHICLE.format(log=shlex.quote(str(log)))
     else:
@@ -93,7 +93,7 @@ def look(
                 steps.append(Step(title, said, command, picture, report))
             _tell(steps[-1])
     page = folder / "log.html"
-    write_page(found["log"], sentence, steps, then, command_line(), page)
+    write_page(checked["log"], sentence, steps, then, command_line(), page)
     run.record = folder / "run.json"
     for line in then.splitlines():
         console.print(line, soft_wrap=True)
@@ -103,8 +103,8 @@ def look(
     return {**results, "sentence": sentence, "page": page}
 
 
-def _typed(command: str, log: Path, reading: Reading) -> str:
-    """Return what a user types for one step alone."""
+def _typed(command: str, log: Path, reading: LogOptions) -> str:
+    """Return the command line of one step alone."""
     given = vars(reading).items()
     options = [str(x) for name, value in given if value is not None for x in (f"--{name}", value)]
     return shlex.join(["windwrench", command, str(log), *options])
@@ -115,11 +115,11 @@ def _tell(step: Any) -> None:
     console.print(f"  {step.command}", soft_wrap=True, style="dim")
 
 
-def _what_it_holds(found: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what ``check`` found as sentences."""
-    read = f"{found['samples']} rows, {found['seconds']:.1f} s, read by {found['read_by']}."
-    rates = (f"{name} {c['rate_hz']:.3g} Hz" for name, c in found["channels"].items())
-    doubts = len(found["doubts"])
+def _what_it_holds(checked: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the result of ``check`` as sentences."""
+    read = f"{checked['samples']} rows, {checked['seconds']:.1f} s, read by {checked['read_by']}."
+    rates = (f"{name} {c['rate_hz']:.3g} Hz" for name, c in checked["channels"].items())
+    doubts = len(checked["doubts"])
     said = [f"{doubts} doubts: the command below tells them."] if doubts else []
     return (read, f"Channels: {', '.join(rates)}.", *said)
 
@@ -132,8 +132,8 @@ def _what_acts(result: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _what_lacks(result: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the first sentence of a diagnosis, and what is left of the force: in that sentence
-    where it has no number of its own, else as a further one.
+    """Return the first sentence of a diagnosis, and the rest of the force: within a sentence
+    without a number of its own, else as a further one.
     """
     headline, error = result["headline"], result["error"]
     before, after = (1e3 * error[when]["force_rms_N"] for when in ("before", "after"))

@@ -1,5 +1,5 @@
-"""The options and arguments of the commands. ``options.yaml`` says what each is for; a command's
-function states its name, type and default.
+"""The options and arguments of the commands. ``options.yaml`` explains each; a command's function
+states its name, type and default.
 """
 
 import os
@@ -18,18 +18,18 @@ _OPTIONS: dict[str, Any] = read_yaml(Path(__file__).with_name("options.yaml"), "
 
 
 def _described(command: str, name: str) -> dict[str, Any]:
-    """Return what ``options.yaml`` says of an option: the command's own words before the common
+    """Return the entry of an option in ``options.yaml``: the command's own words before the common
     ones.
     """
-    found: dict[str, Any] = {}
+    entry: dict[str, Any] = {}
     for section in ("common", command):
         said = _OPTIONS.get(section, {}).get(name, {})
-        found |= {"help": said} if isinstance(said, str) else said
-    return found
+        entry |= {"help": said} if isinstance(said, str) else said
+    return entry
 
 
 def declared(command: str, name: str, kind: Any) -> Any:
-    """Return the type of a command's parameter with what typer is to make of it."""
+    """Return the type of a command's parameter with its declaration for typer."""
     said = _described(command, name)
     sources = said.pop("names", None)
     for key in ("only", "reads"):  # checked when the command runs
@@ -43,8 +43,8 @@ def declared(command: str, name: str, kind: Any) -> Any:
 
 
 def check_values(command: str, options: Mapping[str, Any]) -> None:
-    """Check the options that take one of the listed names and nothing else, and the files that a
-    command reads: a wrong path is told before anything large is imported.
+    """Check the options with a closed list of names, and the files read by a command: a wrong path
+    is told before anything large is imported.
 
     Raises:
         InputError: an option has another value, or a file is not there.
@@ -60,26 +60,26 @@ def check_values(command: str, options: Mapping[str, Any]) -> None:
 
 
 def names_of(sources: str | list[str]) -> list[str]:
-    """Return the names that an option offers.
+    """Return the names offered by an option.
 
     Args:
         sources: names, or ``module:attribute`` within the package: a collection of names, or a
-            function that returns one.
+            function without arguments for one.
     """
     names: list[str] = []
     for source in [sources] if isinstance(sources, str) else sources:
         module, colon, attribute = source.partition(":")
         if colon:
-            found = getattr(import_module(f"..{module}", __package__), attribute)
-            names += found() if callable(found) else found
+            offered = getattr(import_module(f"..{module}", __package__), attribute)
+            names += offered() if callable(offered) else offered
         else:
             names.append(source)
     return names
 
 
 def offering(sources: str | list[str]) -> Callable[[str], list[str]]:
-    """Return what completes a name, or the last of several with commas, in a shell. A module of
-    ``sources`` (``names_of``) is imported there alone.
+    """Return the completion of a name, or of the last of several with commas, in a shell. A module
+    of ``sources`` (``names_of``) is imported there alone.
     """
 
     def complete(incomplete: str) -> list[str]:

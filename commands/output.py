@@ -1,5 +1,5 @@
-"""Standard output and standard error of the command: what an encoding lacks is shown as an escape,
-and a disk that is full ends the command in one clear line.
+"""Standard output and standard error of the command: characters outside the encoding are shown as
+escapes, and a full disk ends the command in one clear line.
 """
 
 import io
@@ -11,8 +11,8 @@ from ..runtime.errors import InputError
 
 
 class _Output(io.FileIO):
-    """A stream to a file descriptor that says once, in an InputError, that it cannot be written,
-    and drops what comes after; a quiet one says nothing.
+    """A stream to a file descriptor. An InputError tells the first failed write, and the rest is
+    dropped; a quiet stream tells nothing.
     """
 
     def __init__(self, descriptor: int, quiet: bool) -> None:
@@ -41,8 +41,8 @@ class _Output(io.FileIO):
 
 
 def prepare_output() -> None:
-    """Put such streams in the place of the process's own; where others stand there already, such as
-    those of a test, they stay.
+    """Put such streams in the place of the process's own; others in their place, such as a test's,
+    stay.
     """
     for name, quiet in (("stdout", False), ("stderr", True)):
         stream = getattr(sys, name)

@@ -1,6 +1,7 @@
 """The paper, figure by figure."""
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,15 @@ def reproduce(
 
     Example: windwrench reproduce fig6 --out results/reproduction
     """
-    from ..paper import KEPT, NAMES
-    from ..paper.reproduce import chosen, is_done, numbers_of_seeds, write_page
-    from ..paper.reproduce import reproduce as run
+    from ..runtime.errors import InputError
+
+    if find_spec("..reproduction", __package__) is None:
+        raise InputError(
+            "reproduce: an installed wheel holds no figures; expected a checkout of the repository"
+        )
+    from ..reproduction import KEPT, NAMES
+    from ..reproduction.reproduce import chosen, is_done, numbers_of_seeds, write_page
+    from ..reproduction.reproduce import reproduce as run
     from ..runtime.regular_files import read_json
 
     names = chosen(figure)

@@ -1,5 +1,5 @@
 """How every command runs: ``--json``, ``--quiet`` and ``--dry-run`` mean the same everywhere;
-``run.json`` says what ran.
+``run.json`` records the run.
 """
 
 import functools
@@ -26,18 +26,16 @@ Work = TypeVar("Work", bound=Callable[..., Any])
 
 
 def expensive(work: Work) -> Work:
-    """Mark a command as one that runs for minutes: it gets ``--dry-run``, which stops it at
-    ``results_folder``.
-    """
+    """Mark a command of minutes: ``--dry-run`` stops the command at ``results_folder``."""
     work.expensive = True  # type: ignore[attr-defined]
     return work
 
 
 def as_command(work: Callable[..., Any]) -> Callable[..., None]:
-    """Return a function for typer: ``work`` with the options that every command has.
+    """Return a function for typer: ``work`` with the options of every command.
 
-    ``work`` returns what ``--json`` prints as the result, tells ``say`` what it wrote, and
-    ``results_folder`` where.
+    ``work`` returns the result for ``--json``, gives ``say`` its written files, and
+    ``results_folder`` their place.
     """
     name = command_name(work)
     can_stop = getattr(work, "expensive", False)
@@ -92,7 +90,7 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
 
 
 def _single(one: inspect.Parameter) -> list[inspect.Parameter]:
-    """Return the options that a group of options, a data class, stands for; else the one itself."""
+    """Return the options of a group, a data class; else the one itself."""
     if not is_dataclass(one.annotation):
         return [one]
     each = fields(one.annotation)
@@ -100,7 +98,7 @@ def _single(one: inspect.Parameter) -> list[inspect.Parameter]:
 
 
 def _grouped(signature: inspect.Signature, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the arguments of a command whose options are given one by one."""
+    """Return the arguments of a command from single options."""
     given = {}
     for name, one in signature.parameters.items():
         group: Callable[..., Any] = one.annotation
@@ -110,7 +108,7 @@ def _grouped(signature: inspect.Signature, options: Mapping[str, Any]) -> dict[s
 
 
 def _words(value: object) -> str:
-    """Return a part of a plan as a person reads it."""
+    """Return a part of a plan for a reader."""
     if isinstance(value, Mapping):
         return "; ".join(f"{key}: {_words(item)}" for key, item in value.items())
     if isinstance(value, (list, tuple)):
@@ -119,7 +117,7 @@ def _words(value: object) -> str:
 
 
 def command_name(work: Callable[..., Any]) -> str:
-    """Return what a user types for the command that a function is."""
+    """Return the typed name of a function's command."""
     return work.__name__.replace("_", "-")
 
 
@@ -130,7 +128,7 @@ def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
     It holds no date and no duration: the same command gives the same bytes.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""What the commands share: the terminal, the folder of results, and the words on both."""
+"""Shared by the commands: the terminal, the folder of results, and the words on both."""
 
 import os
 import shlex
@@ -36,31 +36,31 @@ _LINE_EVERY = 10.0  # s between two lines on progress where no bar can move
 
 
 class _Terminal(Console):
-    """A console that shows what a terminal might act on, in names and texts of files, as escapes;
-    whatever is printed comes through here.
+    """A console that shows control characters, in names and texts of files, as escapes. All printed
+    text comes through here.
     """
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Yield the pieces of text and style that a thing is printed as."""
+        """Yield the printed pieces of text and style of a thing."""
         for text, style, control in super().render(renderable, options):
             yield Segment(text if control else printable(text), style, control)
 
 
-# without emoji and markup: an address such as crazyflie:radio://0/80 is no picture of a radio, and
+# without emoji and markup: an address such as mavlink:radio://0/80 is no picture of a radio, and
 # columns such as [x, y, z] are no style
 console = _Terminal(emoji=False, markup=False)
 errors = _Terminal(stderr=True, emoji=False, markup=False)
 
 
 @dataclass
-class Run:
-    """What the command that runs now has done so far."""
+class CommandRun:
+    """The running command's record so far."""
 
     dry: bool = False
     written: list[Path] = field(default_factory=list)
-    record: Path | None = None  # where it is noted how the results came about
+    record: Path | None = None  # file with the origin of the results
     made: list[Path] = field(default_factory=list)  # folders, innermost first
     code: int = 0  # exit code of work that was ended and has a result all the same
     notes: bool = True  # whether notes on the input are told
@@ -70,13 +70,13 @@ class Run:
         self.dry, self.written, self.record, self.made, self.code = dry, [], None, [], 0
 
     def undo(self) -> None:
-        """Take the folders away again that were made for results and are empty."""
+        """Remove the empty folders among those made for results."""
         with suppress(OSError):
             for folder in self.made:
                 folder.rmdir()
 
 
-run = Run()
+run = CommandRun()
 
 
 class DryRun(Exception):  # noqa: N818 - the way out of a command whose request is good, no error
@@ -88,12 +88,12 @@ class DryRun(Exception):  # noqa: N818 - the way out of a command whose request 
 
 
 def command_line() -> str:
-    """Return what the user typed, for a page or a file that says how it came about."""
+    """Return the user's command line, for a page or file with its origin."""
     return shlex.join(["windwrench", *sys.argv[1:]])
 
 
 def gate_of(gate: float | None) -> float | None:
-    """Return the probability that ``--gate`` states, or the default one; None: no gate.
+    """Return the probability of ``--gate``, or the default one; None: no gate.
 
     Raises:
         InputError: the gate is neither 0 nor a probability.
@@ -107,37 +107,23 @@ def gate_of(gate: float | None) -> float | None:
     return gate or None
 
 
-def film_kinds(view: bool, video: bool, gif: bool) -> list[str]:
-    """Return the kinds of films that are wanted, ``mp4`` and ``gif``.
-
-    Raises:
-        InputError: beside a window.
-    """
-    kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
-    if view and kinds:
-        raise InputError(
-            "--view shows the flight in a window; expected it without --video and --gif"
-        )
-    return kinds
-
-
 def result_file(out: Path, usual: str, endings: Collection[str] = ()) -> Path:
-    """Return the main result's file: ``--out`` itself where it has one of the ``endings``, or any
-    where none is given; else that of the ``usual`` name in the folder that ``--out`` names.
+    """Return the main result's file: ``--out`` itself with one of the ``endings``, or any where
+    none is given; else the ``usual`` name in the folder ``--out``.
     """
     named = out.suffix in endings if endings else out.suffix
     return out if named and not os.path.isdir(out) else out / usual
 
 
 def results_folder(out: Path, **plan: object) -> Path:
-    """Make the results' folder, before the work starts, so that no result is lost for want of it.
+    """Make the results' folder before the work starts: no result is lost for want of a folder.
 
     Every command calls this once its request is checked and before its work begins: here a dry run
     ends.
 
     Args:
         out: the folder.
-        plan: what is about to be done, for a dry run.
+        plan: the work to come, for a dry run.
 
     Raises:
         InputError: there can be no such folder.
@@ -159,7 +145,7 @@ def results_folder(out: Path, **plan: object) -> Path:
 
 
 class _What(ProgressColumn):
-    """What is being done; while functions are compiled, how many."""
+    """The work at hand; during compilation, the number of functions."""
 
     def render(self, task: Task) -> Text:
         """Return the text beside a bar."""
@@ -168,13 +154,13 @@ class _What(ProgressColumn):
 
 @contextmanager
 def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
-    """Show what is being done and how long the rest will take; give a function that takes how much
-    is done, another text, or how much more is done.
+    """Show the work at hand and the time of its rest. Give a function of the finished amount,
+    another text, or a further amount.
 
     In a terminal a bar moves; elsewhere, such as in a log of a build, a line comes now and then.
 
     Args:
-        text: says what is being done.
+        text: names the work at hand.
         total: how much there is to do: 1 where shares are told.
     """
     columns = (
@@ -222,7 +208,7 @@ def _line(task: Task) -> str:
 
 @contextmanager
 def silently() -> Iterator[None]:
-    """Print nothing of what another command would print; its progress is shown."""
+    """Print nothing of another command's output; its progress is shown."""
     quiet, console.quiet = console.quiet, True
     told, run.notes = run.notes, False
     try:
@@ -232,14 +218,14 @@ def silently() -> Iterator[None]:
 
 
 def note(text: str) -> None:
-    """Say on standard error what is worth knowing about the input; a warning stands out."""
+    """Print notes on the input on standard error; a warning stands out."""
     if run.notes:
         errors.print(text, style="yellow" if text.startswith("warning") else "dim")
 
 
 def show_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table, no word of which is cut: what is too wide for the terminal is folded at
-    spaces, and columns that do not fit even so follow below, beside the first column again.
+    """Print a table without a cut word. Cells too wide for the terminal are folded at spaces.
+    Columns still too many follow below, beside the first column again.
     """
     columns = list(zip(header, *rows, strict=True))
     full = [max(map(len, column)) for column in columns]
@@ -262,19 +248,19 @@ def show_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
 
 
 def _width(columns: Iterable[int]) -> int:
-    """Return the characters across a table whose columns have so many."""
+    """Return the characters across a table from the widths of its columns."""
     return 1 + sum(width + 3 for width in columns)
 
 
 def say(*paths: Path) -> None:
-    """Say which files were written."""
+    """Print the written files."""
     run.written.extend(paths)
     for path in paths:
         console.print(f"wrote {path}", soft_wrap=True)
 
 
 def show_page(path: Path, wanted: bool) -> None:
-    """Say where a page is, and open it in a browser if that is wanted and a display is there."""
+    """Print a page's place, and open the page in a browser if wanted and a display is there."""
     address = path.resolve().as_uri()
     console.print(f"page: {address}", soft_wrap=True)
     display = not sys.platform.startswith("linux") or any(

@@ -1,4 +1,6 @@
-"""The tuning of a filter as a YAML file: what ``estimate`` writes, it and ``live`` take."""
+"""The tuning of a filter as a YAML file: written by ``estimate``, read by ``estimate`` and
+``live``.
+"""
 
 from pathlib import Path
 
@@ -12,7 +14,7 @@ from ..runtime.yaml_file import read_yaml
 
 
 def save_tuning(tuning: UKFTuning, period: float, path: Path) -> None:
-    """Write a tuning of steps of ``period`` s to a YAML file, as that of 5 ms.
+    """Write a tuning of steps of ``period`` s to a YAML file, for steps of 5 ms.
 
     Raises:
         InputError: the file cannot be written.
@@ -22,16 +24,16 @@ def save_tuning(tuning: UKFTuning, period: float, path: Path) -> None:
 
 
 def load_tuning(path: Path, period: float = PERIOD) -> UKFTuning:
-    """Return the tuning of a YAML file, whose fields are those of ``UKFTuning`` for steps of 5 ms,
-    for steps of ``period`` s.
+    """Return the tuning of a YAML file for steps of ``period`` s. Its fields are ``UKFTuning``'s
+    for steps of 5 ms.
 
     Raises:
         InputError: the file cannot be read, or a field is unknown or out of range.
     """
     data = read_yaml(path, "a tuning file")
     if not isinstance(data, dict) or not data:
-        found = type(data).__name__
-        raise InputError(f"{path}: expected a mapping of fields such as force_walk, got {found}")
+        kind = type(data).__name__
+        raise InputError(f"{path}: expected a mapping of fields such as force_walk, got {kind}")
     fields = UKFTuning.__dataclass_fields__
     for name in data:
         if name not in fields:

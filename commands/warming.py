@@ -1,4 +1,4 @@
-"""All that the common commands compile, at once."""
+"""All compiled code of the common commands, at once."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,7 @@ from .flying import fly, record
 from .live import live
 from .terminal import console, run, silently, working
 
-_SECONDS = 12.0  # of the flight that is recorded, the shortest that is diagnosed
+_SECONDS = 12.0  # s, recorded flight: the shortest for a diagnosis
 
 
 def warm() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The flight loop and the vehicle under it near hover, one axis at a time, as linear systems.
+"""The flight loop and its vehicle near hover, one axis at a time, as linear systems.
 
 An acceleration ``u`` beside the flight loop's own, an external force ``f`` and an external torque
 ``tau`` move a horizontal axis as
@@ -24,13 +24,14 @@ Array = NDArray[np.float64]
 
 MOTOR_LAG = 0.04  # s, of the tasks' plant
 PLACE, SPEED, TILT, RATE, ALPHA = range(5)  # of a horizontal axis; its last state is the integral
+SET_POINT = 6  # of a horizontal axis with its set point
 THRUST = 2  # of the vertical axis: place, speed, the rotors' acceleration, integral
 
 
 @dataclass(frozen=True, eq=False)
 class AxisModel:
-    """``dx/dt = A x + B u + D d`` of n states; ``d`` is force in N, of a horizontal axis also the
-    torque in Nm that tilts along it.
+    """``dx/dt = A x + B u + D d`` of n states. ``d`` is force in N; on a horizontal axis also the
+    tilting torque in Nm.
     """
 
     A: Array  # (n, n)
@@ -38,7 +39,7 @@ class AxisModel:
     D: Array  # (n, 2) or (n, 1)
 
     def held(self, period: float) -> tuple[Array, Array, Array]:
-        """Return A, B and D of a step of ``period`` s in which inputs hold their values."""
+        """Return A, B and D of a step of ``period`` s with constant inputs."""
         from scipy.linalg import expm
 
         n, inputs = len(self.A), np.hstack([self.B, self.D])
@@ -48,8 +49,8 @@ class AxisModel:
         return step[:, :n], step[:, n : n + 1], step[:, n + 1 :]
 
     def with_set_point(self, velocity: float = FlightGains.velocity) -> "AxisModel":
-        """Return the model with the place of the set point as its last state, and as its input the
-        velocity (m/s) with which the set point moves.
+        """Return the model with the set point's place as its last state, and the set point's
+        velocity (m/s) as its input.
 
         Args:
             velocity: gain of the flight loop on a velocity error, 1/s.
@@ -65,8 +66,8 @@ class AxisModel:
 def axis_models(
     vehicle: Vehicle, gains: FlightGains | None = None, lag: float = MOTOR_LAG
 ) -> tuple[AxisModel, AxisModel, AxisModel]:
-    """Return the models along the world's x, y and z of a vehicle that faces along x, whichever
-    way, with the body effects that it declares.
+    """Return the models along the world's x, y and z of a vehicle facing along +x or -x, with its
+    declared body effects.
     """
     body, k = compile_effects(vehicle).vehicle, gains or FlightGains()
     g, m = body.gravity, body.mass
@@ -98,5 +99,5 @@ def axis_models(
 
 
 def tilting(torque: Array) -> tuple[Array, Array]:
-    """Return what of torques (..., 3), world, tilts the thrust along x, and along y."""
+    """Return the parts of torques (..., 3), world, that tilt the thrust along x, and along y."""
     return torque[..., 1], -torque[..., 0]

@@ -1,5 +1,5 @@
-"""What a designed controller may be told before it flies: its own vehicle, its own sensors, the
-kind of fan, and for those that say so, how the fan is known to move.
+"""A designed controller's knowledge before its flight: its own vehicle, its own sensors, the kind
+of fan, and for some the fan's family of motions.
 """
 
 from __future__ import annotations
@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any, Self
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 
 # the vehicle of the tasks
-standard_vehicle = partial(load_vehicle, "ardrone2")
+standard_vehicle = cache(partial(load_vehicle, "ardrone2"))
 
 
 def _along(value: ArrayLike, axis: int) -> float:
@@ -26,11 +26,11 @@ def _along(value: ArrayLike, axis: int) -> float:
 
 @dataclass(frozen=True)
 class FilterNoise:
-    """What the wrench filter was told of noise: standard deviations in one of its steps. They
-    settle how fast its estimate follows the truth.
+    """The wrench filter's numbers of noise: standard deviations in one of its steps. They settle
+    how fast its estimate follows the truth.
     """
 
-    torque: float = 0.03  # Nm about z, that the rotor model misses, new each step
+    torque: float = 0.03  # Nm about z, error of the rotor model, new each step
     torque_walk: float = 3.26e-4 / 0.45  # Nm, change of the external torque
     thrust: float = 0.3  # N along y, likewise
     force_walk: float = 3.26e-3 / 0.45  # N
@@ -40,7 +40,7 @@ class FilterNoise:
 
     @classmethod
     def of(cls, tuning: Any, period: float) -> Self:
-        """Return what a wrench filter of this ``estimator.UKFTuning`` was told, whose step takes
+        """Return the noise of a wrench filter with this ``estimator.UKFTuning`` and steps of
         ``period`` s.
         """
         return cls(
@@ -56,16 +56,16 @@ class FilterNoise:
 
 @dataclass(frozen=True)
 class Air:
-    """What makes the wrench uncertain beside the mean jet: the actuators' own unmodelled
-    disturbance and the gusts of the jet, as the standard scenarios have them.
+    """Uncertainty of the wrench beside the mean jet: the actuators' own unmodelled disturbance and
+    the gusts of the jet, as the standard scenarios have them.
     """
 
     disturbance_force: float = 0.03  # N, standard deviation along each axis
     disturbance_torque: float = 0.01  # Nm
-    disturbance_time: float = 0.3  # s, over which it lasts
+    disturbance_time: float = 0.3  # s, correlation time
     turbulence: float = 0.10  # gusts as a share of the local axial speed
-    gust_length: float = 0.25  # m, over which gusts at two places are correlated
-    gust_time: float = 0.10  # s, over which they last
+    gust_length: float = 0.25  # m, correlation length of gusts
+    gust_time: float = 0.10  # s, correlation time of gusts
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Jet:
     u0: float = 3.6  # m/s
     kd: float = 0.020  # N/(m/s), drag of each rotor
     area: float = 0.060  # m2, drag area of the hull
-    distance: float = 2.3  # m, of the vehicle from it
+    distance: float = 2.3  # m, the vehicle's distance
 
 
 # places (n,) m after times (s) of motions with a largest speed (m/s) over a travel (m), from 0 to
@@ -94,7 +94,7 @@ PLACES: dict[str, Callable[..., NDArray[np.float64]]] = {
 class Motions:
     """The family of a fan's motions, each from its place at the start: a share ``motions`` of
     still, sine, triangle and ramp, at a largest ``speed`` and over a ``travel`` within these
-    ranges; a ramp ends after 0.8 m and 8/7 of what the travel exceeds its least.
+    ranges. A ramp ends after 0.8 m and 8/7 of the travel above its least.
     """
 
     motions: tuple[str, ...] = ("sine", "triangle", "ramp", "still")
@@ -105,7 +105,7 @@ class Motions:
 
 @dataclass(frozen=True)
 class Briefing:
-    """All of it. The defaults are those of the scenario ``base``."""
+    """The whole briefing, by default of the scenario ``base``."""
 
     vehicle: Vehicle = field(default_factory=standard_vehicle)
     noise: FilterNoise = FilterNoise()

@@ -1,8 +1,8 @@
 """Hand-designed laws of the tasks with a fan: velocities along y, or along y and z, of the wrench.
 
-With the fan at the origin and the jet along +x, the world's ``tau_z`` is positive at positive y,
-and ``tau_y`` negative above the axis: a vehicle that moves by ``(-k tau_z, +k tau_y)`` moves to the
-axis. (In the body frame of a vehicle that faces the fan, y and the sign turn round.)
+The fan is at the origin and its jet along +x. The world's ``tau_z`` is positive at positive y, and
+``tau_y`` negative above the axis. The velocity ``(-k tau_z, +k tau_y)`` leads to the axis. (In the
+body frame of a vehicle facing the fan, y and the sign turn round.)
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Array = NDArray[np.floating[Any]]
 
 
 class FanLaw:
-    """What the laws share: a command within its limits, and no memory unless a law says so."""
+    """Shared by the laws: a command within its limits, and no memory unless a law says so."""
 
     def __post_init__(self) -> None:
         self.reset()
@@ -40,7 +40,7 @@ class FanLaw:
 
 @dataclass(eq=False)
 class Hover(FanLaw):
-    """Stays where it is: the lower bound, score 0."""
+    """Stays in place: the lower bound, score 0."""
 
     axes: int = 1  # that are commanded
 
@@ -54,7 +54,7 @@ class Admittance(FanLaw):
     """The admittance controller of McKinnon and Schoellig (2016): velocity in proportion to the yaw
     torque, and where a second axis is commanded, to the pitch torque.
 
-    ``gain`` times the jet's largest torque bounds the speed of a fan that the law can follow.
+    ``gain`` times the jet's largest torque is the largest speed of a fan followed by the law.
     """
 
     gain: float = 18.0  # m/s per Nm, sideways
@@ -69,8 +69,8 @@ class Admittance(FanLaw):
 
 @dataclass(eq=False)
 class Ratio(FanLaw):
-    """Velocity in proportion to ``tau_z / f_x``, which grows with the offset where ``tau_z`` alone
-    falls off again.
+    """Velocity in proportion to ``tau_z / f_x``: the ratio grows with the offset where ``tau_z``
+    alone falls off again.
     """
 
     gain: float = 8.0  # m/s per m, sideways
@@ -89,8 +89,8 @@ class Ratio(FanLaw):
 class Lead(FanLaw):
     """Ratio with derivative: ``x = tau_z / max(f_x, least_force)``, ``u = -(gain x + lead dx/dt)``.
 
-    The rate is that from one decision to the next. The rate makes good for part of the filter's
-    lag, and a vehicle that falls behind turns round earlier.
+    The rate is taken from one decision to the next. The rate makes good for part of the filter's
+    lag, and a vehicle behind turns round earlier.
     """
 
     gain: float = 11.35  # 1/s
@@ -114,8 +114,8 @@ class AdmittancePID(FanLaw):
     """The admittance law with integral and lead: ``u = -(gain tau_z + integral S + lead
     dtau_z/dt)``, ``S`` the integral of ``tau_z``.
 
-    The integral follows a fan that moves evenly without the steady offset that a proportional law
-    needs. It stops while the command is at its bound and would grow further (no windup).
+    The integral follows an evenly moving fan without the steady offset of a proportional law. It
+    stops while the command is at its bound and would grow further (no windup).
     """
 
     gain: float = 20.0  # m/s per Nm

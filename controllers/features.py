@@ -1,4 +1,4 @@
-"""What a learned policy sees: scaled quantities of an observation, over the last few decisions."""
+"""Inputs of a learned policy: scaled quantities of an observation, over the last few decisions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Quantity:
-    """Where a quantity stands, and the size that becomes 1."""
+    """Place of a quantity, and its size on the scale 1."""
 
     scale: float  # N, Nm, m/s or m
     column: int
@@ -53,8 +53,7 @@ class Features:
     """The quantities of one frame, each with its scale, and how many frames a policy sees.
 
     Raises:
-        InputError: a quantity that does not exist or comes twice, no frame, a scale that is not
-            positive.
+        InputError: an unknown or repeated quantity, no frame, a scale of zero or less.
     """
 
     frame: tuple[str, ...]
@@ -88,19 +87,19 @@ class Features:
         """Return scaled frames (n, quantities) of n environments' observations (n, 8)."""
         rows = np.asarray(observations, dtype=np.float64)
         scaled = rows[:, [QUANTITIES[name].column for name in self.frame]] / np.array(self.scale)
-        scaled[:, self.summed] *= DECISION_PERIOD  # what one decision adds
+        scaled[:, self.summed] *= DECISION_PERIOD  # change of one decision
         clipped: Array = np.clip(scaled, -10.0, 10.0).astype(np.float32)
         return clipped
 
     @property
     def mirrored(self) -> Array:
-        """Signs (size,) of what a policy sees where left and right change places."""
+        """Signs (size,) of a policy's inputs where left and right change places."""
         signs = [-1.0 if QUANTITIES[name].odd else 1.0 for name in self.frame]
         return np.array(signs * self.history, dtype=np.float32)
 
     @property
     def summed(self) -> list[int]:
-        """Columns of a frame that a ``History`` adds up."""
+        """Columns of a frame summed by a ``History``."""
         return [i for i, name in enumerate(self.frame) if QUANTITIES[name].summed]
 
 

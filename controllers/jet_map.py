@@ -1,4 +1,4 @@
-"""What a vehicle feels beside a fan's axis, and how that wavers: tables over its offset."""
+"""A vehicle's wrench beside a fan's axis, and its variance: tables over its offset."""
 
 import math
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ _SIDEWAYS, _TURNING = 0.2, 0.3
 @dataclass(frozen=True, eq=False)
 class JetMap:
     """Tables (AXES, COUNT) of ``tau_z`` (Nm), ``f_x`` and ``f_y`` (N), world, over the offset from
-    the axis of a vehicle that faces the fan at the height of its axis.
+    the axis. The vehicle faces the fan at the height of the axis.
     """
 
     mean: Array  # of a vehicle at rest
@@ -45,7 +45,7 @@ class JetMap:
 @lru_cache(maxsize=16)
 def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> JetMap:
     """Return the tables of a vehicle, from the effect model ``fan_jet`` at the vehicle's own
-    stations; the gusts' from the drag at these stations, each in its own gust.
+    stations. The gusts' variance follows from the drag at these stations, each in its own gust.
     """
     coefficients = {"u0": jet.u0, "x": 0.0, "y": 0.0, "z": 0.0, "kd": jet.kd, "area": jet.area}
     alone = replace(
@@ -80,7 +80,7 @@ def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> JetMap:
 
 
 def _gust_variance(vehicle: Vehicle, jet: Jet, air: Air, offsets: Array) -> Array:
-    """Return the variance (AXES, n) that gusts of all three directions give each axis."""
+    """Return the variance (AXES, n) of each axis from gusts of all three directions."""
     angles = np.arange(HULL_STATIONS) * math.pi / 4
     ring = HULL_RADIUS * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     # seen from above in the world: the vehicle faces -x

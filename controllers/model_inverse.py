@@ -1,12 +1,12 @@
-"""A declared model in the flight loop: what its effects will do to the vehicle, and the commands
-that make its rotors deliver what is wanted.
+"""A declared model in the flight loop: the coming wrench of its effects, and commands for wanted
+rotor speeds.
 
-The three kinds of effects enter as what they are. *Wrench* effects: their force and torque at the
-reference's velocity are taken off what the rotors have to make (``foresee``). *Rotor-input*
-effects: commands are found that deliver the wanted rotor speeds (``through_the_rotors``). *Sensing*
-effects: the filter has taken them out of its estimate already; those on the *rigid body* are mass,
-inertia and centre of mass of the flight loop. No effect is known here by its name: the same models
-are called as plant and filter call.
+Each of the three kinds of effects enters in its own way. *Wrench* effects: their force and torque
+at the reference's velocity are taken off the rotors' share (``foresee``). *Rotor-input* effects:
+commands are found for the wanted delivered rotor speeds (``through_the_rotors``). *Sensing*
+effects: the filter has taken them out of its estimate already. Effects on the *rigid body* are
+mass, inertia and centre of mass of the flight loop. No effect is known here by its name: the same
+models are called as plant and filter call.
 """
 
 from ..dynamics.effects.base import ROTOR_ACCELERATION, ROTOR_TIME
@@ -31,10 +31,10 @@ def foresee(c: Record, model: Record, x: Array) -> None:
     """Write the wrench of the model's effects that the rotors have to balance into ``c.foreseen``
     (6,): force in the world, torque in the body frame.
 
-    It is that at the set point's position and velocity, without body rates, as flatness-based
-    control of vehicles with drag has it (Faessler, Franchi and Scaramuzza, RA-L 3(2), 2018): what
-    an effect adds at the vehicle's own velocity beyond that is damping, and a loop that cancelled
-    it would oscillate more. Attitude: as estimated. Rotor speeds: as wanted last.
+    The wrench is taken at the set point's position and velocity, without body rates. So does
+    flatness-based control of vehicles with drag (Faessler, Franchi and Scaramuzza, RA-L 3(2),
+    2018). An effect's further part at the vehicle's own velocity is damping: a loop without this
+    damping would oscillate more. Attitude: as estimated. Rotor speeds: as wanted last.
     """
     if model.wrench_count == 0:
         return

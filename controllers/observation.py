@@ -1,7 +1,7 @@
-"""The observation that controllers act on, and the action that they return.
+"""The observation of controllers, and their action.
 
-One frame is (8,): estimated external force x, y, z (N) and torque x, y, z (Nm) in the world frame,
-own estimated velocity along y (m/s), and the last command (m/s). The action is (1,): the commanded
+One frame is (8,): estimated external force x, y, z (N) and torque x, y, z (Nm), world. Then the own
+estimated velocity along y (m/s), and the last command (m/s). The action is (1,): the commanded
 velocity along the world's y.
 """
 

@@ -1,5 +1,5 @@
-"""The controllers of each task by their names: designed laws, the gains found for them by search
-(``tuned.yaml`` says for which scenario and how), and the trained policies that come with the kit.
+"""The controllers of each task by their names: designed laws, their gains from a search (with
+scenario and command in ``tuned.yaml``), and the kit's trained policies.
 """
 
 from __future__ import annotations
@@ -14,9 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
+from ..runtime.python_file import is_file_name
 from ..runtime.yaml_file import read_yaml
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
+from .law_file import is_law_file, read_law
 from .lqg import LQG
+from .own_file import load_controller
 from .preview import Oracle, WindOracle
 from .tracker import InformedTracker, Limit, Tracker, TrackerLQG
 from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, PIDWithWrench
@@ -26,11 +29,11 @@ STANDARD_SCENARIO = "base"  # of the gains of a law that is called no more than 
 
 
 class Controller(Protocol):
-    """From an observation to a command; ``info`` is the environment's, for those that may see the
+    """From an observation to a command; ``info`` is the environment's, for controllers that see the
     truth.
 
-    One that also has ``brief(briefing)`` is told what its vehicle, its sensors and the fan are
-    (``controllers.briefing.Briefing``) before ``reset``, which one without a memory may lack.
+    A method ``brief(briefing)`` gets vehicle, sensors and fan (``controllers.briefing.Briefing``)
+    before ``reset``. A controller without a memory needs no ``reset``.
     """
 
     def reset(self) -> None:
@@ -49,25 +52,25 @@ Laws = dict[str, Callable[..., Any]]
 
 @cache
 def tuned_gains(task: str = STANDARD_TASK) -> dict[str, dict[str, Any]]:
-    """Return what is known of a task's gains: law, of FanTracking also scenario, and then ``gains``
-    and how they were found.
+    """Return a task's tuned gains: law, of FanTracking also scenario, and then ``gains`` and how
+    they were found.
     """
     sections: dict[str, dict[str, dict[str, Any]]] = read_yaml(
         Path(__file__).with_name("tuned.yaml"), "tuned gains"
     )
     if task != STANDARD_TASK:
         return sections.get(task, {})
-    return {law: found for law, found in sections.items() if law in LAWS}
+    return {law: entries for law, entries in sections.items() if law in LAWS}
 
 
 def _tuned() -> Laws:
     """Return ``LAW-tuned`` (for the scenario base) and ``LAW-tuned-SCENARIO`` of FanTracking."""
     return {
         f"{law}-tuned" + ("" if scenario == STANDARD_SCENARIO else f"-{scenario}"): partial(
-            LAWS[law], **found["gains"]
+            LAWS[law], **entry["gains"]
         )
         for law, scenarios in tuned_gains().items()
-        for scenario, found in scenarios.items()
+        for scenario, entry in scenarios.items()
     }
 
 
@@ -109,35 +112,44 @@ TASK_LAWS: dict[str, Laws] = {
     "WindHover": _WIND,
     "WindTrajectory": _WIND,
 }
+# laws of a user's own by name, for every task: ``OWN_LAWS["me/gentle"] = Gentle``
+OWN_LAWS: Laws = {}
 # tasks that are flown with the gains of another where the file has none of their own
 _AS = {"WindTrajectory": "WindHover"}
 
 
 def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
-    """Return a new ``Controller`` of a task by its name; where the name of a law of another task
-    than FanTracking has gains that were found, the law has these.
+    """Return a new ``Controller`` of a task by its name, by a law's YAML file, or of a
+    Python file (``FILE.py:CLASS``). In tasks other than FanTracking a law has its tuned gains,
+    where there are some; those of a file come before.
 
     Raises:
-        InputError: no task or no controller has this name.
+        InputError: no task or no controller has this name, or a file holds none.
     """
+    if is_file_name(name):
+        return load_controller(name)
     if task not in TASK_LAWS:
         raise unknown_name("task", task, TASK_LAWS)
-    laws = TASK_LAWS[task]
+    laws = OWN_LAWS | TASK_LAWS[task]
+    gains: dict[str, Any] = {}
+    if is_law_file(name):
+        stated = read_law(name, task, laws)
+        name, gains = stated.law, stated.gains
     if name not in laws:
-        raise unknown_name("controller", name, laws)
+        raise unknown_name("controller", name, [*laws, *shipped_policies(task)])
     if task == STANDARD_TASK:
-        return laws[name]()
-    found = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
-    return laws[name](**found.get("gains", {}))
+        return laws[name](**gains)
+    entry = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
+    return laws[name](**{**entry.get("gains", {}), **gains})
 
 
 @cache
 def shipped_policies(task: str = STANDARD_TASK) -> dict[str, Path]:
-    """Return the file of each policy of a task that this installation has, sorted by name. A wheel
-    has one seed of each kind, a checkout all.
+    """Return the file of each installed policy of a task, sorted by name. A wheel has one seed of
+    each kind, a checkout all.
     """
     folder = Path(str(resources.files(__package__))).parent / "training" / "policies"
     start = "" if task == STANDARD_TASK else f"{task}-"
-    found = (folder / "tasks" if start else folder).glob(f"{start}*.npz")
-    kept = (path for path in found if path.with_suffix(".json").exists())
+    files = (folder / "tasks" if start else folder).glob(f"{start}*.npz")
+    kept = (path for path in files if path.with_suffix(".json").exists())
     return {path.stem.removeprefix(start): path for path in sorted(kept)}

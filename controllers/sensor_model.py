@@ -1,4 +1,4 @@
-"""What a tracker knows of its own sensing: the jet's map, the wrench filter's lag, the coloured
+"""A tracker's knowledge of its own sensing: the jet's map, the wrench filter's lag, the coloured
 noise, and its own yaw, in arrays for compiled code.
 """
 
@@ -23,7 +23,7 @@ SETTLED = 19  # decisions of 80 ms that the filter has settled before the first 
 
 
 class SensorModel(NamedTuple):
-    """Arrays that ``weigh`` takes, and how the vehicle yaws."""
+    """Arrays for ``weigh``, and the vehicle's yaw."""
 
     # over the offset: mean, slopes with velocity and yaw rate, standard deviation
     tables: Array  # (COUNT, 4, AXES)
@@ -74,9 +74,9 @@ def sensor_model(briefing: Briefing) -> SensorModel:
 class Sensing:
     """One vehicle's own motion through an episode, and the weights of places of the fan.
 
-    Places are along y from where the vehicle was at the first observation: its own is the integral
-    of its estimated velocity, which drifts by millimetres. Its yaw rate, which turns its stations
-    against the jet, is that of the flight loop's yaw under the estimated torque.
+    Places are along y from where the vehicle was at the first observation: the vehicle's is the
+    integral of its estimated velocity, with a drift of millimetres. Its yaw rate, of the stations
+    against the jet, follows from the flight loop's yaw under the estimated torque.
     """
 
     def __init__(self, model: SensorModel) -> None:

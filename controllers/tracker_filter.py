@@ -1,4 +1,4 @@
-"""The inner loop of the trackers: how likely each particle makes what the filter shows."""
+"""The inner loop of the trackers: each particle's likelihood of the filter's estimate."""
 
 import math
 from typing import Any

@@ -1,8 +1,7 @@
-"""Trained policies as files: weights in ``NAME.npz``, and beside them the card ``NAME.json`` that
-says what they are.
+"""Trained policies as files: weights in ``NAME.npz``, and beside them their card ``NAME.json``.
 
-Neither can run code when it is read, and a policy is flown in plain NumPy: scoring needs no
-deep-learning library.
+Reading them runs no code, and a policy is flown in plain NumPy: scoring needs no deep-learning
+library.
 """
 
 import hashlib
@@ -57,7 +56,7 @@ def _lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array
 
 def _gru(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array, Array]:
     """Return the next hidden state (h,) of a GRU with gates in the order reset, update, new, and
-    ``cell``, which it has no use for.
+    the unused ``cell``.
     """
     entered = weights["gru_input"] @ x + weights["gru_input_bias"]
     kept = weights["gru_hidden"] @ hidden + weights["gru_hidden_bias"]
@@ -69,12 +68,12 @@ def _gru(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array,
     return after, cell
 
 
-# gates of each recurrent cell, and what it does
+# gates and step of each recurrent cell
 _CELLS = {"lstm": (4, _lstm), "gru": (3, _gru)}
 
 
 def cell_of(weights: Weights) -> str | None:
-    """Return which recurrent cell stands before the dense layers: lstm, gru, or none."""
+    """Return the recurrent cell before the dense layers: lstm, gru, or none."""
     return next((name for name in _CELLS if f"{name}_input" in weights), None)
 
 
@@ -84,7 +83,7 @@ def _sigmoid(x: Array) -> Array:
 
 
 class _Network:
-    """What the policies share: a recurrent cell where there is one, and dense layers.
+    """Shared by the policies: a recurrent cell where there is one, and dense layers.
 
     The card says ``activation``, and ``squash``: the output goes through a tanh and is a share of
     the largest action.
@@ -117,9 +116,9 @@ class _Network:
             shapes |= {f"weight{i}": (rows, below), f"bias{i}": (rows,)}
             below = rows
         for part, shape in shapes.items():
-            found = weights[part].shape if part in weights else "none"
-            if found != shape:
-                raise InputError(f"{name}: {part} must have the shape {shape}, got {found}")
+            actual = weights[part].shape if part in weights else "none"
+            if actual != shape:
+                raise InputError(f"{name}: {part} must have the shape {shape}, got {actual}")
         self.size = below  # of the action
 
     def reset(self) -> None:
@@ -128,7 +127,7 @@ class _Network:
         self._hidden, self._kept = (np.zeros(size, dtype=np.float32) for _ in range(2))
 
     def act(self, x: Array) -> Array:
-        """Return the action for what is seen (n,); a recurrent policy remembers what it saw."""
+        """Return the action for inputs (n,); a recurrent policy remembers earlier ones."""
         if self._cell is not None:
             _, step = _CELLS[self._cell]
             self._hidden, self._kept = step(self.weights, x, self._hidden, self._kept)
@@ -145,7 +144,7 @@ class _Network:
 
 @contextmanager
 def _entries_named(name: str) -> Iterator[None]:
-    """Name an entry of a card that is missing or spoiled."""
+    """Name a missing or spoiled entry of a card."""
     try:
         yield
     except (KeyError, TypeError, ValueError) as error:
@@ -155,14 +154,15 @@ def _entries_named(name: str) -> Iterator[None]:
 
 
 class TrainedPolicy(_Network):
-    """A policy of ``FanTracking`` that was learned, as a controller.
+    """A learned policy of ``FanTracking``, as a controller.
 
     Args:
-        card: what the policy is: ``features``, ``repeat`` (decisions that a command is held),
-            ``activation``, ``squash`` (the output goes through a tanh), and where it comes from.
-        weights: dense layers ``weight0`` (out, in), ``bias0`` (out,), ...; before them, where there
-            is one, the LSTM ``lstm_input`` (4h, in), ``lstm_hidden`` (4h, h), ``lstm_input_bias``,
-            ``lstm_hidden_bias`` (4h,), or the GRU ``gru_input`` (3h, in) and so on.
+        card: ``features``, ``repeat`` (decisions a command), ``activation``, ``squash`` (the output
+            goes through a tanh), and the policy's origin.
+        weights: dense layers ``weight0`` (out, in), ``bias0`` (out,), ... Before them a recurrent
+            cell, if any. An LSTM has ``lstm_input`` (4h, in), ``lstm_hidden`` (4h, h),
+            ``lstm_input_bias``, ``lstm_hidden_bias`` (4h,). A GRU has ``gru_input`` (3h, in) and so
+            on.
 
     Raises:
         InputError: card and weights do not go together.
@@ -209,10 +209,11 @@ class TaskPolicy(_Network):
     """A learned policy of another task: scaled observations, and the same layers.
 
     Args:
-        card: ``task``; ``scale`` (n,), what each number of the observation is divided by;
-            ``largest``, of the action; ``activation``; ``squash`` (the output goes through a tanh
-            and is a share of ``largest``).
-        weights: as those of a ``TrainedPolicy``.
+        card: ``task``; ``scale`` (n,), divisors of the observation; ``largest``, of the action;
+            ``activation``; ``squash`` (a tanh of the output is a share of ``largest``). ``memory``
+            (m,), if any: the layers see m first-order low-passes of the observation, each of so
+            many decisions.
+        weights: as of a ``TrainedPolicy``.
 
     Raises:
         InputError: card and weights do not go together.
@@ -222,20 +223,33 @@ class TaskPolicy(_Network):
         with _entries_named(name):
             self.task, largest = str(card["task"]), float(card["largest"])
             self._scale = np.array(card["scale"], dtype=np.float32)
+            memory = np.array(card.get("memory", [1.0]), dtype=np.float32)
             if self._scale.ndim != 1:
                 raise InputError(f"{name}: scale must be a list of numbers")
-            super().__init__(card, weights, len(self._scale), largest, name)
+            if memory.ndim != 1 or not np.all(memory >= 1.0):
+                raise InputError(f"{name}: memory must be a list of numbers from 1 on")
+            self._rates = 1.0 / memory[:, None]
+            seen = len(self._scale) * len(memory)
+            super().__init__(card, weights, seen, largest, name)
         self.reset()
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        super().reset()
+        self._remembered: Array | None = None
 
     def __call__(
         self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
     ) -> Array:
         """Return the action of the task, in its units, for an observation in SI units."""
-        return self.act((np.asarray(observation) / self._scale).astype(np.float32))
+        seen = (np.asarray(observation) / self._scale).astype(np.float32)
+        kept = seen if self._remembered is None else self._remembered
+        self._remembered = kept + self._rates * (seen - kept)
+        return self.act(self._remembered.ravel())
 
 
 def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:
-    """Write ``path`` (.npz) and the card beside it; return the path. The same weights give the same
+    """Write ``path`` (.npz) and the card beside; return the path. The same weights give the same
     bytes.
     """
     buffer = io.BytesIO()
@@ -276,7 +290,7 @@ def load_policy(path: str | Path) -> Any:
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             weights = {name: np.asarray(arrays[name], dtype=np.float32) for name in arrays.files}
-    except Exception as error:  # whatever a parser makes of bytes that are no archive of arrays
+    except Exception as error:  # any error of a parser on bytes of another kind
         raise InputError(f"{file}: cannot be read as weights: {error}") from error
     bad = [
         name

@@ -1,9 +1,9 @@
 """Control laws of the tasks in the wind: from an observation (27,) to an acceleration (3,) m/s2
 beside the flight loop's own.
 
-All of them are what their papers state for the position loop: attitude and rates stay with the
-flight loop. They add to its proportional, derivative and weak integral action. Those that answer
-the torque ask the flight loop for the tilt that its attitude loop turns against it.
+All are their papers' laws for the position loop: attitude and rates stay with the flight loop. They
+add to its proportional, derivative and weak integral action. Laws with an answer to the torque ask
+the flight loop for the tilt of its attitude loop against the torque.
 """
 
 import math
@@ -39,7 +39,7 @@ _ATTITUDE_LAG = FlightGains.rate / FlightGains.attitude * np.array([1.0, 1.0, 0.
 
 @dataclass(eq=False)
 class WindLaw:
-    """What the laws share: proportional, derivative and integral action on the position error.
+    """Shared by the laws: proportional, derivative and integral action on the position error.
 
     ``a = kp e + kd de/dt + ki (integral of e)``, beside the flight loop's own; the integral stops
     where the action is limited.
@@ -81,7 +81,7 @@ class WindLaw:
         )
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
-        """Return the part (3,) m/s2 that cancels the wind; none in this one."""
+        """Return the part (3,) m/s2 against the wind; none in this law."""
         return np.zeros(3)
 
     def _led(self, name: str, value: Wide, lead: float | Wide) -> Wide:
@@ -92,13 +92,11 @@ class WindLaw:
         return led
 
     def _tilting(self, o: Wide, lead: float) -> Wide:
-        """Return what of the estimated torque, led, tilts the vehicle along x and y, and 0: (3,)
-        Nm.
-        """
+        """Return the tilting parts of the estimated torque, led, along x and y, and 0: (3,) Nm."""
         return self._led("torque", np.array([*tilting(o[TORQUE]), 0.0]), lead)
 
     def _turned(self, o: Wide, lead: float) -> Wide:
-        """Return the acceleration (3,) m/s2 of which the attitude loop makes the angular
+        """Return the acceleration (3,) m/s2 for which the attitude loop makes the angular
         acceleration of the estimated torque, led.
         """
         against_tilt = np.diag(self.vehicle.inertia)[[1, 0]]  # kg m2, along x and y
@@ -111,15 +109,15 @@ class FlightLoopAlone(WindLaw):
 
 
 class PID(WindLaw):
-    """A PID position controller, which has to wait for the error."""
+    """A PID position controller: it waits for the error."""
 
 
 @dataclass(eq=False)
 class PIDWithForce(WindLaw):
     """A PID controller with the estimated force fed forward: ``- gain f / m``.
 
-    ``f`` is the external force as the unscented Kalman filter estimates it (McKinnon and
-    Schoellig, IROS 2016).
+    ``f`` is the external force from the unscented Kalman filter (McKinnon and Schoellig, IROS
+    2016).
     """
 
     gain: float = 1.0  # share of the force that is cancelled
@@ -132,8 +130,8 @@ class PIDWithForce(WindLaw):
 
 @dataclass(eq=False)
 class PIDWithWrench(PIDWithForce):
-    """The same with the estimated torque, too, which tilts the vehicle, and the tilt carries it
-    away.
+    """The same with the estimated torque, too: torque tilts the vehicle, and the tilt carries the
+    vehicle away.
     """
 
     tilt: float = 10.0  # m/s2 for 1 Nm; g / (J k_attitude) cancels all of a steady torque: 30
@@ -150,14 +148,14 @@ class INDI(WindLaw):
 
     Tal and Karaman, *Accurate tracking of aggressive quadrotor trajectories using incremental
     nonlinear dynamic inversion and differential flatness*, IEEE TCST 29(3), 2021, the incremental
-    law of linear acceleration: ``(tau b_z)_c = (tau b_z)_f + a_c - a_f``. The specific thrust that
-    is commanded is the one now, plus what the acceleration lacks, both behind the same low-pass (a
-    Butterworth of second order; so in Smeur, Chu and de Croon, JGCD 39(3), 2016). With the flight
-    loop's command as ``a_c`` this adds ``-(a_f - (tau b_z)_f + g)``, which is the low-passed
-    difference of accelerometer and rotor model.
+    law of linear acceleration: ``(tau b_z)_c = (tau b_z)_f + a_c - a_f``. The commanded specific
+    thrust is the present one plus the missing acceleration. Both pass the same Butterworth low-pass
+    of second order, as of Smeur, Chu and de Croon (JGCD 39(3), 2016). With the flight loop's
+    command as ``a_c`` this adds ``-(a_f - (tau b_z)_f + g)``: the low-passed difference of
+    accelerometer and rotor model.
 
     The paper's law of angular acceleration, ``mu_c = mu_f + J (alpha_c - alpha_f)``, takes the
-    torque that the rotors do not explain from the command. Here the wrench filter estimates it, and
+    rotors' unexplained torque from the command. Here the wrench filter estimates this torque, and
     the flight loop's attitude loop, ``alpha = k_attitude a / g``, is inverted: ``a = - g (tau +
     tilt_lead dtau/dt) / (J k_attitude)``. The lead makes good for the lag of estimate and motors.
     Both increments pass the same low-pass, as there. Measurements come as means over 40 ms.
@@ -202,12 +200,12 @@ class L1Adaptive(WindLaw):
     Wu, Cheng, Ackerman, Gahlawat, Lakshmanan, Zhao and Hovakimyan, *L1 adaptive augmentation for
     geometric tracking control of quadrotors*, ICRA 2022 (and L1Quad, arXiv 2302.07208): a state
     predictor ``dv^/dt = f/m - g + sigma^ + A_s (v^ - v)``, the piecewise constant adaptation law
-    ``sigma^ = -Phi^-1 exp(A_s T) (v^ - v)`` with ``Phi = A_s^-1 (exp(A_s T) - I)``, and the control
-    ``-C(s) sigma^`` with a first-order low-pass. The predictor's input is the rotors' specific
+    ``sigma^ = -Phi^-1 exp(A_s T) (v^ - v)`` with ``Phi = A_s^-1 (exp(A_s T) - I)``, and a low-pass
+    of first order: the control ``-C(s) sigma^``. The predictor's input is the rotors' specific
     force by the declared model, and of the torque the wrench filter's estimate stands for
     ``sigma^``. Neither acts where the command does, before the attitude loop: both are unmatched,
     and the control is ``-C(s) H_m^-1(s) H_um(s) sigma^`` (Xargay, Hovakimyan and Cao, ACC 2010). To
-    first order that is ``sigma^ + k_rate / k_attitude dsigma^/dt`` for the force, and as in
+    first order the inverse is ``sigma^ + k_rate / k_attitude dsigma^/dt`` for the force, and as in
     ``INDI`` for the torque.
 
     Raises:

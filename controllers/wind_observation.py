@@ -1,9 +1,8 @@
 """The observation and the action of the tasks in the wind.
 
-One frame is (27,), world axes: position error, velocity, velocity and acceleration of the
-reference, estimated force and torque, specific force of the accelerometer and of the rotors, and
-the last action, three numbers each. The action is (3,): an acceleration in m/s2 beside that of the
-flight loop.
+One frame is (27,), world axes: three numbers each. Position error, velocity, velocity and
+acceleration of the reference. Estimated force and torque, specific force of accelerometer and
+rotors, last action. The action is (3,): an acceleration in m/s2 beside the flight loop's.
 """
 
 POSITION_ERROR = slice(0, 3)  # m, reference less estimate

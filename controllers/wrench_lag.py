@@ -1,12 +1,12 @@
 """How an estimated wrench follows the true one: the wrench filter in steady flight, as a linear
-system, and what its errors have in common from one decision to the next.
+system, and the covariance of its errors from one decision to the next.
 
-Along one axis the filter knows a place (or an angle), its rate, and a wrench that walks at random;
-a noise of its own drives the rate, and the place is measured. Its error ``e`` obeys ``e' = (I - K
-C) (A e + b dw) - K v``, ``dw`` being the change of the true wrench and ``v`` the noise of the
-measurement: the estimate is the true wrench less the third part of ``e``. Whatever is not the jet's
-mean is a coloured noise with known covariance, told from decision to decision by an autoregression
-(Yule and Walker).
+Along one axis the filter knows a place (or an angle), its rate, and a random walk of the wrench. A
+noise of its own drives the rate, and the place is measured. Its error ``e`` obeys ``e' = (I - K C)
+(A e + b dw) - K v``, with ``dw`` the true wrench's change and ``v`` the measurement noise: the
+estimate is the true wrench less the third part of ``e``. Whatever is not the jet's mean is a
+coloured noise with known covariance, told from decision to decision by an autoregression (Yule and
+Walker).
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class AxisLag:
 
     @property
     def delay(self) -> float:
-        """How many decisions the estimate of a wrench that changes evenly is behind."""
+        """Delay of the estimate of an evenly changing wrench, in decisions."""
         return float(np.linalg.solve(np.eye(3) - self.keep, self.enter)[2])
 
 
@@ -46,8 +46,8 @@ def axis_lag(
 
     Args:
         inertia: kg or kg m2.
-        noise: what the filter assumes of its model (N or Nm, a step), of the wrench's walk
-            (likewise) and of the measurement (m or rad).
+        noise: assumed noise of the model (N or Nm, a step), of the wrench's walk (likewise) and of
+            the measurement (m or rad).
         air: whose times count.
         period: of the filter, s.
         steps: of the filter in a decision.
@@ -76,7 +76,9 @@ def axis_lag(
         power = F @ power
 
     def coloured(time: float) -> Array:
-        """Return the autocovariance of the output for a unit wrench that lasts over ``time``."""
+        """Return the autocovariance of the output for a unit wrench of the correlation time
+        ``time``.
+        """
         phi = float(np.exp(-period / time))
         whole = np.zeros((4, 4))
         whole[:3, :3], whole[:3, 3], whole[3, 3] = F, b * (phi - 1.0), phi

@@ -1,6 +1,4 @@
-"""Steps of a command as one page: what each found in words, a picture, and the command that does it
-alone.
-"""
+"""Steps of a command as one page: findings in words, a picture, and the command of each step."""
 
 import base64
 from collections.abc import Sequence
@@ -17,11 +15,11 @@ class Step:
     """One step.
 
     Attributes:
-        title: of a few words.
-        sentences: what came of it.
-        command: what a user types to repeat it.
+        title: a few words.
+        sentences: results.
+        command: to be typed for this step alone.
         picture: PNG, or None.
-        report: page that this page links to, or empty.
+        report: linked page, or empty.
         board: rows of a leaderboard.
     """
 
@@ -36,15 +34,16 @@ class Step:
 def write_page(
     title: str, lead: str, steps: Sequence[Step], then: str, command: str, path: Path
 ) -> None:
-    """Write steps as one page that needs no network.
+    """Write steps as one page without a need of a network.
 
     Args:
-        title: of the page.
-        lead: the sentence below it.
+        title: heading of the page.
+        lead: the sentence below the heading.
         steps: in order.
-        then: what to do next; a line that begins with ``windwrench`` is a command. Empty: nothing.
-        command: that made the page.
-        path: of the page.
+        then: next steps of the user; a line beginning with ``windwrench`` is a command. Empty:
+            nothing.
+        command: behind the page.
+        path: the page's.
 
     Raises:
         InputError: the page cannot be written.

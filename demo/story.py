@@ -1,4 +1,4 @@
-"""The steps of the demonstration, each with what it found, in words, a picture and its command."""
+"""The steps of the demonstration, each with its results in words, a picture and its command."""
 
 import itertools
 import shlex
@@ -27,26 +27,26 @@ from ..runtime.page_files import write_png
 from .steps import Step
 
 CONTROLLER, SCENARIO = "admittance", "base"
-LAWS = ("hover", "admittance", "ratio", "oracle")  # of the leaderboard
-SECONDS = 25.0  # of the flight that is diagnosed
+LAWS = ("hover", "admittance", "ratio", "oracle")  # on the leaderboard
+SECONDS = 25.0  # of the recorded flight
 TRAJECTORY = "excite"
 
-Report = Callable[[float], None]  # takes the share that is done
+Report = Callable[[float], None]  # takes the share done
 
 
 @dataclass
 class Story:
-    """What is asked for, and its steps, in order: each returns what it found.
+    """The request, and its steps in order: each returns its results.
 
     Attributes:
         vehicle: as declared.
-        vehicle_name: what a user types for it.
-        effect: that the true vehicle has and its model lacks.
-        seed: of all flights.
+        vehicle_name: as typed by a user.
+        effect: of the true vehicle, missing in the model.
+        seed: for all flights.
         episodes: flights before and after the diagnosis.
         out: folder for the results.
-        log: of the recorded flight.
-        found: what its diagnosis found.
+        log: the recorded flight.
+        diagnosis: of the recorded flight.
         reports: files of the diagnosis.
     """
 
@@ -57,12 +57,12 @@ class Story:
     episodes: int
     out: Path
     log: FlightLog = field(init=False)
-    found: Diagnosis = field(init=False)
+    diagnosis: Diagnosis = field(init=False)
     reports: list[Path] = field(init=False)
 
     @property
     def effect_words(self) -> str:
-        """The effect as a user types it."""
+        """The effect as typed by a user."""
         given = ",".join(f"{name}={value:g}" for name, value in self.effect.coefficients.items())
         return f"{self.effect.name}:{given}"
 
@@ -108,11 +108,11 @@ class Story:
         ]
 
     def record(self, report: Report) -> list[Step]:
-        """Fly a vehicle that has the effect, and write the log."""
+        """Fly a vehicle with the effect, and write the log."""
         columns: dict[str, Any] = record_flight(
             self.vehicle, (self.effect,), TRAJECTORY, SECONDS, self.seed, report=report
         )
-        for truth in ("force", "torque"):  # which no real log has
+        for truth in ("force", "torque"):  # not in a real log
             del columns[truth]
         path = self.out / "flight.csv"
         self.log = FlightLog(**columns, name=path.stem, vehicle=self.vehicle.name)
@@ -138,11 +138,11 @@ class Story:
             f"windwrench diagnose {self.out / 'flight.csv'} --vehicle "
             f"{shlex.quote(self.vehicle_name)} --out {folder}"
         )
-        self.found = diagnose([self.log], self.vehicle, (), (), stage)
-        self.reports = write_report(self.found, folder, command)
+        self.diagnosis = diagnose([self.log], self.vehicle, (), (), stage)
+        self.reports = write_report(self.diagnosis, folder, command)
         told = (
             "The diagnosis sees the log and the declared vehicle.",
-            headline(self.found),
+            headline(self.diagnosis),
             f"True: {self.effect_words}.",
         )
         return [Step("Diagnose it", told, command, report="diagnose/report.html")]
@@ -151,7 +151,7 @@ class Story:
         """Fly the same episodes with the declared model and with the amended one."""
         count, law = self.episodes, make_controller(CONTROLLER)
         flown: list[Episode] = []
-        for model in (self.vehicle, self.found.amended):
+        for model in (self.vehicle, self.diagnosis.amended):
             env = FanTrackingEnv(SCENARIO, vehicle=model, effects=[self.effect], truth=self.vehicle)
             for i in range(count):
                 each = _counted(report, len(flown), 2 * count)
@@ -178,7 +178,7 @@ class Story:
         ]
 
     def compare(self, rows: Sequence[Standing], folder: Path) -> list[Step]:
-        """Return the step that a leaderboard is, whose files lie in a folder."""
+        """Return a leaderboard as a step, with its files in a folder."""
         best = ", ".join(f"{r.controller} {r.rmse_m:.3f} m" for r in rows if r.scenario == SCENARIO)
         return [
             Step(
@@ -197,7 +197,7 @@ class Story:
 
 
 def _counted(report: Report, done: int, episodes: int) -> Callable[[Any], None]:
-    """Return what is called after each decision of an episode, with ``done`` flown before it."""
+    """Return a function to call after each decision of an episode, the ``done``-th."""
     decisions = itertools.count(1)
     return lambda info: report((done + next(decisions) / DECISIONS) / episodes)
 

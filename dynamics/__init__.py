@@ -1,6 +1,4 @@
-"""What a quadrotor is: rotations, the vehicle as data, how it moves, and the physical effects on
-it.
-"""
+"""A quadrotor: rotations, the vehicle as data, its motion, and the physical effects on it."""
 
 from ..runtime.errors import InputError
 from .vehicle import EffectSetting, Mocap, Vehicle

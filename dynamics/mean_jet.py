@@ -1,10 +1,10 @@
 """The mean wind of a drum fan's jet, as a table over distance and radius.
 
-Axial speed: the momentum of an annular disc spread by a Gaussian that widens with the distance x, a
-jet still in its shear layer:
-``u^2 = U0^2 (disc of radius 0.45 less hub of radius 0.10) * Gaussian of width 0.12 x / sqrt 2``.
-The momentum flux is the same at every x, and the radial inflow (entrainment) follows from
-continuity. The convolution of a disc with a Gaussian is a non-central chi-square distribution.
+Axial speed: the momentum of an annular disc spread by a Gaussian, wider with the distance x, a jet
+still in its shear layer: ``u^2 = U0^2 (disc of radius 0.45 less hub of radius 0.10) * Gaussian of
+width 0.12 x / sqrt 2``. The momentum flux is the same at every x, and the radial inflow
+(entrainment) follows from continuity. The convolution of a disc with a Gaussian is a non-central
+chi-square distribution.
 """
 
 import math
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 AIR_DENSITY = 1.2  # kg/m3
-HULL_RADIUS = 0.26  # m, of the ring on which the wind acts on a vehicle's hull
+HULL_RADIUS = 0.26  # m, radius of the ring of the wind's action on a vehicle's hull
 HULL_STATIONS = 8  # on that ring
 # the table's distances and radii, m
 FIRST_X, STEP_X, COUNT_X = 0.2, 0.05, 137

@@ -1,7 +1,7 @@
-"""A vehicle with its effects, as fields of a record that compiled code works on.
+"""A vehicle with its effects, as fields of a record for compiled code.
 
-Filter and plant each hold one: the filter's has the declared effects, the plant's also those that
-nobody declared.
+Filter and plant each hold one: the filter's with the declared effects, the plant's also with
+undeclared ones.
 """
 
 import numpy as np
@@ -26,14 +26,14 @@ from .effects.call import add_wrenches, advance, deliver, report
 from .motion import BODY, body_record, fill_state, rotor_wrench
 from .vehicle import Vehicle
 
-MAX_EFFECTS = 16  # of a kind
+MAX_EFFECTS = 16  # a kind
 MAX_SENSING = 4
-MEMORY = 112  # numbers that a rotor-input or sensing effect may keep
+MEMORY = 112  # numbers of a rotor-input or sensing effect
 _SENSING_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
-# the model's: whether it has delivered rotor speeds yet, and those
+# the model's: whether there are delivered rotor speeds, and their values
 _OWN_ROW = MAX_EFFECTS + MAX_SENSING
 
-# fields that hold addresses of compiled effects
+# fields with addresses of compiled effects
 _ADDRESSES = ("wrench_models", "wrench_hooks", "rotor_models", "sensing_models")
 
 MODEL_FIELDS: list[tuple[object, ...]] = [
@@ -44,7 +44,7 @@ MODEL_FIELDS: list[tuple[object, ...]] = [
     ("wrench_hooks", "i8", (MAX_EFFECTS,)),
     ("wrench_count", "i8"),
     ("hooked", "i8"),  # whether any effect has a state of its own
-    ("waiting", "i8"),  # whether those states are still to be carried over the step in hand
+    ("waiting", "i8"),  # whether the states have still to be carried over this step
     ("rotor_models", "i8", (MAX_EFFECTS,)),
     ("rotor_coefficients", "f8", (MAX_EFFECTS, PARAMETERS)),
     ("rotor_count", "i8"),
@@ -101,7 +101,7 @@ def lay_addresses(record: np.void, bundle: Bundle) -> None:
 
 
 def without_addresses(record: np.ndarray) -> np.ndarray:
-    """Return a copy of a record (1,) with a model's fields that another process may read."""
+    """Return a copy of a record (1,) with a model's fields, readable in another process."""
     copy = record.copy()
     for name in _ADDRESSES:
         copy[name] = 0
@@ -109,7 +109,7 @@ def without_addresses(record: np.ndarray) -> np.ndarray:
 
 
 def reset_model(record: np.void) -> None:
-    """Forget all that effects remember, and set the time to zero."""
+    """Clear the effects' memory, and set the time to zero."""
     record["memory"], record["time"], record["waiting"] = 0.0, 0.0, 0
     record["wrench_coefficients"][:, HIDDEN:] = 0.0
 
@@ -150,8 +150,8 @@ def apply_effects(
 ) -> None:
     """Write what the wrench effects say at a state into ``f.effect_wrench``.
 
-    The first call after ``drive`` also carries the effects' own states over the step: it must be at
-    the state itself, not at a sigma point.
+    The first call after ``drive`` also carries the effects' own states over the step: made at the
+    state itself, not at a sigma point.
     """
     if f.wrench_count > 0:
         count = f.wrench_count

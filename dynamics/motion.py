@@ -1,6 +1,6 @@
 """How a quadrotor moves: the prediction model of McKinnon and Schoellig, (2)-(5) and (11)-(14).
 
-Zero-order hold: attitude, thrust, torque and wrench are those of the start of the step.
+Zero-order hold: attitude, thrust, torque and wrench are taken at the start of the step.
 """
 
 import math
@@ -182,7 +182,7 @@ def accelerations(
     )
 
 
-# rad: a step that turns the body further carries its angular momentum by the exact rotation
+# rad: beyond, a step carries the angular momentum by the exact rotation
 LONG_TURN = 0.25
 
 
@@ -193,10 +193,10 @@ def gyroscopic_rest(
     """Return the angular acceleration, rad/s2, body, that (12) lacks of the exact turn of the
     angular momentum, ``square`` being that of the step's angle.
 
-    (12) takes ``-omega x J omega`` of the step's start for all of it: explicit Euler, which adds
-    energy in each step, and without bound where a step turns far. In the body frame the momentum
-    of a free body turns by ``exp(-[omega dt]x)``, which keeps its length. Below ``LONG_TURN``,
-    where the two agree within a few percent of the gyroscopic term, (12) stands as printed.
+    (12) takes ``-omega x J omega`` at the step's start for the whole step: explicit Euler. Euler
+    adds energy in each step, and without bound in long turns. In the body frame the momentum of a
+    free body turns by ``exp(-[omega dt]x)``, at a constant length. Below ``LONG_TURN``, where the
+    two agree within a few percent of the gyroscopic term, (12) stands as printed.
     """
     hx = inertia[0, 0] * wx + inertia[0, 1] * wy + inertia[0, 2] * wz
     hy = inertia[1, 0] * wx + inertia[1, 1] * wy + inertia[1, 2] * wz
@@ -235,7 +235,7 @@ def effect_wrench(
     """Write the summed wrench (6,) of the effects into ``out``: force in the world, torque in the
     body frame.
 
-    ``state`` (STATE_SIZE,) is scratch but for the rotors' acceleration, which must be there.
+    ``state`` (STATE_SIZE,) is scratch but for the rotors' acceleration, an input.
     """
     fill_state(body, position, rotation, velocity, omega, rotor_speeds, wind, voltage, time, state)
     for i in range(6):

@@ -1,11 +1,10 @@
 """Rotations: unit quaternions (scalar first, Hamilton, body to world) and modified Rodrigues
 parameters.
 
-Equation numbers are those of McKinnon and Schoellig, *Unscented External Force and Torque
-Estimation for Quadrotors*, IROS 2016, with the sign conventions of body-to-world quaternions (see
-docs/estimator.md). The functions are compiled and write into their last argument, so that the
-filter allocates nothing in a step; arrays of rotations in Python code are better served by
-``scipy.spatial.transform.Rotation``.
+Equation numbers: McKinnon and Schoellig, *Unscented External Force and Torque Estimation for
+Quadrotors*, IROS 2016. Signs: body-to-world quaternions (see docs/estimator.md). The functions are
+compiled and write into their last argument: the filter allocates nothing in a step. For arrays of
+rotations in Python code take ``scipy.spatial.transform.Rotation``.
 """
 
 import math
@@ -20,8 +19,8 @@ Array = NDArray[np.float64]
 Numbers = tuple[float, ...]
 
 
-# Formulas of numbers, which compiled loops over many rotations share with the functions below: each
-# is compiled anew where it is called.
+# Formulas of numbers, shared by compiled loops over many rotations and the functions below; each is
+# compiled anew in its caller.
 
 
 @compiled_inline

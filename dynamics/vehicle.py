@@ -1,5 +1,5 @@
-"""What is declared of a quadrotor: rigid body, rotors, sensing, the effects that its model includes
-and how well its numbers are known.
+"""The declaration of a quadrotor: rigid body, rotors, sensing, the effects in its model and the
+accuracy of its numbers.
 
 Vehicles are data: ``vehicle_file`` reads them.
 Rotor geometry, mixing and its inverse are equations (1) and (8)-(10) of McKinnon and Schoellig,
@@ -25,15 +25,14 @@ Array = NDArray[np.float64]
 # Rotors as in the paper: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right, with x forward and
 # y left.
 _QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
-# Turning sense about body +z; the reaction on the body is opposite, which gives tau_z = M1 - M2 +
-# M3 - M4.
+# Turning sense about body +z; the reaction on the body is opposite: tau_z = M1 - M2 + M3 - M4.
 _SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
 
 _MOST_POWERS = 6  # coefficients of a motor curve
 
 
 def _must(hold: Callable[[Any], bool], words: str) -> AfterValidator:
-    """Return a validator of numbers that refuses those for which something does not hold."""
+    """Return a validator that refuses numbers without a property."""
 
     def check(value: Any) -> Any:
         if not hold(value):
@@ -142,15 +141,15 @@ class MotorCurve:
 @dataclass(frozen=True)
 class Uncertainty:
     """How well a vehicle's numbers are known: standard deviations, as shares of the numbers, of
-    errors that last for a flight and have nothing to do with each other. 0: not stated.
+    independent errors, constant over a flight. 0: not stated.
 
     Attributes:
-        mass: of the mass.
-        thrust: of all rotors' ``k`` in common.
-        rotor: of each rotor's ``k`` beside the others'. A centre of mass that is off by
-            ``arm_l / 2`` times this makes the same torque.
-        torque: of all rotors' ``p`` in common.
-        inertia: of the whole tensor.
+        mass: the mass's.
+        thrust: all rotors' ``k`` in common.
+        rotor: each rotor's ``k`` beside the others'. A centre of mass off by ``arm_l / 2`` times
+            this makes the same torque.
+        torque: all rotors' ``p`` in common.
+        inertia: the whole tensor's.
         arm_l: of the rotors' distances in common.
         command: of thrust and torques at one command, from day to day and over a battery; counts
             where rotor speeds are worked out from commands.
@@ -167,14 +166,37 @@ class Uncertainty:
     command: Share = 0.0
 
 
+Standing = Literal["identified", "assumed", "refuted"]
+
+
 @dataclass(frozen=True)
-class EffectSetting:
-    """One effect of a vehicle's model: its name and the coefficients given; those not given are
-    zero.
+class ModelStatus:
+    """What predictions of held-out flights say of a vehicle's model.
+
+    A refuted force keeps the velocity of a prediction, a refuted torque the body rate: see
+    ``windwrench.identification.predict``. Plant and filter use the numbers in any case.
 
     Attributes:
-        name: of an effect in the library.
-        coefficients: by their names, in the units that the effect states.
+        force: "identified": thrust and drag predict held-out motion no worse than an unchanged
+            velocity. "refuted": worse. "assumed": no held-out flight was predicted.
+        torque: the same of the rotors' torques and an unchanged body rate.
+        coefficients: the source of single numbers, by the names of ``identify``'s table.
+    """
+
+    __pydantic_config__ = STRICT
+
+    force: Standing = "assumed"
+    torque: Standing = "assumed"
+    coefficients: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class EffectSetting:
+    """One effect of a vehicle's model: its name and the given coefficients; the others are zero.
+
+    Attributes:
+        name: an effect of the library.
+        coefficients: by their names, in the effect's units.
     """
 
     __pydantic_config__ = STRICT
@@ -185,7 +207,7 @@ class EffectSetting:
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """A quadrotor as it is declared; SI units, body axes x forward, y left, z up.
+    """A declared quadrotor; SI units, body axes x forward, y left, z up.
 
     Attributes:
         name: of the vehicle, as messages and reports give it.
@@ -204,11 +226,12 @@ class Vehicle:
         rotor_positions: (4, 3) m from the geometric centre; default from arm_l.
         com: (3,) m, centre of mass from the geometric centre.
         mocap: how its pose is measured.
-        effects: declared effects, which the model includes.
+        effects: declared effects of the model.
         motor_curve: thrust against command; None: not known.
         floor_z: m, world, height of the floor.
         ceiling_z: m, world, height of the ceiling.
         uncertainty: how well these numbers are known.
+        status: what predictions of held-out flights say of force, torque and single numbers.
     """
 
     __pydantic_config__ = STRICT
@@ -234,6 +257,7 @@ class Vehicle:
     floor_z: Number = -math.inf
     ceiling_z: Number = math.inf
     uncertainty: Uncertainty = Uncertainty()
+    status: ModelStatus = ModelStatus()
 
     def __repr__(self) -> str:
         effects = ", ".join(effect.name for effect in self.effects) or "none"
@@ -262,7 +286,7 @@ class Vehicle:
 
     @property
     def hover_rate(self) -> float:
-        """Rotor speed in rad/s at which four equal rotors carry the weight."""
+        """Rotor speed of hover in rad/s: four equal rotors carry the weight."""
         return math.sqrt(self.weight / float(np.sum(self.k)))
 
     def rotor_wrench(self, rotor_speeds: Array) -> Array:
@@ -272,10 +296,10 @@ class Vehicle:
         return np.square(rotor_speeds) @ self.mixing.T
 
     def rotor_speeds(self, thrust: float, torque: Array) -> Array:
-        """Return the rotor speeds (4,) in rad/s that give a thrust (N) and body torques (3,) in Nm,
-        the inverse of (1).
+        """Return the rotor speeds (4,) in rad/s for a thrust (N) and body torques (3,) in Nm, the
+        inverse of (1).
 
-        What no non-negative rotor speed can give is clipped at zero and at ``omega_max``.
+        Rotor speeds are clipped at zero and at ``omega_max``.
         """
         square = np.linalg.solve(self.mixing, np.concatenate([[thrust], torque]))
         return np.minimum(np.sqrt(np.maximum(square, 0.0)), self.omega_max)

@@ -20,11 +20,11 @@ from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
 from .vehicle import _SPIN, Vehicle
 
-Deviations = Mapping[str, Mapping[str, float]]  # of coefficients, by effect
+Deviations = Mapping[str, Mapping[str, float]]  # a coefficient's, by effect
 
 
 def preset_names() -> list[str]:
-    """Return the names of the vehicles that come with the kit."""
+    """Return the names of the kit's vehicles."""
     return sorted(
         file.name[:-5]
         for file in resources.files(__package__).joinpath("vehicles").iterdir()
@@ -32,29 +32,29 @@ def preset_names() -> list[str]:
     )
 
 
-def named_vehicle(name: str, log: object, otherwise: str = "") -> Vehicle:
-    """Return the preset that a log names.
+def named_vehicle(name: str, log: object) -> Vehicle:
+    """Return the preset named by a log.
 
     Raises:
-        InputError: there is none; ``otherwise`` names further ways to say which vehicle flew.
+        InputError: no such preset.
     """
     if name not in preset_names():
         unknown = f"names the vehicle {name}, which does not come with the kit"
         what = unknown if name else "the log does not name its vehicle"
         raise InputError(
             f"{log}: {what}; expected --vehicle {', '.join(preset_names())} or the path of a YAML "
-            f"file{otherwise}"
+            "file"
         )
     return load_vehicle(name)
 
 
 def name_in_log(vehicle: Vehicle, given: str) -> str:
-    """Return the name by which a log states its vehicle; empty where a file's vehicle has the name
-    of a preset, which is another vehicle.
+    """Return the vehicle's name for a log; empty where a file's vehicle has the name of a preset,
+    another vehicle.
 
     Args:
-        vehicle: that was loaded.
-        given: the preset's name, or the path, by which it was loaded.
+        vehicle: the loaded one.
+        given: its source: the preset's name, or the path.
     """
     presets = preset_names()
     return vehicle.name if given in presets or vehicle.name not in presets else ""
@@ -64,8 +64,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     """Return a preset by its name, or the vehicle of a YAML file.
 
     Raises:
-        InputError: no such preset or file, or a field that is missing, unknown, malformed or out of
-            range.
+        InputError: no such preset or file, or a missing, unknown, malformed or out-of-range field.
     """
     path = Path(name_or_path)
     if path.suffix in {".yaml", ".yml"}:
@@ -80,7 +79,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
 
 
 def parse_vehicle(text: str, where: str = "vehicle") -> Vehicle:
-    """Return the vehicle that a YAML text describes; ``where`` names it in errors."""
+    """Return the vehicle of a YAML text; ``where`` names the text in errors."""
     return _vehicle(parse_yaml(text, where), where)
 
 
@@ -105,11 +104,11 @@ def dump_vehicle(vehicle: Vehicle, std: Deviations | None = None) -> str:
     gives the vehicle again.
 
     Args:
-        vehicle: what is written.
-        std: of a vehicle that was measured, the standard deviations of its effects' coefficients.
-            They stand beside the coefficients, and every number has two digits more than what is
-            known of it, six significant ones where nothing is. A coefficient that is zero within
-            its error is written too: one that a file does not state is fixed at zero.
+        vehicle: the vehicle.
+        std: standard deviations of its effects' coefficients, for a measured vehicle. They stand
+            beside the coefficients. Every number has two digits more than its accuracy, or six
+            significant ones without a known accuracy. A coefficient of zero within its error is
+            written, too: missing ones are fixed at zero.
     """
     data = plain(vehicle)
     if not np.any(vehicle.inertia - np.diag(np.diag(vehicle.inertia))):
@@ -139,7 +138,7 @@ def dump_vehicle(vehicle: Vehicle, std: Deviations | None = None) -> str:
 
 def _rounded(value: Any, share: float, deviation: float = 0.0) -> Any:
     """Return numbers, in lists and mappings too, with two digits more than a standard deviation, or
-    one that is a share of each; where there is neither, with six significant digits.
+    a share of each number. With neither, they have six significant digits.
     """
     if isinstance(value, dict):
         return {key: _rounded(item, share, deviation) for key, item in value.items()}

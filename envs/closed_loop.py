@@ -17,7 +17,6 @@ A user's own ``Stage`` stands before one of them.
 from __future__ import annotations
 
 import ctypes
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -27,12 +26,14 @@ import mujoco
 import numpy as np
 
 from ..controllers.flight import (
+    BESIDE,
     FLIGHT,
+    ROTORS,
     FlightGains,
     flight_record,
-    fly,
     move_setpoint,
     reset_flight,
+    steer,
 )
 from ..controllers.model_inverse import foresee, through_the_rotors
 from ..dynamics.effects import compile_effects
@@ -49,7 +50,6 @@ from ..runtime.addresses import call_at, call_step
 from ..runtime.compiled import Record, compiled, compiled_without_gil, specialised
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, STATIONS, Fan, fan_record
-from .observing import Motion
 from .plant import (
     NOISE,
     PLANT,
@@ -63,14 +63,12 @@ from .plant import (
     reset_plant,
     sense,
 )
-from .suspended_load import SuspendedLoad, hang, pull, set_down
+from .state import REFERENCE_SIZE, Motion, is_healthy
 from .untimed import Untimed
 from .wind.field import Calls, Sum, Wind, add_winds
 
 _C_FUNCTION = ctypes.CFUNCTYPE(None)
-FASTEST = 200.0  # m/s and rad/s; a vehicle is not
-WIND_EVERY = 2  # ticks over which the winds at the stations are held
-REFERENCE_SIZE = 10  # position, velocity, acceleration, yaw
+WIND_EVERY = 2  # ticks between two evaluations of the winds at the stations
 ACCELEROMETER_NOISE = 3  # unit normals of a tick with an accelerometer, behind the plant's
 
 LOOP = np.dtype(
@@ -86,15 +84,16 @@ LOOP = np.dtype(
         ("rotation", "f8", (3, 3)),  # of the vehicle, body to world, when the winds blew last
         ("points", "f8", (3, STATIONS)),  # m, world, of the vehicle's stations then
         ("air", "f8", (3, STATIONS)),  # m/s, world, of the winds there
-        ("action", "f8", (3,)),  # m/s2, beside the flight loop's own
+        ("action", "f8", (4,)),  # the command, of a kind that ``controllers.flight.steer`` knows
+        ("kind", "i8"),
         ("model_in_loop", "i8"),  # whether the flight loop counters the effects of its model
         ("accelerometer_sigma", "f8"),  # m/s2, a tick
         ("accelerometer_bias", "f8", (3,)),  # m/s2, body axes
-        # m/s2, world, mean over the last run: specific force as the accelerometer has it, and that
-        # of the rotors by the declared model
+        # m/s2, world, mean over the last run: specific force of the accelerometer, and of the
+        # rotors by the declared model
         ("specific", "f8", (3,)),
         ("thrust", "f8", (3,)),
-        # of loops in lanes: what others have from MuJoCo, and the unit normals of the tick in hand
+        # in lanes alone: MuJoCo's part, and the unit normals of the present tick
         ("qpos", "f8", (7,)),
         ("qvel", "f8", (6,)),
         ("xfrc", "f8", (6,)),
@@ -104,7 +103,7 @@ LOOP = np.dtype(
     ]
 )
 
-# what estimates the wrench in flight
+# estimators of the wrench in flight
 ESTIMATORS: dict[str, type[WrenchUKF]] = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
 
 
@@ -114,7 +113,7 @@ class World(NamedTuple):
     jet: Array  # (2, COUNT_X, COUNT_R) axial and radial speed of the jet's table
     qpos: Array  # (7,) MuJoCo's position m and quaternion of the vehicle
     qvel: Array  # (6,) MuJoCo's velocity m/s, world, and angular velocity rad/s, body
-    xfrc: Array  # (6,) force N and torque Nm, world, that MuJoCo applies
+    xfrc: Array  # (6,) force N and torque Nm, world, applied by MuJoCo
     reference: Array  # (n, REFERENCE_SIZE), a row a tick; (0, REFERENCE_SIZE): none
     winds: Calls  # (n, 2) of the compiled winds
 
@@ -124,7 +123,7 @@ class Stage:
     """A user's own stage of the pipeline: a sensor, an actuator or a wind.
 
     ``run`` takes the ``ClosedLoop`` at each tick and changes the loop's arrays in place. A pose
-    that the filter gets 2 cm off, and a rotor that loses a tenth of its speed from 5 s on:
+    2 cm off for the filter, and a rotor without a tenth of its speed from 5 s on:
 
     ```python
     def offset(loop):
@@ -135,13 +134,13 @@ class Stage:
             loop.command[0] *= 0.9
 
     stages = [Stage("offset", offset, before="estimate"), Stage("weaken", weaken, before="actuate")]
-    env = gym.make("windwrench/FanTracking-v0", stages=stages)
+    env = gym.make("windwrench/FanTracking-v1", stages=stages)
     ```
 
     A force of one's own is added to ``loop.applied`` (6,) before ``actuate``.
 
     Raises:
-        InputError: ``run`` cannot be called, or no stage of the kit has the name ``before``.
+        InputError: ``run`` is no function, or no stage of the kit has the name ``before``.
     """
 
     name: str
@@ -165,8 +164,9 @@ def blow_at(
     points: Array,
     air: Array,
 ) -> None:
-    """Write the winds at the stations of a vehicle at a pose (7,) into ``air`` (3, STATIONS) m/s,
-    and the stations' places into ``points`` (3, STATIONS) m, world.
+    """Write the winds at a vehicle's stations into ``air`` (3, STATIONS) m/s, for a pose (7,).
+
+    The stations' places in the world go into ``points`` (3, STATIONS) m.
     """
     R, s = rotation, stations
     quaternion_to_matrix(pose[3:7], R)
@@ -207,16 +207,6 @@ def _estimate(record: Record, world: World, path: Array, noise: Array, k: int) -
 
 
 @compiled
-def fly_beside(flight: Record, x: Array, action: Array) -> None:
-    """Fly to the set point with an acceleration (3,) m/s2 beside the flight loop's own."""
-    for i in range(3):
-        flight.setpoint[6 + i] += action[i]
-    fly(flight, x, TICK)
-    for i in range(3):
-        flight.setpoint[6 + i] -= action[i]
-
-
-@compiled
 def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
     """Write the rotor speeds that fly to the reference, or to the set point where there is none."""
     loop = record[0]
@@ -229,8 +219,8 @@ def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> N
         move_setpoint(flight, ukf.x, TICK)
     if loop.model_in_loop > 0:
         foresee(flight, ukf, ukf.x)
-    fly_beside(flight, ukf.x, loop.action)
-    if loop.model_in_loop > 0:
+    steer(flight, ukf.x, loop.action, loop.kind, TICK)
+    if loop.model_in_loop > 0 and loop.kind != ROTORS:
         through_the_rotors(flight, ukf)
 
 
@@ -255,8 +245,8 @@ def _actuate(record: Record, world: World, path: Array, noise: Array, k: int) ->
 
 @compiled
 def accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
-    """Add what an accelerometer in the centre of mass measures, turned into the world by the
-    estimated attitude, and what the rotors make by the declared model.
+    """Add the specific force of an accelerometer in the centre of mass, in the world by the
+    estimated attitude, and that of the rotors by the declared model.
     """
     plant, body = loop.plant, loop.flight.body
     R, E = plant.rotation, loop.flight.rotation
@@ -277,8 +267,7 @@ def accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
 
 @compiled_without_gil
 def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int) -> None:
-    """Run a tick for each row of ``noise`` in one call: what flies without a user's own stages and
-    winds.
+    """Run a tick for each row of ``noise`` in one call, without a user's own stages and winds.
 
     ``move`` is the address of a C function that calls MuJoCo's step.
     """
@@ -290,15 +279,6 @@ def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int
         _actuate(record, world, path, noise, k)
         call_at(move, 0)
         record[0].ticks += 1
-
-
-@compiled
-def is_healthy(state: Array, qvel: Array) -> bool:
-    """Return whether an estimate (20,) is finite, and no velocity (6,) larger than a vehicle's."""
-    healthy = math.isfinite(state[:19].sum())
-    for velocity in qvel:
-        healthy = healthy and abs(velocity) < FASTEST
-    return healthy
 
 
 def _compiled_stage(function: Callable[..., None]) -> Callable[[ClosedLoop], None]:
@@ -324,34 +304,35 @@ class ClosedLoop:
 
     Args:
         declared: the vehicle as filter and flight loop know it.
-        true: the vehicle as it is, with the effects that nobody declared; default: as declared.
-        tuning: of the filter; default ``UKFTuning.for_vehicle(declared)``.
+        true: the vehicle with its undeclared effects; default: as declared.
+        tuning: the filter's; default ``UKFTuning.for_vehicle(declared)``.
         fan: the jet, and the drag of the vehicle; None: still air without drag.
-        settings: of the plant.
-        gains: of the flight loop.
-        load: a body that ``hang_load`` hangs on; default: none.
-        drawn: whether the world has what is there for the eye alone.
+        settings: the plant's.
+        gains: the flight loop's.
+        drawn: whether the world has its parts for the eye alone.
         estimator: one of ``ESTIMATORS``.
         accelerometer: standard deviation in m/s2 of its noise, a tick, and of its bias. None: there
             is no accelerometer, and a tick uses ``NOISE`` unit normals instead of three more.
-        model_in_loop: whether the flight loop counters the effects that ``declared`` has.
-        stages: of a user's own, in the pipeline of a tick.
+        model_in_loop: whether the flight loop counters the effects of ``declared``.
+        kind: of the commands in ``action``, once the filter has settled.
+        stages: a user's own, in the pipeline of a tick.
 
     Attributes:
         state: (20,) estimated state, laid out as in ``estimator.estimate``.
         covariance: (18, 18) of the estimate.
         setpoint: (11,) position, velocity, acceleration, yaw and yaw rate to fly to.
-        action: (3,) m/s2, world, beside the flight loop's own acceleration.
+        action: (4,) the command, of the kind ``kind``: in m/s2, world, beside the flight loop's own
+            acceleration, or as of ``controllers.flight.steer``.
         command: (4,) rad/s, of the rotors.
-        sample: (11,) rotor speeds, position and quaternion as they were measured last.
-        unrounded: (4,) rad/s, these rotor speeds before they are rounded.
+        sample: (11,) rotor speeds, position and quaternion of the last measurement.
+        unrounded: (4,) rad/s, these rotor speeds before rounding.
         air: (STATIONS, 3) m/s, world, of the winds at the stations.
         position: (3,) m, world, true, of the geometric centre; ``quaternion`` (4,), body to world,
             and ``velocity`` (3,) m/s, world, likewise.
-        motion: MuJoCo's generalised position and velocity: the vehicle's are the first (7,) and
-            (6,). ``shown`` has them, with estimate and wrench, as a row of vehicles side by side.
-        external: (6,) true external force N and torque Nm, world; of it ``jet`` is the jet's part,
-            ``disturbance`` that of the actuators, and ``applied`` what a user applies.
+        motion: MuJoCo's generalised position and velocity, the vehicle's first (7,) and (6,).
+            ``shown`` has them, with estimate and wrench, as a row of vehicles side by side.
+        external: (6,) true external force N and torque Nm, world. Its parts are ``jet``, the
+            actuators' ``disturbance``, and a user's ``applied``.
         specific: (3,) m/s2, world, specific force by the accelerometer, mean of the last run.
         thrust: (3,) m/s2, likewise that of the rotors by the declared model.
 
@@ -367,25 +348,25 @@ class ClosedLoop:
         fan: Fan | None = None,
         settings: PlantSettings | None = None,
         gains: FlightGains | None = None,
-        load: SuspendedLoad | None = None,
         drawn: bool = False,
         estimator: str = "ukf",
         accelerometer: tuple[float, float] | None = None,
         model_in_loop: bool = False,
+        kind: int = BESIDE,
         stages: Sequence[Stage] = (),
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
         self.true = declared if true is None else true
         plant, self._body = plant_record(self.true, settings or PlantSettings())
-        self.model, self.data = load_world(self._body, load, drawn)
-        self.load, self.own_stages = load, tuple(stages)
+        self.model, self.data = self._make_world(drawn)
+        self.own_stages = tuple(stages)
         self.record = np.zeros(1, dtype=LOOP)
         loop = self.record[0]
         loop["plant"] = plant[0]
         # the flight loop's model has no effects but those of the body: mass, inertia and its centre
         loop["flight"] = flight_record(compile_effects(declared).vehicle, gains)[0]
-        loop["model_in_loop"] = model_in_loop
+        loop["model_in_loop"], self.kind = model_in_loop, kind
         self.jet_table: Array = np.zeros((2, COUNT_X, COUNT_R))  # axial and radial
         if fan is not None:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
@@ -402,13 +383,14 @@ class ClosedLoop:
         self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
         self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
         self._settled = 0  # ticks before the episode
-        self._carried = tuple(self.__dict__)  # by a copy, which lays the rest over it
+        self._carried = tuple(self.__dict__)  # to a copy, where ``_bind`` adds the rest
         self._bind()
 
+    def _make_world(self, drawn: bool) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        return load_world(self._body, drawn)
+
     def _bind(self) -> None:
-        """Lay what Python reads and writes over the record and MuJoCo's data, and find compiled
-        code.
-        """
+        """Lay Python's arrays over the record and MuJoCo's data, and find compiled code."""
         loop = self.record[0]
         loop["step"] = self.ukf.step_address
         lay_addresses(loop["plant"], compile_effects(self.true))
@@ -439,7 +421,7 @@ class ClosedLoop:
 
     @staticmethod
     def _pipeline(own: Sequence[Stage]) -> dict[str, Callable[[ClosedLoop], object]]:
-        """Return the stages of a tick by their names, in the order in which they run."""
+        """Return the stages of a tick by their names, in running order."""
         stages = {}
         for name, run in STAGES.items():
             for stage in own:
@@ -451,12 +433,21 @@ class ClosedLoop:
         return stages
 
     def _look_at_world(self) -> None:
-        """Take the arrays of MuJoCo's data, which a reset of it may move."""
+        """Take the arrays of MuJoCo's data; a reset may have moved them."""
         p, v = self.motion = self.data.qpos, self.data.qvel
         self.position, self.quaternion, self.velocity = p[:3], p[3:7], v[:3]
         xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
         self.world = World(self.jet_table, p[:7], v[:6], xfrc, self.reference, self.winds.calls)
-        shown = p[:7], v[:6], self.external, self.state, self.specific, self.thrust, self.air
+        shown = (
+            p[:7],
+            v[:6],
+            self.external,
+            self.state,
+            self.covariance,
+            self.specific,
+            self.thrust,
+            self.air,
+        )
         self.shown = Motion(*(values[np.newaxis, ..., np.newaxis] for values in shown))
 
     @property
@@ -491,31 +482,30 @@ class ClosedLoop:
         pose.
 
         Args:
-            rng: what the start is drawn from.
-            position: of the geometric centre.
+            rng: generator of the start.
+            position: the geometric centre's.
             yaw: rad.
-            winds: what blows, at its time 0 until the episode begins.
-            reference: (n, REFERENCE_SIZE), a row a tick; default: the set point stays where it is,
-                and moves with the velocity that it is given.
+            winds: at their time 0 until the episode begins.
+            reference: (n, REFERENCE_SIZE), a row a tick; default: the set point moves with its own
+                velocity alone.
 
         Raises:
-            InputError: something that is no wind, or another shape.
+            InputError: something is no wind, or has another shape.
         """
         blowing = Sum(*winds, where="ClosedLoop")
-        rows = np.zeros((0, REFERENCE_SIZE))
-        if reference is not None:
-            rows = np.ascontiguousarray(reference, dtype=np.float64)
-            if rows.shape[1:] != (REFERENCE_SIZE,) or not np.all(np.isfinite(rows)):
-                raise InputError(
-                    f"ClosedLoop: reference must be finite numbers, shape (n, {REFERENCE_SIZE}), "
-                    f"got shape {rows.shape}"
-                )
+        given = np.zeros((0, REFERENCE_SIZE)) if reference is None else reference
+        rows = np.ascontiguousarray(given, dtype=np.float64)
+        if rows.shape[1:] != (REFERENCE_SIZE,) or not np.all(np.isfinite(rows)):
+            raise InputError(
+                f"ClosedLoop: reference must be finite numbers, shape (n, {REFERENCE_SIZE}), "
+                f"got shape {rows.shape}"
+            )
         mujoco.mj_resetData(self.model, self.data)
         self.winds, self.reference = blowing, rows
         self._look_at_world()
         loop = self.record[0]
         loop["winds"] = len(blowing.winds)
-        self.action[:] = 0.0
+        self.action[:], loop["kind"] = 0.0, self.kind
         if self.accelerometer is not None:
             loop["accelerometer_bias"] = self.accelerometer[1] * rng.standard_normal(3)
         loop["ticks"] = self._settled = 0
@@ -531,46 +521,27 @@ class ClosedLoop:
         sense(self.record[0:1]["plant"][0], self.motion[0], noise)
         self.ukf.reset(self.sample[4:7], self.sample[7:11])
         loop["filter"] = self.ukf.record[0]
-        if self.load is not None:
-            set_down(self.model, self.data, self.load)
         mujoco.mj_forward(self.model, self.data)
 
     def settle(self, rng: np.random.Generator, ticks: int, fan_path: Array | None = None) -> None:
         """Let the filter settle for ``ticks`` of flight before the episode begins.
 
         Args:
-            rng: what the noise is drawn from.
-            ticks: even, so that the winds blow from the first.
-            fan_path: where the fan stands meanwhile, as ``run`` takes it.
+            rng: generator of the noise.
+            ticks: even: the winds blow from the first.
+            fan_path: the fan's place meanwhile, as in ``run``.
         """
-        self.record[0]["ticks"], self._settled = -ticks, ticks
+        self.record[0]["ticks"], self._settled, self.record[0]["kind"] = -ticks, ticks, BESIDE
         self.run(rng.standard_normal((ticks, self.noise_size)), fan_path)
-
-    def hang_load(self) -> None:
-        """Hang the load on: at rest below its anchor on the taut thread.
-
-        Raises:
-            InputError: this loop was made without a load.
-        """
-        if self.load is None:
-            raise InputError(
-                "ClosedLoop: there is no load to hang on; give one with load=SuspendedLoad(...)"
-            )
-        hang(self.model, self.data, self.load)
-
-    def load_pull(self) -> Array:
-        """Return the true force (N) and torque (Nm) about the centre of mass, (6,) world, of a load
-        on the vehicle.
-        """
-        return pull(self.data, self._body.com)
+        self.record[0]["kind"] = self.kind
 
     def run(self, noise: Array, fan_path: Array | None = None) -> None:
         """Run one tick for each row of ``noise``.
 
         Args:
             noise: (n, ``noise_size``) unit normals.
-            fan_path: (m,) the fan's y in m, or (m, 2) its y and height, tick by tick from the first
-                of this run; after the last the fan stands still. Default: y = 0.
+            fan_path: (m,) the fan's y in m, or (m, 2) its y and height, tick by tick of this run.
+                After the last row the fan stands still. Default: y = 0.
 
         Raises:
             InputError: a shape is wrong.
@@ -609,27 +580,26 @@ class ClosedLoop:
 
     @property
     def was_reset(self) -> bool:
-        """Whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state
-        is not finite. Its time then is zero.
+        """Whether MuJoCo reset the vehicle on its own, silently, for a state that is not finite.
+        Its time then is zero.
         """
         return bool(self.data.time < (self._settled + self.ticks - 0.5) * TICK)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy starts from: no views, and no addresses of this process."""
+        """Return a copy's start: no views, and no addresses of this process."""
         record = self.record.copy()
         record["step"] = 0
         for part in ("plant", "filter"):
             record[part] = without_addresses(record[part])
-        return {name: getattr(self, name) for name in (*self._carried, "_carried")} | {
-            "record": record
-        }
+        carried = {name: getattr(self, name) for name in (*self._carried, "_carried")}
+        return carried | {"record": record}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._bind()
 
     def healthy(self) -> bool:
-        """Whether it still flies: every number of plant and filter finite, and nothing faster than
-        a vehicle can be.
+        """Whether the vehicle still flies: every number of plant and filter finite, and nothing
+        faster than a vehicle.
         """
         return bool(self._is_healthy(self.state, self.world.qvel)) and not self.was_reset

@@ -1,5 +1,5 @@
-"""How this machine draws, which is settled before MuJoCo is imported, and whether it can show a
-window: MuJoCo's viewer ends the interpreter where it cannot.
+"""This machine's way to draw, settled before MuJoCo is imported, and its windows: without a display
+MuJoCo's viewer ends the interpreter.
 """
 
 import ctypes
@@ -29,10 +29,10 @@ def _choose() -> None:
 
 
 def _import_mujoco() -> None:
-    """Import MuJoCo, which refuses a way to draw that it does not know or cannot load.
+    """Import MuJoCo.
 
     Raises:
-        InputError: it does.
+        InputError: MuJoCo does not know the way to draw, or cannot load it.
     """
     try:
         import mujoco  # noqa: F401
@@ -51,8 +51,8 @@ _import_mujoco()
 
 
 def modes_shown(metadata: Mapping[str, Any]) -> list[str]:
-    """Return those of the render modes of an environment's ``metadata`` that this machine can show:
-    no ``human`` where nothing names a display.
+    """Return the render modes of an environment's ``metadata`` on this machine: without a display's
+    name no ``human``.
     """
     windows = not _LINUX or any(os.environ.get(v) for v in _VARIABLES)
     return [mode for mode in metadata["render_modes"] if mode != "human" or windows]
@@ -80,6 +80,6 @@ def need_display() -> None:
                     return
             why = f"GLFW finds none at {', '.join(named)}"
     raise InputError(
-        f"render: no window without a display ({why}); expected render_mode='rgb_array', --gif or "
-        f"--video on a machine without one"
+        f"render: no window without a display ({why}); expected render_mode='rgb_array' or "
+        f"--gif on a machine without one"
     )

@@ -1,10 +1,9 @@
-"""Drawing the world: drops that drift with the air, fans, the reference, the wrench as arrows, and
-the path flown, in a window or as a picture.
+"""Drawing the world in a window or as a picture: drops adrift in the air, fans, the reference, the
+wrench as arrows, and the path flown.
 """
 
 import math
 import time
-from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -20,22 +19,22 @@ from .wind import FanWall
 
 Array = NDArray[np.float64]
 
-# degrees that a picture of 4:3 shows from top to bottom; a wider one shows less there
+# degrees of a picture of 4:3 from top to bottom; a wider one shows less there
 _FIELD = 48.0
 SCALES = (1.6, 25.0)  # m per N, m per Nm
 _WIND_SCALES = (0.5, 8.0)  # likewise, of the tasks in the wind
-_TRAIL = 120  # pictures back that the path is shown for
+_TRAIL = 120  # pictures of path behind the vehicle
 _DROPS = 300
 # m: corners of the box of drops, from the fan; and of the tasks in the wind, in the world
 _BOX = np.array([[0.1, -0.6, -0.6], [3.6, 0.6, 0.6]])
 _WIND_BOX = np.array([[0.2, -1.6, 0.2], [4.4, 1.6, 2.8]])
-_STILL = 0.4  # m/s, of air whose drops are not shown
-_AWAY = (0.0, 0.0, -50.0)  # m, where a fan is that is not there
+_STILL = 0.4  # m/s, below which drops are not shown
+_AWAY = (0.0, 0.0, -50.0)  # m, place of a fan out of sight
 _SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 
 
 class Viewer:
-    """Draws a closed loop; one that flies along a reference is one in the wind.
+    """Draws a closed loop, in the wind or in the jet of a fan.
 
     Args:
         mode: ``"rgb_array"`` for pictures, ``"human"`` for a window.
@@ -43,8 +42,7 @@ class Viewer:
         height: likewise.
 
     Raises:
-        InputError: a window where there is no display; when it is to draw, also that this machine
-            has no way to do it.
+        InputError: a window without a display; when drawing, a machine without a way to draw.
     """
 
     def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
@@ -60,14 +58,11 @@ class Viewer:
         self._begun = 0.0  # s, of the wall's clock, at its start
         # drops only decorate, so their generator is their own
         self._rng = np.random.default_rng(0)
-        self._drops = np.full((_DROPS, 3), np.nan)  # m; drawn anew where they are in no box
+        self._drops = np.full((_DROPS, 3), np.nan)  # m; drawn anew outside the box
 
-    def open_world(self, model: Any, data: Any, near: bool = False) -> None:
-        """Make ready to draw a model, unless it is the one that was drawn last; ``near``: a wide
-        picture shows as much from side to side as one of 4:3.
-
-        Raises:
-            InputError: this machine has no way to draw.
+    def _open(self, model: Any, data: Any, near: bool) -> None:
+        """Make ready to draw a new model; ``near``: a wide picture shows as much from side to side
+        as one of 4:3.
         """
         if self._model is model:
             return
@@ -89,7 +84,7 @@ class Viewer:
                     across = up * 4 / 3 * self.height / self.width
                     model.cam_fovy[:] = math.degrees(2 * math.atan(min(up, across)))
                 self._renderer = mujoco.Renderer(model, self.height, self.width)
-        # what a missing OpenGL raises differs from one backend to the next
+        # the errors of a missing OpenGL differ from one backend to the next
         except Exception as error:
             raise InputError(
                 f"render: this machine cannot draw ({error}). Without a screen, set MUJOCO_GL=egl "
@@ -97,13 +92,13 @@ class Viewer:
                 "install Debian's libegl1 or libosmesa6"
             ) from error
 
-    def draw(self, loop: ClosedLoop) -> NDArray[np.uint8] | None:
-        """Draw the loop as it is now; return the picture (height, width, 3) unless it went to a
-        window.
+    def draw(self, loop: ClosedLoop, goal: Array | None = None) -> NDArray[np.uint8] | None:
+        """Draw the loop as it is now, in the wind with its ``goal`` (3,) m; return the picture
+        (height, width, 3), or None from a window.
         """
-        in_wind = len(loop.reference) > 0
+        in_wind = goal is not None
         self.scales = _WIND_SCALES if in_wind else SCALES
-        self.open_world(loop.model, loop.data, not in_wind)
+        self._open(loop.model, loop.data, not in_wind)
         step = min(loop.time - self._last, 0.08)
         if step < 0.0:  # another episode
             self._path.clear()
@@ -114,26 +109,34 @@ class Viewer:
         self._path.append(loop.position.copy())
         air = self._drift(loop, step, in_wind)
         mujoco.mj_kinematics(loop.model, loop.data)
+        if self._window is not None:
+            with self._window.lock():
+                self._window.user_scn.ngeom = 0
+                self._mark(self._window.user_scn, loop, air, goal)
+            self._window.sync()
+            return None
+        self._renderer.update_scene(loop.data, camera="chase")
+        self._mark(self._renderer.scene, loop, air, goal)
+        picture: NDArray[np.uint8] = self._renderer.render()
+        return picture
 
-        def mark(scene: Any) -> None:
-            for drop, speed in zip(self._drops, np.linalg.norm(air, axis=1), strict=True):
-                colour = np.array([0.25, 0.55, 0.95, 0.08 + 0.1 * min(speed, 6.0)])
-                if speed > _STILL:
-                    add_shape(scene, _SPHERE, np.full(3, 0.013), drop, colour)
-            for wind in loop.winds.winds:
-                if isinstance(wind, FanWall):
-                    _add_wall(scene, wind, loop.time)
-            for row in loop.reference[max(loop.ticks, 0) :][:1]:
-                yellow = np.array([0.95, 0.75, 0.10, 0.6])
-                add_shape(scene, _SPHERE, np.full(3, 0.035), row[:3], yellow)
-            at = loop.position
-            add_shadow(scene, at, 0.22)
-            add_path(scene, self._path[-_TRAIL:])
-            true, seen = loop.external, loop.state
-            add_wrench(scene, at, true[:3], true[5], self.scales, 0.22, true=True)
-            add_wrench(scene, at, seen[16:19], seen[15], self.scales, 0.22)
-
-        return self.show(loop.data, mark, "chase")
+    def _mark(self, scene: Any, loop: ClosedLoop, air: Array, goal: Array | None) -> None:
+        """Add drops, fans, the goal, the path and the wrench to a scene."""
+        for drop, speed in zip(self._drops, np.linalg.norm(air, axis=1), strict=True):
+            colour = np.array([0.25, 0.55, 0.95, 0.08 + 0.1 * min(speed, 6.0)])
+            if speed > _STILL:
+                add_shape(scene, _SPHERE, np.full(3, 0.013), drop, colour)
+        for wind in loop.winds.winds:
+            if isinstance(wind, FanWall):
+                _add_wall(scene, wind, loop.time)
+        if goal is not None:
+            yellow = np.array([0.95, 0.75, 0.10, 0.6])
+            add_shape(scene, _SPHERE, np.full(3, 0.035), goal, yellow)
+        at, true, seen = loop.position, loop.external, loop.state
+        add_shadow(scene, at)
+        add_path(scene, self._path[-_TRAIL:])
+        add_wrench(scene, at, true[:3], true[5], self.scales, True)
+        add_wrench(scene, at, seen[16:19], seen[15], self.scales, False)
 
     def _drift(self, loop: ClosedLoop, step: float, in_wind: bool) -> Array:
         """Place the fan, and carry the drops with the air for ``step`` s; return the air (n, 3)
@@ -153,42 +156,12 @@ class Viewer:
         drops += step * air + 0.004 * self._rng.standard_normal(drops.shape)
         return air
 
-    def show(self, data: Any, mark: Callable[[Any], None], camera: Any) -> NDArray[np.uint8] | None:
-        """Draw a world with the marks that ``mark`` adds; return the picture unless it went to a
-        window.
-
-        Args:
-            data: MuJoCo's, of the world of ``open_world``.
-            mark: adds shapes to a scene.
-            camera: name of a camera of the model, or a free one.
-        """
-        if self._window is not None:
-            with self._window.lock():
-                self._window.user_scn.ngeom = 0
-                mark(self._window.user_scn)
-            self._window.sync()
-            return None
-        self._renderer.update_scene(data, camera=camera)
-        mark(self._renderer.scene)
-        picture: NDArray[np.uint8] = self._renderer.render()
-        return picture
-
     def pixels_per_metre(self, at: Array) -> float:
-        """Return how many pixels of the last picture a metre across it takes at a place (3,) m."""
+        """Return the pixels of a metre across the last picture at a place (3,) m."""
         view = self._renderer.scene.camera[0]
-        ahead = np.asarray(at) - np.asarray(view.pos)
-        depth = float(ahead @ np.asarray(view.forward))
+        depth = float((np.asarray(at) - np.asarray(view.pos)) @ np.asarray(view.forward))
         across = float(view.frustum_top - view.frustum_bottom) / float(view.frustum_near)
         return self.height / max(across * depth, 1e-6)
-
-    @property
-    def is_open(self) -> bool:
-        """Whether there is a window that nobody has closed, or a renderer."""
-        return (
-            bool(self._window.is_running())
-            if self._window is not None
-            else self._renderer is not None
-        )
 
     def close(self) -> None:
         """Close the window or free the renderer."""
@@ -202,15 +175,10 @@ def _add_wall(scene: Any, wall: FanWall, time: float) -> None:
     """Append the fans of a wall, the brighter the faster they blow."""
     speeds = wall.speeds[min(int(time / 0.02), len(wall.speeds) - 1)]
     frame = np.column_stack([wall.axes[1], wall.axes[2], wall.axes[0]])
+    size = np.array([wall.radius, 0.03, 0.0])
     for place, speed in zip(wall.places[0], speeds, strict=True):
         share = min(speed / 6.0, 1.0)
         colour = np.array([0.20 + 0.1 * share, 0.30 + 0.4 * share, 0.40 + 0.55 * share, 1.0])
-        shape = add_shape(
-            scene,
-            mujoco.mjtGeom.mjGEOM_CYLINDER,
-            np.array([wall.radius, 0.03, 0.0]),
-            place,
-            colour,
-        )
+        shape = add_shape(scene, mujoco.mjtGeom.mjGEOM_CYLINDER, size, place, colour)
         if shape is not None:
             shape.mat[:] = frame

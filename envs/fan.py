@@ -1,15 +1,16 @@
-"""The fan of the environment: its jet with gusts, and what it does to a vehicle in it. The mean
+"""The fan of the environment: its jet with gusts, and the drag of a vehicle in the jet. The mean
 jet: ``dynamics.mean_jet``.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..controllers.briefing import standard_vehicle
 from ..dynamics.mean_jet import (
     AIR_DENSITY,
     COUNT_R,
@@ -21,34 +22,48 @@ from ..dynamics.mean_jet import (
     STEP_X,
 )
 from ..dynamics.rotation import product
+from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.vector_lanes import any_of, choose, corners
 
 Array = NDArray[np.float64]
 
-STATIONS = (
-    4 + HULL_STATIONS
-)  # where the wind acts on the vehicle: four rotors and a ring on the hull
+STATIONS = 4 + HULL_STATIONS  # points of drag: four rotors and a ring on the hull
 
 
 @dataclass(frozen=True)
 class Fan:
-    """A drum fan at (0, y, height) that blows along +x, and the drag of the vehicle that it blows
-    at.
-    """
+    """A drum fan at (0, y, height), blowing along +x, and the drag of the vehicle in front."""
 
     speed: float = 3.6  # m/s, U0 of the jet
     radius: float = 0.45  # m
     hub_radius: float = 0.10  # m
     height: float = 1.2  # m
     turbulence: float = 0.10  # standard deviation of the gusts, as a share of the local axial speed
-    gust_length: float = 0.25  # m, over which gusts at two stations are correlated
-    gust_time: float = 0.10  # s, over which they last
+    gust_length: float = 0.25  # m, correlation length of gusts at two stations
+    gust_time: float = 0.10  # s, their correlation time
     rotor_drag: float = 0.020  # N/(m/s), each rotor, in its plane
     hull_area: float = 0.060  # m2, drag area of the whole hull
-    # rad, by which the hull's stations lie in turn above and below the rotors' plane, as seen from
-    # the centre: 0 is a ring, which no jet beside it in height can pitch, 0.6 a spherical cage
+    # rad, of the hull's stations in turn above and below the rotors' plane, as seen from the
+    # centre: 0 is a ring, and a jet above pitches nothing; 0.6 is a spherical cage
     hull_elevation: float = 0.0
+    hull_radius: float = HULL_RADIUS  # m, of the hull's stations
+
+    def sized(self, vehicle: Vehicle) -> Fan:
+        """Return the fan with a hull for a vehicle: drag by the weight, lengths by the root of the
+        arm, over the standard vehicle's. Then the wind's force goes with the weight, and its torque
+        with weight and arm.
+        """
+        standard = standard_vehicle()
+        weight, length = vehicle.weight / standard.weight, vehicle.arm_l / standard.arm_l
+        length = math.sqrt(length)
+        return replace(
+            self,
+            rotor_drag=weight * self.rotor_drag,
+            hull_area=weight * self.hull_area,
+            hull_radius=length * self.hull_radius,
+            gust_length=length * self.gust_length,
+        )
 
 
 FAN = np.dtype(
@@ -58,7 +73,7 @@ FAN = np.dtype(
         ("turbulence", "f8"),
         ("rotor_drag", "f8"),
         ("hull_area", "f8"),
-        ("keep", "f8"),  # share of a gust that lasts over a tick
+        ("keep", "f8"),  # share of a gust left after a tick
         ("mixing", "f8", (STATIONS, STATIONS)),  # lower root of the correlation between stations
         ("stations", "f8", (STATIONS, 3)),  # m, body frame, from the geometric centre
         ("gusts", "f8", (STATIONS, 3)),  # unit variance
@@ -79,11 +94,11 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
         f[name] = getattr(fan, name)
     f["keep"] = math.exp(-period / fan.gust_time)
     angle = np.arange(8) * math.pi / 4
-    ring = HULL_RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)
+    ring = fan.hull_radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)
     if fan.hull_elevation != 0.0:
         above = fan.hull_elevation * (-1.0) ** np.arange(8)
         ring[:, :2] *= np.cos(above)[:, None]
-        ring[:, 2] = HULL_RADIUS * np.sin(above)
+        ring[:, 2] = fan.hull_radius * np.sin(above)
     stations = np.concatenate([rotor_positions, ring])
     f["stations"] = stations
     distance = np.linalg.norm(stations[:, None] - stations[None], axis=2)
@@ -93,7 +108,7 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
 
 @compiled
 def between(table: Array, i: float, j: float, a: float, b: float) -> float:
-    """Return what a table says shares ``a`` and ``b`` beyond its row ``i`` and column ``j``."""
+    """Interpolate a table at shares ``a`` and ``b`` beyond its row ``i`` and column ``j``."""
     near, far, near_after, far_after = corners(table, i, j)
     value: float = (1 - a) * ((1 - b) * near + b * far) + (
         a * ((1 - b) * near_after + b * far_after)
@@ -113,7 +128,7 @@ def jet_at(
     if not any_of(inside):
         wind[0], wind[1], wind[2] = 0.0, 0.0, 0.0
         return
-    # where there is no jet any place of the table will do
+    # without a jet any place of the table will do
     row, column = choose(inside, row, 0.0), choose(inside, column, 0.0)
     i, j = math.floor(row), math.floor(column)
     a, b = row - i, column - j
@@ -150,10 +165,10 @@ def jet_wrench(
     """Write force and torque about the centre of mass (6,), world frame, of the wind on the vehicle
     into ``out``.
 
-    Drag acts at the stations, each in its own wind: that is why a symmetric vehicle feels a torque
-    where the jet falls off across its span. ``velocity`` (6,) is that of the geometric centre in
-    the world, and the angular velocity in the body frame; ``wind`` (3,) is scratch; ``jet`` (2,
-    COUNT_X, COUNT_R) is the table of axial and radial speeds.
+    Drag acts at the stations, each in its own wind: so a symmetric vehicle feels a torque as the
+    jet falls off across its span. ``velocity`` (6,) holds the geometric centre's in the world, and
+    the angular velocity in the body frame. ``wind`` (3,) is scratch; ``jet`` (2, COUNT_X, COUNT_R)
+    is the table of axial and radial speeds.
     """
     R, axial, radial = rotation, jet[0], jet[1]
     for i in range(6):

@@ -4,117 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..controllers.briefing import Air, Briefing, FilterNoise, Jet, Motions
+from ..controllers.observation import MAX_COMMAND
 from ..dynamics.motion import Array
-from ..runtime.compiled import compiled_without_gil
-from ..runtime.errors import InputError
+from ..runtime.errors import InputError, unknown_name
+from .definition import EPISODE_SECONDS, LOST_OFFSET
 from .fan import Fan
-from .observing import LIMITS, SCALES, Episodes, Motion, View
-from .plant import TICK, PlantSettings
-from .scenarios import SCENARIOS, draw_fan_path
-from .task import (
-    COMMON_VALUES,
-    EPISODE_SECONDS,
-    LOST_OFFSET,
-    Frame,
-    Task,
-    is_flying,
-    keep_within,
-)
+from .fan_task import AWAY, DISTANCE, LIMITS, SCALES, FanTask
+from .scenarios import draw_fan_path
+from .state import Flags, State
 
-DECISION_TICKS = 16  # 12.5 Hz
-DISTANCE = 2.3  # m, from the fan
-TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
-CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
-_LIMITS = np.array(LIMITS)
-AWAY = 1.0  # m, off its height or its distance, at which a vehicle is lost
-FAN_TIMES = TICK * np.arange(round(EPISODE_SECONDS / TICK) + 2, dtype=np.float64)
-
-
-class FanTask(Task):
-    """What the tasks in front of a fan share: the fan moves along a path of y and height (n, 2) m,
-    a row a tick, and the agent commands velocities across its jet.
-    """
-
-    scenarios = SCENARIOS
-    decision_ticks = DECISION_TICKS
-
-    def __init__(self, *shared: Any, fan: Fan, **named: Any) -> None:
-        super().__init__(*shared, **named)
-        self.fan = replace(fan, turbulence=self.scenario.turbulence)
-
-    def briefing(self) -> Briefing:
-        """Return beside the declared vehicle the standard fan, the tuning of the filter, the
-        scenario's motions and its air.
-        """
-        fan, scenario = self.fan, self.scenario
-        plant = self.settings or PlantSettings.for_vehicle(self.vehicle)
-        air = Air(
-            plant.disturbance_force,
-            plant.disturbance_torque,
-            plant.disturbance_time,
-            fan.turbulence,
-            fan.gust_length,
-            fan.gust_time,
-        )
-        jet = Jet(fan.speed, fan.rotor_drag, fan.hull_area, DISTANCE)
-        motions = Motions(scenario.motions, scenario.speed, offset=scenario.offset)
-        return Briefing(self.vehicle, FilterNoise.of(self.tuning, TICK), air, jet, motions)
-
-    def _start(self, path: Array, offset: Array) -> None:
-        """Hover ``offset`` (2,) m beside the fan's axis."""
-        self.path, self.distance = path, self.drawn.get("distance", DISTANCE)
-        start = np.array([self.distance, *(path[0] + offset)])
-        self.loop.reset(self.np_random, start, math.pi)
-
-    def _truth(self) -> dict[str, Any]:
-        """Return beside ``Task._truth`` the places (3,) m of vehicle and set point, and where the
-        fan's axis is now and after each decision to come, (foresight + 1, 2) m.
-        """
-        loop, path = self.loop, self.path
-        rows = loop.ticks - 1 + self.decision_ticks * np.arange(self.foresight + 1)
-        return super()._truth() | {
-            "place": loop.position.copy(),
-            "setpoint": loop.setpoint[:3].copy(),
-            "fan_ahead": path[np.clip(rows, 0, len(path) - 1)],
-        }
-
-
-@compiled_without_gil
-def look_along_y(
-    which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
-) -> None:
-    """Write what ``FanTrackingEnv`` sees and tells of the episodes ``which``."""
-    lanes = motion.state.shape[2]
-    for n in np.flatnonzero(which):
-        b, lane = n // lanes, n % lanes
-        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        state, path, value = motion.state[b, :, lane].copy(), episodes.paths[n], values[n]
-        frame = frames[n]
-        for i in range(3):
-            frame[i], frame[3 + i] = state[16 + i], state[13 + i]  # force, torque
-        frame[6], frame[7] = state[8], episodes.commands[n, 0]
-        keep_within(frame, _LIMITS)
-        k = min(episodes.ticks[n], len(path) - 1)
-        value.time, value.fan_y = episodes.ticks[n] * TICK, path[max(k - 1, 0), 0]
-        value.fan_velocity = (path[k, 0] - value.fan_y) / TICK
-        value.y, value.offset = p[1], p[1] - value.fan_y
-        value.force[:], value.torque[:] = motion.wrench[b, :3, lane], motion.wrench[b, 3:, lane]
-        ratio, change = value.offset / TRACKING_WIDTH, episodes.changes[n, 0]
-        value.reward_tracking = 1.0 / (1.0 + ratio * ratio)
-        value.reward_change = -CHANGE_COST * change * change
-        # written such that a number that is not finite counts as lost
-        value.lost = episodes.broken[n] or not (
-            is_flying(state, p, v)
-            and abs(value.offset) <= LOST_OFFSET
-            and abs(p[0] - episodes.distance[n]) <= AWAY
-            and abs(p[2] - path[0, 1]) <= AWAY
-        )
+FRAMES = 25  # decisions of a history, 2 s
+# for the pose: position (m), velocity (m/s), tilt, yaw (rad), command (m/s)
+_POSE_LIMITS = (5.0, 5.0, 5.0, 5.0, 1.0, 1.0, math.pi, MAX_COMMAND)
+_POSE_SCALES = (1.0, 1.0, 1.0, 0.5, 0.1, 0.1, 0.2, 1.0)
+# limits and scales of the views
+_VIEWS = {
+    "wrench": (LIMITS, SCALES),
+    "wrench-without-fx": (LIMITS[1:], SCALES[1:]),
+    "history": (LIMITS * FRAMES, SCALES * FRAMES),
+    "pose": (_POSE_LIMITS, _POSE_SCALES),
+}
 
 
 class FanTrackingEnv(FanTask):
@@ -122,10 +35,10 @@ class FanTrackingEnv(FanTask):
 
     ## Description
 
-    A drum fan stands at the origin, blows along +x and moves along y. A quadrotor hovers 2.3 m in front of it, at the
-    height of its axis, and faces it. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
-    external force and torque, at 200 Hz. On the axis the jet pushes the vehicle back; off the axis it also turns it,
-    because its drag falls off across the vehicle's span. The agent sees the estimate, 12.5 times a second, and commands
+    A drum fan stands at the origin, blows along +x and moves along y. A quadrotor hovers 2.3 m in front of the fan, at
+    the height of its axis, and faces the fan. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
+    external force and torque, at 200 Hz. On the axis the jet pushes the vehicle back. Off the axis the
+    drag falls off across the vehicle's span and turns the vehicle, too. The agent sees the estimate, 12.5 times a second, and commands
     a velocity along y; an inner flight loop does the rest. The task follows McKinnon and Schoellig, IROS 2016, V-C.
 
     ## Action space
@@ -149,7 +62,7 @@ class FanTrackingEnv(FanTask):
     | 6   | own estimated velocity along y            | 5     | m/s  |
     | 7   | last command                              | 1     | m/s  |
 
-    Where the fan is, is not observed: ``info`` has it.
+    The fan's place is not observed: ``info`` has it.
 
     ``observe`` takes another view of the same flight, for ablations:
 
@@ -160,12 +73,13 @@ class FanTrackingEnv(FanTask):
     | `"pose"`              | 8    | no wrench: the pose, as the filter estimates it                    |
     | `"history"`           | 200  | the table above at the last 25 decisions (2 s), oldest first       |
 
-    The pose is the position since the start x, y, z (m), the velocity along y (m/s), the x and y of the body's z axis
-    (its tilt), yaw less 180 degrees (rad), and the last command. Before the start the history is as at the start.
+    The pose is the position since the start x, y, z (m), the velocity along y (m/s), and the x and y of the body's z
+    axis (its tilt). Then come yaw less 180 degrees (rad) and the last command. Before the start the history is as at the
+    start.
 
-    In v1, and with ``normalize=True``, each number is divided by a fixed scale, so that it is about 1 in flight:
+    With ``normalize=True`` each number is divided by a fixed scale, and is about 1 in flight:
     force 0.5 N, torque 0.03 Nm, velocity 0.5 m/s, command 1 m/s, position 1 m, tilt 0.1, yaw 0.2 rad.
-    The action needs no scale: it lies between -1 and 1 as it is.
+    The action needs no scale: the limits are -1 and 1 as they are.
 
     ## Rewards
 
@@ -188,7 +102,7 @@ class FanTrackingEnv(FanTask):
     ## Arguments
 
     ```python
-    gym.make("windwrench/FanTracking-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/FanTracking-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     | Parameter     | Default      | Description                                                               |
@@ -198,53 +112,91 @@ class FanTrackingEnv(FanTask):
     | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
     | `observe`     | `"wrench"`   | what is seen: `"wrench"`, `"wrench-without-fx"`, `"pose"` or `"history"`    |
 
-    All arguments of ``windwrench.envs.task.Task`` come beside these.
+    All arguments of ``windwrench.envs.Task`` come beside these.
     ``metadata["render_modes"]`` of an environment names what this machine can show: without a display, no
     `"human"`. ``reset`` refuses any ``options``.
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v2: normalised, ``observation="wrench"``; truncates its episodes itself.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
 
     name = "FanTracking"
-    action_size = 1
-
-    look = look_along_y
-    values = np.dtype(
-        [*COMMON_VALUES, *[(name, "f8") for name in ("fan_y", "fan_velocity", "y", "offset")]],
-        align=True,
-    )
-    limits, scales = LIMITS, SCALES
+    axes = (1,)
+    limits: Any = LIMITS
+    scales: Any = SCALES
+    standard = Fan()
 
     def __init__(
         self,
         *shared: Any,
-        fan: Fan | None = None,
         fan_path: Callable[[Array], Array] | None = None,
         observe: str = "wrench",
         **named: Any,
     ) -> None:
-        super().__init__(*shared, fan=fan or Fan(), **named)
-        self._see_by(View(observe, self.normalize))
-        self.fan_path = fan_path
+        if observe not in _VIEWS:
+            raise unknown_name("view", str(observe), _VIEWS, "FanTracking: observe")
+        self.fan_path, self.view = fan_path, observe
+        self.limits, self.scales = _VIEWS[observe]
+        super().__init__(*shared, **named)
 
-    def hover(self) -> None:
-        """Draw a path of the fan, and place the vehicle in hover beside its start."""
-        rng, scenario = self.np_random, self.scenario
-        self.drawn_label, fan_y = draw_fan_path(scenario, rng, FAN_TIMES)
+    def draw_path(self, rng: np.random.Generator) -> tuple[str, Array, Array]:
+        """Return the motion's name, the fan's path, and the vehicle's start beside its axis."""
+        label, fan_y = draw_fan_path(self.scenario, rng, self.times)
         if self.fan_path is not None:
-            self.drawn_label = "given"
-            fan_y = np.asarray(self.fan_path(FAN_TIMES), dtype=np.float64)
-            if fan_y.shape != FAN_TIMES.shape or not np.all(np.isfinite(fan_y)):
-                n = FAN_TIMES.size
+            label, n = "given", self.times.size
+            fan_y = np.asarray(self.fan_path(self.times), dtype=np.float64)
+            if fan_y.shape != (n,) or not np.all(np.isfinite(fan_y)):
                 raise InputError(
                     f"FanTracking: fan_path must return {n} finite numbers for {n} times"
                 )
-        offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
+        offset = float(rng.uniform(*self.scenario.offset) * rng.choice([-1.0, 1.0]))
         path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
-        self._start(path, np.array([offset, 0.0]))
+        return label, path, np.array([offset, 0.0])
+
+    def off_axis(self, s: State) -> Array:
+        """Return the vehicles' offsets (n, 1) m."""
+        return s.position[:, 1:2] - s.fan[:, :1]
+
+    def observe(self, s: State) -> Array:
+        """Return the frame, or what ``observe`` chose of it."""
+        frame, n = super().observe(s), len(s.time)
+        if self.view == "history":
+            past = s.memory.setdefault("past", np.zeros((n, FRAMES, frame.shape[1])))
+            past[s.decision == 0] = frame[s.decision == 0, None]
+            rows, now = np.arange(n), s.decision % FRAMES
+            past[rows, now] = frame
+            ordered = (now[:, None] + 1 + np.arange(FRAMES)) % FRAMES
+            history: Array = past[rows[:, None], ordered].reshape(n, -1)
+            return history
+        if self.view == "pose":
+            e = s.estimate
+            w, i, j, k = e.quaternion.T
+            yaw = np.arctan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)) - math.pi
+            tilt = 2.0 * (i * k + w * j), 2.0 * (j * k - w * i)
+            turned = np.column_stack([*tilt, np.arctan2(np.sin(yaw), np.cos(yaw))])
+            moved = e.position - s.first("place", e.position)
+            return np.concatenate([moved, frame[:, 6:7], turned, frame[:, 7:]], axis=1)
+        return frame[:, 1:] if self.view == "wrench-without-fx" else frame
+
+    def is_lost(self, s: State) -> Flags:
+        """Return whether each vehicle is lost (n,)."""
+        away = np.abs(s.position - s.reference[:, :3])
+        near = (away[:, 0] <= AWAY) & (away[:, 2] <= AWAY)
+        lost: Flags = ~(s.flying & near & (np.abs(self.off_axis(s)[:, 0]) <= LOST_OFFSET))
+        return lost
+
+    def info(self, s: State) -> dict[str, Any]:
+        """Return the fan's motion and the true offset, force and torque."""
+        y, fan_y = s.position[:, 1], s.fan[:, 0]
+        told = {"fan_y": fan_y, "fan_velocity": s.fan_velocity[:, 0], "y": y, "offset": y - fan_y}
+        if self.view != "wrench" and self.chosen is None:
+            frame = np.clip(super().observe(s), -np.array(LIMITS), LIMITS)
+            told["observation"] = np.nan_to_num(frame).astype(np.float32)
+        return {"time": s.time, "force": s.force, "torque": s.torque, **told}
 
 
-__all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]
+fan_tracking_vector = FanTrackingEnv.vector
+__all__ = ["DISTANCE", "EPISODE_SECONDS", "LOST_OFFSET", "SCALES", "FanTrackingEnv"]

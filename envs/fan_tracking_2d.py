@@ -5,68 +5,31 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import compiled_without_gil
+from ..dynamics.motion import Array
+from .definition import LOST_OFFSET
 from .fan import Fan
-from .fan_tracking import AWAY, CHANGE_COST, FAN_TIMES, TRACKING_WIDTH, FanTask
-from .observing import Episodes, Motion
-from .plant import TICK
+from .fan_task import AWAY, LIMITS, SCALES, FanTask
 from .scenarios import draw_fan_path
-from .task import COMMON_VALUES, LOST_OFFSET, Frame, is_flying, keep_within
+from .state import Flags, State
 
 FAN_HEIGHT = 1.5  # m, of the fan's axis at the start
 CAGE = 0.6  # rad, of the cage's stations above and below the rotors' plane
-_VERTICAL = 0.5  # of the scenario's speeds and travels that the fan moves up and down with
-_LIMITS = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0])
-SCALES_2D = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 0.5, 1.0, 1.0)
-
-
-@compiled_without_gil
-def look_across(
-    which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
-) -> None:
-    """Write what ``FanTracking2DEnv`` sees and tells of the episodes ``which``."""
-    lanes = motion.state.shape[2]
-    for n in np.flatnonzero(which):
-        b, lane = n // lanes, n % lanes
-        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        x, path, value = motion.state[b, :, lane].copy(), episodes.paths[n], values[n]
-        frame, change = frames[n], 0.0
-        for i in range(3):
-            frame[i], frame[3 + i] = x[16 + i], x[13 + i]
-        k = min(episodes.ticks[n], len(path) - 1)
-        for i in range(2):
-            frame[6 + i], frame[8 + i] = x[8 + i], episodes.commands[n, i]
-            value.fan[i], value.position[i] = path[max(k - 1, 0), i], p[1 + i]
-            value.fan_velocity[i] = (path[k, i] - value.fan[i]) / TICK
-            change += episodes.changes[n, i] ** 2
-        keep_within(frame, _LIMITS)
-        value.time = episodes.ticks[n] * TICK
-        value.error = math.hypot(p[1] - value.fan[0], p[2] - value.fan[1])
-        value.force[:], value.torque[:] = motion.wrench[b, :3, lane], motion.wrench[b, 3:, lane]
-        value.reward_tracking = 1.0 / (1.0 + (value.error / TRACKING_WIDTH) ** 2)
-        value.reward_change = -CHANGE_COST * change
-        # written such that a number that is not finite counts as lost
-        value.lost = episodes.broken[n] or not (
-            is_flying(x, p, v)
-            and value.error <= LOST_OFFSET
-            and abs(p[0] - episodes.distance[n]) <= AWAY
-            and p[2] > 0.0
-        )
+_VERTICAL = 0.5  # share of the scenario's speeds and travels, up and down
+SCALES_2D = (*SCALES[:7], *SCALES[6:], SCALES[7])
 
 
 class FanTracking2DEnv(FanTask):
     """A quadrotor in a spherical cage must stay on the axis of a fan that moves in y and z.
 
-    What is not said here is as in ``FanTrackingEnv``: the filter, the times, the arguments ``scenario``
-    and ``fan``, and what is refused.
+    The filter, the times, the arguments ``scenario`` and ``fan``, and refusals are as in
+    ``FanTrackingEnv``.
 
     ## Description
 
-    A drum fan blows along +x and moves along y and along z. The quadrotor flies in a cage: the stations
-    on which the wind acts on its hull lie in turn 0.15 m above and below the rotors, so that a jet that
-    falls off in height pitches it as one that falls off sideways turns it (a flat ring, as in
-    ``FanTracking``, would feel no torque of a vertical offset).
+    A drum fan blows along +x and moves along y and along z. The quadrotor flies in a cage: the wind acts
+    on its hull at stations in turn 0.15 m above and below the rotors. Off the axis in height the jet
+    pitches the vehicle, and sideways turns it. A flat ring, as in ``FanTracking``, would feel no torque
+    of a vertical offset.
 
     ## Action space
 
@@ -102,41 +65,44 @@ class FanTracking2DEnv(FanTask):
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v2: normalised, ``observation="wrench"``; truncates its episodes itself.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
 
     name = "FanTracking2D"
-    action_size = 2
+    axes = (1, 2)
+    limits, scales = (*LIMITS[:7], *LIMITS[6:], LIMITS[7]), SCALES_2D
+    standard = Fan(height=FAN_HEIGHT, hull_elevation=CAGE)
+    # not read; the episodes of this version rest on the three normals a tick behind it
+    accelerometer = (0.0, 0.0)
 
-    look = look_across
-    values = np.dtype(
-        [
-            *COMMON_VALUES,
-            *[(name, "f8", (2,)) for name in ("fan", "fan_velocity", "position")],
-            ("error", "f8"),
-        ],
-        align=True,
-    )
-    limits, scales = tuple(_LIMITS), SCALES_2D
-
-    def __init__(self, *shared: Any, fan: Fan | None = None, **named: Any) -> None:
-        fan = fan or Fan(height=FAN_HEIGHT, hull_elevation=CAGE)
-        super().__init__(*shared, fan=fan, **named)
-
-    def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> Any:
-        """Return the closed loop; its accelerometer, which nobody reads, uses three more normals of
-        a tick, of which the episodes of this version are made.
-        """
-        return super().make_loop(vehicle, fan, accelerometer=(0.0, 0.0), **given)
-
-    def hover(self) -> None:
-        """Draw a path of the fan, and place the vehicle in hover beside its start."""
-        rng, scenario = self.np_random, self.scenario
-        sideways, y = draw_fan_path(scenario, rng, FAN_TIMES)
-        upwards, z = draw_fan_path(scenario, rng, FAN_TIMES)
-        self.drawn_label = f"{sideways} and {upwards}"
+    def draw_path(self, rng: np.random.Generator) -> tuple[str, Array, Array]:
+        """Return the motions' names, the fan's path, and the vehicle's start beside its axis."""
+        sideways, y = draw_fan_path(self.scenario, rng, self.times)
+        upwards, z = draw_fan_path(self.scenario, rng, self.times)
         path = np.column_stack([y, self.fan.height + _VERTICAL * z])
-        offset, side = float(rng.uniform(*scenario.offset)), float(rng.uniform(-math.pi, math.pi))
+        offset = float(rng.uniform(*self.scenario.offset))
+        side = float(rng.uniform(-math.pi, math.pi))
         beside = offset * np.array([math.cos(side), 0.5 * math.sin(side)])
-        self._start(path, beside)
+        return f"{sideways} and {upwards}", path, beside
+
+    def off_axis(self, s: State) -> Array:
+        """Return the vehicles' offsets (n, 2) m."""
+        return s.position[:, 1:] - s.fan
+
+    def is_lost(self, s: State) -> Flags:
+        """Return whether each vehicle is lost (n,)."""
+        near = np.abs(s.position[:, 0] - s.reference[:, 0]) <= AWAY
+        error = np.hypot(*self.off_axis(s).T)
+        lost: Flags = ~(s.flying & near & (s.position[:, 2] > 0.0) & (error <= LOST_OFFSET))
+        return lost
+
+    def info(self, s: State) -> dict[str, Any]:
+        """Return the fan's motion and the true place, force and torque."""
+        told = {"fan": s.fan, "fan_velocity": s.fan_velocity, "position": s.position[:, 1:]}
+        error = np.hypot(*self.off_axis(s).T)
+        return {"time": s.time, "force": s.force, "torque": s.torque, "error": error, **told}
+
+
+fan_tracking_2d_vector = FanTracking2DEnv.vector

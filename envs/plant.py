@@ -1,17 +1,20 @@
 """The plant: a quadrotor in MuJoCo with real motors, real sensing and effects that nobody declared.
 
-One tick is one sample of the motion capture (5 ms). In it the motors follow their commands, rotors,
-effects, jet and unmodelled disturbance make a wrench that holds over the tick, and MuJoCo
-integrates the rigid body in two steps.
+One tick is one sample of the motion capture (5 ms). The motors follow their commands. Rotors,
+effects, jet and unmodelled disturbance make a wrench for the tick, and MuJoCo integrates the rigid
+body in two steps.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import resources
+from typing import Any
 
 import mujoco
 import numpy as np
 
+from ..controllers.briefing import standard_vehicle
 from ..dynamics.model import (
     MODEL_FIELDS,
     apply_effects,
@@ -32,7 +35,6 @@ from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import any_of, choose
 from .fan import STATIONS, gust, jet_wrench
-from .suspended_load import SuspendedLoad, add_load
 
 TICK = 0.005  # s
 SUBSTEPS = 2
@@ -45,16 +47,16 @@ _KEPT = round(MAX_DELAY / TICK) + 1
 
 @dataclass(frozen=True)
 class PlantSettings:
-    """What the plant does that its vehicle file does not say."""
+    """Properties of the plant beyond its vehicle file."""
 
     motor_lag: float = 0.04  # s, of a first-order motor whose true rotor speed is logged
     # N, standard deviation of the unmodelled part of the actuation, each axis
     disturbance_force: float = 0.03
     disturbance_torque: float = 0.01  # Nm
-    disturbance_time: float = 0.3  # s, over which it lasts
-    # s, until what was commanded, or measured, arrives: at most ``MAX_DELAY``, whole ticks
+    disturbance_time: float = 0.3  # s, its correlation time
+    # s, delay of a command or measurement: at most ``MAX_DELAY``, whole ticks
     actuator_delay: float = 0.0  # of rotor commands, before the motors' lag
-    pose_delay: float = 0.0  # of the pose, whose rotor speeds are not late
+    pose_delay: float = 0.0  # of the pose, not of its rotor speeds
     imu_delay: float = 0.0  # of the accelerometer, where there is one
     dropout: float = 0.0  # share of the poses that are lost
     dropout_burst: float = 0.0  # s, mean length of a run of lost poses; 0: each alone
@@ -63,12 +65,14 @@ class PlantSettings:
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle) -> "PlantSettings":
-        """Return the settings with the disturbance, which is stated for the AR.Drone, scaled to a
-        vehicle.
+        """Return the settings with the AR.Drone's disturbance scaled to a vehicle: force by the
+        weight, torque by the inertia, for the same accelerations.
         """
-        force = vehicle.weight / 4.56
+        standard = standard_vehicle()
+        torque = 0.01 * (standard.weight / 4.56) * standard.arm_l / 0.1262
+        inertia = vehicle.inertia[0, 0] / standard.inertia[0, 0]
         return cls(
-            disturbance_force=0.03 * force, disturbance_torque=0.01 * force * vehicle.arm_l / 0.1262
+            disturbance_force=0.03 * (vehicle.weight / 4.56), disturbance_torque=torque * inertia
         )
 
 
@@ -79,7 +83,7 @@ PLANT = np.dtype(
         ("battery_life", "f8"),
         ("battery", "f8"),  # V now; 0: not modelled
         ("seen", "i8"),
-        # of loops in lanes all of a block have these
+        # in lanes common to a block
         ("motor_keep", "f8"),
         ("omega_lsb", "f8"),
         ("sigma_position", "f8"),
@@ -87,17 +91,17 @@ PLANT = np.dtype(
         ("disturbance_force", "f8"),
         ("disturbance_torque", "f8"),
         ("disturbance_keep", "f8"),
-        ("applied", "f8", (6,)),  # the part of ``external`` that a user applies, until it changes
-        # and each has its own of these
+        ("applied", "f8", (6,)),  # a user's part of ``external``, until changed
+        # in lanes each lane's own
         ("omega_max", "f8"),
-        # a unit normal below it loses the pose: after one that came, and after one that was lost
+        # a unit normal below loses the pose: after a pose, and after a lost one
         ("dropout", "f8"),
         ("dropout_kept", "f8"),
         ("lost", "f8", (1,)),  # 1: the last pose was lost
         ("actuator_late", "f8"),  # ticks
         ("pose_late", "f8"),
         ("imu_late", "f8"),
-        ("late", "f8", (7,)),  # what arrives now of one of ``past``
+        ("late", "f8", (7,)),  # now arriving, from one of ``past``
         ("speeds", "f8", (4,)),  # of the motors, rad/s
         # the sample: logged rotor speeds of the last tick, position, quaternion
         ("z", "f8", (11,)),
@@ -108,7 +112,7 @@ PLANT = np.dtype(
         ("q", "f8", (4,)),
         ("rho", "f8", (3,)),
         ("scratch", "f8", (3,)),
-        # of the last ticks, the newest first: rad/s; m and quaternion; m/s2, body
+        # the last ticks, the newest first: rad/s; m and quaternion; m/s2, body
         ("past_commands", "f8", (_KEPT, 4)),
         ("past_poses", "f8", (_KEPT, 7)),
         ("past_felt", "f8", (_KEPT, 3)),
@@ -134,8 +138,9 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
         vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * vehicle.hover_rate
     )
     p["omega_lsb"] = vehicle.omega_lsb
-    p["sigma_position"] = vehicle.mocap.sigma_pos_m if settings.sensor_noise else 0.0
-    p["sigma_attitude"] = vehicle.mocap.sigma_att_rad if settings.sensor_noise else 0.0
+    if settings.sensor_noise:
+        p["sigma_position"] = vehicle.mocap.sigma_pos_m
+        p["sigma_attitude"] = vehicle.mocap.sigma_att_rad
     for name in ("disturbance_force", "disturbance_torque", "battery_life"):
         p[name] = getattr(settings, name)
     p["disturbance_keep"] = math.exp(-TICK / settings.disturbance_time)
@@ -146,21 +151,21 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
                 f"PlantSettings: {name}_delay must be 0 to {MAX_DELAY} s, got {delay!r}"
             )
         p[f"{name}_late"] = round(delay / TICK)
-    share, leaves = settings.dropout, 1.0 - settings.dropout
+    share, leaves, burst = settings.dropout, 1.0 - settings.dropout, settings.dropout_burst
     if not 0.0 <= share <= 1.0:
         raise InputError(f"PlantSettings: dropout must be 0 to 1, got {share!r}")
-    if settings.dropout_burst != 0.0 and 0.0 < share < 1.0:
+    if burst != 0.0 and 0.0 < share < 1.0:
         shortest = TICK * max(1.0, share / leaves)
-        if not settings.dropout_burst >= shortest:
+        if not burst >= shortest:
             raise InputError(
                 f"PlantSettings: dropout_burst must be 0, or at least {shortest:.4g} s where a "
-                f"share of {share:g} is lost, got {settings.dropout_burst!r}"
+                f"share of {share:g} is lost, got {burst!r}"
             )
         # Gilbert, Bell System Technical Journal 39 (1960): a chain of two states
-        ends = TICK / settings.dropout_burst
+        ends = TICK / burst
         share, leaves = ends * share / leaves, ends
     p["dropout"] = ndtri(share)
-    p["dropout_kept"] = ndtri(1.0 - leaves) if settings.dropout_burst != 0.0 else p["dropout"]
+    p["dropout_kept"] = ndtri(1.0 - leaves) if burst != 0.0 else p["dropout"]
     p["voltage_ref"] = vehicle.voltage_ref
     return record, amended
 
@@ -179,21 +184,23 @@ def reset_plant(p: np.void, vehicle: Vehicle) -> None:
 
 
 def is_a_body(inertia: Array) -> bool:
-    """Return whether any body has an inertia (3, 3): none has a principal moment that exceeds the
-    sum of the others.
+    """Return whether any body has an inertia (3, 3): no principal moment exceeds the sum of the
+    others.
     """
     moments = np.linalg.eigvalsh(inertia)
     return bool(moments[0] + moments[1] >= moments[2])
 
 
 def load_world(
-    vehicle: Vehicle, load: SuspendedLoad | None = None, drawn: bool = True
+    vehicle: Vehicle, drawn: bool = True, add: Callable[[Any], None] | None = None
 ) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
-    """Return MuJoCo's model and data of the world with a vehicle whose body effects are applied,
-    and a load for it.
+    """Return MuJoCo's model and data of the world with a vehicle after its body effects.
 
-    One that is not ``drawn`` has nothing that is there for the eye alone: it moves as the other
-    does, bit for bit, and a fifth faster.
+    Args:
+        vehicle: with its body effects applied.
+        drawn: whether the world has its parts for the eye alone. Without them the vehicle moves
+            alike, bit for bit, a fifth faster.
+        add: adds constrained bodies to the world before it is compiled; default: none.
 
     Raises:
         InputError: no body has the vehicle's inertia.
@@ -204,25 +211,24 @@ def load_world(
     if not is_a_body(vehicle.inertia):
         raise InputError(
             f"{vehicle.name}: no body has the principal moments of inertia {moments[0]:.4g}, "
-            f"{moments[1]:.4g} and "
-            f"{moments[2]:.4g} kg m2: the largest exceeds the sum of the others"
+            f"{moments[1]:.4g} and {moments[2]:.4g} kg m2: the largest exceeds the sum of the "
+            f"others"
         )
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
-    # before it is compiled: the compiler takes short cuts for a centre of mass that lies in the
-    # body's origin
+    # before compilation: the compiler takes short cuts for a centre of mass in the body's origin
     body = spec.body("vehicle")
     body.mass, body.inertia, body.ipos, body.iquat = vehicle.mass, moments, vehicle.com, quaternion
-    if load is not None:
-        add_load(spec, load)
+    if add is not None:
+        add(spec)
     spec.compiler.discardvisual = not drawn
     if not drawn:
         for part in (*spec.cameras, *spec.lights, spec.body("fan")):
             spec.delete(part)
     model = spec.compile()
-    if load is None:  # whose thread is the world's one constraint, and could have a spring
+    if add is None:  # no other constraint or spring
         flags = mujoco.mjtDisableBit
         model.opt.disableflags |= (
             int(flags.mjDSBL_CONSTRAINT) | int(flags.mjDSBL_SPRING) | int(flags.mjDSBL_DAMPER)
@@ -230,17 +236,15 @@ def load_world(
     model.opt.gravity[2] = -vehicle.gravity
     model.opt.timestep = TICK / SUBSTEPS
     # the drawing follows the vehicle's size
-    scale = vehicle.arm_l / 0.1262
-    for geom in range(model.ngeom):
-        if model.geom_bodyid[geom] == model.body("vehicle").id:
-            model.geom_pos[geom] *= scale
-            model.geom_size[geom] *= scale
+    parts = model.geom_bodyid == model.body("vehicle").id
+    for lengths in (model.geom_pos, model.geom_size):
+        lengths[parts] *= vehicle.arm_l / 0.1262
     return model, mujoco.MjData(model)
 
 
 @compiled
 def delay(past: Array, ticks: float, now: Array, late: Array) -> None:
-    """Write what ``now`` (n,) was ``ticks`` ago into ``late``; ``past`` (_KEPT, n) is kept."""
+    """Write ``now`` (n,) of ``ticks`` ago into ``late``, and keep ``past`` (_KEPT, n)."""
     late_in_any = any_of(ticks > 0.0)
     for i in range(past.shape[1]):
         late[i] = now[i]
@@ -253,13 +257,12 @@ def delay(past: Array, ticks: float, now: Array, late: Array) -> None:
 
 @compiled
 def sense(p: Record, qpos: Array, noise: Array) -> int:
-    """Write the sample that motion capture takes now into ``p.z``; return its parts (3, or 0 where
-    it is lost).
+    """Write motion capture's present sample into ``p.z``; return its parts (3, or 0 where lost).
 
     Sensing effects change the true pose before its noise comes on.
 
-    The attitude comes with a non-negative scalar part, as from a real system, so that a vehicle
-    that faces -x sees the sign of its quaternion flip several times a second.
+    The attitude comes with a non-negative scalar part, as from a real system: a vehicle facing -x
+    sees its quaternion's sign flip several times a second.
     """
     delay(p.past_poses, p.pose_late, qpos, p.late)
     for i in range(7):
@@ -293,7 +296,7 @@ def note_loss(p: Record, noise: Array) -> None:
 
 @compiled
 def lose_pose(p: Record, noise: Array) -> None:
-    """Write NaN for the pose in ``p.z`` where it is lost: what ``sense`` returns, as numbers."""
+    """Write NaN for a lost pose in ``p.z``: the answer of ``sense``, as numbers."""
     note_loss(p, noise)
     for i in range(4, 11):
         p.z[i] = choose(p.lost[0] > 0.0, math.nan, p.z[i])
@@ -310,7 +313,7 @@ def follow(p: Record, command: Array) -> None:
 
 @compiled
 def log_speeds(p: Record, speeds: Array) -> None:
-    """Write rotor speeds (4,) rad/s into ``p.z``, rounded as they are logged."""
+    """Write rotor speeds (4,) rad/s into ``p.z``, rounded as in the log."""
     for i in range(4):
         if p.omega_lsb == 0.0:
             p.z[i] = speeds[i]
@@ -368,8 +371,8 @@ def actuate(
     noise: Array,
     xfrc: Array,
 ) -> None:
-    """Let the motors follow their commands for one tick and write the wrench that acts in it into
-    ``xfrc`` (6,).
+    """Let the motors follow their commands for one tick and write the tick's wrench into ``xfrc``
+    (6,).
     """
     follow(p, command)
     load = 0.0

@@ -12,23 +12,28 @@ REFERENCE_FADE = 1.5  # s, over which a moving reference gets up to speed
 
 
 def hold(position: Array, yaw: float, seconds: float) -> Array:
-    """Return a reference (n, 10) that stays at ``position`` (3,) m."""
-    return _rows(np.tile(position, (round(seconds / TICK) + 1, 1)), yaw)
+    """Return a reference (n, 10) at rest at ``position`` (3,) m."""
+    return along(np.tile(position, (round(seconds / TICK) + 1, 1)), yaw)
 
 
-def _rows(position: Array, yaw: float) -> Array:
-    """Return a reference from places (n, 3) m a tick apart, with velocity and acceleration by
-    central differences.
+def along(position: Array, yaw: float) -> Array:
+    """Return a reference (n, 10) from places (n, 3) m a tick apart, with velocity and acceleration
+    by central differences.
     """
     rows = np.zeros((len(position), 10))
     rows[:, :3], rows[:, 9] = position, yaw
+    if len(position) < 2:
+        return rows
     rows[:, 3:6] = np.gradient(position, TICK, axis=0)
     rows[:, 6:9] = np.gradient(rows[:, 3:6], TICK, axis=0)
     return rows
 
 
-def _warp(t: Array) -> Array:
-    """Return times that run slow at first and then as ``t`` less half the fade; twice smooth."""
+def _warped(seconds: float) -> Array:
+    """Return times of the ticks in ``seconds``, slow at first and then less half the fade; twice
+    smooth.
+    """
+    t = TICK * np.arange(round(seconds / TICK) + 1, dtype=np.float64)
     u = np.clip(t / REFERENCE_FADE, 0.0, 1.0)
     # integral of the smooth step 10 u^3 - 15 u^4 + 6 u^5
     return REFERENCE_FADE * (2.5 * u**4 - 3.0 * u**5 + u**6) + np.maximum(t - REFERENCE_FADE, 0.0)
@@ -42,23 +47,22 @@ def figure_of_eight(
 
     ``along = a sin(w t)``, ``across = b sin(2 w t)``.
     """
-    t = _warp(TICK * np.arange(round(seconds / TICK) + 1, dtype=np.float64))
+    t = _warped(seconds)
     phase = 2.0 * math.pi / period * t
-    along, across = size[0] * np.sin(phase), size[1] * np.sin(2.0 * phase)
+    far, side = size[0] * np.sin(phase), size[1] * np.sin(2.0 * phase)
     c, s = math.cos(turn), math.sin(turn)
-    position = centre + np.column_stack([c * along - s * across, s * along + c * across, 0.0 * t])
-    return _rows(position, yaw)
+    position = centre + np.column_stack([c * far - s * side, s * far + c * side, 0.0 * t])
+    return along(position, yaw)
 
 
 def random_spline(
     rng: np.random.Generator, centre: Array, yaw: float, seconds: float, size: Array, every: float
 ) -> Array:
-    """Return a cubic spline (n, 10) through points drawn from a box of half ``size`` (3,) m about
-    ``centre``, one ``every`` s, which begins at the centre at rest.
+    """Return a cubic spline (n, 10) that begins at ``centre`` at rest. Every ``every`` s it passes
+    a point drawn from a box of half ``size`` (3,) m about the centre.
     """
     count = math.ceil(seconds / every) + 2
     points = centre + size * rng.uniform(-1.0, 1.0, (count, 3))
     points[0] = centre
     spline = CubicSpline(every * np.arange(count), points, bc_type=((1, np.zeros(3)), "not-a-knot"))
-    t = _warp(TICK * np.arange(round(seconds / TICK) + 1, dtype=np.float64))
-    return _rows(np.asarray(spline(t)), yaw)
+    return along(np.asarray(spline(_warped(seconds))), yaw)

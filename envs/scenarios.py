@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,14 @@ from pydantic import AfterValidator, Field
 
 from ..controllers.briefing import PLACES
 from ..dynamics.vehicle import NotNegative
-from ..runtime.errors import unknown_name
+from ..runtime.errors import InputError, unknown_name
 from ..runtime.forms import STRICT, Positive, checked, expected
+from ..runtime.python_file import is_file_name, named_in_file
 from ..runtime.yaml_file import read_yaml
 
 Array = NDArray[np.float64]
 AnyScenario = TypeVar("AnyScenario")
+_YAML = (".yaml", ".yml")
 
 
 def _ordered(value: tuple[float, float]) -> tuple[float, float]:
@@ -27,7 +29,7 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-# what a scenario's file may state
+# types of the fields of a scenario's file
 Range = Annotated[
     tuple[NotNegative, NotNegative],
     AfterValidator(_ordered),
@@ -47,8 +49,8 @@ Motions = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
-    """What is drawn anew each episode: ranges (low, high). Those that are stated here replace what
-    ``PlantSettings`` say, in their units; None: as these say.
+    """Ranges (low, high) of an episode's draws. Stated ranges replace fields of ``PlantSettings``
+    in their units; None: no draw.
     """
 
     __pydantic_config__ = STRICT
@@ -61,8 +63,7 @@ class Drawn:
 
     def draw(self, rng: np.random.Generator) -> dict[str, float]:
         """Return one value of each field by its name, uniform, in the order of the fields."""
-        ranges = vars(self)
-        return {name: float(rng.uniform(*r)) for name, r in ranges.items() if r is not None}
+        return {name: rng.uniform(*r) for name, r in vars(self).items() if r is not None}
 
 
 @dataclass(frozen=True)
@@ -78,13 +79,13 @@ class Variation(Drawn):
     fan_speed: Factors = (0.85, 1.25)
     rotor_drag: Range = (0.8, 1.2)
     hull_area: Range = (0.8, 1.2)
-    mass: Factors = (0.93, 1.07)  # of the true vehicle; the filter keeps the declared
+    mass: Factors = (0.93, 1.07)  # the true vehicle's; the filter keeps the declared
     inertia: Factors = (0.9, 1.1)
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """How the fan moves, where the vehicle starts, and what it measures with."""
+    """Motion of the fan, start of the vehicle, and its measurement."""
 
     __pydantic_config__ = STRICT
 
@@ -109,30 +110,54 @@ def kept_scenarios(section: str, form: type[AnyScenario]) -> dict[str, AnyScenar
 SCENARIOS = kept_scenarios("fan", Scenario)
 
 
-def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
-    """Return a scenario by its name, or that of a YAML file, whose fields are those of the known
-    ones and keep their defaults where the file states nothing.
+def scenarios_in(path: str, known: Mapping[str, AnyScenario]) -> dict[str, AnyScenario]:
+    """Return the scenarios of a YAML file by name: ``FILE.yaml`` where the file states the fields
+    of one, ``FILE.yaml:NAME`` where it has the groups of ``scenarios.yaml``.
 
     Raises:
-        InputError: no scenario has this name; no such file; or a field of it that is unknown,
-            malformed or out of range.
+        InputError: no such file; no group of this kind; or a field is unknown, malformed or out of
+            range.
     """
-    if name.endswith((".yaml", ".yml")):
+    form = type(next(iter(known.values())))
+    data, group = read_yaml(Path(path), "a scenario file"), "fan" if form is Scenario else "wind"
+    if not isinstance(data, Mapping) or not data or not set(data) <= {"fan", "wind"}:
+        return {path: checked(form, data, path)}
+    some = data.get(group)
+    if not isinstance(some, Mapping) or not some:
+        raise InputError(f"{path}: {group}: expected scenarios by name, as in scenarios.yaml")
+    return {f"{path}:{n}": checked(form, fields, f"{path}: {n}") for n, fields in some.items()}
+
+
+def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
+    """Return a scenario by its name, of a YAML file, or of a Python file: ``FILE.py:NAME``. A file
+    states any fields of the known scenarios; others keep their defaults.
+
+    Raises:
+        InputError: an unknown name, or as ``scenarios_in`` and ``named_in_file``.
+    """
+    if is_file_name(name):
         form = type(next(iter(known.values())))
-        return checked(form, read_yaml(Path(name), "a scenario file"), name)
+        what = f"a Python file with a {form.__name__}"
+        found = named_in_file(name, "scenario", what, lambda value: isinstance(value, form))
+        return cast(AnyScenario, found)
+    path = name if name.endswith(_YAML) else name.rpartition(":")[0]
+    if path.endswith(_YAML):
+        listed = scenarios_in(path, known)
+        if name == path and len(listed) == 1:
+            return next(iter(listed.values()))
+        known = listed
     if name not in known:
         raise unknown_name("scenario", name, known)
     return known[name]
 
 
 def draw_fan_path(scenario: Scenario, rng: np.random.Generator, t: Array) -> tuple[str, Array]:
-    """Draw how the fan moves: name of the motion, and y (n,) m at times ``t`` (n,) s.
+    """Draw the fan's motion: its name, and y (n,) m at times ``t`` (n,) s.
 
     The path starts at 0. Sine and triangle swing 0.5-1.2 m to either side; a ramp stops after
     0.8-1.6 m.
     """
     motion = scenario.motions[rng.integers(len(scenario.motions))]
-    speed = float(rng.uniform(*scenario.speed))
-    sign = float(rng.choice([-1.0, 1.0]))
-    travel = float(rng.uniform(0.5, 1.2))
+    speed, sign = rng.uniform(*scenario.speed), float(rng.choice([-1.0, 1.0]))
+    travel = rng.uniform(0.5, 1.2)
     return motion, sign * PLACES[motion](speed, travel, t)

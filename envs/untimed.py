@@ -1,5 +1,5 @@
-"""MuJoCo's steps without its clock: it reads the time two dozen times a step for ``mjData.timer``,
-which takes more than half of the step of a single free body.
+"""MuJoCo's steps without its clock: two dozen readings of the time a step, for ``mjData.timer``,
+take more than half of the step of a single free body.
 """
 
 import ctypes
@@ -23,8 +23,8 @@ def _clock() -> Any:
 
 
 class Untimed:
-    """Within ``with Untimed():`` no step of this process is timed; after the last of them, in any
-    thread, MuJoCo's own clock runs again, or the one that a user had set.
+    """Within ``with Untimed():`` no step of this process is timed. After the last block, in any
+    thread, MuJoCo's own clock or a user's runs again.
     """
 
     _lock, _inside = Lock(), 0

@@ -1,67 +1,65 @@
-"""Many environments of a task in one process: each flies its own loop, and one compiled call writes
-what came of all of them.
+"""Many environments of a task in one process: the one implementation of its flight. A single
+environment is a vector of one.
 """
 
-import inspect
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from typing import Any, ClassVar
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..dynamics.motion import Array
 from ..runtime.compiled import specialised
 from ..runtime.errors import InputError, unknown_name
-from .fan_tracking import FanTrackingEnv
-from .observing import Episodes, Flags, Motion
-from .task import Frame, Task
+from .actions import take
+from .closed_loop import ClosedLoop
+from .definition import TaskDefinition
+from .observations import limit
+from .state import Episodes, Flags, Frame, Start, State, gather
 from .untimed import Untimed
 
 Infos = dict[str, Any]
-# hooks of a task for users; ``look`` writes observation, terms of the reward and ``lost``
-_HOOKS = ("make_loop", "draw_loop", "hover", "fly")
+_COUNTS = ("no", "one", "two", "three", "four")
+SETTLE_TICKS = 300  # the filter settles before an episode starts
+
+
+class JudgedStep(NamedTuple):
+    """What a task says of the state of n worlds."""
+
+    observations: Frame  # (n, k) as the agent sees them
+    rewards: Array  # (n,)
+    lost: Flags  # (n,)
+    values: Infos  # entries of ``info``, (n, ...)
 
 
 class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     """``num_envs`` environments side by side, each bit for bit the single one with its seed.
 
-    ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. An environment whose
-    episode has ended starts its next one at the following step, whose action it ignores
-    (``AutoresetMode.NEXT_STEP``, the default), or within the step that ended it
-    (``AutoresetMode.SAME_STEP``): then ``infos["final_obs"]`` and ``infos["final_info"]`` hold what
-    ended it, as in Gymnasium's own vector environments. Each entry of ``infos`` is an array with a
-    row for each environment; all environments have all of them.
+    ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. After an episode the
+    next one starts at the following step, whose action is ignored (``AutoresetMode.NEXT_STEP``, the
+    default), or within the same step (``AutoresetMode.SAME_STEP``). There ``infos["final_obs"]``
+    and ``infos["final_info"]`` hold the episode's end, as in Gymnasium's own vector environments.
+    Each entry of ``infos`` is an array with a row for each environment.
 
     Args:
-        num_envs: how many.
-        max_episode_steps: decisions after which an episode is truncated; default: those of 20 s.
-        threads: over which the environments are spread; the results do not depend on it. MuJoCo
-            gains little by threads: its step is called through Python.
+        num_envs: number of environments.
+        max_episode_steps: decisions until an episode is truncated; default: those of
+            ``episode_s``.
+        threads: number of threads, without a change of the results. MuJoCo gains little by
+            threads: its step is called through Python.
         autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, of ``gymnasium.vector.AutoresetMode`` or its
             value as text.
-        task: whose environments they are.
-        **kwargs: of ``task``.
+        task: class of the task, or a task that is made.
+        **kwargs: arguments of the class.
 
     Raises:
-        InputError: ``num_envs`` or ``threads`` is not positive, another mode, what ``task``
-            refuses, or a ``task`` with its own ``step``, ``reset``, ``_get_obs`` or any other
-            method of ``Task`` outside ``called``.
+        InputError: ``num_envs`` or ``threads`` is not positive, the mode is another, or ``task``
+            refuses an argument.
     """
-
-    # methods of ``Task`` whose overrides hold in every environment here
-    called: ClassVar[frozenset[str]] = frozenset(
-        {
-            # construction, start of an episode, flight of a decision
-            *("_see_by", "declared", "tuning", "make_loop", "loop", "take_loop", "reference"),
-            *("_begin", "draw_loop", "hover", "refuse_draws", "fly", "decisions"),
-            *("unit_of_actions", "render", "close"),
-            # for controllers of single environments alone
-            *("briefing", "_truth"),
-        }
-    )
 
     def __init__(
         self,
@@ -69,57 +67,52 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         max_episode_steps: int | None = None,
         threads: int = 1,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        task: type[Task] = FanTrackingEnv,
+        *,
+        task: type[TaskDefinition] | TaskDefinition,
         **kwargs: Any,
     ) -> None:
-        if max_episode_steps is None:
-            max_episode_steps = task.decisions()
-        for name, value in (
-            ("num_envs", num_envs),
-            ("max_episode_steps", max_episode_steps),
-            ("threads", threads),
-        ):
+        self.task = task = task if isinstance(task, TaskDefinition) else task(**kwargs)
+        steps = task.max_decisions if max_episode_steps is None else max_episode_steps
+        counts = {"num_envs": num_envs, "max_episode_steps": steps, "threads": threads}
+        for name, value in counts.items():
             if value < 1:
                 raise InputError(f"{task.name}: {name} must be at least 1, got {value}")
-        self.task, self.autoreset_mode = task, _mode(autoreset_mode, task.name)
-        self.num_envs, self.max_episode_steps = num_envs, max_episode_steps
+        self.autoreset_mode = _mode(autoreset_mode, task.name)
+        self.num_envs, self.max_episode_steps = num_envs, steps
         self.threads = min(threads, num_envs)
-        self.envs = self._make_envs(kwargs)
-        first = self.envs[0]
-        self._refuse_uncalled(first)
-        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = first.render_mode
-        self.single_action_space = first.action_space
-        self.single_observation_space = first.observation_space
-        self.action_space = gym.vector.utils.batch_space(first.action_space, num_envs)
-        self.observation_space = gym.vector.utils.batch_space(first.observation_space, num_envs)
-        self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
-        self._begun = np.zeros(num_envs, dtype=np.bool_)
-        self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
-        self._episodes = Episodes.alike(num_envs, first.action_size, first.path, first.reference)
-        self._view = first.view.of_many(num_envs)
-        self._frames = np.zeros(self.observation_space.shape or (), dtype=np.float32)
-        # frames before a view is taken of them
-        self._whole = np.zeros((num_envs, len(first.limits)), dtype=np.float32)
-        self._table = np.zeros(num_envs, dtype=first.values)
-        self._labels = np.zeros(num_envs, dtype=object)
-        self._all = np.ones(num_envs, dtype=np.bool_)
+        self.metadata = {**task.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = task.render_mode
+        self.single_action_space = task.action_space
+        self.single_observation_space = task.observation_space
+        self.action_space = gym.vector.utils.batch_space(task.action_space, num_envs)
+        self.observation_space = gym.vector.utils.batch_space(task.observation_space, num_envs)
+        self.episodes = Episodes.zeros(num_envs, task.action_size)
+        # each environment's own generator; before its first reset a placeholder
+        self.generators: list[np.random.Generator] = [np.random.default_rng(0)] * num_envs
+        self.state = State(self.episodes, self.generators)
+        self._seeded, self._begun, self._over = np.zeros((3, num_envs), dtype=np.bool_)
+        self._fresh = np.zeros(num_envs, dtype=np.bool_)  # no step since the episode's start
+        self._some_fresh = self._ready = False
+        self._frames, self._si = np.zeros((2, num_envs, len(task.kept)), dtype=np.float32)
+        self._labels, self._all = (
+            np.zeros(num_envs, dtype=object),
+            np.ones(num_envs, dtype=np.bool_),
+        )
+        self.viewers: dict[int, Any] = {}  # of the pictures, where there are any
         self._pool: ThreadPoolExecutor | None = None
-        self._compiled: dict[Any, Callable[..., None]] = {}
-        self._motion = self._make_memory()
-
-    @property
-    def _values(self) -> Infos:
-        """Entries of ``infos``, as views."""
-        env = self.envs[0]
-        values: Infos = {name: self._table[name] for name in env.values.names or ()}
-        if env.version > 0:
-            values |= {"observation": self._whole, "command": self._episodes.commands}
-        return values | {env.label: self._labels}
+        self._compiled: dict[Any, Callable[..., Any]] = {}
+        # closed loops of each environment: in flight, and kept for its episodes
+        self.loops: list[ClosedLoop] = []
+        self._kept: list[dict[Any, ClosedLoop]] = [{} for _ in range(num_envs)]
+        self._make_memory()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy starts from: all but threads and compiled code."""
-        return self.__dict__ | {"_pool": None, "_compiled": {}}
+        """Return all but threads, windows and compiled code, for a copy."""
+        return self.__dict__ | {"_pool": None, "_compiled": {}, "viewers": {}}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.state.bind(self.episodes)
 
     def reset(
         self,
@@ -150,194 +143,283 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             )
         self._start(mask, seeds)
         self._over[mask] = False
-        return self._frames.copy(), self._infos(self._all)
+        judged = self._judge()
+        return judged.observations.copy(), self._infos(judged, self._all)
 
     def step(self, actions: Frame) -> tuple[Frame, NDArray[np.float64], Flags, Flags, Infos]:
-        """Fly a decision in every environment with actions (num_envs, n) as ``action_space`` has
-        them.
+        """Fly a decision in every environment with actions (num_envs, n) of ``action_space``.
 
         Raises:
-            InputError: another shape, or a number that is not finite; nothing has flown then.
+            InputError: another shape, or a number is not finite; nothing flies.
         """
-        task, env = self.task, self.envs[0]
-        wanted, shape = np.asarray(actions, dtype=np.float64), self._episodes.commands.shape
-        if wanted.shape != shape or not np.all(np.isfinite(wanted)):
-            raise InputError(
-                f"{task.name}: actions must be finite numbers in {env.unit_of_actions}, shape "
-                f"{shape}, got {wanted!r}"
-            )
-        if not self._begun.all():
-            raise InputError(f"{task.name}: call reset before step")
-        flying = ~self._over
-        limit, commands = env.largest_action, self._episodes.commands
-        given = np.clip(env.action_scale * wanted, -limit, limit)
-        self._episodes.changes[flying] = (given - commands)[flying]
-        commands[flying] = given[flying]
-        self._fly(flying)
-        self._look(flying)
-        self._decisions += 1
-        if self._over.any():
+        some = bool(self._over.any())
+        self.fly(actions, ~self._over if some else self._all)
+        if some:
             self._start(self._over)
-        values, truncated = self._values, self._decisions >= self.max_episode_steps
-        lost, rewards = values["lost"].copy(), values["reward_tracking"] + values["reward_change"]
-        over = lost | truncated
+        judged = self._judge()
+        truncated = self.truncated
+        over = judged.lost | truncated
         if self.autoreset_mode is AutoresetMode.NEXT_STEP or not over.any():
             self._over = over
-            return self._frames.copy(), rewards, lost, truncated, self._infos(self._all)
-        ended, final = self._infos(over), np.full(self.num_envs, None, dtype=object)
+            seen = judged.observations.copy()
+            return seen, judged.rewards, judged.lost, truncated, self._infos(judged, self._all)
+        ended, final = self._infos(judged, over), np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(over):
-            final[i] = self._frames[i].copy()
+            final[i] = judged.observations[i].copy()
         self._start(over)
+        again = self._judge()
         masks = {"_final_obs": over.copy(), "_final_info": over.copy()}
-        infos = self._infos(self._all) | {"final_obs": final, "final_info": ended} | masks
-        return self._frames.copy(), rewards, lost, truncated, infos
+        infos = self._infos(again, self._all) | {"final_obs": final, "final_info": ended} | masks
+        return again.observations.copy(), judged.rewards, judged.lost, truncated, infos
+
+    def begin(self, rng: np.random.Generator) -> JudgedStep:
+        """Start an episode of the one environment, which draws from ``rng``."""
+        self.generators[0], self._seeded[0] = rng, True
+        self._start(self._all)
+        return self._judge()
+
+    def go_on(self, action: Any, rng: np.random.Generator) -> JudgedStep:
+        """Fly a decision of the one environment, which draws from ``rng``.
+
+        Raises:
+            InputError: as ``step``.
+        """
+        self.generators[0], task = rng, self.task
+        if not self._taken([action], self._all):
+            count = f"{_COUNTS[task.action_size]} finite number{'s' * (task.action_size > 1)}"
+            raise InputError(
+                f"{task.name}: action must be {count} in {task.action_unit}, shape "
+                f"({task.action_size},), got {action!r}"
+            )
+        self._fly(self._all)
+        self._fresh[0] = self._some_fresh = False
+        return self._judge()
+
+    @property
+    def truncated(self) -> Flags:
+        """Whether each episode (n,) has had its last decision."""
+        over: Flags = self.episodes.decisions >= self.max_episode_steps
+        return over
+
+    def fly(self, actions: Any, which: Flags) -> None:
+        """Fly a decision in some environments with actions (num_envs, n).
+
+        Raises:
+            InputError: as ``step``.
+        """
+        if not self._taken(actions, which):
+            task, shape = self.task, self.episodes.actions.shape
+            raise InputError(
+                f"{task.name}: actions must be finite numbers in {task.action_unit}, shape "
+                f"{shape}, got {np.asarray(actions, dtype=np.float64)!r}"
+            )
+        self._fly(which)
+        self._fresh[which] = False
+        self._some_fresh = which is not self._all and bool(self._fresh.any())
+
+    def _taken(self, actions: Any, which: Flags) -> bool:
+        """Return whether actions (num_envs, n) are finite and of the right shape; then those of
+        ``which`` are written down.
+        """
+        if not self._ready:
+            raise InputError(f"{self.task.name}: call reset before step")
+        wanted, flown = np.array(actions, dtype=np.float64), self.task.flown
+        how = self.task.action_scale, flown.hover, flown.below, flown.above
+        if wanted.shape != self.episodes.actions.shape:
+            return False
+        return bool(self._call(take, wanted, which, *how, self.episodes))
+
+    def _judge(self) -> JudgedStep:
+        """Return what the task says of the present state."""
+        task, s = self.task, self.state
+        seen = np.ascontiguousarray(task.see(s), dtype=np.float64)
+        if seen.shape != self._si.shape:
+            raise InputError(
+                f"{task.name}: observe must return shape {self._si.shape}, got {seen.shape}"
+            )
+        self._call(limit, seen, task.kept, task.divisors, self._si, self._frames)
+        values: Infos = {"observation": self._si, "command": s.command, **task.info(s)}
+        rewards = np.zeros(self.num_envs)
+        for name, term in task.reward_terms(s).items():
+            values[f"reward_{name}"] = term
+            rewards += term
+        lost = task.is_lost(s) | self.episodes.broken
+        values["lost"], values[task.label] = lost, self._labels
+        if self._some_fresh:  # steps alone decide rewards and losses
+            for name in values:
+                if name.startswith("reward_"):
+                    values[name] = np.where(self._fresh, 0.0, values[name])
+            rewards[self._fresh], lost[self._fresh] = 0.0, False
+        if self.render_mode == "human":
+            self.render()
+        return JudgedStep(self._frames, rewards, lost, values)
 
     def _start(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
-        """Start an episode in all environments that ``which`` (num_envs,) names."""
-        started = np.flatnonzero(which).tolist()
+        """Start an episode in the environments of ``which`` (num_envs,)."""
         self._begun[which] = False
-        _, _, _, _, *moves = self._episodes
-        for numbers in (self._decisions, self._episodes.ticks, *moves):
-            numbers[which] = 0
-        self._hover(started, seeds or [None] * self.num_envs)
-        self._view.restart(which, self._states)
-        self._look(which)
-        for name in ("reward_tracking", "reward_change", "lost"):  # decided by steps
-            self._table[name][which] = 0
-        self._begun[which] = True
+        self._fresh[which] = True
+        started = np.flatnonzero(which).tolist()
+        for i in started:
+            seed = None if seeds is None else seeds[i]
+            if not self._seeded[i] or seed is not None:
+                self.generators[i], self._seeded[i] = np_random(seed)[0], True
+        for i in started:
+            for numbers in self.episodes[-4:-1]:  # commands and actions
+                numbers[i] = 0.0
+            self.episodes.decisions[i] = 0
+        self._ready = False
+        self._hover(started)
+        self._begun[which] = self._some_fresh = True
+        self._ready = bool(self._begun.all())
 
-    def _refuse_uncalled(self, env: Task) -> None:
-        """Refuse an environment with an override of a method outside ``called``."""
-        for name, own in inspect.getmembers_static(Task):
-            method = callable(own) or isinstance(own, property | classmethod | staticmethod)
-            if name.startswith("__") or name in self.called or not method:
-                continue
-            if inspect.getattr_static(env, name) is not own:
-                kind, many = type(env).__qualname__, type(self).__name__
-                held = ", ".join(n for n in _HOOKS if n in self.called)
-                raise InputError(
-                    f"{many}: task {kind} overrides {name}, which {many} never calls; "
-                    f"gym.vector.SyncVectorEnv calls {name}, and {many} calls {held} and look"
-                )
+    def _hover(self, which: list[int]) -> None:
+        """Draw an episode of some environments, and let their vehicles hover at its start. Draw
+        anew where the winds carry a vehicle off before the first decision.
+        """
+        task, drawn = self.task, {}
+        for attempt in range(task.draws):
+            for i in which:
+                rng = self.generators[i]
+                if attempt == 0:
+                    drawn[i] = task.draw_loop(rng, self._kept[i]), task.drawn
+                loop, task.drawn = drawn[i]
+                start = task.draw_start(rng)
+                self._keep(i, start)
+                reference = start.references if task.flown.follows else None
+                loop.reset(rng, start.poses[:3], start.poses[3], start.winds, reference)
+                self._place(i, loop)
+            self._settle(which)
+            lost = self.task.is_lost(self.state) | self.episodes.broken
+            which = [i for i in which if lost[i]]
+            if not which or task.draws == 1:
+                return
+        raise InputError(
+            f"{task.name}: the vehicle is lost before the episode begins in {task.draws} draws "
+            f"of these winds; expected winds that its flight loop can hold for 1.5 s"
+        )
 
-    def _make_envs(self, kwargs: dict[str, Any]) -> list[Task]:
-        """Return the environments."""
-        return [self.task(**kwargs) for _ in range(self.num_envs)]
+    def _keep(self, i: int, start: Start) -> None:
+        """Write down an environment's new episode; after its last row all stays."""
+        for name, rows in (("paths", start.paths), ("references", start.references)):
+            kept = getattr(self.episodes, name)
+            if len(rows) > kept.shape[1]:
+                more = ((0, 0), (0, len(rows) - kept.shape[1]), (0, 0))
+                kept = np.pad(kept, more, mode="edge")
+                self.episodes = self.episodes._replace(**{name: kept})
+            kept[i, : len(rows)], kept[i, len(rows) :] = rows, rows[-1]
+        self._labels[i] = start.labels
 
-    def _make_memory(self) -> Motion:
-        """Make what ``_fly`` works on; return the motion of all, which ``_fly`` writes."""
-        return Motion.zeros(self.num_envs)
+    def _make_memory(self) -> None:
+        """Make the memory of the flights."""
 
-    def _draw(self, i: int, env: Task) -> None:
-        """Write down the episode that an environment has drawn."""
-        given, labels = self._episodes, self._labels
-        if given.paths.shape[1] != len(env.path) or given.references.shape[1] != len(env.reference):
-            self._episodes = given = given._replace(
-                paths=np.zeros((self.num_envs, *env.path.shape)),
-                references=np.zeros((self.num_envs, *env.reference.shape)),
-            )
-        given.paths[i], given.references[i] = env.path, env.reference
-        given.distance[i], labels[i] = env.distance, env.drawn_label
+    def _place(self, i: int, loop: ClosedLoop) -> None:
+        """Let environment ``i`` go on with a loop at the start of an episode."""
+        if i == len(self.loops):
+            self.loops.append(loop)
+        self.loops[i] = loop
 
-    def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:
-        """Draw an episode of some environments, and let their vehicles hover at its start."""
-        self._spread(lambda i: self.envs[i].reset(seed=seeds[i]), which)
-        for i in which:
-            self._draw(i, self.envs[i])
-            self._see(i)
+    def _settle(self, which: list[int]) -> None:
+        """Let the filters of some environments settle."""
+
+        def settle(i: int) -> None:
+            self.loops[i].settle(self.generators[i], SETTLE_TICKS, self.episodes.paths[i, :1])
+
+        self._spread(settle, which)
+        self._see(which)
 
     def _fly(self, which: Flags) -> None:
         """Fly a decision in some environments at their commands."""
-        flying = np.flatnonzero(which).tolist()
-
-        def fly(i: int) -> None:
-            self.envs[i].command[:] = self._episodes.commands[i]
-            self.envs[i].fly()
-
+        flying = [0] if self.num_envs == 1 else np.flatnonzero(which).tolist()
         with Untimed():
-            self._spread(fly, flying)
-        for i in flying:
-            self._see(i)
+            self._spread(self._fly_one, flying)
+        self._see(flying)
 
-    def _see(self, i: int) -> None:
-        """Write where environment ``i`` stands."""
-        loop, episodes = self.envs[i].loop, self._episodes
-        for kept, shown in zip(self._motion, loop.shown, strict=True):
-            kept[i] = shown[0]
-        episodes.ticks[i], episodes.broken[i] = loop.ticks, loop.was_reset
+    def _fly_one(self, i: int) -> None:
+        """Fly a decision with the normals of ``standard_normal``."""
+        task, loop, path = self.task, self.loops[i], self.episodes.paths[i]
+        normals = self.generators[i].standard_normal((task.decision_ticks, loop.noise_size))
+        commanded = loop.setpoint if task.flown.moves else loop.action
+        commanded[task.flown.places] = self.episodes.commands[i]
+        loop.run(normals, path[min(loop.ticks, len(path) - 1) :])
 
-    @property
-    def _states(self) -> Array:
-        """Estimated states (num_envs, 20)."""
-        return self._rows(self._motion.state)
+    def _see(self, which: list[int]) -> None:
+        """Gather the state of some environments."""
+        episodes, s = self.episodes, self.state
+        for i in which:
+            loop = self.loops[i]
+            episodes.ticks[i], episodes.broken[i] = loop.ticks, loop.was_reset
+            self._call(gather, i, i + 1, i, loop.shown, episodes, s.rows, s.flying)
 
-    def _rows(self, values: Array) -> Array:
-        """Return values (rows, size, lanes) of the vehicles as (num_envs, size)."""
-        rows: Array = np.moveaxis(values, 1, 2).reshape(-1, values.shape[1])
-        return rows[: self.num_envs]
-
-    def _look(self, which: Flags) -> None:
-        """Write frames and values of some environments, as their task has them."""
-        given = self._episodes, self._motion, self._whole, self._table
-        self._call(self.task.look, which, *given)
-        self._frames[which] = self._view.of(which, self._whole, self._states)
-        if self.render_mode == "human":
-            self.render()
-
-    def _call(self, function: Callable[..., None], *arguments: Any) -> None:
+    def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a compiled function, always with arguments of the same types."""
         if function not in self._compiled:
             self._compiled[function] = specialised(function, *arguments)
-        self._compiled[function](*arguments)
+        return self._compiled[function](*arguments)
 
     def _spread(self, work: Callable[[int], object], which: Sequence[int]) -> None:
-        """Call ``work`` with each number, once.
-
-        A thread that is done takes the next number, so that no thread waits for a slow one.
-        """
-        numbers, threads = iter(which), min(self.threads, len(which))
-
-        def take_numbers() -> None:
-            for n in numbers:
+        """Call ``work`` with each number, once: each free thread takes the next number."""
+        if min(self.threads, len(which)) < 2:
+            for n in which:
                 work(n)
-
-        if threads < 2:
-            take_numbers()
             return
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads)
-        working = [self._pool.submit(take_numbers) for _ in range(threads)]
+        working = [self._pool.submit(work, n) for n in which]
         wait(working)
         for each in working:
             each.result()
 
-    def _infos(self, which: Flags) -> Infos:
-        """Return what some environments say as Gymnasium's vector environments do: an array and a
-        mask for each entry; zeros, or None, where the mask is not set.
+    def _infos(self, judged: JudgedStep, which: Flags) -> Infos:
+        """Return the ``infos`` of some environments as Gymnasium's vector environments do: an array
+        and a mask for each entry; zeros, or None, outside the mask.
         """
         infos: Infos = {}
-        for name, values in self._values.items():
-            kept = values.copy()
-            kept[~which] = None if kept.dtype == object else 0
+        for name, values in judged.values.items():
+            kept = np.array(values)
+            if kept.ndim == 0:
+                kept = np.full(self.num_envs, kept)
+            if which is not self._all:
+                kept[~which] = None if kept.dtype == object else 0
             infos[name], infos[f"_{name}"] = kept, which.copy()
         return infos
 
     def render(self) -> tuple[Any, ...]:
-        """Return a picture (height, width, 3) of each environment."""
-        return tuple(env.render() for env in self.envs)
+        """Return a picture (height, width, 3) of each environment, or show them in windows.
+
+        Raises:
+            InputError: not reset yet, or this machine cannot draw.
+        """
+        if self.render_mode is None or not self._ready:
+            raise InputError(
+                f"{self.task.name}: render needs a render_mode ('human' or 'rgb_array') and a "
+                f"reset before it"
+            )
+        from .drawing import Viewer
+
+        for i in range(self.num_envs - len(self.viewers)):
+            given = self.render_mode, self.task.width, self.task.height
+            self.viewers[i] = Viewer(*given)
+        goals = (
+            self.state.reference[:, :3] if self.task.fan.speed == 0.0 else [None] * self.num_envs
+        )
+        return tuple(
+            self.viewers[i].draw(*each)
+            for i, each in enumerate(zip(self.loops, goals, strict=True))
+        )
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close all environments and end the threads."""
+        """Close all windows and end the threads."""
         if self._pool is not None:
             self._pool.shutdown()
-        for env in self.envs:
-            env.close()
+        for viewer in self.viewers.values():
+            viewer.close()
+        self.viewers = {}
 
 
 def _mode(given: AutoresetMode | str, task: str) -> AutoresetMode:
-    known = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+    known = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP
     for mode in known:
-        if given is mode or given in (mode.value, mode.name):
+        if given in (mode, mode.value, mode.name):
             return mode
     raise InputError(
         f"{task}: autoreset_mode must be {' or '.join(m.name for m in known)} of "

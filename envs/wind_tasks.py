@@ -1,81 +1,24 @@
 """The tasks in the wind: holding a point, and flying a trajectory."""
 
 import math
-from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..controllers.flight import FlightGains
 from ..controllers.wind_observation import (
     MAX_ACCELERATION,
     OBSERVATION_LIMITS,
     OBSERVATION_SCALES,
-    WIND_PERIOD,
 )
 from ..dynamics.rotation import quaternion_to_matrix
-from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import compiled_without_gil
-from .closed_loop import ClosedLoop
-from .fan import STATIONS, Fan, jet_wrench
-from .observing import Episodes, Motion
+from .fan import jet_wrench
 from .plant import TICK
-from .task import (
-    COMMON_VALUES,
-    EPISODE_SECONDS,
-    LOST_OFFSET,
-    Frame,
-    Task,
-    is_flying,
-    keep_within,
-)
-from .wind import Sum, Wind
-from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_reference, draw_winds
+from .state import Start, State
+from .task import Task
+from .wind_scenarios import START, draw_reference
 
-WIND_DECISION_TICKS = 8  # 25 Hz
-TRACKING_WIDTH = 0.1  # m, error at which the tracking reward is a half
-CHANGE_COST = 0.002  # per (m/s2)^2 of change of the action
-# m/s2, standard deviation of the accelerometer's noise a tick, and of its bias
-ACCELEROMETER = (0.15, 0.05)
-_LIMITS = np.array(OBSERVATION_LIMITS)
-
-
-@compiled_without_gil
-def look_at_reference(
-    which: np.ndarray, episodes: Episodes, motion: Motion, frames: Frame, values: np.ndarray
-) -> None:
-    """Write what ``WindHoverEnv`` sees and tells of the episodes ``which``."""
-    lanes = motion.state.shape[2]
-    for n in np.flatnonzero(which):
-        b, lane = n // lanes, n % lanes
-        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        x, value, frame = motion.state[b, :, lane].copy(), values[n], frames[n]
-        rows = episodes.references[n]
-        reference = rows[min(max(episodes.ticks[n], 0), len(rows) - 1)]
-        square, change = 0.0, 0.0
-        for i in range(3):
-            frame[i], frame[3 + i] = reference[i] - x[i], x[7 + i]  # position error, velocity
-            frame[6 + i], frame[9 + i] = reference[3 + i], reference[6 + i]
-            frame[12 + i], frame[15 + i] = x[16 + i], x[13 + i]  # force, torque
-            frame[18 + i], frame[21 + i] = motion.specific[b, i, lane], motion.thrust[b, i, lane]
-            frame[24 + i] = episodes.commands[n, i]
-            value.position[i], value.reference[i] = p[i], reference[i]
-            value.force[i] = motion.wrench[b, i, lane]
-            value.torque[i] = motion.wrench[b, 3 + i, lane]
-            wind = 0.0
-            for station in range(STATIONS):
-                wind += motion.air[b, station, i, lane]
-            value.wind[i] = wind / STATIONS
-            square += (p[i] - reference[i]) * (p[i] - reference[i])
-            change += episodes.changes[n, i] * episodes.changes[n, i]
-        keep_within(frame, _LIMITS)
-        value.time, value.error = episodes.ticks[n] * TICK, math.sqrt(square)
-        value.reward_tracking = 1.0 / (1.0 + square / (TRACKING_WIDTH * TRACKING_WIDTH))
-        value.reward_change = -CHANGE_COST * change
-        # written such that a number that is not finite counts as lost
-        value.lost = episodes.broken[n] or not (
-            is_flying(x, p, v) and p[2] > 0.0 and value.error <= LOST_OFFSET
-        )
+CHANGE_COST = 0.032  # of a change of an action from 0 to 1
 
 
 class WindHoverEnv(Task):
@@ -83,13 +26,13 @@ class WindHoverEnv(Task):
 
     ## Description
 
-    A quadrotor hovers 2.3 m in front of a wall of 3 x 3 fans that switch by themselves, in a
-    sheared mean wind with turbulence, in gusts, or below another vehicle: what blows is its scenario's. It
-    must stay where it is. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
-    external force and torque, at 200 Hz, and a flight loop (position, velocity, a weak integral,
-    attitude) flies to the reference by the estimated state. The agent commands an acceleration
-    beside the flight loop's own, 25 times a second: it must cancel what the wind does before the
-    flight loop's error grows. The wind acts at 12 stations of the vehicle, each in its own air.
+    A quadrotor must stay in its place, by its scenario 2.3 m in front of a wall of 3 x 3 switching fans,
+    in a sheared mean wind with turbulence, in gusts, or below another vehicle. An unscented Kalman filter
+    turns rotor speeds and motion-capture pose into the external force and torque, at 200 Hz. A flight
+    loop (position, velocity, a weak integral, attitude) flies to the reference by the estimated state.
+    The agent commands an acceleration beside the flight loop's own, 25 times a second: the command must
+    cancel the wind before the flight loop's error grows. The wind acts at 12 stations of the vehicle,
+    each in its own air.
 
     ## Action space
 
@@ -121,8 +64,8 @@ class WindHoverEnv(Task):
     | 24-26 | last action                                              | 4     | 4     | m/s2 |
 
     The accelerometer sits in the centre of mass and has a noise of 0.15 m/s2 a tick (5 ms) and a bias of
-    0.05 m/s2, drawn each episode; it is turned into the world by the estimated attitude. The filter does
-    not use it. Wind and true force are not observed: ``info`` has them.
+    0.05 m/s2, drawn each episode. The estimated attitude turns its axes into the world. The filter does
+    not use the accelerometer. Wind and true force are not observed: ``info`` has them.
 
     ## Rewards
 
@@ -135,8 +78,8 @@ class WindHoverEnv(Task):
     ## Starting state
 
     The vehicle hovers at the start of the reference, 2.3 m in front of the wall and 1.5 m high, facing
-    it, for 1.5 s in the wind of time 0, in which the filter settles. Winds, reference and all noise are
-    drawn from the seed; winds in which the vehicle is lost before the episode begins are drawn anew.
+    the wall. For 1.5 s in the wind of time 0 the filter settles. Winds, reference and all noise are drawn
+    from the seed; winds are drawn anew where the vehicle is lost before the episode begins.
 
     ## Episode end
 
@@ -146,91 +89,61 @@ class WindHoverEnv(Task):
     ## Arguments
 
     ```python
-    gym.make("windwrench/WindHover-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/WindHover-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     | Parameter     | Default      | Description                                                          |
     | ------------- | ------------ | -------------------------------------------------------------------- |
     | `scenario`    | `"base"`     | one of `windwrench.envs.wind_scenarios.WIND_SCENARIOS`, or a `WindScenario` |
-    | `winds`       | `None`       | winds in place of the scenario's: any object with ``velocity(points, time)`` |
-    | `model_in_loop` | `True`     | whether the flight loop counters the effects that `vehicle` declares    |
-    | `gains`       | `None`       | a `FlightGains`: of the flight loop                                    |
+    | `action`      | `"acceleration"` | one of `windwrench.envs.ACTIONS`                                   |
+    | `observation` | `"own"`      | one of `windwrench.envs.OBSERVATIONS`, or the table above; `"wrench"` in v2 |
 
-    All arguments of ``windwrench.envs.task.Task`` come beside these. ``reset`` refuses any ``options``.
+    All arguments of ``windwrench.envs.Task`` come beside these. ``reset`` refuses any ``options``.
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v2: normalised, ``observation="wrench"``; truncates its episodes itself.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """  # noqa: E501
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012
     name = "WindHover"
-    moving: ClassVar[bool] = False  # whether the reference moves
-    scenarios = WIND_SCENARIOS
-    decision_ticks = WIND_DECISION_TICKS
-    action_size = 3
+    observation, normalize = "own", False
     largest_action = MAX_ACCELERATION
-    action_unit = "m/s2"
-
-    label = "trajectory"
-    accelerates, draws = True, 20
-    look = look_at_reference
-    values = np.dtype(
-        [
-            *COMMON_VALUES,
-            ("error", "f8"),
-            *[(name, "f8", (3,)) for name in ("position", "reference", "wind")],
-        ],
-        align=True,
-    )
     limits, scales = OBSERVATION_LIMITS, OBSERVATION_SCALES
+    moving: ClassVar[bool] = False  # whether the reference moves
 
-    def __init__(
-        self,
-        *shared: Any,
-        winds: Sequence[Wind] | None = None,
-        model_in_loop: bool = True,
-        gains: FlightGains | None = None,
-        **named: Any,
-    ) -> None:
-        super().__init__(*shared, **named)
-        self.winds = None if winds is None else Sum(*winds, where=f"{self.name}: winds").winds
-        self.model_in_loop, self.gains = bool(model_in_loop), gains
-        self.fan = Fan(speed=0.0, height=HEIGHT)
+    def start(self, rng: np.random.Generator, n: int) -> Start:
+        """Draw winds and references; hover at their start."""
+        winds = [self.draw_winds(rng) for _ in range(n)]
+        drawn = [draw_reference(rng, math.pi, self.episode_s, self.moving) for _ in range(n)]
+        labels, references = zip(*drawn, strict=True)
+        return Start(np.tile([*START, math.pi], (n, 1)), references, winds, labels=labels)
 
-    def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
-        """Return the closed loop of a true vehicle, with an accelerometer."""
-        return super().make_loop(
-            vehicle,
-            fan,
-            gains=self.gains,
-            accelerometer=ACCELEROMETER,
-            model_in_loop=self.model_in_loop,
-            **given,
-        )
+    def observe(self, s: State) -> NDArray[np.float64]:
+        """Return the task's own observation (n, 27)."""
+        e, r = s.estimate, s.reference
+        moved = [r[:, :3] - e.position, e.velocity, r[:, 3:9]]
+        felt = [e.force, e.torque, s.specific_force, s.specific_thrust]
+        return np.concatenate([*moved, *felt, s.command], axis=1)
 
-    def hover(self) -> None:
-        """Draw winds and reference, and place the vehicle in hover at its start."""
-        rng = self.np_random
-        drawn = draw_winds(self.scenario, rng, EPISODE_SECONDS)
-        winds = drawn if self.winds is None else self.winds
-        self.drawn_label, reference = draw_reference(rng, math.pi, EPISODE_SECONDS, self.moving)
-        self.path = np.array([[0.0, HEIGHT]])
-        self.loop.reset(rng, START, math.pi, winds, reference)
+    def reward_terms(self, s: State) -> dict[str, Any]:
+        """Return ``tracking`` and ``change``."""
+        return super().reward_terms(s) | {"change": -CHANGE_COST * s.change}
 
     def _truth(self) -> dict[str, Any]:
-        """Return beside ``Task._truth`` the actuators' disturbance (6,) N and Nm, world, and the
-        wrench (foresight, 6) of the winds over each decision to come, where the vehicle is now.
+        """Return ``Task._truth``, the actuators' disturbance (6,) N and Nm, world, and the winds'
+        wrench (foresight, 6) over each decision to come, at the vehicle's present place.
         """
         loop, R, wind = self.loop, np.empty((3, 3)), np.empty(3)
         fan = loop.record["fan"].copy()[0]
         quaternion_to_matrix(loop.quaternion, R)
         com, ahead = loop.record[0]["plant"]["body"]["com"], np.empty((self.foresight, 6))
         jet, now = loop.jet_table, (loop.position, R, loop.world.qvel, com)
-        at = loop.time + 0.5 * WIND_PERIOD
+        period = TICK * self.decision_ticks
+        at = loop.time + 0.5 * period
         for k in range(self.foresight):
-            fan["air"] = loop.winds.velocity(loop.points.T, at + k * WIND_PERIOD)
+            fan["air"] = loop.winds.velocity(loop.points.T, at + k * period)
             jet_wrench(fan, jet, *now, wind, ahead[k])
         return super()._truth() | {
             "disturbance": loop.disturbance.copy(),
@@ -241,25 +154,30 @@ class WindHoverEnv(Task):
 class WindTrajectoryEnv(WindHoverEnv):
     """A quadrotor must fly figures of eight and random splines through turbulence and jets.
 
-    Action, observation, reward, episode end and arguments are those of ``WindHoverEnv``; the
-    scenarios are those of ``WindHover``, too. What differs is the reference.
+    Action, observation, reward, episode end, arguments and scenarios are those of ``WindHoverEnv``.
+    The reference differs.
 
     ## Reference
 
     A lying figure of eight (1.0-1.4 m along, 0.4-0.6 m across, in 6-9 s, turned by any angle), or a
-    spline through random points of a box of 2.4 x 2.4 x 0.8 m, one every 1.5-2.2 s. The reference
-    gets up to speed in 1.5 s. The flight loop is given its position, velocity and acceleration, and
-    the agent sees its velocity and acceleration.
+    spline. The spline has a random point of a box of 2.4 x 2.4 x 0.8 m every 1.5-2.2 s. The
+    reference gets up to speed in 1.5 s. The flight loop is given its position, velocity and
+    acceleration, and the agent sees its velocity and acceleration.
 
     ```python
-    gym.make("windwrench/WindTrajectory-v0", scenario="base", render_mode=None)
+    gym.make("windwrench/WindTrajectory-v1", scenario="base", normalize=True, render_mode=None)
     ```
 
     ## Version history
 
-    * v1: ``normalize=True`` by default; ``info`` has ``observation`` and ``command`` in SI units.
-    * v0: initial version.
+    * v2: normalised, ``observation="wrench"``; truncates its episodes itself.
+    * v1: ``normalize``, True by default; ``info`` has ``observation`` and ``command`` in SI units.
+    * v0: v1 with ``normalize=False``, as an alias until 3.0.
     """
 
     name = "WindTrajectory"
     moving = True
+
+
+wind_hover_vector = WindHoverEnv.vector
+wind_trajectory_vector = WindTrajectoryEnv.vector

@@ -1,9 +1,6 @@
-"""Sensing: estimators of the external force and torque on a quadrotor, and how to check that they
-are consistent.
-"""
+"""Sensing: estimators of the external force and torque on a quadrotor, and their consistency."""
 
 from .constant_gain import ConstantGainFilter
-from .ekf import WrenchEKF
 from .estimate import WrenchEstimate
 from .late_poses import TimedFilter
 from .noise_fit import NoiseFit, NoiseFitSettings, fit_noise
@@ -21,7 +18,6 @@ __all__ = [
     "Recovery",
     "TimedFilter",
     "UKFTuning",
-    "WrenchEKF",
     "WrenchEstimate",
     "WrenchUKF",
     "WrenchUKFBatch",

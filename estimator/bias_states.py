@@ -1,22 +1,22 @@
 """Biases of gyro and accelerometer, and the last step's noise, beside the filter's error state.
 
-Neither enters the dynamics. A bias walks on its own; the noise of a step ends with it. So both are
-kept as what the error state e says of them and a rest that it says nothing of,
+Neither enters the dynamics. A bias walks on its own. The noise of a step ends with the step. So
+both are kept as a regression on the error state e and a rest that is independent of e,
 
     c = c_mean + T' e + r,   cov(r) = E,   r and e independent,
 
-which is their joint normal distribution with e: cov(e, c) = P T, cov(c) = T' P T + E. In this form
+their joint normal distribution with e: cov(e, c) = P T, cov(c) = T' P T + E. In this form
 
-* the joint covariance is positive definite whenever P and E are, whatever is done to P;
-* a measured pose, which is of e alone, changes neither T nor E: it moves c_mean by T' times the
-  correction of e, and a pose that is refused moves nothing;
-* the prediction carries cov(e, c) with the transition that carries P, and T is solved for anew.
+* the joint covariance is positive definite whenever P and E are, whatever happens to P.
+* A measured pose is of e alone and changes neither T nor E. The pose moves c_mean by T' times the
+  correction of e, and a refused pose moves nothing.
+* The prediction carries cov(e, c) with the transition of P, and solves for T anew.
 
-The companions c are the biases of gyro (3, rad/s) and accelerometer (3, m/s2), both in body axes,
-then the noise of the last step in standard deviations: motor torque (3) and thrust (3). With that
-noise as a state, a specific force that was measured over this step and a velocity that has moved
-with the same noise need no cross terms (Bar-Shalom, Li and Kirubarajan, 2001, section 8.2.1): they
-are there, before and after the pose of that moment.
+The companions c are the biases of gyro (3, rad/s) and accelerometer (3, m/s2), both in body axes.
+The noise of the last step follows, in standard deviations: motor torque (3) and thrust (3). A
+specific force measured over a step shares the step's noise with the velocity. With the noise as a
+state no cross terms are missing, before or after the pose of the moment (Bar-Shalom, Li and
+Kirubarajan, 2001, section 8.2.1).
 """
 
 import math
@@ -36,7 +36,7 @@ _BLIND = 1e-12  # of a variance: less than this cannot be left of it
 
 
 def load_imu(f: np.void, tuning: UKFTuning, gate: float | None) -> None:
-    """Write what ``tuning`` and ``gate``, a probability or None, say of an IMU into a filter's
+    """Write an IMU's numbers of ``tuning`` and ``gate``, a probability or None, into a filter's
     record.
     """
     imu = f["imu"]
@@ -56,9 +56,8 @@ def load_imu(f: np.void, tuning: UKFTuning, gate: float | None) -> None:
 
 @compiled
 def forget_biases(f: Record) -> None:
-    """Give the biases their prior, and forget the step before: what its rotors did is unknown.
-
-    So do a start, and a restart at a pose: the poses that it contradicts have gone into the biases.
+    """Give the biases their prior, and forget the step before with its rotors. A start does so. A
+    restart at a pose does, too: the contradicted poses have gone into the biases.
     """
     imu = f.imu
     imu.known, imu.in_row = 0, 0
@@ -80,10 +79,9 @@ def reset_imu(record: Record) -> None:
 
 @compiled
 def begin_imu(record: Record) -> None:
-    """Start to carry biases with a filter that had none so far.
-
-    What the last step's noise has to do with the error state is known if nothing was corrected
-    since; else an accelerometer says something from the next step on.
+    """Start to carry biases with a filter that had none so far. The correlation of the last step's
+    noise with the error state is known if nothing was corrected since. Otherwise an accelerometer
+    counts from the next step on.
     """
     f = record[0]
     reset_imu(record)
@@ -102,8 +100,8 @@ def bound_biases(f: Record) -> None:
 
 @compiled
 def restore_bias_prior(f: Record, first: int) -> None:
-    """Give the bias of the sensor whose first number is ``first`` (0 or 3) its prior variance, and
-    no correlation with anything: it was contradicted for too long.
+    """Give the bias of a sensor, of first number ``first`` (0 or 3), its prior variance without any
+    correlation: measurements contradicted the bias for too long.
     """
     imu, last = f.imu, first + 3
     imu.regression[:, first:last] = 0.0
@@ -122,12 +120,12 @@ def cross_covariance(f: Record, columns: int) -> Array:
 
 @compiled
 def split(f: Record, cross: Array, joint: Array) -> None:
-    """Write what the error state says of the companions, and what it does not, from their
-    covariance with it, ``cross`` (18, 12), and among themselves, ``joint`` (12, 12).
+    """Write regression and rest of the companions, from their covariance with the error state,
+    ``cross`` (18, 12), and among themselves, ``joint`` (12, 12).
     """
     P, imu = f.P, f.imu
     imu.bias_covariance[:] = joint[:BIASES, :BIASES]
-    # what the filter has forgotten is correlated with nothing
+    # a forgotten number is correlated with nothing
     for i in range(N):
         if np.count_nonzero(P[i]) <= 1:
             cross[i] = 0.0
@@ -137,8 +135,8 @@ def split(f: Record, cross: Array, joint: Array) -> None:
     rest = root_of(imu.rest)
     for i in range(COMPANIONS):
         if not rest[i, i] * rest[i, i] > _BLIND * joint[i, i]:
-            # the filter's covariance was bounded since (an attitude that nobody knows), and no
-            # longer belongs to these cross covariances
+            # the filter's covariance was bounded since (of an unknown attitude), and no longer
+            # belongs to these cross covariances
             imu.rest[:], imu.regression[:] = joint, 0.0
             return
     divide_transposed(root, whitened)
@@ -149,7 +147,7 @@ def split(f: Record, cross: Array, joint: Array) -> None:
 def carry_companions(f: Record, dt: float, cross: Array) -> None:
     """Take a step of ``dt`` s: the biases walk, and the step has a noise of its own.
 
-    ``cross`` (18, 6) is the covariance of the error state after the step with the biases before it.
+    ``cross`` (18, 6): covariance of the error state after the step with the biases before.
     """
     imu, joint = f.imu, np.eye(COMPANIONS)
     joint[:BIASES, :BIASES] = imu.bias_covariance
@@ -172,12 +170,12 @@ def carry_companions(f: Record, dt: float, cross: Array) -> None:
 
 @compiled
 def carry_with_points(f: Record, dt: float, cross: Array) -> Array:
-    """Return ``cross`` (18, n), the covariance of the error state with something constant, carried
-    over the unscented prediction that was just made.
+    """Return ``cross`` (18, n), covariance of the error state with a constant, carried over the
+    last unscented prediction.
 
-    A constant beside the state is a further row of the root. Its entries in the columns that were
-    drawn as pairs of points go with half the difference of the pair; the others with the linear
-    part of the model.
+    A constant beside the state is a further row of the root. In columns drawn as pairs of points
+    its entries go with half the difference of the pair. The others go with the linear part of the
+    model.
     """
     S, pairs = f.S, 6 if f.wrench_count == 0 else 12
     rows, rest, out = np.empty((pairs, cross.shape[1])), cross.copy(), np.empty_like(cross)
@@ -193,18 +191,9 @@ def carry_with_points(f: Record, dt: float, cross: Array) -> Array:
 
 
 @compiled
-def carry_with_jacobian(f: Record, dt: float, cross: Array) -> Array:
-    """Return the same for the prediction of ``ekf.py``, which leaves the first rows of F - 1 in
-    ``f.S``.
-    """
-    out: Array = cross + np.concatenate((f.S @ cross, np.zeros((N - 12, cross.shape[1]))))
-    return out
-
-
-@compiled
 def correct_companions(f: Record, before: Array) -> None:
-    """Move the companions with a correction of the error state by a pose; ``before`` (20,) is the
-    state before it.
+    """Move the companions with a pose's correction of the error state; ``before`` (20,): the state
+    before the correction.
     """
     imu, error = f.imu, np.empty(N)
     error_from(f.x, before, error)

@@ -1,14 +1,14 @@
-"""Is a filter as good as it says?
+"""Is a filter consistent with its covariance?
 
 Bar-Shalom, Li and Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
 section 5.4: the normalised estimation error squared (NEES) of a consistent filter is chi-squared
-with as many degrees of freedom as the state has (18), the normalised innovation squared (NIS) with
-as many as the measurement has (6). Its innovations are also white (Mehra, *On the identification of
-variances and adaptive Kalman filtering*, IEEE Trans. Automatic Control 15, 1970): whitened ones
-summed over a second and divided by the root of their number are six normal numbers again, whose
-squares add up to a NIS *over a second*. Its mean exceeds that of NIS by the innovations'
-autocorrelations at all lags within a second, nearer ones weighted more. So it shows a wrench that
-walks too slowly, which pushes every pose of a second the same way by less than one pose's noise.
+with the degrees of freedom of the state (18). The normalised innovation squared (NIS) has those of
+the measurement (6). Its innovations are also white (Mehra, *On the identification of variances and
+adaptive Kalman filtering*, IEEE Trans. Automatic Control 15, 1970): whitened ones, summed over a
+second and divided by the root of their number, are six normal numbers again. Their squares add up
+to a NIS *over a second*. Its mean exceeds the mean NIS by the innovations' autocorrelations at all
+lags within a second, nearer ones weighted more. So NIS over a second shows a wrench that walks too
+slowly: such a wrench pushes every pose of a second the same way by less than one pose's noise.
 """
 
 import math
@@ -28,8 +28,8 @@ def state_error(estimate: WrenchEstimate, truth: Array) -> Array:
     """Return truth minus estimate (18,), in the order of the covariance: (rho, omega, x, v, torque,
     force).
 
-    rho is the world-frame MRP that turns the estimated attitude into the true one. ``truth`` (20,)
-    is a state laid out by the constants of ``estimator.estimate``.
+    The world-frame MRP rho turns the estimated attitude into the true one. ``truth`` (20,) is a
+    state laid out by the constants of ``estimator.estimate``.
     """
     error = np.empty(N)
     error_from(truth, estimate.state, error)
@@ -43,7 +43,7 @@ def nees(estimate: WrenchEstimate, truth: Array) -> float:
 
 
 def chi2_band(dof: int, runs: int, probability: float = 0.95) -> tuple[float, float]:
-    """Return the band in which the mean of ``runs`` independent chi-squared numbers lies with
+    """Return the band that holds the mean of ``runs`` independent chi-squared numbers with
     ``probability``.
 
     Raises:
@@ -59,11 +59,11 @@ def chi2_band(dof: int, runs: int, probability: float = 0.95) -> tuple[float, fl
 
 
 class Consistency:
-    """What the innovations of a flight say of its filter's tuning, in memory that does not grow.
+    """Statistics of a flight's innovations as a test of the filter's tuning, in constant memory.
 
     Attributes:
         poses: how many were added.
-        seconds: that have a pose.
+        seconds: with a pose.
     """
 
     def __init__(self) -> None:
@@ -100,8 +100,8 @@ class Consistency:
 
     @property
     def too_slow(self) -> bool:
-        """Whether NIS over a second lies beyond that of 99 % of consistent filters: the wrench
-        walks faster than the tuning says.
+        """Whether NIS over a second exceeds that of 99 % of consistent filters: the wrench walks
+        faster than the tuning says.
         """
         return self.nis_over_second > chi2_band(MEASURED, max(self.seconds, 1), 0.98)[1]
 

@@ -1,10 +1,10 @@
-"""The wrench filter with the gain that it converges to: less than a tenth of the work, for training
-and for many vehicles.
+"""The wrench filter with its converged gain: less than a tenth of the work, for training and for
+many vehicles.
 
-The gain of a Kalman filter in steady flight converges. It is computed once here, from ``WrenchUKF``
-at hover: the same functions carry the mean, (2)-(5), (11)-(14), and nothing the covariance. A yawed
-vehicle sees the same problem turned about the vertical: the innovation is turned into the vehicle's
-heading, and the correction back.
+The gain of a Kalman filter in steady flight converges. Here ``WrenchUKF`` at hover gives the gain
+once. The same functions carry the mean, (2)-(5), (11)-(14), and nothing carries the covariance. A
+yawed vehicle sees the same problem turned about the vertical: the innovation is turned into the
+vehicle's heading, and the correction back.
 """
 
 import math
@@ -35,21 +35,19 @@ from .ukf import WrenchUKF, correct_parts
 from .ukf import step as ukf_step
 
 _MEASURED = (0, 1, 2, 6, 7, 8)  # rows of (rho, x) in the error state
-_LONGEST = 60  # s of hover in which the gain must have converged
+_LONGEST = 60  # s of hover until the gain must have converged
 _CONVERGED = 1e-9  # relative change of the covariance in a second
 _HEIGHT = 1.2  # m, of that hover
-_LONGEST_GAP = 0.1  # s without a position or an attitude that is coasted over with a constant gain
+_LONGEST_GAP = 0.1  # s of coasting with a constant gain, without a position or an attitude
 _NEAR = 1.1  # of the converged variances: nearly converged again
-# time constants of the wrench for which it must have been near: what then still differs is e^-4 of
-# it, so that it makes no difference whether the constant gain takes over a step earlier or later
+# The variances must have been near for so many time constants of the wrench. A difference of e^-4
+# remains: a step earlier or later makes no difference.
 _SETTLE = 2.0
 
 
 @compiled
 def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
-    """Do what the step of ``ukf`` does, with the gain in ``f.gain`` in place of the covariance's
-    while the filter is in its steady state.
-    """
+    """Step like ``ukf.step``; in the steady state the gain is ``f.gain``, not the covariance's."""
     usable = check_sample(f, z, parts)
     if usable < 0:
         return usable
@@ -104,8 +102,8 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     likeliest = max(likeliest_scale(f, 0), likeliest_scale(f, 3))
     late = f.poses.position_age > _LONGEST_GAP or f.poses.attitude_age > _LONGEST_GAP
     if late or not nis <= likeliest * f.alarm[usable // 3]:
-        # a covariance takes over at the predicted state: after a gap, whose widening is made up
-        # for, or at a measurement that is not to be believed as it is
+        # a covariance takes over at the predicted state: after a gap, with the gap's widening made
+        # up for, or at a measurement that must be judged
         f.steady, f.near = 0, 0.0
         x[:NIS], x[NIS] = centre[:NIS], math.nan
         catch_up(f)
@@ -142,7 +140,7 @@ def _correct_with_covariance(f: Record, sample: Array, usable: int) -> None:
 
 @compiled
 def _look_for_steady_state(f: Record) -> None:
-    """Return to the constant gain once the covariance has been that of a converged filter for a
+    """Return to the constant gain once the covariance has stayed near the converged one for a
     while.
     """
     near, noise = f.status == TRACKING, 1.0 + max(f.poses.widened[0], f.poses.widened[1])
@@ -164,13 +162,12 @@ def _step_at(address: int, parts: int, dt: float, voltage: float) -> int:
 class ConstantGainFilter(WrenchUKF):
     """The wrench filter with a constant gain; ``reset`` and ``step`` are those of ``WrenchUKF``.
 
-    It starts with the gain of a filter that has long converged: a first guess of pose or wrench
-    that is far off takes the rise time to correct. A measurement, or a part of it, that was not
-    made is coasted over for up to 0.1 s: the state moves on by the model, and what is measured
-    again is believed no more than before. After a longer gap, at a restart and at a measurement
-    that the gate refuses it has a covariance like ``WrenchUKF``, until that has converged again:
-    that of the model linearised at hover. ``covariance`` is always that of a vehicle that faces
-    along x. Where noise differs between x and y, the gain is exact at that heading only.
+    The gain is converged from the start: a wrong first guess of pose or wrench takes the rise time
+    to correct. Up to 0.1 s without a measurement, or a part of one, the filter coasts: the state
+    moves on by the model, and the gain stays. After a longer gap, a restart or a refused
+    measurement the filter has a covariance until convergence: that of the model linearised at
+    hover. ``covariance`` is always that of a vehicle facing along x. With noise that differs
+    between x and y, the gain is exact at this heading only.
 
     Arguments are those of ``WrenchUKF``.
 
@@ -215,11 +212,11 @@ def _hover(record: np.ndarray, z: Array, steps: int, voltage: float) -> None:
 
 @lru_cache(maxsize=32)
 def _converged(start: bytes, voltage: float) -> tuple[Array, Array]:
-    """Return the covariance (18, 18) after a correction that ``WrenchUKF``, its record given at
-    hover, comes to, and the derivatives (6, 18) of its accelerations there.
+    """Return the converged covariance (18, 18) after a correction of ``WrenchUKF``, its record
+    given at hover, and the derivatives (6, 18) of its accelerations there.
 
     Raises:
-        InputError: it comes to none.
+        InputError: no convergence.
     """
     record = np.frombuffer(start, dtype=FILTER).copy()
     f = record[0]

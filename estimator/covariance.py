@@ -1,8 +1,7 @@
-"""What the filter does to its covariance: root, linear part of the model, noise, sums of squares.
+"""Arithmetic on the covariance: root, linear part of the model, noise, sums of squares.
 
-The loops over 12 or 18 columns are written so that a compiler turns them into vector instructions:
-much work for each column, several rows at once, nothing that could be another array in memory. Sums
-keep their order.
+A compiler turns the loops over 12 or 18 columns into vector instructions: much work for each
+column, several rows at once, no possible alias in memory. Sums keep their order.
 """
 
 import math
@@ -18,7 +17,7 @@ from .recovery import pose_noise
 
 @compiled
 def root_of(P: Array) -> Array:
-    """Return the lower root of P (n, n), which exists also where rounding has eaten a pivot."""
+    """Return the lower root of P (n, n); a pivot eaten by rounding does no harm."""
     n = len(P)
     root = np.zeros((n, n))
     for j in range(n):
@@ -92,9 +91,7 @@ def root_of_six(f: Record) -> None:
 
 @compiled_for_vectors
 def root_of_twelve(f: Record) -> None:
-    """Do the same with the first twelve columns, x and v among them: nothing is left of those in
-    ``M``.
-    """
+    """Do the same with the first twelve columns; nothing of x and v is left in ``M``."""
     P, S, M = f.P, f.S, f.M
     root_of_six(f)
     for r in range(6, 12):
@@ -134,8 +131,8 @@ def _take_off(S: Array, first: int, M: Array) -> None:
 
 @compiled_inline
 def _six_columns(f: Record, rows: Array, first: int) -> None:
-    """Write six columns of the root, from ``first`` on, into ``S``; from ``rows`` (6, 18) those
-    before are taken off.
+    """Write six columns of the root, from ``first`` on, into ``S``; ``rows`` (6, 18) lack the
+    columns before.
     """
     P, S, L, scales = f.P, f.S, f.L, f.scales
     for j in range(6):
@@ -225,8 +222,8 @@ def _linear_rows(f: Record, dt: float, source: Array, out: Array, columns: int) 
 
 @compiled_for_vectors
 def carry_linear_part(f: Record, dt: float) -> None:
-    """Write ``M A'`` into ``Z`` and ``A M A'`` into P, where A is the linear part of the model at
-    ``f.centre_rotation``; the attitude's columns, which are zero, are not worked out.
+    """Write ``M A'`` into ``Z`` and ``A M A'`` into P, with the linear part A of the model at
+    ``f.centre_rotation``. The attitude's columns are zero.
     """
     P, Z = f.P, f.Z
     _linear_rows(f, dt, f.M, Z.T, 12)
@@ -238,16 +235,16 @@ def carry_linear_part(f: Record, dt: float) -> None:
 
 @compiled_for_vectors
 def carry_rows(f: Record, dt: float, rows: Array, out: Array) -> None:
-    """Write what the linear part of the model makes of ``rows`` (12, n), (x, v, torque, force),
-    into ``out`` (18, n).
+    """Apply the linear part of the model to ``rows`` (12, n), (x, v, torque, force): ``out`` (18,
+    n).
     """
     _linear_rows(f, dt, rows, out, rows.shape[1])
 
 
 @compiled
 def carry_by_jacobian(P: Array, A: Array, G: Array) -> None:
-    """Replace P (18, 18) by ``F P F' = P + A P + (A P)' + A P A'``, where ``A`` (12, 18) has the
-    rows of F - 1 that are not zero; many of their numbers are. ``G`` (12, 18) is overwritten.
+    """Replace P (18, 18) by ``F P F' = P + A P + (A P)' + A P A'``. ``A`` (12, 18) has the rows of
+    F - 1 beside its zero rows, and is sparse. ``G`` (12, 18) is overwritten.
     """
     for i in range(12):
         for j in range(N):
@@ -273,8 +270,8 @@ def add_squares(
     P: Array, rows: Array, first: int, sign: float, size: int, written: bool = False
 ) -> None:
     """Add ``sign r' r`` to the first ``size`` rows and columns of P for six rows (18,) of ``rows``
-    from ``first`` on; six at once for speed. What ``written`` says is that rows 0-2 and 6-8 are
-    written anew afterwards, so that pairs of these are left out.
+    from ``first`` on, six at once for speed. ``written``: the caller writes rows 0-2 and 6-8 anew
+    afterwards, and pairs of these are left out.
     """
     r0, r1, r2, r3, r4, r5 = first, first + 1, first + 2, first + 3, first + 4, first + 5
     for i in range(0, size, 2):
@@ -307,9 +304,9 @@ def add_pairs(f: Record, first: int) -> None:
 
 @compiled_for_vectors
 def add_noise(f: Record, rotation: Array, dt: float) -> None:
-    """Add ``B Q B'`` to P: what 24 of the 61 sigma points come to, (27)."""
+    """Add ``B Q B'`` to P: the sum of 24 of the 61 sigma points, (27)."""
     P, J, c, B = f.P, f.body.inverse_inertia, f.body.com, f.B
-    # stated per period: white noise averages over a longer step, a walk grows with it
+    # stated per period: white noise averages over a longer step, a walk grows
     white, walk = f.period / dt, dt / f.period
     offset = c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0
     for n in range(3):
@@ -348,8 +345,8 @@ def whiten(f: Record) -> None:
     """Write the whitened cross covariance of the measurement (rho, x) into ``f.W`` and its part in
     the mean into ``f.mean``.
 
-    Expects the root of the innovation's covariance in ``f.L`` with its inverse diagonal in
-    ``f.scales``, and the whitened innovation; all of these are zero for what was not measured.
+    Expects the root of the innovation's covariance in ``f.L``, its inverse diagonal in
+    ``f.scales``, and the whitened innovation; all zero for parts not measured.
     """
     P, W, L, scales, y, mean = f.P, f.W, f.L, f.scales, f.innovation, f.mean
     y0, y1, y2, y3, y4, y5 = y[0], y[1], y[2], y[3], y[4], y[5]
@@ -365,8 +362,8 @@ def whiten(f: Record) -> None:
 
 @compiled_for_vectors
 def subtract_squares(f: Record) -> None:
-    """Take ``W' W`` off P. Of the rows that were measured that leaves ``R S^-1`` of them, which is
-    written as such: the difference would be rounding alone where the noise R is a 1e-16 of them.
+    """Take ``W' W`` off P. Of measured rows ``R S^-1`` remains and is written as such: with a noise
+    R of 1e-16 of them the difference would be rounding alone.
     """
     P, W, L, c, T = f.P, f.W, f.L, f.scales, f.E
     add_squares(P, W, 0, -1.0, N, all_of((c[0] > 0.0) & (c[3] > 0.0)))

@@ -57,8 +57,8 @@ def fold(f: Record, base: Array, error: Array) -> None:
 
 @compiled
 def symmetrise(P: Array) -> None:
-    """Make P (n, n) symmetric, and hold the attitude's variance, first in it, where an MRP still
-    means something.
+    """Make P (n, n) symmetric, and bound the attitude's variances, its first, within an MRP's
+    meaning.
     """
     n = len(P)
     for i in range(n):

@@ -1,4 +1,4 @@
-"""What every estimator of this kit returns."""
+"""The result of every estimator of this kit."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ STATE_SIZE = 20
 
 
 class Status(IntEnum):
-    """What became of the last step's measurement."""
+    """The verdict on the last step's measurement."""
 
-    TRACKING = 0  # it was taken in
-    COASTING = 1  # there was none
-    REJECTED = 2  # the gate refused it
-    RESTARTED = 3  # pose and twist start anew at it
+    TRACKING = 0  # taken in
+    COASTING = 1  # none was made
+    REJECTED = 2  # refused by the gate
+    RESTARTED = 3  # pose and twist start anew there
 
 
 STATUSES = tuple(status.name.lower() for status in Status)
 TRACKING, COASTING, REJECTED, RESTARTED = map(float, Status)  # in the filter's memory
 # Layout of an estimate's numbers: the state, the status, the restarts, the excess of the variances
-# of measured attitudes and positions over the declared ones, the variances of torque and force that
-# the vehicle's uncertainty makes, then perhaps the covariance
+# of measured attitudes and positions over the declared ones. Then come the variances of torque and
+# force by the vehicle's uncertainty, and perhaps the covariance
 STATUS, RESTARTS, WITHOUT_COVARIANCE = STATE_SIZE, STATE_SIZE + 1, STATE_SIZE + 10
 EXCESS, MODEL = slice(RESTARTS + 1, RESTARTS + 3), slice(RESTARTS + 3, WITHOUT_COVARIANCE)
 ESTIMATE_SIZE = WITHOUT_COVARIANCE + 18 * 18
@@ -43,8 +43,8 @@ ESTIMATE_SIZE = WITHOUT_COVARIANCE + 18 * 18
 class WrenchEstimate:
     """The estimate of one filter, of each filter of a batch, or at each time of a series.
 
-    Shapes below are those of one filter's estimate; those of a batch or series have its axis in
-    front. Later steps do not change an estimate.
+    Shapes below are one filter's; a batch or series has its axis in front. Later steps do not
+    change an estimate.
 
     Args:
         numbers: (30,) state, status, restarts, the excess of the measurements' variances and the
@@ -81,8 +81,7 @@ class WrenchEstimate:
     @property
     def covariance(self) -> Array:
         """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a
-        world-frame MRP: of what noise and the wrench's changes leave uncertain, with a vehicle that
-        is exactly as declared.
+        world-frame MRP, by noise and the wrench's changes, for a vehicle exactly as declared.
 
         Raises:
             InputError: the estimate has none: a batch's stands in the batch, a smoothed one must
@@ -106,26 +105,26 @@ class WrenchEstimate:
 
     @property
     def model_std(self) -> Array:
-        """Standard deviations (6,) of torque, Nm, and force, N, that the stated uncertainty of the
-        vehicle makes (``estimator.model_uncertainty``).
+        """Standard deviations (6,) of torque, Nm, and force, N, by the stated uncertainty of the
+        vehicle (``estimator.model_uncertainty``).
         """
         return np.sqrt(self.numbers[..., MODEL])
 
     @property
     def std_wrench(self) -> Array:
-        """Standard deviations (6,) of torque, Nm, and force, N: of noise and of the vehicle's
+        """Standard deviations (6,) of torque, Nm, and force, N, by noise and the vehicle's
         uncertainty.
         """
         return np.hypot(self.std[..., 12:], self.model_std)
 
     @property
     def std_torque(self) -> Array:
-        """Those (3,) of the torque, Nm."""
+        """Standard deviations (3,) of the torque, Nm."""
         return self.std_wrench[..., :3]
 
     @property
     def std_force(self) -> Array:
-        """Those (3,) of the force, N."""
+        """Standard deviations (3,) of the force, N."""
         return self.std_wrench[..., 3:]
 
     @property
@@ -168,8 +167,8 @@ class WrenchEstimate:
 
     @property
     def noise_scales(self) -> Array:
-        """How large the noise of measured attitudes and positions (2,) is, as a multiple of the
-        declared standard deviations: of some 200 poses, 1 at first (``estimator.recovery``).
+        """Noise of measured attitudes and positions (2,) as a multiple of the declared standard
+        deviations, over some 200 poses; 1 at first (``estimator.recovery``).
         """
         return np.sqrt(1.0 + self.numbers[..., EXCESS])
 
@@ -183,7 +182,7 @@ class WrenchEstimate:
 
     @property
     def status_code(self) -> Any:
-        """What became of the last step's measurement, an index of ``STATUSES``."""
+        """Verdict on the last step's measurement, an index of ``STATUSES``."""
         code = self.numbers[..., STATUS]
         return code.astype(np.int64) if self.numbers.ndim > 1 else int(code)
 
@@ -191,10 +190,10 @@ class WrenchEstimate:
     def status(self) -> Any:
         """The same as a word.
 
-        "tracking": it was taken in; "coasting": there was none, the estimate is a prediction, or
-        held where a gap has left nothing to predict from; "rejected": the gate refused it;
-        "restarted": pose and twist start anew at it, after a gap, or because it and those before it
-        contradict what was estimated (``estimator.recovery``).
+        "tracking": taken in; "coasting": no measurement, the estimate is a prediction, or held
+        after a gap that leaves nothing to predict from; "rejected": refused by the gate;
+        "restarted": pose and twist start anew at the measurement, after a gap or a contradiction
+        (``estimator.recovery``).
         """
         code = self.status_code
         return [STATUSES[i] for i in code] if self.numbers.ndim > 1 else STATUSES[code]

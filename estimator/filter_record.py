@@ -126,7 +126,6 @@ FILTER = np.dtype(
         ("imu", IMU),
     ]
 )
-NUMBERS = ("x", "status", "restarts", "excess", "model")  # of an estimate without its covariance
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to the estimate
 
 

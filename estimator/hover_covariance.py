@@ -1,10 +1,10 @@
 """The covariance of the filter with a constant gain while its gain is not constant: after a gap, a
 restart, a refused measurement.
 
-It is that of the model linearised at hover, in the frame of the vehicle's heading. So it depends on
-what was measured and when, and not on where the vehicle flies to: a filter in C with single
-precision comes back to its constant gain at the same step, and needs no Jacobian. Where the vehicle
-is tilted far or turns fast, it is an approximation, as the constant gain itself is.
+The model is linearised at hover, in the frame of the vehicle's heading. So the covariance depends
+on the measurements and their times, not on the vehicle's path: a filter in C with single precision
+comes back to its constant gain at the same step, and needs no Jacobian. At large tilts and fast
+turns the covariance is an approximation, as is the constant gain itself.
 """
 
 import math
@@ -13,12 +13,12 @@ import numpy as np
 
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from .covariance import add_noise, carry_by_jacobian
-from .ekf import acceleration_jacobian
 from .error_state import symmetrise
 from .estimate import Array
 from .filter_record import N, drive, propagate
+from .linear_model import acceleration_jacobian
 
-CATCH_UP = 32  # predictions that make up for a gap; a longer one is made up for in longer ones
+CATCH_UP = 32  # predictions, at most, that make up for a gap.
 _NOTHING = 1e-9  # of the largest part of an acceleration's deviation: rounding of a derivative
 _NO_HEADING = 1e-6  # of a quaternion squared: thrust points down, and there is none
 
@@ -40,7 +40,7 @@ def carry_at_hover(f: Record, dt: float) -> None:
 
 @compiled
 def catch_up(f: Record) -> None:
-    """Carry the covariance over the time that has not been measured since."""
+    """Carry the covariance over the time since the last measurement."""
     since = max(f.poses.position_age, f.poses.attitude_age)
     if since <= 0.0:
         return
@@ -66,7 +66,7 @@ def turn_world(f: Record, pose: Array, w: float, z: float, before: Array, after:
     """Turn the world about the vertical through ``before`` (3,), which moves to ``after`` (3,):
     estimate, pose (7,) and remembered poses; cosine ``w`` and sine ``z`` of half the angle.
 
-    About the vehicle, so that single precision turns what is small: 17 m away the rounding of a
+    About the vehicle, so that single precision turns small numbers: 17 m away the rounding of a
     turn about the origin was 0.2 % of a pose's noise, in each step.
     """
     cosine, sine = w * w - z * z, 2.0 * w * z
@@ -116,12 +116,12 @@ def _jacobian_at(record: np.ndarray, voltage: float, out: Array) -> None:
 
 def jacobian_at_hover(record: np.ndarray, voltage: float, deviations: Array) -> Array:
     """Return the derivatives (6, 18) of angular (body) and linear acceleration by the error state
-    of a filter whose record hovers facing along x; what rounding leaves is zero.
+    of a filter that hovers facing along x, without rounding errors.
 
     Args:
-        record: of the filter; it is changed.
+        record: the filter's, overwritten.
         voltage: V.
-        deviations: (18,) of the error state, by which parts of an acceleration are compared.
+        deviations: (18,) of the error state: the scale of an acceleration's parts.
     """
     out = np.zeros((6, N))
     record[0]["S"] = 0.0

@@ -1,15 +1,15 @@
 """Gyro and accelerometer as further measurements of the same filter.
 
 The paper says that it "can easily be extended to GPS and IMU". A gyro measures the body rate and
-its bias. An accelerometer at the geometric centre measures its bias and the specific force
-``R' (a + g)``, with the acceleration ``a`` of (4) over the step that just ended: it sees the
-external force at once, where a pose sees it only after two integrations. What the rotor model
-misses in that step (``thrust_noise``) is in the specific force and in the velocity: it is a state
-of its own until the next step (``bias_states``).
+its bias. An accelerometer at the geometric centre measures its bias and the specific force ``R' (a
++ g)``, ``a`` being the acceleration (4) over the last step. The accelerometer sees the external
+force at once, a pose only after two integrations. The rotor model's error in that step
+(``thrust_noise``) is in the specific force and in the velocity. So the error is a state of its own
+until the next step (``bias_states``).
 
 An accelerometer says nothing of the external force while the rotors' is unknown: before the first
 prediction, and between a restart and the next one, the gyro alone is taken in. A gyro measures the
-rate after the step, which has the torque noise in it already.
+rate after the step, torque noise included.
 """
 
 import math
@@ -50,8 +50,9 @@ def expected_imu(f: Record, x: Array, out: Array) -> None:
 
 @compiled
 def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> None:
-    """Correct with what is measured of ``z`` (6,), gyro and accelerometer, unless the gate refuses
-    it: (29)-(37) with the 37 sigma points of the error state; biases and noise are linear in it.
+    """Correct with the measured parts of ``z`` (6,), gyro and accelerometer, unless the gate
+    refuses them: (29)-(37) with the 37 sigma points of the error state; biases and noise are linear
+    in it.
     """
     f = record[0]
     x, imu = f.x, f.imu
@@ -76,10 +77,10 @@ def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> No
 
 @compiled
 def _innovation(f: Record, z: Array, root: Array, turned: Array) -> tuple[Array, Array, Array]:
-    """Return the part of the innovation's covariance (6, 6) that is the error state's, the
-    innovation (6,) without the companions' mean, and the scaled half differences (18, 6) of pairs.
+    """Return the error state's part of the innovation's covariance (6, 6), the innovation (6,)
+    without the companions' mean, and the scaled half differences (18, 6) of pairs.
 
-    ``turned`` (12, 18) is what the companions do along each column of the root.
+    ``turned`` (12, 18): the companions along each column of the root.
     """
     x, C = f.x, f.imu.sensitivity
     spread, weight = math.sqrt(N + f.kappa), 0.5 / (N + f.kappa)  # (28)
@@ -111,8 +112,8 @@ def _nis(covariance: Array, innovation: Array, first: int, last: int) -> float:
 def _believed(
     f: Record, covariance: Array, innovation: Array, first: int, last: int
 ) -> tuple[int, int]:
-    """Return the rows that the gate lets in. Where both sensors together are unlikely, one may be
-    right: an accelerometer that saturates does not cost the gyro.
+    """Return the rows that the gate lets in. One of two sensors that are unlikely together may be
+    right: a saturated accelerometer does not cost the gyro.
     """
     imu, gate = f.imu, f.imu.gate
     if f.x[NIS] <= gate[1 if last - first == 6 else 0]:

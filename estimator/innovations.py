@@ -1,9 +1,9 @@
 """How likely a flight's innovations are under a tuning: one compiled pass of the filter.
 
 Prediction error decomposition (Schweppe, *Evaluation of likelihood functions for Gaussian signals*,
-IEEE Trans. Information Theory 11, 1965): the likelihood of a flight is the product of those of its
-innovations, each normal with the covariance S that the filter states, so its logarithm is
-``-1/2 sum(NIS + log det S + 6 log 2 pi)``.
+IEEE Trans. Information Theory 11, 1965): the likelihood of a flight is the product of its
+innovations' likelihoods, each normal with the filter's covariance S. The logarithm is ``-1/2
+sum(NIS + log det S + 6 log 2 pi)``.
 """
 
 import math
@@ -25,7 +25,7 @@ from .ukf import WrenchUKF, innovate, predict, take_in
 
 Mask = NDArray[np.bool_]
 
-_SLACK = 0.1  # of a period: a step so little too long is still one step
+_SLACK = 0.1  # of a period: a step so little too long is still one.
 _TWIST = 0.03  # s between the poses whose difference starts a piece's velocity
 _MRP_VOLUME = 4.0 * math.pi / 3.0  # of all attitudes: MRPs of at most length 1
 _CONSTANT = -3.0 * math.log(2.0 * math.pi)  # of a normal density of six numbers
@@ -41,7 +41,7 @@ ROW = np.dtype(
         ("counted", "?"),  # and the filter's start is over
     ]
 )
-# What a pass finds at a pose
+# The result of a pass at a pose
 INNOVATION = np.dtype(
     [
         ("t", "f8"),  # s
@@ -60,8 +60,8 @@ Innovations = Any  # a record array of INNOVATION
 class Piece:
     """Rows of a flight without a long gap, from one with a pose on.
 
-    A row whose pose repeats that of the last one to the last digit is one without: a sensor's noise
-    does not repeat, so the pose was held.
+    A row with the last row's pose, to the last digit, counts as without one: a sensor's noise does
+    not repeat, so the pose was held.
     """
 
     position: Array  # (3,) m, world, at its start
@@ -81,11 +81,11 @@ def pieces_of(
     longest_gap: float,
     startup: float,
 ) -> list[Piece]:
-    """Return a flight of N rows in pieces, cut where no pose came for more than
-    ``longest_gap`` s; the poses of the first ``startup`` s of each do not count.
+    """Return a flight of N rows in pieces, cut at gaps of more than ``longest_gap`` s without a
+    pose. The poses of a piece's first ``startup`` s do not count.
 
     Args:
-        vehicle: whose nominal voltage stands in where none was logged.
+        vehicle: its nominal voltage stands in for an unlogged one.
         t: (N,) s, increasing.
         rotor_speeds: (N, 4) rad/s.
         position: (N, 3) m, world; a row that is not finite has no pose.
@@ -138,17 +138,16 @@ def innovations(
     outlier_range: float,
     covariance: Array | None = None,
 ) -> Innovations:
-    """Return how likely the poses that count are to a filter with this tuning (M,).
+    """Return the likelihoods (M,) of the counted poses under a tuning.
 
-    With a chance of ``outlier_chance`` a pose is an outlier, which lies anywhere within
-    ``outlier_range`` of the prediction along each axis and has any attitude. A pose that is
-    likelier that than not is not taken in, and it costs the logarithm of this density however far
-    off it is: a few wild poses cannot dominate.
+    With a chance of ``outlier_chance`` a pose is an outlier: anywhere within ``outlier_range`` of
+    the prediction along each axis, with any attitude. A likely outlier is not taken in. However far
+    off, an outlier costs the logarithm of this density: a few wild poses cannot dominate.
 
     Args:
         vehicle: with its declared effects.
-        tuning: what the filter assumes of noise.
-        period: s, to which the tuning belongs.
+        tuning: the filter's.
+        period: s, of the tuning.
         pieces: of the flight.
         outlier_chance: from 0, every pose is taken in, to 1.
         outlier_range: m.
@@ -205,11 +204,11 @@ def _pass(
 
 
 def fisher_information(found: Innovations, moved: Sequence[Innovations], step: float) -> Array:
-    """Return the expected information (n, n) on n parameters, of which ``moved`` have one each
+    """Return the expected information (n, n) on n parameters; each of ``moved`` has one parameter
     moved by ``step``.
 
-    Of normal innovations it is ``sum(d_i y' S^-1 d_j y + tr(S^-1 d_i S S^-1 d_j S) / 2)``
-    (Schweppe 1965); outliers tell nothing.
+    Normal innovations have ``sum(d_i y' S^-1 d_j y + tr(S^-1 d_i S S^-1 d_j S) / 2)`` (Schweppe
+    1965); outliers have none.
     """
     kept = ~np.logical_or.reduce([found.outlier, *(m.outlier for m in moved)])
     inverse, mean = np.linalg.inv(found.root[kept]), found.innovation[kept]

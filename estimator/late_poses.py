@@ -1,14 +1,14 @@
 """A filter with a clock: measurements with a time stamp in the past are fused where they belong.
 
 Poses take time to be computed and sent, not always the same time: they come late and out of order.
-``TimedFilter`` keeps what came in over the last ``horizon`` seconds, and the filter's memory at a
-few times in between. A late measurement takes the filter back to the last of these before its
-stamp; from there everything is done again, with the measurement in its place. The prediction in
-which its stamp lies is split there, its rotor speeds holding on both sides. What comes out is, bit
-for bit, what a filter says that was given everything in order of time stamps.
+``TimedFilter`` keeps the inputs of the last ``horizon`` seconds, and the filter's memory at a few
+times in between. A late measurement takes the filter back to the last of these times before its
+stamp. From there all inputs are repeated, with the measurement in its place. The stamp splits a
+prediction, whose rotor speeds hold on both sides. The result equals, bit for bit, a filter's with
+all inputs in order of time stamps.
 
-All that a step changes is taken back with it: state, covariance, what effects such as motor lag or
-latency remember, and what the filter keeps count of (refusals and restarts of its gate).
+The filter's whole memory goes back: state, covariance, the memory of effects such as motor lag or
+latency, and the counts of refusals and restarts.
 """
 
 from __future__ import annotations
@@ -44,28 +44,27 @@ class _Event:
 
 
 class TimedFilter:
-    """A wrench filter that takes measurements by their time stamps, late and in any order.
+    """A wrench filter for measurements with time stamps, late and in any order.
 
-    Call ``reset`` with a first pose, ``predict`` with each set of rotor speeds, in order, and
-    ``correct`` or ``correct_imu`` whenever a measurement comes in, its stamp lying up to
-    ``horizon`` in the past. Stamps are times in s on one clock, rounded to nanoseconds.
-    Measurements with equal stamps count in the order in which they came.
+    Call ``reset`` with a first pose and ``predict`` with each set of rotor speeds, in order. Call
+    ``correct`` or ``correct_imu`` at each measurement, with a stamp of at most ``horizon`` in the
+    past. Stamps are times in s on one clock, rounded to nanoseconds. Measurements with equal stamps
+    count in order of arrival.
 
-    A late measurement costs a replay of all after its stamp. The worst, 0.3 s late among rotor
-    speeds at 200 Hz and poses at 100 Hz, takes 0.5 ms with ``WrenchUKF`` on one core; a measurement
-    of now takes 5 us. Snapshots take 0.8 MB.
+    A late measurement costs a replay of all after its stamp. The worst takes 0.5 ms with
+    ``WrenchUKF`` on one core: 0.3 s late among rotor speeds at 200 Hz and poses at 100 Hz. A
+    measurement of now takes 5 us. Snapshots take 0.8 MB.
 
     Args:
-        ukf: a ``WrenchUKF``, ``WrenchEKF`` or ``ConstantGainFilter``; only read from it from now
-            on.
-        horizon: how far in the past a stamp may lie, s. Longer costs memory, and time where
-            measurements are that late.
+        ukf: a ``WrenchUKF`` or ``ConstantGainFilter``; only to be read from now on.
+        horizon: how far in the past a stamp may lie, s. Longer costs memory, and time at late
+            measurements.
 
     Attributes:
         late: how many measurements were fused in the past.
         too_late: how many were refused, being older than the horizon or than the reset.
-        fused: the estimate at the stamp of the measurement that was fused last, just after it was;
-            its NIS is that measurement's. None before the first.
+        fused: the estimate at the stamp of the last fused measurement, just after the fusion, with
+            the measurement's NIS. None before the first.
 
     Raises:
         InputError: the horizon is not positive.
@@ -95,7 +94,7 @@ class TimedFilter:
 
     @property
     def estimate(self) -> WrenchEstimate:
-        """What the filter believes now."""
+        """The estimate now."""
         return self.ukf.estimate
 
     def reset(
@@ -144,7 +143,7 @@ class TimedFilter:
     def correct(
         self, t: float, position: ArrayLike | None, quaternion: ArrayLike | None
     ) -> WrenchEstimate | None:
-        """Take in a pose, or a part of one, that was measured at time ``t``, s.
+        """Take in a pose, or a part of one, measured at time ``t``, s.
 
         Returns:
             The present estimate; None where the pose is older than the horizon, and was refused.
@@ -158,8 +157,8 @@ class TimedFilter:
     def correct_imu(
         self, t: float, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None
     ) -> WrenchEstimate | None:
-        """Take in what an IMU measured at time ``t``, s; otherwise as ``correct``, with the
-        arguments of ``WrenchUKF.correct_imu``.
+        """Take in an IMU's measurement at time ``t``, s, as ``correct`` does; arguments of
+        ``WrenchUKF.correct_imu``.
         """
         return self._take("correct_imu", t, gyro, accelerometer)
 
@@ -195,7 +194,7 @@ class TimedFilter:
         return self.ukf.estimate
 
     def _append(self, event: _Event, now: float) -> WrenchEstimate:
-        """Do what is newest, and keep it if it could be done."""
+        """Do the newest event, and keep it unless it fails."""
         if not self._events or now - self._snapped >= self.horizon / _SNAPSHOTS:
             event.before = self._snapshot()
         estimate = self._do(event, now)
@@ -205,7 +204,7 @@ class TimedFilter:
         return estimate
 
     def _do(self, event: _Event, now: float) -> WrenchEstimate:
-        """Carry the filter from ``now`` to an event, and take in what was measured then."""
+        """Carry the filter from ``now`` to an event, and take in its measurement."""
         ukf = self.ukf
         if event.inputs is not None and event.t > now:
             speeds, voltage = event.inputs
@@ -216,7 +215,7 @@ class TimedFilter:
         return estimate
 
     def _replay(self, new: int) -> None:
-        """Do again what a new event changes, from the last snapshot before it on."""
+        """Repeat the events after a new one, from the last snapshot before it on."""
         events = self._events
         first = next(i for i in range(new, -1, -1) if events[i].before is not None)
         for part, old in zip(self.ukf.memory, events[first].before or (), strict=True):
@@ -234,7 +233,7 @@ class TimedFilter:
                 self.fused = estimate
 
     def _forget(self, until: float) -> None:
-        """Drop events up to the last snapshot that is as old as ``until``, s."""
+        """Drop events up to the last snapshot as old as ``until``, s."""
         events, last = self._events, 0
         for i in range(1, len(events)):
             if events[i - 1].t > until:

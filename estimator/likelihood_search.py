@@ -1,9 +1,9 @@
-"""The parameters at which innovations are likeliest: Fisher scoring within bounds.
+"""The likeliest parameters of innovations: Fisher scoring within bounds.
 
 Newton's method with the expected information in place of the Hessian (Gupta and Mehra,
 *Computational aspects of maximum likelihood estimation and reduction in sensitivity function
-calculations*, IEEE Trans. Automatic Control 19, 1974). It needs a tenth of the passes of a
-quasi-Newton method, and leaves the covariance of what it found.
+calculations*, IEEE Trans. Automatic Control 19, 1974). Scoring needs a tenth of the passes of a
+quasi-Newton method, and leaves the covariance of the parameters.
 """
 
 from collections.abc import Callable
@@ -28,17 +28,17 @@ def climb(
     a bound.
 
     Args:
-        evaluate: what a pass with parameters (n,) finds; called in several threads at once.
+        evaluate: the pass with parameters (n,); called in several threads at once.
         start: (n,), within the bounds.
         bounds: (n, 2).
-        threads: that evaluate the slopes.
+        threads: for the slopes.
     """
     x, low, high = start, *bounds.T
     here = evaluate(x)
     damping = 1e-3
     deviation = np.full(len(x), np.nan)
     for _ in range(_MOST):
-        # towards the middle, so that it stays within the bounds
+        # towards the middle, within the bounds
         steps = np.where(x < 0.5 * (low + high), _DIFFERENCE, -_DIFFERENCE)
         moved = list(threads.map(evaluate, x + np.diag(steps)))
         total = here.log_likelihood.sum()

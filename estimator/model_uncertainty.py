@@ -1,11 +1,11 @@
-"""What the vehicle's own uncertainty adds to the variances of torque and force.
+"""Variances of torque and force by the vehicle's own uncertainty.
 
-A mass or a thrust coefficient that is wrong stays wrong for all of a flight. No measurement of the
-motion tells it from a wrench, so it adds to the output and leaves the filter as it is: as process
-noise it would average out over time, and the stated deviation would shrink as if it did.
+A wrong mass or thrust coefficient stays wrong for all of a flight. No measurement of the motion
+tells the error from a wrench. So the error adds to the output and leaves the filter alone: as
+process noise the error would average out over time, and the stated deviation would shrink.
 
-A wrong vehicle acts on the filter as the wrench ``sum_j e_j L_j`` would, with its relative errors e
-and these loads L, in the world frame:
+A wrong vehicle acts on the filter as a wrench ``sum_j e_j L_j``. In the world frame, by its
+relative errors e, the loads L are:
 
     mass              force   m (a + g) = thrust z + force + effects
     thrust, command   force   thrust z;  torque  that of the rotors
@@ -13,9 +13,9 @@ and these loads L, in the world frame:
     torque, arm_l     torque  the rotors' about z, and about x and y
     inertia           torque  all that turns the body
 
-The filter shows a wrench by and by, in each correction the share of its variance that the
-correction takes away, 1 - P / P-; so the loads are followed in the same shares. With errors that
-have nothing to do with each other, the variance of the output is ``sum_j var(e_j) L_j^2``.
+The filter shows a wrench by and by: each correction shows the share of the variance removed, 1 - P
+/ P-. The loads are followed in the same shares. With independent errors the variance of the output
+is ``sum_j var(e_j) L_j^2``.
 """
 
 from dataclasses import replace
@@ -27,15 +27,15 @@ from ..runtime.compiled import Record, compiled_for_vectors
 from ..runtime.vector_lanes import choose
 from .estimate import Array
 
-# Loads, one a row: thrust along body x and y, which times its arm turns the body, and along z (N);
-# what moves the mass (N); torques of the rotors about body x and y, about z, and all torques (Nm).
-# The third and fourth are followed as the force is, the others as the torque
+# Loads, one a row: thrust along body x and y (times its arm a torque) and along z (N). Then the
+# force that moves the mass (N), and torques of the rotors about body x and y, about z, and all
+# torques (Nm). The third and fourth are followed as the force is, the others as the torque
 LOAD = (7, 3)
 # Variances by which squares of the loads count: of mass, thrust, command, arm, reaction torque,
 # inertia, then (m2) of the rotors' places y y, x x, x y
 FACTORS = 9
 
-# what each stated number is called in a sentence
+# the stated numbers' names in a sentence
 NAMES = {
     "mass": "the mass",
     "thrust": "the thrust coefficient",
@@ -66,7 +66,7 @@ def factors_of(vehicle: Vehicle) -> Array:
 
 
 def factors_alone(vehicle: Vehicle) -> dict[str, Array]:
-    """Return the same of each stated number alone; they add up to those of all."""
+    """Return the factors of each stated number alone; their sum is ``factors_of``."""
     return {
         name: factors_of(replace(vehicle, uncertainty=Uncertainty(**{name: size})))
         for name in NAMES
@@ -128,9 +128,8 @@ def follow_loads(f: Record, R: Array, dt: float) -> None:
 
 @compiled_for_vectors
 def follow_back(load: Array, passed: Array, earlier: Array) -> None:
-    """Replace smoothed loads (7, 3) by those one step earlier, where they had been followed to
-    ``earlier``; ``passed`` (6,): variance of torque and force there, as a
-    share of that predicted from there.
+    """Replace smoothed loads (7, 3) by those one step earlier; ``earlier``: the loads of the filter
+    there; ``passed`` (6,): variance of torque and force there, as a share of the predicted one.
     """
     for row in range(7):
         first = 3 if row in (2, 3) else 0

@@ -1,15 +1,15 @@
-"""The tuning that makes a flight's innovations likeliest.
+"""The tuning with the likeliest innovations of a flight.
 
 Maximum likelihood of the innovations: Mehra, *On the identification of variances and adaptive
 Kalman filtering*, IEEE Trans. Automatic Control 15, 1970; Astrom, *Maximum likelihood and
-prediction error methods*, Automatica 16, 1980. What is fitted, in logarithms:
+prediction error methods*, Automatica 16, 1980. The fitted numbers, as logarithms:
 
-* walk of the force and of the torque, each horizontally (x and y are alike) and vertically;
+* walk of the force and of the torque, each horizontally (x and y are alike) and vertically.
 * white noise of thrust and motor torque, and noise of position and attitude, one number each.
 
 Pose noise and walks are well determined: they shape the innovations at short and at long times.
-White noise often is not: below some size it changes nothing, and then it stays where it is or
-comes to rest on its bound.
+White noise often is not: below some size white noise changes nothing, and then stays or comes to
+rest on its bound.
 """
 
 from __future__ import annotations
@@ -46,27 +46,26 @@ _PARAMETERS: tuple[tuple[str, tuple[int, ...]], ...] = (
 
 @dataclass(frozen=True)
 class NoiseFitSettings:
-    """What the fit looks at, and how far it may go.
+    """Rows and bounds of the fit.
 
-    Walks are bounded as a random walk over a second, white noise as a deviation at 200 Hz; both
-    are shares of the vehicle's weight, or of weight times arm. Bounds keep the filter sane where a
-    log was filtered before it was written and has no noise to find.
+    Walks are bounded as a random walk over a second, white noise as a deviation at 200 Hz. Both are
+    shares of the vehicle's weight, or of weight times arm. Bounds keep the filter sane with a log
+    that was filtered before writing and has no noise.
 
     Attributes:
-        startup: s after each start of the filter that do not count.
-        longest_gap: s without a pose, after which the filter starts anew.
-        rows: of the log that are fitted; a longer one is thinned to spread excerpts.
+        startup: s after each start of the filter, not counted.
+        longest_gap: s without a pose until the filter starts anew.
+        rows: fitted rows of the log; a longer log is thinned to spread excerpts.
         excerpt: s, each of them; the first ``startup`` s do not count.
         fewest_poses: that count: 600 numbers for 8 parameters.
-        outlier_chance: of a pose, before it is looked at.
+        outlier_chance: prior chance of a pose.
         outlier_range: m from the truth, along each axis.
-        walk: share of the weight by which a force may change in a second: from a breath to a
-            tumble.
+        walk: share of the weight, change of a force in a second: from a breath to a tumble.
         white: share of the weight: no rotor is known better than 0.1 %, none is worse than its own
             thrust.
         position: m: the best motion capture, a poor radio.
         attitude: rad.
-        rise_times: s, of tunings among which the search starts, with a tenth of the white noise.
+        rise_times: s, of further starting tunings, with a tenth of the white noise.
     """
 
     startup: float = 1.0
@@ -85,24 +84,24 @@ class NoiseFitSettings:
 
 @dataclass(frozen=True, eq=False)
 class NoiseFit:
-    """A tuning found in a log, and how it compares with the one that was given.
+    """A tuning fitted to a log, beside the given one.
 
-    Figures "before" are those of the given tuning and "after" those of the fitted one, both over
-    the whole log without start-ups and outliers.
+    Figures "before" are of the given tuning, "after" of the fitted one, both over the whole log
+    without start-ups and outliers.
 
     Attributes:
         tuning: the fitted one.
-        given: the tuning that was given.
-        before: what the innovations say of the given tuning.
+        given: the given one.
+        before: consistency of the given tuning.
         after: likewise, of the fitted one.
         log_likelihood_before: sum over the poses, outliers included.
         log_likelihood_after: sum over the poses, outliers included.
         outliers: poses, to the fitted tuning.
         rise_before: (3,) s of the force, (3,) s of the torque, 10-90 %.
         rise_after: likewise (s), of the fitted tuning.
-        deviation: standard deviation of the logarithm of each fitted number (8,), in the order of
-            force walk (horizontal, vertical), torque walk (the same), thrust, motor torque,
-            position and attitude noise; NaN where it came to rest on a bound.
+        deviation: standard deviation of the logarithm of each fitted number (8,); NaN on a bound.
+            Their order: force walk (horizontal, vertical), torque walk (the same), thrust, motor
+            torque, position and attitude noise.
     """
 
     tuning: UKFTuning
@@ -156,8 +155,8 @@ def consistency_of(
     voltage: ArrayLike | None = None,
     tuning: UKFTuning | None = None,
 ) -> Consistency:
-    """Return what the innovations of a flight say of a tuning, without a fit: arguments and errors
-    are those of ``fit_noise``.
+    """Return the consistency of a flight's innovations with a tuning, without a fit: arguments and
+    errors as of ``fit_noise``.
     """
     columns = t, rotor_speeds, position, quaternion, voltage
     flight = _Flight(vehicle, columns, tuning, NoiseFitSettings())
@@ -174,17 +173,17 @@ def fit_noise(
     tuning: UKFTuning | None = None,
     settings: NoiseFitSettings | None = None,
 ) -> NoiseFit:
-    """Find the tuning that makes the innovations of one flight likeliest.
+    """Find the tuning with the likeliest innovations of one flight.
 
     Args:
-        vehicle: the declared vehicle, whose declared effects are part of the filter's model.
+        vehicle: the declared vehicle; its declared effects are part of the filter's model.
         t: (N,) s, increasing.
         rotor_speeds: (N, 4) rad/s, at the instants of the rows; a step uses the mean of its ends.
         position: (N, 3) m, world; rows that are not finite have no pose.
         quaternion: (N, 4) body to world, scalar first; likewise.
         voltage: (N,) V; default: the vehicle's nominal one.
-        tuning: the given one, to compare with; what is not fitted (``kappa``, the noise of inertial
-            sensors) stays as it is there. Default: ``UKFTuning.for_vehicle``.
+        tuning: the given one, to compare with; numbers beyond the fit (``kappa``, the noise of
+            inertial sensors) stay. Default: ``UKFTuning.for_vehicle``.
         settings: default ``NoiseFitSettings()``.
 
     Raises:
@@ -221,7 +220,7 @@ def fit_noise(
 
 
 def _tuning(x: Array, given: UKFTuning) -> UKFTuning:
-    """Return the tuning whose fitted numbers have the logarithms ``x`` (8,)."""
+    """Return the tuning with logarithms ``x`` (8,) of the fitted numbers."""
     values: dict[str, Any] = {name: np.empty(3) for name, _ in _PARAMETERS}
     for (name, axes), value in zip(_PARAMETERS, np.exp(x), strict=True):
         values[name][list(axes)] = value
@@ -239,20 +238,16 @@ def _numbers(tuning: UKFTuning) -> Array:
 
 
 def _starts(flight: _Flight) -> list[UKFTuning]:
-    """Return the given tuning, and what it is with other walks and less white noise."""
-    tunings = []
-    for rise in flight.use.rise_times:
-        made = UKFTuning.for_vehicle(flight.vehicle, flight.period, rise)
-        tunings.append(
-            replace(
-                flight.given,
-                force_walk=made.force_walk,
-                torque_walk=made.torque_walk,
-                thrust_noise=0.1 * np.asarray(made.thrust_noise),
-                motor_torque_noise=0.1 * np.asarray(made.motor_torque_noise),
-            )
-        )
-    return [flight.given, *tunings]
+    """Return the given tuning, and variants with other walks and less white noise."""
+    factors = {"force_walk": 1, "torque_walk": 1, "thrust_noise": 0.1, "motor_torque_noise": 0.1}
+    others = (
+        UKFTuning.for_vehicle(flight.vehicle, flight.period, r) for r in flight.use.rise_times
+    )
+    variants: list[dict[str, Any]] = [
+        {name: factor * np.asarray(getattr(made, name)) for name, factor in factors.items()}
+        for made in others
+    ]
+    return [flight.given, *(replace(flight.given, **variant) for variant in variants)]
 
 
 def _bounds(vehicle: Vehicle, period: float, use: NoiseFitSettings) -> Array:
@@ -327,18 +322,18 @@ class _Flight:
     def pieces(self, rows: slice) -> list[Piece]:
         """Return the pieces of some rows."""
         columns: list[Any] = [None if c is None else c[rows] for c in self.columns]
-        t, speeds, x, q, volts = columns
+        t, speeds, position, quaternion, voltage = columns
         gap, startup = self.use.longest_gap, self.use.startup
-        return pieces_of(self.vehicle, t, speeds, x, q, volts, gap, startup)
+        return pieces_of(self.vehicle, t, speeds, position, quaternion, voltage, gap, startup)
 
     def evaluate(self, tuning: UKFTuning, pieces: Sequence[Piece]) -> Innovations:
-        """Return what a pass of the filter with this tuning finds."""
+        """Return the result of a pass of the filter with this tuning."""
         chance, reach = self.use.outlier_chance, self.use.outlier_range
         return innovations(self.vehicle, tuning, self.period, pieces, chance, reach)
 
     def judge(self, tuning: UKFTuning) -> tuple[Consistency, float, int]:
-        """Return what all poses say of a tuning, their log-likelihood, and how many are outliers to
-        it.
+        """Return consistency and log-likelihood of all poses under a tuning, and the count of
+        outliers.
         """
         found, consistency = self.evaluate(tuning, self.whole), Consistency()
         for pose in found[~found.outlier]:

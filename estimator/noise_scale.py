@@ -1,4 +1,4 @@
-"""How noisy measured poses are, beside the declared noise, and what a user does about it."""
+"""Noise of measured poses beside the declared noise, and advice to the user."""
 
 import numpy as np
 from numpy.typing import ArrayLike

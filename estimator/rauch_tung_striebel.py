@@ -10,14 +10,14 @@ both errors, the estimate before, given the one after, has
     x_s = x + G (x_s' - x-'),  P_s = K + G P_s' G',
 
 a prime being the later time. Differences of states are error states (rho, omega, x, v, torque,
-force) with the world-frame MRP of (24) and (25). K is a conditional covariance and P_s a sum of
-two positive matrices, so nothing is subtracted on the way back. C comes from the sigma points of
-the very prediction that the filter makes: with the columns S of the root of P and half differences
-H after the step, it is ``S' H`` plus the linear part ``M A'``, exactly what 61 points would give.
+force) with the world-frame MRP of (24) and (25). K is a conditional covariance and P_s a sum of two
+positive matrices, so nothing is subtracted on the way back. C comes from the sigma points of the
+filter's own prediction. With the columns S of the root of P and half differences H after the step,
+C is ``S' H`` plus the linear part ``M A'``, exactly as of 61 points.
 
-``G = 0, K = P`` cuts: nothing that is seen later says anything about earlier. That is done where
-the filter restarts, and where its covariance was held at a bound, since it is then no longer that
-of one probability distribution with the covariance before.
+``G = 0, K = P`` cuts: later measurements say nothing about earlier states. A restart cuts. A
+covariance held at a bound cuts, too: it shares no probability distribution with the covariance
+before.
 """
 
 import math
@@ -94,8 +94,8 @@ def cut(P: Array, G: Array, K: Array) -> None:
 
 @compiled
 def _hold_positive(K: Array, P: Array) -> bool:
-    """Add to the diagonal of ``K`` what rounding took off, so that it has a root; False if far more
-    is missing. ``P`` gives the size of what K was left from.
+    """Restore on the diagonal of ``K`` the loss by rounding, for a root; False if far more is
+    missing. ``P`` gives the scale of rounding.
     """
     L = np.empty((N, N))
     for i in range(N):

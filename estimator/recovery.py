@@ -1,31 +1,30 @@
-"""What a filter does after a gap, with poses noisier than declared, and with poses that are wrong.
+"""Recovery of a filter from gaps, from poses noisier than declared, and from wrong poses.
 
 A Kalman filter's model knows none of five events. Each breaks another assumption:
 
 * *Noise* other than declared makes every pose unlikely, or none. The filter learns the variances of
   measured attitudes and positions from the poses (``learn_noise``), starting at the declared ones.
-  Where poses refute the declared variance the filter takes a wider one. The filter never takes a
-  narrower one: smooth errors of a motion capture change little from pose to pose. Unrefuted, the
-  filter is the paper's, bit for bit.
-* A *gap* makes the covariance grow. A part that is known no better than a prior is *lost*: pose and
-  twist are held with the prior's covariance, and the next measurement restarts them.
+  A refuted variance is replaced by a wider one, never by a narrower one: smooth errors of a motion
+  capture change little from pose to pose. Unrefuted, the filter is the paper's, bit for bit.
+* A *gap* makes the covariance grow. A part known no better than a prior is *lost*: pose and twist
+  are held with the prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: far from the filter's expectation and, by more than a vehicle
-  can move, from the pose just before. A gate refuses the pose and its successors, which a filter
-  that has not seen for a while would take for likely. Poses are accepted again once the
-  jumps cancel, however wrong the wrench is. Or once the innovation says that there was no jump: a
-  clock's blur also exceeds a vehicle's motion by a little.
+  can move, from the pose just before. A gate refuses the pose and its successors, likely to a
+  filter that has not seen for a while. Poses are accepted again once the jumps cancel, however
+  wrong the wrench is. Or once the innovation says that there was no jump: a clock's blur also
+  exceeds a vehicle's motion by a little.
 * A *push* is harder than the random walk of the wrench expects. The pose is far from the
   expectation, yet goes on from the pose before. The filter takes the pose in, gate or not.
 * A *jump for good* is an outlier whose successors all agree with each other. The filter restarts
-  there after ``Recovery.patience``, without a gate at once. Poses that do not even agree with each
-  other restart the filter after ``Recovery.give_up``, known no better than they disagree.
+  there after ``Recovery.patience``, without a gate at once. Poses in disagreement restart the
+  filter after ``Recovery.give_up``, with their disagreement as deviation.
 
-After a restart attitude and rate may be so little known that a pose which contradicts them would be
-explained by a spin, and then by a torque. So the filter restarts again at poses that come back to
-an attitude that is a guess, and once within ``Recovery.patience`` at an unlikely one that goes on.
-A restart that repeats another allows no third: with noise twice the declared each restart brought
-the next, 44 a second. The wrench after unlikely poses is not known either: while they are taken in,
-and as the filter forgets them, the stated variances are widened by their NIS.
+After a restart attitude and rate may be little known: a spin, and then a torque, would explain a
+contradicting pose. So the filter restarts again at poses that come back to a guessed attitude.
+Within ``Recovery.patience`` it restarts once at an unlikely pose that goes on. A repeated restart
+allows no third: with noise twice the declared each restart brought the next, 44 a second. The
+wrench after unlikely poses is not known either: while they are taken in, and as the filter forgets
+them, the stated variances are widened by their NIS.
 
 So a filter is in one of three phases, and each measured pose has one verdict, its ``Status``:
 
@@ -40,16 +39,15 @@ So a filter is in one of three phases, and each measured pose has one verdict, i
     ONE_REFUSED, more   lasting (``_outlasts``)           RESTARTED   BELIEVING
 
 Where an unlikely pose goes on or is back, and no linear correction leads there (``_is_beyond``),
-the filter restarts instead of tracking. While a part whose jumps do not cancel is not measured,
-the phase stays.
+the filter restarts instead of tracking. The phase stays while a part with uncancelled jumps is not
+measured.
 
-Whether refused poses agree is asked of the poses alone. A filter that took in a wrong attitude has
-a velocity that runs away, and by that velocity two poses at one spot would not agree.
+Whether refused poses agree is asked of the poses alone. After a wrong attitude the filter's
+velocity runs away, and by that velocity two poses at one spot would not agree.
 
 A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates,
-with variances so wide that there may be no wrench at all. A wrench that the model took for
-impossible explains a contradiction as well as a pose that jumped, and after a gap nothing says that
-the wrench still acts.
+with variances so wide that there may be no wrench at all. An impossible wrench explains a
+contradiction as well as a jump of the pose. After a gap nothing says that the wrench still acts.
 
 One compiled code is that of single filters, of filters side by side in lanes, and of the exported
 C: so phases are numbers, and conditions have an answer for each lane (``runtime.vector_lanes``).
@@ -71,8 +69,8 @@ from .estimate import COASTING, NIS, REJECTED, RESTARTED, TRACKING, Array
 N = 18  # error state (rho, omega, x, v, torque, force)
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
 _LOST = 0.9  # of a prior's variance: known no better than that
-# poses that go on from each other before they are believed again: of poses 10 cm off in directions
-# of their own one in a hundred goes on from the one before by chance, and two in a row 1e-4
+# poses in a row, in agreement, before they are believed again. With poses 10 cm off in random
+# directions one in a hundred agrees with the one before by chance, and two in a row 1e-4.
 AGREEING = 3
 
 # How the noise of measured poses is learned. The declared one counts as this many poses,
@@ -121,13 +119,13 @@ MEMORY = np.dtype(
 
 @dataclass(frozen=True)
 class Recovery:
-    """What the filter assumes of gaps, outliers and restarts; the defaults suit vehicles from 30 g
+    """The filter's assumptions on gaps, outliers and restarts; the defaults suit vehicles from 30 g
     to a few kg.
 
     Attributes:
-        patience: s, after which refused poses in a row that agree with each other are believed;
-            longer than the bursts of motion capture (0.1 to 0.5 s)
-        give_up: s, after which refused poses are believed even though they do not agree.
+        patience: s of refused poses in a row, in agreement with each other, until they are
+            believed; longer than the bursts of motion capture (0.1 to 0.5 s).
+        give_up: s of refused poses until they are believed in spite of disagreement.
         jump_at: standard deviations of an innovation beyond which a filter without a gate asks
             whether the pose jumped; a consistent filter never sees them.
         restart_at: standard deviations beyond which the filter restarts instead of following a
@@ -141,8 +139,8 @@ class Recovery:
         position_std: m, beyond which a position means nothing; a flight hall.
         force_std: share of the weight, of a force of which a contradiction has left nothing known.
         torque_std: share of weight times arm, likewise.
-        response: s, in which the filter follows a push of at most two weights, and the same about
-            the arm; how far two poses in a row may lie apart follows.
+        response: s to follow a push of at most two weights, and the same about the arm. The largest
+            distance between two poses in a row follows.
     """
 
     patience: float = 0.6
@@ -366,7 +364,7 @@ def believable(
     """Give the verdict on a measured pose, or a part of one, of which ``ukf.innovate`` was called;
     restart there if it must be.
 
-    Returns whether it is to be taken in by a linear correction.
+    Returns whether a linear correction takes the pose in.
     """
     m, alarm = f.poses, f.alarm
     measured = with_position | with_attitude
@@ -436,8 +434,8 @@ def _judge(
 def _is_beyond(f: Record, with_attitude: bool, nis: float) -> bool:
     """Return whether an unlikely pose is beyond what a linear correction can follow.
 
-    Just after a restart, where a wrench of any size is likely, it is an attitude or a rate that was
-    wrong by more than a linear model holds, and with it what was concluded since.
+    Just after a restart a wrench of any size is likely. An unlikely pose then means an attitude or
+    a rate off by more than a linear model holds, with all conclusions since.
     """
     far = _turns_between(f) | (f.poses.settling > 0.0)
     beyond: bool = opposite(nis <= f.restart_at) | (with_attitude & far)
@@ -449,8 +447,8 @@ def _turns_between(f: Record) -> bool:
     """Return whether the vehicle is estimated to turn by more than half a turn from one measured
     attitude to the next: as many attitudes are explained by one turn more in each, or one less.
 
-    Where attitudes contradict the filter as well, it has taken a vehicle that was elsewhere for one
-    that spins, and a torque for what keeps it spinning up.
+    If attitudes contradict the filter as well, the filter has taken a vehicle elsewhere for a
+    spinning one, and a torque for the cause of the spin.
     """
     x, age = f.x, f.poses.attitude_age
     rate = x[10] * x[10] + x[11] * x[11] + x[12] * x[12]
@@ -572,17 +570,17 @@ def _agrees(f: Record, pose: Array, with_position: bool, with_attitude: bool) ->
 def _is_back(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> bool:
     """Return whether poses are back from where they jumped to, or never were away.
 
-    How likely a pose is says little after half a second without one, and where a vehicle could have
-    got to in that time even less; what jumps from one pose to the next add up to is known to their
-    noise however long ago the first of them was. So poses are back where the jumps since the last
-    one that was believed cancel.
+    The likelihood of a pose says little after half a second without one, and the vehicle's reach in
+    that time even less. The sum of the jumps from pose to pose is known to the poses' noise,
+    however old the first of them. So poses are back once the jumps since the last believed one
+    cancel.
 
-    Jumps that do not cancel leave two hypotheses: the pose still is off by their sum, or it never
-    was. Each has its innovation. The second is believed where it is the likelier by as much as the
-    gate asks of a pose; a covariance that has grown beyond the sum of the jumps cannot say so.
+    Jumps that do not cancel leave two hypotheses: the pose still is off by their sum, or never was.
+    Each has its innovation. The second is believed if likelier by as much as the gate asks of a
+    pose. A covariance larger than the sum of the jumps cannot decide.
 
-    Poses at random may cancel and even agree with the one before by chance, so of more than one
-    that were refused three have to go on from each other.
+    Poses at random may cancel and even agree with the one before by chance. So after more than one
+    refusal three have to go on from each other.
     """
     x, P, m, miss, cancelled = f.x, f.P, f.poses, f.miss, True
     attitude_error(pose[3:7], x[3:7], miss[0:3])

@@ -14,9 +14,8 @@ def rise_times(vehicle: Vehicle, tuning: UKFTuning, period: float) -> tuple[Arra
     """Return the 10-90 % rise times (3,) s of the estimated force and (3,) s of the torque, along
     x, y, z near hover, with a pose every period.
 
-    Where the white noise of the model dominates that of the pose this is about
-    ``2.2 * period * thrust_noise / force_walk``; where it does not, the pose's noise slows the
-    filter down further.
+    If the white noise of the model dominates the pose's, this is about ``2.2 * period *
+    thrust_noise / force_walk``. Otherwise the pose's noise slows the filter down further.
 
     Args:
         vehicle: whose mass and inertia are used.

@@ -67,11 +67,11 @@ def _backward(
     numbers: Array,
     std: Array,
 ) -> None:
-    """Write the smoothed estimates of a block, from the last, which ``record`` holds; leave in it
-    the one before the block, whose link is the first.
+    """Write the smoothed estimates of a block, from the last, in ``record``, backwards. ``record``
+    then holds the estimate before the block; its link is the first.
 
-    Unlikely poses that were taken in widen what is smoothed before them as what is after: the
-    ``strains`` (n,) of the filter fall backwards at the same rate.
+    Unlikely poses taken in widen smoothed estimates before and after them alike: the ``strains``
+    (n,) of the filter fall backwards at the same rate.
     """
     f = record[0]
     for k in range(len(numbers) - 1, -1, -1):
@@ -84,10 +84,9 @@ def _backward(
 
 
 class RecordingUKF(WrenchUKF):
-    """A ``WrenchUKF`` that keeps what it is given, for the smoother. About 0.1 kB a call.
+    """A ``WrenchUKF`` that keeps its inputs, for the smoother. About 0.1 kB a call.
 
-    ``events`` counts the calls that were kept; after a call, its estimate is that of event
-    ``events - 1``.
+    ``events`` counts the kept calls; after a call, its estimate is event ``events - 1``.
 
     Arguments are those of ``WrenchUKF``. A pose that the gate refuses counts as not measured for
     the smoother, too.

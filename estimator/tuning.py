@@ -21,15 +21,15 @@ class UKFTuning:
     """Standard deviations per step, each a scalar or (3,) for x, y, z; the defaults suit
     ``ardrone2`` at 200 Hz.
 
-    The 10-90 % rise time of the force estimate is about
-    ``2.2 * period * thrust_noise / force_walk``, and of the torque estimate likewise: about 1 s as
-    given. A ``motor_torque_noise`` far below the model's real error makes the filter lose the
-    attitude when the torque steps, which shows as a wrong lateral force.
+    The 10-90 % rise time of the force estimate is about ``2.2 * period * thrust_noise /
+    force_walk``, and of the torque estimate likewise: about 1 s as given. With a
+    ``motor_torque_noise`` far below the model's real error the filter loses the attitude when the
+    torque steps. A wrong lateral force is the sign.
 
     The biases of an IMU begin with the deviations of PX4's EKF2 (``GBIAS_INIT`` 0.1 rad/s,
-    ``ABIAS_INIT`` 0.2 m/s2). They walk within a factor of five of its process noise, 7e-6 rad/s and
-    2e-5 m/s2 in 5 ms; the accelerometer's faster, for temperature and vibration. Their bounds are
-    what the data sheet of the MPU-6000 allows of a sensor's zero: 20 deg/s and 80 mg.
+    ``ABIAS_INIT`` 0.2 m/s2). They walk within a factor of five of EKF2's process noise, 7e-6 rad/s
+    and 2e-5 m/s2 in 5 ms. The accelerometer's walks faster, for temperature and vibration. Their
+    bounds are the MPU-6000's data sheet's, for a sensor's zero: 20 deg/s and 80 mg.
 
     Attributes:
         motor_torque_noise: Nm, body frame: torque that the rotor model misses, new each step.

@@ -138,7 +138,7 @@ def carry(f: Record, dt: float) -> None:
 @compiled_inline
 def _pairs_in_turn(f: Record, dt: float, pairs: int, moved: Any) -> None:
     """Write the scaled half differences and half sums of the first pairs of sigma points, and their
-    mean, one point after the other, each carried ahead by ``moved``.
+    mean. ``moved`` carries one point after the other ahead.
     """
     spread, weight, scale = _spread_of(f)
     x, H, E, mean, error = f.x, f.H, f.E, f.mean, f.error
@@ -227,9 +227,8 @@ def innovate(f: Record, pose: Array, with_position: bool, with_attitude: bool) -
     """Leave the root of the innovation's covariance in ``f.L`` and the whitened innovation of what
     was measured of a pose (7,), (rho, x), in ``f.innovation``; return the NIS.
 
-    Leaves the innovation itself in ``f.poses.residual``, and by how much it changed since the last
-    measurement was taken in, in ``f.increment``; the variances of the expected pose in
-    ``f.unsure``.
+    Leaves the innovation itself in ``f.poses.residual``, its change since the last measurement
+    taken in, in ``f.increment``, and the variances of the expected pose in ``f.unsure``.
     """
     x, P, L, scales, y, residual = f.x, f.P, f.L, f.scales, f.innovation, f.poses.residual
     attitude_error(pose[3:7], x[3:7], y[0:3])
@@ -301,10 +300,10 @@ def correct_parts(f: Record, z: Array, parts: int) -> None:
         correct(f, z[4:11], parts & 1 != 0, parts & 2 != 0)
 
 
-@compiled_inline
-def step_by(f: Record, z: Array, parts: int, dt: float, voltage: float, predict_with: Any) -> int:
-    """Predict over ``dt`` s by ``predict_with`` if that is positive, then correct with the
-    ``parts`` of ``z`` (11,) that were measured.
+@compiled
+def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
+    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,)
+    that were measured.
 
     Returns the parts that could be used, or -1, with the filter as it was, if the quaternion is no
     rotation.
@@ -313,15 +312,9 @@ def step_by(f: Record, z: Array, parts: int, dt: float, voltage: float, predict_
     if usable >= 0:
         sample = undo_sensing(f, z, usable, dt)
         if dt > 0.0:
-            predict_with(f, sample[0:4], dt, voltage)
+            predict(f, sample[0:4], dt, voltage)
         correct_parts(f, sample, usable)
     return usable
-
-
-@compiled
-def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
-    """Do ``step_by`` the unscented prediction."""
-    return step_by(f, z, parts, dt, voltage, predict)
 
 
 @compiled
@@ -330,20 +323,16 @@ def _step_at(address: int, parts: int, dt: float, voltage: float) -> int:
     return step(f, f.z, parts, dt, voltage)
 
 
-@compiled_inline
-def step_with_biases_by(
-    f: Record, parts: int, dt: float, voltage: float, predict_with: Any, carry_with: Any
-) -> int:
-    """Step like ``step_by`` with the sample in ``f.z``, and the biases of an IMU, whose covariance
-    with the error state ``carry_with`` carries over the prediction.
-    """
+@compiled
+def step_with_biases(f: Record, parts: int, dt: float, voltage: float) -> int:
+    """Step like ``step`` with the sample in ``f.z``, and with the biases of an IMU."""
     usable: int = check_sample(f, f.z, parts)
     if usable >= 0:
         sample = undo_sensing(f, f.z, usable, dt)
         if dt > 0.0:
             cross, restarts = cross_covariance(f, BIASES), f.restarts
-            predict_with(f, sample[0:4], dt, voltage)
-            carry_companions(f, dt, carry_with(f, dt, cross))
+            predict(f, sample[0:4], dt, voltage)
+            carry_companions(f, dt, carry_with_points(f, dt, cross))
             if f.restarts > restarts:
                 forget_biases(f)
         x, restarts = f.x.copy(), f.restarts
@@ -358,7 +347,7 @@ def step_with_biases_by(
 @compiled
 def _step_with_biases_at(address: int, parts: int, dt: float, voltage: float) -> int:
     f = carray(pointer_to(address), 1, FILTER)[0]
-    return step_with_biases_by(f, parts, dt, voltage, predict, carry_with_points)
+    return step_with_biases(f, parts, dt, voltage)
 
 
 _POSES = FILTER.fields["poses"][1]  # type: ignore[index]  # where their memory begins
@@ -367,7 +356,7 @@ _STRAINED = 0.01  # of a variance: less is not told
 
 @compiled
 def _add_doubt(record: Record, variances: Array) -> None:
-    """Add to an estimate's variances (18,) what refused and unlikely poses add."""
+    """Widen an estimate's variances (18,) by refused and unlikely poses."""
     f = record[0]
     doubted_variance(f, f.mean)
     for i in range(N):
@@ -375,12 +364,35 @@ def _add_doubt(record: Record, variances: Array) -> None:
 
 
 @compiled
+def write_variances(f: Record, out: Array) -> None:
+    """Write the variances (18,) of the error state, widened by refused and unlikely poses, into
+    ``out``; of a single filter or of a block in hand.
+    """
+    m = f.poses
+    doubted = (m.phase > BELIEVING) | (m.strain > _STRAINED) | (m.astray > 0.0)
+    for i in range(N):
+        out[i] = f.P[i, i]
+    if any_of(doubted):
+        _add_doubt((f,), out)
+        for i in range(N):
+            out[i] = choose(doubted, out[i], f.P[i, i])
+
+
+@compiled
+def write_numbers(f: Record, out: Array) -> None:
+    """Write an estimate's numbers, without the covariance, into ``out``."""
+    out[:STATE_SIZE], out[MODEL], out[EXCESS] = f.x, f.model, f.excess
+    out[STATUS], out[RESTARTS] = f.status, f.restarts
+
+
+@compiled
 def make_calls(
     record: Record, calls: np.ndarray, rows: np.ndarray, numbers: Array, std: Array, loads: Array
 ) -> int:
-    """Make calls (n,) of an unscented filter, and write into the row of each what it leads to:
-    numbers (N, 30) and standard deviations (N, 18) of an estimate, and what the vehicle's
-    uncertainty scales (N, 7, 3); return how many there were up to a quaternion that is no rotation.
+    """Make calls (n,) of an unscented filter, and write the results into the row of each. Results
+    are numbers (N, 30) and standard deviations (N, 18) of an estimate, and the loads of the
+    vehicle's uncertainty (N, 7, 3). Return the number of calls up to a quaternion that is no
+    rotation.
     """
     f = record[0]
     for k, row in enumerate(rows):
@@ -392,20 +404,14 @@ def make_calls(
                 begin_imu(record)
             take_in_imu(record, f.z[:6], gyro, accelerometer)
         elif f.imu.used > 0:
-            used = step_with_biases_by(
-                f, call.parts, call.dt, call.voltage, predict, carry_with_points
-            )
+            used = step_with_biases(f, call.parts, call.dt, call.voltage)
         else:
             used = step(f, f.z, call.parts, call.dt, call.voltage)
         if used < 0:
             return k
-        numbers[row, :STATE_SIZE], numbers[row, MODEL], loads[row] = f.x, f.model, f.load
-        numbers[row, STATUS], numbers[row, RESTARTS] = f.status, f.restarts
-        numbers[row, EXCESS] = f.excess
-        std[row] = np.diag(f.P)
-        m = f.poses
-        if m.phase > BELIEVING or m.strain > _STRAINED or m.astray > 0.0:
-            _add_doubt(record, std[row])
+        write_numbers(f, numbers[row])
+        write_variances(f, std[row])
+        loads[row] = f.load
         std[row] = np.sqrt(std[row])
     return len(calls)
 
@@ -423,9 +429,9 @@ class WrenchUKF:
             the estimated wrench is what they do not explain.
         tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
         period: time between steps, s.
-        gate: refuse poses, or parts of one, whose NIS has a smaller chance than ``1 - gate``
-            (0.999, say) and which do not go on from the pose before; None takes in any. Refused
-            poses that agree with each other for ``recovery.patience`` are believed, and the filter
+        gate: refuse poses, or parts of one, with an NIS of a smaller chance than ``1 - gate``
+            (0.999, say), unless they go on from the pose before; None takes in any. Refused poses
+            that agree with each other for ``recovery.patience`` are believed, and the filter
             restarts there.
         recovery: how gaps, outliers and restarts are dealt with, gate or not; default
             ``Recovery()``.
@@ -633,8 +639,8 @@ class WrenchUKF:
 
     @property
     def estimate(self) -> WrenchEstimate:
-        """What the filter believes now. While poses are refused, or unlikely ones taken in, its
-        covariance widens.
+        """The estimate now. While poses are refused, or unlikely ones taken in, its covariance
+        widens.
         """
         numbers, doubts = self._now.copy(), self._doubts
         if doubts[0] > BELIEVING or doubts[1] > _STRAINED or doubts[2] > 0.0:

@@ -20,22 +20,13 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
 from ..runtime.compiled import compiled_without_gil
 from ..runtime.errors import InputError
-from .estimate import (
-    EXCESS,
-    MODEL,
-    RESTARTS,
-    STATE_SIZE,
-    STATUS,
-    WITHOUT_COVARIANCE,
-    Array,
-    WrenchEstimate,
-)
+from .estimate import WITHOUT_COVARIANCE, Array, WrenchEstimate
 from .filter_record import N
 from .recovery import Recovery
 from .sample import convert
 from .tuning import UKFTuning
-from .ukf import WrenchUKF, step
-from .ukf_lanes import Blocks, write_variances
+from .ukf import WrenchUKF, step, write_numbers, write_variances
+from .ukf_lanes import Blocks
 
 
 @compiled_without_gil
@@ -62,10 +53,7 @@ def _step_records(
         f = records[n]
         step(f, z[n], parts, dt, voltage[n])
         write_variances(f, variances[n])
-        for i in range(STATE_SIZE):
-            out[n, i] = f.x[i]
-        out[n, STATUS], out[n, RESTARTS] = f.status, f.restarts
-        out[n, EXCESS], out[n, MODEL] = f.excess, f.model
+        write_numbers(f, out[n])
 
 
 class _Records:
@@ -91,8 +79,8 @@ class WrenchUKFBatch:
     """``WrenchUKF`` for ``count`` vehicles: the same numbers, bit for bit, for all of them in one
     call.
 
-    Filters of one vehicle without declared effects cost less than half of what a single one does in
-    a compiled loop, others as much (``python -m windwrench.speed`` prints it).
+    Filters of one vehicle without declared effects cost less than half of a single one in a
+    compiled loop, others as much (``python -m evidence.speed`` prints both).
 
     Args:
         vehicles: the declared vehicle of all, or a sequence of ``count``.
@@ -211,7 +199,7 @@ class WrenchUKFBatch:
 
     @property
     def estimate(self) -> WrenchEstimate:
-        """What the filters believe now."""
+        """The estimates now."""
         numbers, variances = self._now
         return WrenchEstimate(numbers.copy(), partial(np.sqrt, variances))
 

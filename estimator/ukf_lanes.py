@@ -2,8 +2,8 @@
 (``runtime.vector_lanes``).
 
 Filters of one vehicle without effects, as many as there are lanes, make a block. Between steps a
-block is its estimates and covariances; what it works on in a step lies in one record for all
-blocks, so that a few hundred filters stay in a core's cache.
+block is its estimates and covariances. The scratch of a step lies in one record for all blocks, so
+that a few hundred filters stay in a core's cache.
 """
 
 import math
@@ -16,11 +16,11 @@ from ..dynamics.motion import rotor_wrench
 from ..dynamics.rotation import quaternion_to_matrix
 from ..runtime.addresses import address_of, call_at, numbers_at
 from ..runtime.compiled import Record, compiled, compiled_without_gil
-from ..runtime.vector_lanes import WIDTH, LaneRecord, any_of, choose
-from .estimate import STATE_SIZE, Array
-from .filter_record import FILTER, NUMBERS, N, fields_between
-from .recovery import BELIEVING, MEMORY
-from .ukf import _STRAINED, _add_doubt, carry, correct
+from ..runtime.vector_lanes import WIDTH, LaneRecord, choose
+from .estimate import WITHOUT_COVARIANCE, Array
+from .filter_record import FILTER, N, fields_between
+from .recovery import MEMORY
+from .ukf import carry, correct, write_variances
 
 # what a filter must not forget from one step to the next; first in both layouts
 _KEPT = fields_between("x", "last_speeds")
@@ -34,6 +34,7 @@ _WORK = LaneRecord(
 _BLOCK = LaneRecord(FILTER, _KEPT, nested=_MEMORY)
 BLOCK_SIZE, STATE = _BLOCK.dtype.itemsize, _BLOCK.offset("x")  # bytes; where the estimates lie
 _NUMBERS = BLOCK_SIZE // 8
+_FIRST = STATE // (8 * WIDTH)  # of a filter's numbers: the first of its estimate
 
 new_blocks = _BLOCK.zeros  # the memory of blocks between steps
 columns = _BLOCK.columns  # blocks (n,) as numbers (n, m, WIDTH), those of a filter in one column
@@ -52,21 +53,6 @@ def _check(f: Record) -> None:
     for i in range(4):
         z[i] = choose(abs(z[i]) <= f.fastest, z[i], last[i])
         last[i] = z[i]
-
-
-@compiled
-def write_variances(f: Record, out: Array) -> None:
-    """Write the variances (18,) of the error state into ``out``, with what refused and unlikely
-    poses add; of a single filter or of a block in hand.
-    """
-    m = f.poses
-    doubted = (m.phase > BELIEVING) | (m.strain > _STRAINED) | (m.astray > 0.0)
-    for i in range(N):
-        out[i] = f.P[i, i]
-    if any_of(doubted):
-        _add_doubt((f,), out)
-        for i in range(N):
-            out[i] = choose(doubted, out[i], f.P[i, i])
 
 
 def _step_work(address: int) -> None:
@@ -107,14 +93,13 @@ def _step_blocks(
     work_z: Array,
     work_variances: Array,
     blocks: int,
-    kept: tuple[Array, Array, Array, Array, Array],
+    numbers: Array,
     z: Array,
     out: Array,
     variances: Array,
 ) -> None:
-    estimates, status, restarts, excess, model = kept
     count = len(z)
-    for b in range(len(estimates)):
+    for b in range(len(numbers)):
         take_up(blocks + b * BLOCK_SIZE, work)
         for lane in range(WIDTH):
             n = min(WIDTH * b + lane, count - 1)  # lanes to spare do what the last filter does
@@ -125,14 +110,8 @@ def _step_blocks(
         for lane in range(min(WIDTH, count - WIDTH * b)):
             for i in range(N):
                 variances[WIDTH * b + lane, i] = work_variances[i, lane]
-            for i in range(STATE_SIZE):
-                out[WIDTH * b + lane, i] = estimates[b, i, lane]
-            out[WIDTH * b + lane, STATE_SIZE] = status[b, lane]
-            out[WIDTH * b + lane, STATE_SIZE + 1] = restarts[b, lane]
-            for i in range(2):
-                out[WIDTH * b + lane, STATE_SIZE + 2 + i] = excess[b, i, lane]
-            for i in range(6):
-                out[WIDTH * b + lane, STATE_SIZE + 4 + i] = model[b, i, lane]
+            for i in range(WITHOUT_COVARIANCE):
+                out[WIDTH * b + lane, i] = numbers[b, i, lane]
 
 
 def new_work(record: np.ndarray) -> np.ndarray:
@@ -175,14 +154,13 @@ class Blocks:
         """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 28) and
         variances of the error states (n, 18), written.
         """
-        kept: Any = tuple(self._blocks[name] for name in NUMBERS)
         _step_blocks(
             step_address(),
             self._work.ctypes.data,
             self._work["z"][0],
             self._work["S"][0, 0],
             self._blocks.ctypes.data,
-            kept,
+            columns(self._blocks)[:, _FIRST : _FIRST + WITHOUT_COVARIANCE],
             z,
             out,
             variances,

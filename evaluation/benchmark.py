@@ -1,88 +1,103 @@
 """The benchmark of all tasks: controllers flown through the same episodes."""
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from ..controllers.registry import STANDARD_TASK
-from ..envs.scenarios import find_scenario
 from ..runtime.errors import InputError
 from ..runtime.workers import every
 from .episodes import Episode, benchmark_seeds, fly_episode
-from .tasks import TASKS, make_pilot, task_of
+from .rewards import find_reward
+from .tasks import BenchmarkTask, import_files, make_pilot, scenario_names, task_of
 
-_CHUNK = 5  # episodes that a worker flies at a time
-_SEEDS = 2**32  # of a benchmark
+_CHUNK = 5  # episodes of a worker at a time
+_SEEDS = 2**32  # bound of a benchmark's seeds
 
 Results = dict[tuple[str, str], list[Episode]]  # by controller and scenario
-Chunk = tuple[str, str, str, tuple[int, ...]]  # task, controller, scenario, seeds
 
 
-def check_request(
-    controllers: Sequence[str],
-    scenarios: Sequence[str],
-    episodes: int,
-    seed: int,
-    task: str = STANDARD_TASK,
-) -> None:
-    """Check what ``fly_all`` is asked for, before anything is flown.
+@dataclass(frozen=True)
+class Request:
+    """A benchmark.
 
-    Raises:
-        InputError: an unknown name, no episodes, or a seed out of range.
+    Attributes:
+        controllers: names, of trained policies too, or their paths, YAML files of laws, or
+            FILE.py:CLASS.
+        scenarios: names, paths of YAML files, or FILE.py:NAME.
+        episodes: a scenario.
+        seed: the benchmark's.
+        task: a name of ``TASKS``, a registered id, or FILE.py:NAME.
+        reward: one's own, as of ``find_reward``; None: the task's.
+        imports: Python files that register a task, a law, a scenario or a reward.
     """
-    known = task_of(task)
-    if episodes < 1:
-        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
-    if not 0 <= seed < _SEEDS:
-        raise InputError(f"benchmark: --seed must lie between 0 and {_SEEDS - 1}, got {seed}")
-    for name in controllers:
-        make_pilot(name, task)
-    for name in scenarios:
-        find_scenario(name, known.environment.scenarios)
+
+    controllers: tuple[str, ...]
+    scenarios: tuple[str, ...]
+    episodes: int
+    seed: int
+    task: str = STANDARD_TASK
+    reward: str | None = None
+    imports: tuple[str, ...] = ()
+
+    def check(self) -> BenchmarkTask:
+        """Check all names, before any flight; return the task.
+
+        Raises:
+            InputError: an unknown name, no episodes, or a seed out of range.
+        """
+        import_files(self.imports)
+        known = task_of(self.task)
+        if self.episodes < 1:
+            raise InputError(f"benchmark: --episodes must be at least 1, got {self.episodes}")
+        if not 0 <= self.seed < _SEEDS:
+            raise InputError(
+                f"benchmark: --seed must lie between 0 and {_SEEDS - 1}, got {self.seed}"
+            )
+        for name in self.controllers:
+            make_pilot(name, self.task)
+        scenario_names(self.scenarios, known)
+        if self.reward is not None:
+            find_reward(self.reward)
+        return known
+
+    def flights(self) -> int:
+        """Return the number of episodes, those of the reference laws among them."""
+        laws, worlds = task_of(self.task).references(self.controllers), set(self.scenarios)
+        return len(laws) * len(worlds) * self.episodes
 
 
-def count_flights(
-    controllers: Sequence[str], scenarios: Sequence[str], episodes: int, task: str = STANDARD_TASK
-) -> int:
-    """Return how many episodes ``fly_all`` flies."""
-    return len(task_of(task).references(controllers)) * len(set(scenarios)) * episodes
+Chunk = tuple[Request, str, str, tuple[int, ...]]  # with controller, scenario and seeds
 
 
 def fly_all(
-    controllers: Sequence[str],
-    scenarios: Sequence[str],
-    episodes: int,
-    seed: int,
+    request: Request,
     jobs: int | None = None,
     advance: Callable[[int], None] = lambda count: None,
     cluster: str | None = None,
-    task: str = STANDARD_TASK,
 ) -> Results:
     """Fly every controller, and the references, through every scenario on the same seeds.
 
     Args:
-        controllers: names, of trained policies too, or their paths, or FILE.py:CLASS.
-        scenarios: names, or paths of YAML files.
-        episodes: a scenario.
-        seed: of the benchmark.
-        jobs: processes; default: one a core. The results do not depend on it.
+        request: the benchmark.
+        jobs: processes, without a change of the results; default: one a core.
         advance: called with the number of episodes flown since the last call.
-        cluster: address of a Ray cluster that flies, or ``local`` for one of its own on this
-            machine; default: none.
-        task: one of ``TASKS``.
+        cluster: address of a Ray cluster, or ``local`` for a new one on this machine; default:
+            none.
 
     Raises:
-        InputError: as ``check_request``.
+        InputError: as ``Request.check``.
     """
-    check_request(controllers, scenarios, episodes, seed, task)
-    wanted, worlds = task_of(task).references(controllers), dict.fromkeys(scenarios)
-    seeds = tuple(benchmark_seeds(seed, episodes))
+    wanted = request.check().references(request.controllers)
+    worlds, episodes = dict.fromkeys(request.scenarios), request.episodes
+    seeds = tuple(benchmark_seeds(request.seed, episodes))
     chunks = [
-        (task, controller, scenario, seeds[i : i + _CHUNK])
+        (request, controller, scenario, seeds[i : i + _CHUNK])
         for scenario in worlds
         for controller in wanted
         for i in range(0, episodes, _CHUNK)
     ]
-    # one episode first, so that soon there is something to count
+    # one episode first, for an early count
     first = chunks[0]
     chunks[:1] = [(*first[:3], part) for part in (first[3][:1], first[3][1:]) if part]
     flown: dict[Chunk, list[Episode]] = {}
@@ -103,13 +118,15 @@ def _flown(
     if jobs == 1 and cluster is None:
         return ((chunk, _fly_chunk(chunk)) for chunk in chunks)
     if cluster is None:
-        task, _, scenario, _ = chunks[0]
-        TASKS[task].environment(scenario).reset(seed=0)  # compiles, once for all processes
+        request, _, scenario, _ = chunks[0]
+        # compiles, once for all processes
+        task_of(request.task).make(scenario).reset(seed=0)
     return every(_fly_chunk, chunks, None if cluster else jobs, cluster)
 
 
 def _fly_chunk(chunk: Chunk) -> list[Episode]:
-    task, name, scenario, seeds = chunk
-    known, pilot = TASKS[task], make_pilot(name, task)
-    env = known.environment(scenario)
+    request, name, scenario, seeds = chunk
+    import_files(request.imports)
+    pilot = make_pilot(name, request.task)
+    env = task_of(request.task).make(scenario, request.reward)
     return [fly_episode(env, pilot, seed) for seed in seeds]

@@ -21,10 +21,11 @@ from ..runtime.drawing import (
 from ..runtime.page_files import write_png
 from .benchmark import Results
 from .episodes import Episode
-from .leaderboard import Standing, shown
+from .leaderboard import SETTLED, Standing, figures, shown
+from .tables import in_mm
 from .tasks import short_names
 
-# of controllers in every picture; all others take turns
+# fixed in every picture; other controllers take turns
 COLOURS = {"hover": GREY, "admittance": SERIES[1], "limit": BLACK, "oracle": SERIES[0]}
 _OTHERS = (*SERIES[2:], "#5f0f40", "#6a994e", "#8c564b", "#e08dac", "#3d405b")
 
@@ -32,7 +33,8 @@ _OTHERS = (*SERIES[2:], "#5f0f40", "#6a994e", "#8c564b", "#e08dac", "#3d405b")
 @styled()
 def draw_episode(episode: Episode, title: str, path: Path) -> None:
     """Draw an episode over time. In the jet of a fan on one path: fan and vehicle, torque, force
-    and command, as the paper's Fig. 7; in other tasks: the error and the three forces.
+    and command, as the paper's Fig. 7; in other tasks: the error and the three forces. Where the
+    task states no error: the actions, and up to three numbers of the observation.
     """
     t, estimate = episode.time, episode.estimate
     true = np.hstack([episode.force, episode.torque])
@@ -43,9 +45,12 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
     )
     figure = new_figure(7.0)
     top, *others = figure.subplots(4, 1, sharex=True, height_ratios=[2, 1, 1, 1])
-    end = "lost" if episode.lost else "never lost"
-    told = f" ({episode.motion}, seed {episode.seed})"
-    top.set_title(f"{title}: RMSE {episode.rmse:.3f} m, {end}{told}")
+    end = "terminated" if episode.lost else "not terminated"
+    told = ", ".join(filter(None, (episode.motion, f"seed {episode.seed}")))
+    figure_text = f"return {episode.total_reward:.4g}"
+    if len(episode.error):
+        figure_text = f"RMSE after 3 s {episode.rmse_settled:.3g} m"
+    top.set_title(f"{title}: {figure_text}, {end} ({told})")
     if episode.in_jet:
         fan, command = episode.fan_y, others.pop()
         top.fill_between(t, fan - 0.45, fan + 0.45, color=JET, label="width of the fan")
@@ -56,11 +61,18 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
         command.step(t, episode.command, where="post", color=BLACK)
         command.axhline(0, color=BLACK, lw=0.5)
         command.set_ylabel("command (m/s)")
-    else:
+    elif len(episode.error):
         top.plot(t, episode.error, color=COLOURS["admittance"], lw=2)
         top.set_ylabel("error (m)")
         top.set_ylim(bottom=0)
-    for axes, (i, label) in zip(others, wrench, strict=True):
+    else:
+        top.step(t, episode.action, where="post")
+        top.set_ylabel("action, -1 to 1")
+        for i, (axes, seen) in enumerate(zip(others, episode.observation.T, strict=False)):
+            axes.plot(t, seen, color=ESTIMATE)
+            axes.set_ylabel(f"observation {i}")
+        others.clear()
+    for axes, (i, label) in zip(others, wrench, strict=False):
         axes.plot(t, true[:, i], color=TRUTH, lw=1, label="true")
         axes.plot(t, estimate[:, i], color=ESTIMATE, lw=1.6, label="estimated")
         axes.axhline(0, color=BLACK, lw=0.5)
@@ -77,8 +89,9 @@ def _legend(axes: Any, columns: int) -> None:
 
 @styled()
 def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> None:
-    """Draw the RMSE of every episode and the mean with its interval, and the rival's median
-    episode, a scenario a row; of a kind, the episodes of all policies, and the first one's path.
+    """Draw a scenario a row: the RMSE after 3 s of every episode and the mean with its interval,
+    and the rival's median episode. A kind has the episodes of all policies, and the first one's
+    path. Where the task states no error, the return stands in place of the RMSE.
     """
     rows = shown(rows)
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
@@ -89,42 +102,42 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
     for (left, right), scenario in zip(grid, scenarios, strict=True):
         all_of_it = [row for row in rows if row.scenario == scenario]
         some = all_of_it[:MOST_ROWS]
-        rival = results[some[0].rival, scenario]
-        middle = int(np.argsort([e.rmse for e in rival])[len(rival) // 2])
+        flights = {name: each for (name, world), each in results.items() if world == scenario}
+        rival, by_error = flights[some[0].rival], some[0].ranked_by == SETTLED
+        kept = "rmse_settled" if by_error else "total_reward"
+        middle = int(np.argsort(figures([rival], kept)[0])[len(rival) // 2])
         for i, row in enumerate(some):
             flown = [
                 each
-                for (name, world), each in results.items()
-                if world == scenario
-                and (name if row.policies == 1 else name.rpartition("-")[0]) == row.controller
+                for name, each in flights.items()
+                if (name if row.policies == 1 else name.rpartition("-")[0]) == row.controller
             ]
-            values = np.array([e.rmse for each in flown for e in each])
+            values = figures(flown, kept).ravel()
+            shown_mean = row.rmse_settled_m if by_error else row.return_mean
+            mean_text = f"{in_mm(shown_mean)} mm" if by_error else f"{shown_mean:.4g}"
             jitter = np.random.default_rng(0).uniform(-0.24, 0.24, len(values))
             colour = colours[row.controller]
             left.scatter(values, i + jitter, s=11, color=colour, alpha=0.4, lw=0)
-            left.plot(row.rmse_ci95_m, [i, i], color=BLACK, lw=2.2, solid_capstyle="butt", zorder=4)
-            left.plot(row.rmse_m, i, "o", color=colour, mec=BLACK, ms=8, zorder=5)
-            lost = f", {100 * row.lost_fraction:.1f} % lost" if row.lost_fraction else ""
-            left.annotate(
-                f"{row.rmse_m:.3f} m{lost}",
-                (1.01, i),
-                xycoords=("axes fraction", "data"),
-                va="center",
-            )
+            if by_error:
+                ends = row.rmse_settled_ci95_m
+                left.plot(ends, [i, i], color=BLACK, lw=2.2, solid_capstyle="butt", zorder=4)
+            left.plot(shown_mean, i, "o", color=colour, mec=BLACK, ms=8, zorder=5)
+            lost = f", {row.lost_episodes} terminated" if row.lost_episodes else ""
+            beside, text = ("axes fraction", "data"), f"{mean_text}{lost}"
+            left.annotate(text, (1.01, i), xycoords=beside, va="center")
             episode = flown[0][middle]
             way = episode.y if episode.in_jet else episode.error
-            right.plot(episode.time, way, color=colour)
-        longest = max(
-            (each[middle] for (_, world), each in results.items() if world == scenario),
-            key=lambda episode: len(episode.time),
-        )
+            right.plot(episode.time[: len(way)], way, color=colour)
+        longest = max((each[middle] for each in flights.values()), key=lambda e: len(e.time))
         right.plot(longest.time, longest.fan_y, "--", color=BLACK, lw=1.3)
         left.set_yticks(range(len(some)), [names[row.controller] for row in some])
         left.invert_yaxis()
-        left.set_xlim(left=0)
-        of = f", the best {len(some)} of {len(all_of_it)}" if len(some) < len(all_of_it) else ""
-        left.set_title(f"{scenario}{of}: RMSE of each episode, mean, 95 % interval")
-        left.set_xlabel("RMSE (m)")
+        if by_error:
+            left.set_xlim(left=0)
+        of = f", the best {len(some)} of {len(all_of_it)}" if some != all_of_it else ""
+        what, interval = ("RMSE after 3 s", ", 95 % interval") if by_error else ("return", "")
+        left.set_title(f"{scenario}{of}: {what} of each episode, mean{interval}")
+        left.set_xlabel(f"{what}{' (m)' * by_error}")
         told = "y (m), fan dashed" if longest.in_jet else "error (m)"
         right.set_title(f"median episode of {some[0].rival}")
         right.set_xlabel("time (s)")

@@ -2,25 +2,25 @@
 
 A score matrix has a row for each run (training seed) and a column for each task (a test episode in
 a world). Every statistic also takes a stack of matrices (..., runs, tasks) and then returns (...).
-The definitions are those of Agarwal, Schwarzer, Castro, Courville and Bellemare, *Deep
-reinforcement learning at the edge of the statistical precipice*, NeurIPS 2021.
+Definitions: Agarwal, Schwarzer, Castro, Courville and Bellemare, *Deep reinforcement learning at
+the edge of the statistical precipice*, NeurIPS 2021.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import bootstrap
+from scipy.stats import bootstrap, trim_mean
 
 from ..runtime.errors import InputError
 
 Array = NDArray[np.float64]
 _RESAMPLES = 2_000
 _LEVEL = 0.95  # of an interval
-_AT_ONCE = 1_000_000  # numbers drawn at a time
+_AT_ONCE = 1_000_000  # numbers per draw
 _LAST_TWO = (-2, -1)
 
 
@@ -43,8 +43,14 @@ def mean(scores: ArrayLike) -> Any:
     return score_matrix(scores).mean(axis=_LAST_TWO)
 
 
+def interquartile_mean(scores: ArrayLike) -> Any:
+    """Return the mean over the middle half of all runs and tasks together."""
+    matrix = score_matrix(scores)
+    return trim_mean(matrix.reshape(*matrix.shape[:-2], -1), 0.25, axis=-1)
+
+
 def probability_of_improvement(x: ArrayLike, y: ArrayLike) -> Any:
-    """Return the probability that a run of X beats a run of Y on a task drawn at random; a tie
+    """Return the probability of a run of X beating a run of Y on a task drawn at random; a tie
     counts half.
 
     The Mann-Whitney statistic over all pairs of runs, task by task: scores where more is better.
@@ -59,7 +65,7 @@ def probability_of_improvement(x: ArrayLike, y: ArrayLike) -> Any:
 
 
 def relative_change(x: ArrayLike, y: ArrayLike) -> Any:
-    """Return by which share the mean of X lies above that of Y; -0.1: ten per cent below."""
+    """Return the relative excess of X's mean over Y's; -0.1: ten per cent below."""
     return mean(x) / mean(y) - 1.0
 
 
@@ -85,7 +91,7 @@ def episode_bootstrap(
     Args:
         statistic: takes a stack (k, tasks) of scores; returns (k,).
         scores: (tasks,), or (1, tasks).
-        resamples: how often tasks are drawn.
+        resamples: number of draws.
     """
     (run,) = score_matrix(scores)
     if len(run) == 1:  # scipy refuses a single number
@@ -106,27 +112,29 @@ def hierarchical_draws(
     *matrices: ArrayLike,
     resamples: int = _RESAMPLES,
     seed: int = 0,
+    strata: Sequence[int] = (),
 ) -> Array:
     """Return a statistic of one or more score matrices over many draws of policies and episodes.
 
-    Both levels are drawn anew, each as a whole: a policy keeps all its episodes together, and an
-    episode is the same for all policies of all matrices (the pigeonhole bootstrap of Owen, 2007,
-    for two crossed factors). What differs between policies so counts as often as there are
-    policies, not once an episode. Of n policies or episodes n - 1 are drawn, which makes the
-    variance of a mean unbiased for few of them (Rao and Wu, 1988); a single policy, as a designed
-    law is, stays as it is.
+    Both levels are drawn anew, each as a whole: the pigeonhole bootstrap of Owen (2007) for two
+    crossed factors. A policy keeps all its episodes together, and an episode is the same for all
+    policies of all matrices. So differences between policies count once a policy, not once an
+    episode. From n policies or episodes n - 1 are drawn: the variance of a mean is then unbiased
+    for small n (Rao and Wu, 1988). A single policy, as a designed law, stays as it is.
 
     Args:
         statistic: takes as many stacks (k, runs, tasks) as there are matrices; returns (k,).
         *matrices: (runs, tasks).
-        resamples: how often everything is drawn.
-        seed: of the draws.
+        resamples: number of draws.
+        seed: for the draws.
+        strata: numbers of episodes that are drawn among themselves, as of each scenario; they add
+            up to ``tasks``. Default: all.
 
     Returns:
         (resamples,).
 
     Raises:
-        InputError: matrices that do not have the same tasks.
+        InputError: the matrices have different tasks.
     """
     given = _same_tasks(*matrices)
     rng, count = np.random.default_rng(seed), given[0].shape[1]
@@ -134,7 +142,12 @@ def hierarchical_draws(
     values = []
     for first in range(0, resamples, step):
         k = min(step, resamples - first)
-        columns = rng.integers(count, size=(k, max(count - 1, 1)))
+        columns = np.hstack(
+            [
+                end - size + rng.integers(size, size=(k, max(size - 1, 1)))
+                for size, end in zip(strata or (count,), np.cumsum(strata or (count,)), strict=True)
+            ]
+        )
         drawn = []
         for m in given:
             rows = rng.integers(len(m), size=(k, max(len(m) - 1, 1)))
@@ -144,24 +157,22 @@ def hierarchical_draws(
 
 
 def interval_of(draws: ArrayLike) -> tuple[float, float]:
-    """Return the percentile interval that holds 95 % of the draws (n,)."""
+    """Return the percentile interval of 95 % of the draws (n,)."""
     low, high = np.quantile(np.asarray(draws), [(1.0 - _LEVEL) / 2.0, (1.0 + _LEVEL) / 2.0])
     return float(low), float(high)
 
 
 def hierarchical_bootstrap(
-    statistic: Callable[..., Any], *matrices: ArrayLike, resamples: int = _RESAMPLES, seed: int = 0
+    statistic: Callable[..., Any], *matrices: ArrayLike, **given: Any
 ) -> tuple[float, float]:
-    """Return the 95 % percentile interval of ``hierarchical_draws``, whose arguments and errors
-    these are.
-    """
-    return interval_of(hierarchical_draws(statistic, *matrices, resamples=resamples, seed=seed))
+    """Return the 95 % percentile interval of ``hierarchical_draws``, with its arguments."""
+    return interval_of(hierarchical_draws(statistic, *matrices, **given))
 
 
 def sign_probability(draws: ArrayLike) -> float:
     """Return the two-sided p-value of a statistic being zero, from its bootstrap draws (n,).
 
-    The value is twice the share on the rarer side, and never below what n draws can tell.
+    The value is twice the share on the rarer side, and never below the resolution of n draws.
     """
     values = np.asarray(draws, dtype=np.float64)
     rarer = min(int(np.sum(values >= 0.0)), int(np.sum(values <= 0.0)))
@@ -169,11 +180,12 @@ def sign_probability(draws: ArrayLike) -> float:
 
 
 def holm(p_values: ArrayLike) -> Array:
-    """Return p-values (n,) of n claims, adjusted so that all claims below 0.05 hold together with
-    95 % (Holm, 1979): the k-th smallest times (n - k + 1), never less than one before it.
+    """Return adjusted p-values (n,) of n claims: all claims below 0.05 hold together with 95 %.
+
+    Holm (1979): the k-th smallest times (n - k + 1), never less than one before.
 
     Raises:
-        InputError: a number that is no probability.
+        InputError: a number is no probability.
     """
     p = np.asarray(p_values, dtype=np.float64)
     if p.ndim != 1 or not np.all((p >= 0.0) & (p <= 1.0)):

@@ -49,9 +49,9 @@ def rmse(env, controller, seed):
     """Return the root-mean-square offset from the fan's axis over one episode, m."""
     controller.reset()
     observation, info = env.reset(seed=seed)
-    offsets, lost, over = [], False, False
-    while not (lost or over):
-        observation, _, lost, over, info = env.step(controller(observation, info))
+    offsets, terminated, truncated = [], False, False
+    while not (terminated or truncated):
+        observation, _, terminated, truncated, info = env.step(controller(observation, info))
         offsets.append(info["offset"])
     rest = [LOST] * (DECISIONS - len(offsets))
     return float(np.sqrt(np.mean(np.square([*offsets, *rest]))))
@@ -59,7 +59,7 @@ def rmse(env, controller, seed):
 
 def main(episodes=20, scenario="base"):
     """Fly all on the same episodes; print and return their mean RMSE in m."""
-    env = gym.make("windwrench/FanTracking-v0", scenario=scenario)
+    env = gym.make("windwrench/FanTracking-v1", scenario=scenario, normalize=False)
     laws = {
         "hover": make_controller("hover"),
         "admittance": make_controller("admittance"),

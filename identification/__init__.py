@@ -1,9 +1,9 @@
-"""Measured data: flight logs, the wrench on a logged flight, and what its vehicle's model lacks."""
+"""Measured data: flight logs, the wrench on a logged flight, and effects missing in its model."""
 
 from importlib import import_module
 from typing import Any
 
-# what a name needs is imported when it is asked for: reading a log needs no inference and no page
+# a name's module is imported when the name is asked for: reading a log needs no inference, no page
 _MODULES = {
     "FlightLog": "logs.flight_log",
     "diagnose": "diagnosis",

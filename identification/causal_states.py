@@ -1,20 +1,19 @@
 """The state of a flight at each row of its log, from this row and those before it alone.
 
-A prediction starts here. The wrench filter runs forward, and no smoother follows. How closely a
-filter has to follow the pose depends on how wrong the vehicle's model is, which no file states.
-Filters with four assumptions of it run side by side. At each row the one under which the poses so
-far are likeliest speaks (multiple models: Magill, *Optimal adaptive estimation of sampled
-stochastic processes*, IEEE Trans. Automatic Control 10, 1965).
+A prediction starts here. The wrench filter runs forward, without a smoother. The best bandwidth of
+a filter depends on the model's errors, stated in no file. So filters with four assumptions of them
+run side by side. At each row the state is from the filter with the likeliest poses so far (multiple
+models: Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE Trans. Automatic
+Control 10, 1965).
 
-A gyro measures the angular velocity, however wrong the model's torque is. One filter with the
-default tuning then starts predictions as well as four.
+A gyro measures the angular velocity, however wrong the model's torque. One filter with the default
+tuning then starts predictions as well as four.
 """
 
 import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.effects import get
 from ..dynamics.vehicle import Vehicle
@@ -25,10 +24,9 @@ from ..estimator.tuning import PERIOD
 from ..estimator.ukf import default_covariance, make_calls
 from ..runtime.compiled import Record, compiled
 from .logs.flight_log import FlightLog
+from .logs.table import Array
 from .motion.sensing_effects import delay_of
 from .wrench_series import calls_of
-
-Array = NDArray[np.float64]
 
 STATE = 13  # numbers: position, quaternion, velocity, angular velocity
 
@@ -36,10 +34,10 @@ STATE = 13  # numbers: position, quaternion, velocity, angular velocity
 # ``UKFTuning.for_vehicle``. On 17 simulated and measured flights a grid of 17 predicts the position
 # nearer by 0.2 % on average and by 6.5 % at most; the default alone is 31 % worse on average
 _ASSUMED = ((1.0, 1.0, 1.0), (0.1, 1.0, 0.03), (0.1, 1.0, 1.0), (0.1, 45.0, 45.0))
-# the scale of a filter's innovations is estimated as well, since noise is not as declared: from the
-# declared one, which counts as much as so many poses
+# the scale of a filter's innovations is estimated as well, since noise is not as declared. The
+# declared scale counts as much as so many poses
 _DECLARED = 20.0
-# degrees of freedom of Student's t: a pose that jumps counts by a logarithm of how far
+# degrees of freedom of Student's t: a jump of a pose counts by the logarithm of its size
 _TAIL = 4.0
 
 
@@ -50,21 +48,21 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
 
     Args:
         log: with a pose, without declared sensing effects (``undo_log_sensing``).
-        vehicle: whose model the filters run, with its declared effects.
+        vehicle: the filters' model, with its declared effects.
 
     Raises:
-        InputError: the vehicle has more effects than a model holds.
+        InputError: the vehicle has too many effects for a model.
     """
     first, count = int(np.flatnonzero(log.valid)[0]), len(log.t)
-    # the clock of an IMU is not that of poses that a declared delay has moved
+    # a declared delay has moved the poses off the clock of an IMU
     with_imu = log.gyro is not None and delay_of(vehicle) == 0.0
     vehicle = replace(
         vehicle, effects=tuple(e for e in vehicle.effects if get(e.name).kind != "sensing")
     )
-    # of a period of its own: the log's, a median, would tell of later rows
+    # with a fixed period: the log's, a median, would depend on later rows
     usual = UKFTuning.for_vehicle(vehicle, PERIOD)
     filters = [
-        WrenchUKF(vehicle, _tuning(usual, *factors), PERIOD)
+        WrenchUKF(vehicle, scaled_tuning(usual, *factors), PERIOD)
         for factors in _ASSUMED[: 1 if with_imu else None]
     ]
     rows = np.arange(first + 1, count)
@@ -86,7 +84,7 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
     return states
 
 
-def _tuning(usual: UKFTuning, white: float, force: float, torque: float) -> UKFTuning:
+def scaled_tuning(usual: UKFTuning, white: float, force: float, torque: float) -> UKFTuning:
     """Return a tuning with the white noise of the model and the walks times these factors."""
     return replace(
         usual,
@@ -109,8 +107,8 @@ def _filter(
     states: Array,
     best: Array,
 ) -> None:
-    """Make the calls of each row, and write the state (n, STATE) that they lead to where the poses
-    so far are likelier than to the filters before, with their log-likelihood (n,).
+    """Make the calls of each row. Write the state (n, STATE) after them, and the log-likelihood
+    (n,) of the poses so far, where this is larger than of the filters before.
 
     Translation and rotation have a scale of their own.
     """

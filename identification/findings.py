@@ -1,7 +1,7 @@
-"""What a diagnosis finds, as plain data: ``diagnosis`` fills it, ``report`` writes it down.
+"""The findings of a diagnosis, as plain data: ``diagnosis`` fills it, ``report`` writes it down.
 
-Everything that was compared was low-passed at ``Diagnosis.cutoff_hz`` with zero phase. Force is in
-the world frame, torque about the centre of mass in the body frame.
+All compared quantities were low-passed at ``Diagnosis.cutoff_hz`` with zero phase. Force is in the
+world frame, torque about the centre of mass in the body frame.
 """
 
 import math
@@ -9,32 +9,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..dynamics.vehicle import Vehicle
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from .logs.table import Array, Mask
 
 CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
 
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that the model lacked.
+    """An effect missing in the model.
 
     Attributes:
-        name: as the effect library has it.
+        name: its name in the effect library.
         coefficients: in ``units``.
         std: standard deviation of each coefficient.
         units: of each coefficient; "1" for a pure number.
-        tentative: it may stand for another effect: see ``Diagnosis.structure``.
-        indistinguishable_from: effects that would explain these logs as well.
-        evidence: the share of the held-out residual's energy that it explains; the logarithm of
-            the Bayes factor of sets with it against those without; its largest coefficient in
-            typical sizes; and its size over what is left unexplained.
-        channels: of the logs, that carried the finding.
+        tentative: whether it may stand for another effect: see ``Diagnosis.structure``.
+        indistinguishable_from: effects with an equal explanation of these logs.
+        evidence: its share of the held-out residual's energy; the logarithm of the Bayes factor of
+            sets with it against sets without; its largest coefficient in typical sizes; and its
+            size over the unexplained rest.
+        channels: channels of the logs with the finding.
     """
 
     name: str
@@ -49,7 +44,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Errors:
-    """How wrong a model is on the held-out blocks; NaN where it could not be worked out.
+    """Errors of a model on the held-out blocks; NaN if not computable.
 
     Attributes:
         force_rms: N, all three axes.
@@ -66,11 +61,11 @@ class Errors:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that was tried alone, against the bare model.
+    """An effect tried alone, against the bare model.
 
     Attributes:
-        name: as the effect library has it.
-        gain: deviance that it explains, over that which the whole library explains.
+        name: its name in the effect library.
+        gain: its deviance, over the deviance of the whole library.
         named: whether the diagnosis names it.
     """
 
@@ -89,9 +84,9 @@ class Trace:
         t: (n,) s.
         before: (n, 6) N and Nm, by the declared vehicle.
         after: (n, 6) N and Nm, with the named effects.
-        held_out: (n,) the fit never saw it.
-        parts: (n, 6) N and Nm, of each named effect: by how much ``after`` grows where this
-            effect alone is left out.
+        held_out: (n,) whether it is outside the fit.
+        parts: (n, 6) N and Nm, of each named effect: growth of ``after`` with this effect alone
+            left out.
     """
 
     log: str
@@ -105,14 +100,14 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """Residual against the variable that a named effect follows (n points), with the effect's own
+    """Residual against the variable followed by a named effect (n points), with the effect's own
     part.
 
     Attributes:
         effect: its name.
         channel: one of CHANNELS.
-        regressor: what x is, with its unit.
-        x: (n,) in the unit that ``regressor`` states.
+        regressor: name of x, with its unit.
+        x: (n,) in the unit of ``regressor``.
         residual: (n,) N or Nm, by the model with all named effects but this one.
         fitted: (n,) N or Nm, by this effect.
     """
@@ -127,12 +122,12 @@ class Signature:
 
 @dataclass(frozen=True)
 class Structure:
-    """The column of a dictionary that explains most of what the named effects leave.
+    """The dictionary's best column beside the named effects.
 
     Attributes:
         test: its group, in words.
         where: channel and variable, in words.
-        gain: share of the deviance that is left, which it explains.
+        gain: share of the remaining deviance.
     """
 
     test: str
@@ -148,7 +143,7 @@ class Disturbance:
         channel: one of CHANNELS; of a raw pose roll and pitch are about the world's x and y.
         rms: N, or Nm.
         time: s, correlation time.
-        unanswered: N, or Nm, what of it the rotors do not answer before the pose shows it.
+        unanswered: N, or Nm, part not answered by the rotors before the pose shows it.
     """
 
     channel: str
@@ -157,7 +152,7 @@ class Disturbance:
     unanswered: float = 0.0
 
     def unanswered_below(self, frequency: float) -> float:
-        """Return the RMS (N, or Nm) of what is unanswered and slower than a frequency (Hz)."""
+        """Return the RMS (N, or Nm) of the unanswered part below a frequency (Hz)."""
         return self.unanswered * math.sqrt(
             2.0 / math.pi * math.atan(2.0 * math.pi * frequency * self.time)
         )
@@ -182,11 +177,11 @@ class TransientDisturbance:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A set of effects that may be what the model lacks.
+    """A set of effects possibly missing in the model.
 
     Attributes:
         effects: names; empty: nothing of the library.
-        probability: that these act and no others of the library.
+        probability: of these effects and no others of the library.
     """
 
     effects: tuple[str, ...]
@@ -195,12 +190,12 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Probabilities:
-    """How probable what was found is.
+    """Probabilities of the findings.
 
     Attributes:
-        names: that it acts, of each effect that is named, or that an alternative has.
+        names: probability of each effect that is named or in an alternative.
         alternatives: the likeliest sets of effects first.
-        unknown: that something acts which no effect of the library is.
+        unknown: probability of a cause outside the library.
     """
 
     names: Mapping[str, float]
@@ -214,9 +209,9 @@ class RankedSet:
 
     Attributes:
         effects: names, in order of the alphabet.
-        probability: that these act and no others, if nothing acts but effects of the library.
+        probability: of these effects and no others, without a cause outside the library.
         coefficients: of each effect, at the mode, in the units of the library.
-        std: their standard deviations, where they have one.
+        std: their standard deviations, if they have one.
     """
 
     effects: tuple[str, ...]
@@ -227,14 +222,14 @@ class RankedSet:
 
 @dataclass(frozen=True)
 class Ranking:
-    """The posterior of a flight, given that nothing acts but effects of the library.
+    """The posterior of a flight, without a cause outside the library.
 
     Attributes:
-        probability: of each effect of the library, that it acts.
+        probability: of each effect of the library.
         sets: the likeliest first.
-        structure: logarithm of the Bayes factor of one more column, of a dictionary of what an
-            effect outside the library may follow, beside the likeliest set.
-        tempering: power of the likelihood, 1 where its scatter is what it should be.
+        structure: logarithm of the Bayes factor of one more column beside the likeliest set. The
+            columns are of a dictionary of variables for effects outside the library.
+        tempering: power of the likelihood, 1 if its scatter is as expected.
     """
 
     probability: Mapping[str, float]
@@ -245,7 +240,7 @@ class Ranking:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What logs of one vehicle say about its model.
+    """The findings of one vehicle's logs about its model.
 
     ``remainder``, ``gusts`` and ``pushes`` are named as in ``report.json``: the kind of the
     residual, the disturbances and the transient disturbances.
@@ -253,37 +248,37 @@ class Diagnosis:
     Attributes:
         verdict: explained, partly explained, unexplained, nothing to explain.
         remainder: none, random, structured.
-        effects: named ones, in the order in which they were found.
+        effects: named ones, in the order of their finding.
         held_out_segments: log, from, to (s)
         before: errors of the declared vehicle.
         after: errors of the amended vehicle.
-        floor_force_rms: N, what sensors alone leave.
+        floor_force_rms: N, of the sensors' noise alone.
         floor_torque_rms: Nm.
-        advice: what to fly to separate what these logs cannot.
-        notes: doubts about the logs, thrust models of readers, corrections that were made.
+        advice: flights for the questions these logs leave open.
+        notes: doubts about the logs, thrust models of readers, corrections made.
         candidates: best first.
         traces: residual over time, a piece of flight each.
         signatures: one a named effect.
         structure: strongest first.
-        gusts: of each channel; none where pose or rotor speeds are not as they were measured.
+        gusts: of each channel; none unless pose and rotor speeds are as measured.
         pushes: one a channel at most, the plainest first.
-        cutoff_hz: Hz, of the low-pass of everything that was compared.
-        declared: the vehicle that was given.
+        cutoff_hz: Hz, of the low-pass of all compared quantities.
+        declared: the given vehicle.
         amended: with the named effects, ready for ``estimate`` and the environment; the declared
-            vehicle where they do not make the held-out error smaller.
-        logs: names of those it learned from.
-        test_logs: those the error is on, if they were given apart.
-        seconds: of flight in all.
+            vehicle if they do not reduce the held-out error.
+        logs: names of the fitted logs.
+        test_logs: names of the logs for the error, if given apart.
+        seconds: s of flight in all.
         floor_is_bound: whether the logs' noise was filtered before they were written (or is not
             white for another reason): then the floor is a lower bound.
-        rotor_faults: one a log that can show it: whether a rotor lost thrust during the flight, as
-            plain data (``comparison/words.py``); empty where that was not looked for.
-        needs_pose: effects that these logs cannot show because the pose is missing, or too slow,
-            beside the IMU.
-        doubts: why names are tentative, by the check that says so: sentences, which are notes as
-            well, or names. Beside these, ``structure`` is a doubt of all names.
+        rotor_faults: one a log with enough data: whether a rotor lost thrust during the flight, as
+            plain data (``comparison/words.py``); empty without a search.
+        needs_pose: effects hidden in these logs because the pose is missing, or too slow, beside
+            the IMU.
+        doubts: reasons for tentative names, by check: sentences (notes as well), or names. Beside
+            these, ``structure`` is a doubt of all names.
         ranking: the posterior of sets of effects.
-        probabilities: of what was found.
+        probabilities: of the findings.
     """
 
     verdict: str
@@ -317,7 +312,7 @@ class Diagnosis:
 
     @property
     def held_out_by_log(self) -> dict[str, list[tuple[float, float]]]:
-        """The held-out segments, from and to (s), of each log that has some."""
+        """The held-out segments, from and to (s), of each log with some."""
         blocks: dict[str, list[tuple[float, float]]] = {}
         for log, start, end in self.held_out_segments:
             blocks.setdefault(log, []).append((start, end))

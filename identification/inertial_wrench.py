@@ -1,15 +1,13 @@
 """The external wrench from an IMU: of logs without a pose, and the smoothed one of logs with both.
 
-The specific force is the balance of forces itself: what it needs beyond the rotors and the declared
-effects is the external force, sample by sample, and the gyro's rate shows the torque likewise. Both
-go through a fixed-interval smoother of the wrench filter's own model: a wrench that walks, rotors
-that miss some thrust and torque anew in each step. Attitude and biases come from
-``inertial_fusion`` (with the poses, where there are some); what they leave uncertain is in the
-standard deviations.
+The specific force is the balance of forces itself. Less the rotors and the declared effects, it is
+the external force, sample by sample, and the gyro's rate shows the torque likewise. Both go through
+a fixed-interval smoother of the wrench filter's own model: a walking wrench, and rotors with a new
+error of thrust and torque in each step. Attitude and biases come from ``inertial_fusion`` (with the
+poses, if there are some); their uncertainty is in the standard deviations.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.spatial.transform import Rotation
 
@@ -32,11 +30,10 @@ from ..estimator.estimate import (
 )
 from ..estimator.model_uncertainty import LOAD, factors_of, variances_along
 from .logs.flight_log import FlightLog
+from .logs.table import Array
 from .motion.inertial_signals import InertialSignals, imu_noise, inertial_signals, pose_rate
 from .motion.residual import acting_wrench, needed_wrench
 from .motion.smoothing import continuous, resampled
-
-Array = NDArray[np.float64]
 
 
 def inertial_wrench(
@@ -45,11 +42,11 @@ def inertial_wrench(
     """Return the smoothed estimate at every row (N,) of a log by its gyro and accelerometer, the
     loads (N, 7, 3) of ``estimator.model_uncertainty``, and notes.
 
-    The status is "tracking" within an unbroken piece of IMU readings, else "coasting". Position and
-    velocity are NaN where nothing measured them; there is no NIS.
+    The status is "tracking" within an unbroken piece of IMU readings, else "coasting". Unmeasured
+    position and velocity are NaN; there is no NIS.
 
     Args:
-        log: with gyro, accelerometer and rotor speeds; poses in it are used.
+        log: with gyro, accelerometer and rotor speeds; its poses are used.
         vehicle: as declared.
         tuning: of the wrench filter.
 
@@ -74,7 +71,7 @@ def inertial_wrench(
         numbers[before:end, STATUS] = np.where(inside, TRACKING, COASTING)
         before = end
     numbers[:, NIS] = np.nan
-    if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from them
+    if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from both
         numbers[:, POSITION], numbers[:, VELOCITY] = np.nan, np.nan
     quaternion = numbers[:, QUATERNION]
     quaternion /= np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
@@ -90,7 +87,7 @@ def _piece(
     noise: tuple[float, float],
 ) -> tuple[Array, Array, Array]:
     """Return the state (n, STATE_SIZE) of a piece, laid out as an estimate's, the standard
-    deviations of torque and force (n, 6), and the loads (n, 7, 3), smoothed as these are.
+    deviations of torque and force (n, 6), and the loads (n, 7, 3), smoothed likewise.
     """
     acting, body = acting_wrench(s, vehicle)
     needed = needed_wrench(s, body)
@@ -108,7 +105,7 @@ def _piece(
     for i in range(3):
         variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
         walk = walk_force[i] ** 2 * steps
-        # a walk that white noise of this variance hides
+        # a walk hidden by white noise of this variance
         y = needs[:, i]
         walked, std = _two_sided(y, np.zeros_like(y)[:, None], np.eye(1), np.diag([walk]), variance)
         force[:, i], spread[i] = walked[:, 0], std[0]
@@ -136,10 +133,10 @@ def _piece(
 
 
 def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array], list[Array]]:
-    """Return the loads (n, 3) of the force, world, and of the torque, body frame, as they act.
+    """Return the loads (n, 3) of the force, world, and of the torque, body frame, in action.
 
-    Those of the rotors are by the logged speeds: what a declared lag or efficiency changes of them
-    is a small part of a deviation.
+    The rotors' loads are by the logged speeds: a declared lag or efficiency changes a small part of
+    a deviation.
     """
     thrust, x, y, z = body.rotor_wrench(s.rotor_speeds).T
     none, omega = np.zeros_like(thrust), s.angular_velocity
@@ -155,9 +152,8 @@ def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array
 def _smoothed_turning(
     rate: Array, driven: Array, period: float, walk: float, miss: float, variance: float
 ) -> tuple[Array, float]:
-    """Return the angular acceleration (n, c) rad/s2 beside the first that drives an angular
-    velocity (n,), its standard deviation, and what each of the others would show as if it acted
-    beside.
+    """Return the angular acceleration (n, c) rad/s2 of an angular velocity (n,) beside the first
+    drive, its standard deviation, and the same of each other drive in action beside it.
     """
     model = np.array([[1.0, period], [0.0, 1.0]])
     acting = 0.5 * period * (driven[:-1] + driven[1:])
@@ -172,8 +168,8 @@ def _smoothed_turning(
 def _two_sided(
     y: Array, drive: Array, model: Array, noise: Array, variance: float
 ) -> tuple[Array, Array]:
-    """Return the states (n, m, c) of a steady fixed-interval smoother, of which the first is
-    measured (n, c), and their standard deviations (m,).
+    """Return the states (n, m, c) of a steady fixed-interval smoother with measurements (n, c) of
+    the first, and their standard deviations (m,).
     """
     m = len(model)
     H = np.eye(1, m)

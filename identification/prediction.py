@@ -1,10 +1,10 @@
-"""What a vehicle's model, with the effects that it declares, predicts of a logged flight, and how
-well: in metres and as NIS.
+"""Predictions of a logged flight by a vehicle's model, with its declared effects, and their errors:
+in metres and as NIS.
 
-All three run the model of plant and filter. ``predict`` and ``rollout_error`` give what a planner
-would see: the model is let go from the flight's own state, which knows no later row, and compared
-with the flight a second later. ``nis_without_wrench_state`` is what a filter would see that has
-nothing but the model to explain the motion with.
+All three functions run the model of plant and filter. ``predict`` and ``rollout_error`` take a
+planner's view: the model starts from the flight's own state, without any later row, and is compared
+with the flight a second later. ``nis_without_wrench_state`` takes the view of a filter with nothing
+but the model to explain the motion.
 """
 
 from __future__ import annotations
@@ -27,50 +27,39 @@ from ..estimator.innovations import innovations, pieces_of
 from ..estimator.ukf import default_covariance
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
-from .causal_states import STATE, causal_states
+from .causal_states import STATE, causal_states, scaled_tuning
 from .logs.commanded_speeds import with_commanded_speeds
 from .logs.flight_log import NORM_TOLERANCE, FlightLog
-from .logs.table import finite_rows
+from .logs.table import Array, finite_rows
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import Signals, known_pieces, log_signals, longest_step
 from .motion.smoothing import continuous, resampled, unbroken
 
-Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]
 
 
-@dataclass(frozen=True)
-class PredictionSettings:
-    """How a model is flown from a state, and how the filter without a wrench is set up."""
-
-    longest_rotor_step: float = 0.005  # s, over which rotors are held
-    # of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
-    motion_steps: int = 4
-    # s after the start of unbroken pose: the filter that a prediction starts from settles
-    start_margin: float = 0.5
-    # s before its end: the low-pass of the flight that a prediction is compared with
-    end_margin: float = 0.1
-    horizon: float = 1.0  # s, of ``rollout_error``
-    start_every: float = 0.25  # s, of an error's predictions
-    most_starts: int = 2000  # of an error's predictions in a piece, spread over it
-    longest_gap: float = 2.0  # s without a pose, after which the filter starts anew (estimate_log)
-    step_tolerance: float = 0.1  # of a period: a step so little too long is still one step
-    # of its usual standard deviation: a wrench state that cannot move
-    frozen_wrench_factor: float = 1e-6
-
-
-PREDICTION = PredictionSettings()
-# compiled code takes plain numbers
-_MOTION_STEPS, _STEP_TOLERANCE = PREDICTION.motion_steps, PREDICTION.step_tolerance
-_LONGEST_ROTOR_STEP = PREDICTION.longest_rotor_step
-
+# the flight of a model from a state
+_LONGEST_ROTOR_STEP = 0.005  # s, over which rotors are held
+# of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
+_MOTION_STEPS = 4
+_HEAVY = 1e9  # kg m2: torques turn nothing
+_STEP_TOLERANCE = 0.1  # of a period: a step so little too long is still one step
+# s after the start of unbroken pose: the filter of a prediction's start settles
+_START_MARGIN = 0.5
+_END_MARGIN = 0.1  # s before its end: the low-pass of the flight to compare with
+_HORIZON = 1.0  # s, of ``rollout_error``
+_START_EVERY = 0.25  # s, of an error's predictions
+_MOST_STARTS = 2000  # of an error's predictions in a piece, spread over it
+# the filter without a wrench
+_LONGEST_GAP = 2.0  # s without a pose, after which it starts anew (``estimate_log``)
+_FROZEN = 1e-6  # of its usual standard deviation: a fixed wrench state
 
 _MODEL = np.dtype([*MODEL_FIELDS, ("acceleration", "f8", (6,)), ("rotation", "f8", (3, 3))])
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """The motion that a model predicts from each of n starts, over m steps of ``period``."""
+    """The motion predicted by a model from each of n starts, over m steps of ``period``."""
 
     start: NDArray[np.intp]  # (n,) rows of the log
     period: float  # s
@@ -90,28 +79,31 @@ def predict(
     """Predict a flight from its own states by a vehicle's model and the logged rotor speeds alone.
 
     The model starts at a row from position, velocity, attitude and angular velocity. From then on
-    it is given the logged rotor speeds and voltage; a rotor speed holds over the interval that ends
-    at its sample. Rotors and effects start with the memory that the flight before gave them.
-    Declared sensing effects are taken out of the log. No row after a start changes its state.
+    only the logged rotor speeds and voltage enter; a rotor speed holds over the interval before its
+    sample. Rotors and effects start with the memory of the flight before. Declared sensing effects
+    are taken out of the log. No row after a start changes its state.
 
-    What limits a prediction is its start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of
-    angular velocity is 16 mm. See ``causal_states``.
+    A torque that held-out flights refuted (``vehicle.status``) leaves the body rate as at the
+    start. A refuted force leaves the velocity.
+
+    The start limits a prediction: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of angular
+    velocity is 16 mm. See ``causal_states``.
 
     Args:
         log: the flight.
-        vehicle: whose model predicts, with its declared effects.
+        vehicle: the predicting model, with its declared effects.
         horizon_s: s.
-        every: samples from start to start. Starts without a whole horizon behind them, before the
-            next break of the pose, or with a state before the next break of the rows, are left out.
+        every: samples from start to start. Starts without a whole horizon before the next break of
+            the pose, or with a state before the next break of the rows, are left out.
         state: (N, 13) position, quaternion (body to world), velocity (world) and angular velocity
             (body) at each row, taken as they are; of the log without declared sensing effects.
-            Rows that are not finite cannot start. None: a filter's, which has seen no later row.
+            Rows with a NaN are no starts. None: a filter's state, without any later row.
 
     Raises:
         InputError: no stretch of pose is unbroken for 3 s, a state has another shape or a
-            quaternion of another length than 1, or the vehicle has more effects than a model holds.
+            quaternion of another length than 1, or the vehicle has too many effects for a model.
     """
-    log = undo_log_sensing(log, vehicle)
+    log = undo_log_sensing(with_commanded_speeds(log, vehicle), vehicle)
     if state is None:
         pieces, states = known_pieces(log), causal_states(log, vehicle)
     else:
@@ -133,10 +125,10 @@ def predict(
 
 
 def _checked(log: FlightLog, state: ArrayLike) -> Array:
-    """Return states (N, STATE) that a user gives, with quaternions of length 1.
+    """Return a user's states (N, STATE), with quaternions of length 1.
 
     Raises:
-        InputError: the shape is another, or a quaternion is none of a rotation.
+        InputError: the shape differs, or a quaternion is not a rotation.
     """
     states = np.array(state, dtype=np.float64)
     if states.shape != (len(log.t), STATE):
@@ -145,7 +137,7 @@ def _checked(log: FlightLog, state: ArrayLike) -> Array:
             "position, quaternion, velocity and angular velocity at each row"
         )
     length = np.linalg.norm(states[:, QUATERNION], axis=1)
-    wrong = np.flatnonzero(np.abs(length - 1.0) > NORM_TOLERANCE)  # False where it is not finite
+    wrong = np.flatnonzero(np.abs(length - 1.0) > NORM_TOLERANCE)  # not where a NaN is
     if wrong.size:
         raise InputError(
             f"{log.name}: state: the quaternion of row {wrong[0]} has length {length[wrong[0]]:.4g}"
@@ -158,9 +150,9 @@ def _checked(log: FlightLog, state: ArrayLike) -> Array:
 def _flown(
     log: FlightLog, vehicle: Vehicle, states: Array, starts: NDArray[np.intp], ahead: int
 ) -> Array:
-    """Return the states (starts, ahead, STATE) that the model predicts, a period apart, from the
-    states (N, STATE) of a log at some rows in ascending order. Between rows without a state the
-    last one holds, for what effects remember.
+    """Return the model's states (starts, ahead, STATE), a period apart, from the states (N, STATE)
+    of a log at some rows in ascending order. For the memory of effects, the last state holds over
+    rows without one.
     """
     path = np.zeros((len(starts), ahead, STATE))
     if not len(starts):
@@ -168,35 +160,37 @@ def _flown(
     known = finite_rows(states)
     first = int(np.argmax(known))
     last_known = np.maximum.accumulate(np.where(known, np.arange(len(log.t)), 0))[first:]
-    # the model that flies along, and the copy of it that is let go
+    # the model along the flight, and its copy from a start on
     models = np.zeros(2, dtype=_MODEL)
+    if vehicle.status.torque == "refuted":
+        vehicle = replace(vehicle, inertia=_HEAVY * np.eye(3))
     load_model(models[0], vehicle)
     t = log.t[first:] - log.t[0]
     models[0]["time"] = t[0]
     voltage = np.zeros(len(log.t)) if log.voltage is None else log.voltage
     speeds, volts = (np.ascontiguousarray(x[first:]) for x in (log.rotor_speeds, voltage))
-    _fly_along(models, t, speeds, volts, states[last_known], starts - first, log.period, path)
+    keeps = vehicle.status.force == "refuted"
+    after = states[last_known], starts - first, log.period, keeps, path
+    _fly_along(models, t, speeds, volts, *after)
     return path
 
 
 def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:
-    """Return the RMS distance (m) between flight and model after a second of prediction, as
-    ``predict`` makes them.
+    """Return the RMS distance (m) between flight and model after a second of ``predict``.
 
     Args:
         log: the flight.
-        vehicle: whose model predicts, with its declared effects.
-        segments: times (s) from and to; a prediction counts if it lies in one of them from its
-            start to its end.
+        vehicle: the predicting model, with its declared effects.
+        segments: times (s) from and to; a prediction counts if one of them holds all of it.
 
     Returns:
-        NaN where no segment holds an unbroken stretch of pose that is long enough.
+        NaN if no segment holds a sufficient unbroken stretch of pose.
 
     Raises:
-        InputError: the vehicle has more effects than a model holds.
+        InputError: the vehicle has too many effects for a model.
     """
     try:
-        _, seen, path = _predictions(log, vehicle, segments, PREDICTION.horizon)
+        _, seen, (path,) = _predictions(log, [vehicle], segments, _HORIZON)
     except InputError:
         return math.nan
     off = path[:, -1, POSITION] - seen[:, -1, POSITION]
@@ -208,28 +202,31 @@ QUANTITIES = {"position": "m", "velocity": "m/s", "attitude": "rad", "body rate"
 
 @dataclass(frozen=True, eq=False)
 class PredictionErrors:
-    """How far predictions are from a flight, on average over their starts: a row for each of
+    """Mean distances of predictions from a flight over their starts: a row for each of
     ``QUANTITIES``, a column for each of m samples after the start.
     """
 
     starts: int
     horizon: Array  # (m,) s after the start
     model: Array  # (4, m)
-    still: Array  # (4, m) where velocity and body rate stay as they are at the start
+    still: Array  # (4, m) with velocity and body rate as at the start
 
     @property
     def worse(self) -> list[str]:
-        """The quantities that the model predicts worse than the guess, at the horizon's end."""
+        """The quantities with a larger error than the guess, at the horizon's end."""
         ends = zip(QUANTITIES, self.model[:, -1], self.still[:, -1], strict=True)
         return [name for name, model, still in ends if model > still]
 
     @classmethod
     def pooled(cls, parts: Sequence[PredictionErrors]) -> PredictionErrors:
-        """Return the errors over all starts of several, which have one horizon."""
+        """Return the errors over all starts of several, at the samples of the slowest."""
+        horizon = min((part.horizon for part in parts), key=len)
+        at = [np.searchsorted(part.horizon, horizon - 0.5 * part.horizon[0]) for part in parts]
+        of = [[part.model[:, i] for part, i in zip(parts, at, strict=True)]]
+        of.append([part.still[:, i] for part, i in zip(parts, at, strict=True)])
         starts = [part.starts for part in parts]
-        both = [[part.model for part in parts], [part.still for part in parts]]
-        means = (np.average(of, axis=0, weights=starts) for of in both)
-        return cls(sum(starts), parts[0].horizon, *means)
+        means = (np.average(each, axis=0, weights=starts) for each in of)
+        return cls(sum(starts), horizon, *means)
 
 
 def prediction_errors(
@@ -239,99 +236,112 @@ def prediction_errors(
     windows: Sequence[Segments] | None = None,
     start_by: Vehicle | None = None,
 ) -> PredictionErrors:
-    """Return how well a model predicts flights, beside the guess that nothing changes.
+    """Return a model's prediction errors, beside the guess of an unchanged velocity.
 
-    A prediction starts every 0.25 s, as ``predict`` makes it, and the guess from the same state.
-    The flight that both are compared with is the pose below 15 Hz; the angle between two attitudes
-    is their distance.
+    A prediction starts every 0.25 s, as in ``predict``, and the guess from the same state. Both are
+    compared with the pose below 15 Hz; the angle between two attitudes is their distance.
 
     Args:
-        logs: with a pose; flights that the model was not fitted to, or its errors mean little. For
-            commands alone the vehicle's motor curve says the rotor speeds.
-        vehicle: whose model predicts, with its declared effects.
+        logs: with a pose; flights outside the model's fit, or the errors mean little. For commands
+            alone the vehicle's motor curve gives the rotor speeds.
+        vehicle: the predicting model, with its declared effects.
         horizon_s: s.
         windows: for each log, its parts: from and to in s after its start; None: all of it.
-        start_by: whose filters give the starts, where models are compared from the same ones;
-            None: the vehicle's.
+        start_by: the vehicle of the filters for the starts, to compare models from the same ones;
+            None: the predicting one.
 
     Raises:
-        InputError: no stretch of pose is long enough, or poses come at different rates.
+        InputError: no stretch of pose is long enough.
     """
-    model: list[Array] = []
-    still: list[Array] = []
-    horizons: list[Array] = []
+    return errors_of_models(logs, [vehicle], horizon_s, windows, start_by)[0]
+
+
+def errors_of_models(
+    logs: Sequence[FlightLog],
+    vehicles: Sequence[Vehicle],
+    horizon_s: float = 0.5,
+    windows: Sequence[Segments] | None = None,
+    start_by: Vehicle | None = None,
+) -> list[PredictionErrors]:
+    """Return ``prediction_errors`` of several models of one vehicle, from the same starts: by the
+    first one's filters, where ``start_by`` names no other.
+
+    Raises:
+        InputError: no stretch of pose is long enough.
+    """
+    parts: list[list[PredictionErrors]] = []
     whole = [[(0.0, math.inf)]] * len(logs)
-    for log, parts in zip(logs, windows or whole, strict=True):
+    for log, spans in zip(logs, windows or whole, strict=True):
         first, last = log.t[[0, -1]].tolist()
-        ends = [(first + begin, min(first + end, last)) for begin, end in parts]
-        flown = with_commanded_speeds(log, vehicle)
-        begun, seen, path = _predictions(flown, vehicle, ends, horizon_s, start_by)
-        if len(path):
-            horizons.append(log.period * np.arange(1, path.shape[1] + 1))
-            model.append(_distances(path, seen))
-            still.append(_distances(_unchanged(begun, horizons[-1]), seen))
-    if len({len(horizon) for horizon in horizons}) != 1:
+        ends = [(first + begin, min(first + end, last)) for begin, end in spans]
+        flown = with_commanded_speeds(log, vehicles[0])
+        begun, seen, paths = _predictions(flown, vehicles, ends, horizon_s, start_by)
+        if len(begun):
+            horizon = log.period * np.arange(1, seen.shape[1] + 1)
+            still = _distances(_unchanged(begun, horizon), seen).mean(axis=0)
+            means = (_distances(path, seen).mean(axis=0) for path in paths)
+            parts.append([PredictionErrors(len(begun), horizon, mean, still) for mean in means])
+    if not parts:
         names = ", ".join(log.name for log in logs)
-        raise InputError(f"{names}: expected poses at one rate, unbroken for {horizon_s + 1:g} s")
-    both = np.concatenate(model), np.concatenate(still)
-    return PredictionErrors(len(both[0]), horizons[-1], *(x.mean(axis=0) for x in both))
+        raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s")
+    return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
 
 
 def _unchanged(begun: Array, ahead: Array) -> Array:
-    """Return the states (n, m, STATE) at m times ``ahead`` (s) of states (n, STATE) whose velocity
-    and angular velocity stay as they are.
+    """Return the states (n, m, STATE) at m times ``ahead`` (s) of states (n, STATE) with constant
+    velocity and angular velocity.
     """
     out = np.repeat(begun[:, None], len(ahead), axis=1)
     out[..., POSITION] += ahead[:, None] * out[..., VELOCITY]
     turn = Rotation.from_rotvec((ahead[:, None] * out[..., RATE]).reshape(-1, 3))
-    turned = Rotation.from_quat(out[..., QUATERNION].reshape(-1, 4), scalar_first=True) * turn
+    turned = _attitudes(out) * turn
     out[..., QUATERNION] = turned.as_quat(scalar_first=True).reshape(*out.shape[:2], 4)
     return out
 
 
+def _attitudes(states: Array) -> Rotation:
+    return Rotation.from_quat(states[..., QUATERNION].reshape(-1, 4), scalar_first=True)
+
+
 def _distances(x: Array, y: Array) -> Array:
     """Return the distances (n, 4, m), in the order of ``QUANTITIES``, of states (n, m, STATE)."""
-    one, other = (
-        Rotation.from_quat(z[..., QUATERNION].reshape(-1, 4), scalar_first=True) for z in (x, y)
-    )
     off = [np.linalg.norm(x[..., i] - y[..., i], axis=2) for i in (POSITION, VELOCITY, RATE)]
-    off.insert(2, (one.inv() * other).magnitude().reshape(x.shape[:2]))
+    off.insert(2, (_attitudes(x).inv() * _attitudes(y)).magnitude().reshape(x.shape[:2]))
     return np.stack(off, axis=1)
 
 
 def _predictions(
     log: FlightLog,
-    vehicle: Vehicle,
+    vehicles: Sequence[Vehicle],
     segments: Segments,
     horizon: float,
     start_by: Vehicle | None = None,
-) -> tuple[Array, Array, Array]:
-    """Return the states (n, STATE) from which predictions start, and the states (n, m, STATE) of
-    flight and prediction at the m samples that follow.
+) -> tuple[Array, Array, list[Array]]:
+    """Return the start states (n, STATE) of predictions, and the states (n, m, STATE) of flight and
+    of each model's prediction at the next m samples.
     """
-    log = undo_log_sensing(log, vehicle)
+    log = undo_log_sensing(log, vehicles[0])
     ahead = max(1, round(horizon / log.period))
     starts, seen = [], []
     for piece in log_signals(log):
         rows = _start_rows(log, piece, segments, horizon)
-        rows = rows[:: math.ceil(len(rows) / PREDICTION.most_starts) or 1]
+        rows = rows[:: math.ceil(len(rows) / _MOST_STARTS) or 1]
         starts.append(rows)
         seen.append(_seen(piece, log.t[rows, None] + log.period * np.arange(1, ahead + 1)))
     rows, target = np.concatenate(starts), np.concatenate(seen)
     if not rows.size:
-        return np.empty((0, STATE)), target, target
-    states = causal_states(log, start_by or vehicle)
-    return states[rows], target, _flown(log, vehicle, states, rows, ahead)
+        return np.empty((0, STATE)), target, [target for _ in vehicles]
+    states = causal_states(log, start_by or vehicles[0])
+    return states[rows], target, [_flown(log, v, states, rows, ahead) for v in vehicles]
 
 
 def _start_rows(
     log: FlightLog, piece: Signals, segments: Segments, horizon: float
 ) -> NDArray[np.intp]:
-    """Return the rows at which predictions start that lie in a segment and well inside a piece."""
-    use = PREDICTION
-    first = piece.t[0] + use.start_margin
-    last = piece.t[-1] - horizon - use.end_margin
-    each = (np.arange(t0, t1 - horizon + 1e-9, use.start_every) for t0, t1 in segments)
+    """Return the start rows of predictions in a segment and well inside a piece."""
+    first = piece.t[0] + _START_MARGIN
+    last = piece.t[-1] - horizon - _END_MARGIN
+    each = (np.arange(t0, t1 - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
     times = times[(times >= first) & (times <= last)]
     return np.unique(np.searchsorted(log.t, times - 0.5 * log.period))
@@ -354,10 +364,12 @@ def _fly_along(
     states: Array,
     starts: np.ndarray,
     period: float,
+    keeps_velocity: bool,
     path: Array,
 ) -> None:
-    """Run the first model along a flight of n rows, for what rotors and effects remember; let a
-    copy of it go at each start, and write the states (starts, ahead, STATE) that it comes to.
+    """Run the first model along a flight of n rows, for the memory of rotors and effects; let a
+    copy of it go at each start, and write the copy's states (starts, ahead, STATE). With
+    ``keeps_velocity`` no force acts.
     """
     f, g = models[0], models[1]
     after, x, between = np.zeros(STATE_SIZE), np.zeros(STATE_SIZE), np.empty(4)
@@ -391,6 +403,10 @@ def _fly_along(
                     drive(g, between, dt, volts)
                     for _ in range(_MOTION_STEPS):
                         propagate(g, x, dt / _MOTION_STEPS, after)
+                        if keeps_velocity:
+                            for j in range(3):
+                                after[7 + j] = x[7 + j]
+                                after[j] = x[j] + x[7 + j] * dt / _MOTION_STEPS
                         x[:] = after
                     g.time += dt
                 path[at, i] = x[:size]
@@ -399,44 +415,39 @@ def _fly_along(
 
 @compiled
 def _rotor_steps(length: float) -> int:
-    """Return in how many steps the rotors are carried over ``length`` s."""
+    """Return the number of rotor steps in ``length`` s."""
     return max(1, math.ceil(length / _LONGEST_ROTOR_STEP - _STEP_TOLERANCE))
 
 
 def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:
-    """Return the mean NIS over the segments of a wrench filter whose external wrench is held at
+    """Return the mean NIS over the segments of a wrench filter with the external wrench held at
     zero.
 
     The filter runs over the whole log as in ``estimate_log``, with ``UKFTuning.for_vehicle``, and
-    undoes declared sensing effects by itself. As the wrench cannot move, what the model lacks stays
-    in the innovations. The mean is 6 for a model whose errors are as large as the tuning says, and
-    lower for a better one.
+    undoes declared sensing effects itself. With a fixed wrench, the errors of the model stay in the
+    innovations. The mean is 6 for a model with errors as large as in the tuning, and lower for a
+    better one.
 
     Args:
         log: the flight.
-        vehicle: whose model the filter runs, with its declared effects.
+        vehicle: the filter's model, with its declared effects.
         segments: times (s) from and to.
 
     Returns:
-        NaN where no row of a segment has a pose to compare with, or the filter's numbers overflow.
+        NaN if no row of a segment has a pose to compare with, or the filter's numbers overflow.
 
     Raises:
-        InputError: the vehicle has more effects than a model holds.
+        InputError: the vehicle has too many effects for a model.
     """
     period = log.period
-    tuning = UKFTuning.for_vehicle(vehicle, period)
-    tuning = replace(
-        tuning,
-        force_walk=PREDICTION.frozen_wrench_factor * np.asarray(tuning.force_walk),
-        torque_walk=PREDICTION.frozen_wrench_factor * np.asarray(tuning.torque_walk),
-    )
+    tuning = scaled_tuning(UKFTuning.for_vehicle(vehicle, period), 1.0, _FROZEN, _FROZEN)
     covariance = default_covariance(vehicle, tuning)
-    covariance[12:18, 12:18] *= PREDICTION.frozen_wrench_factor**2
+    covariance[12:18, 12:18] *= _FROZEN**2
     position = np.where(log.valid[:, None], log.position, np.nan)
     columns = log.t, log.rotor_speeds, position, log.quaternion, log.voltage
-    pieces = pieces_of(vehicle, *columns, PREDICTION.longest_gap, 0.0)
+    pieces = pieces_of(vehicle, *columns, _LONGEST_GAP, 0.0)
     if not pieces:
         return math.nan
-    found = innovations(vehicle, tuning, period, pieces, 0.0, math.inf, covariance)
-    inside = np.any([(found.t >= t0) & (found.t <= t1) for t0, t1 in segments], axis=0)
-    return float(np.mean(found.nis[inside])) if inside.any() else math.nan
+    steps = innovations(vehicle, tuning, period, pieces, 0.0, math.inf, covariance)
+    inside = np.any([(steps.t >= t0) & (steps.t <= t1) for t0, t1 in segments], axis=0)
+    return float(np.mean(steps.nis[inside])) if inside.any() else math.nan

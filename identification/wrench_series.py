@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.vehicle import Vehicle
@@ -35,17 +34,17 @@ from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_log
 from .logs.streams import MOTOR_RATES, between_samples
+from .logs.table import Array, Rows
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
+from .motion.smoothing import mean_square
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
 T = TypeVar("T")
 
-# probability beyond which a pose is asked whether it jumped: one good pose in 10,000 is, at 200 Hz
-# every 50 s, and it is refused only if it also lies away from the pose before
+# probability beyond which a jump of a pose is checked: for one good pose in 10,000, at 200 Hz every
+# 50 s; the pose is refused only if it also lies away from the pose before
 GATE = 0.9999
-# of wrench.csv, here and of a stream
+# columns of wrench.csv, here and of a stream
 COLUMNS = (
     "t",
     *(f"{kind}{axis}" for kind in ("f", "t", "std_f", "std_t") for axis in "xyz"),
@@ -58,17 +57,16 @@ _REPORTED = 10_000  # rows between two reports of progress
 class WrenchSeries(WrenchEstimate):
     """The estimate at every row (N,) of a log.
 
-    Standard deviations are those of noise, of the vehicle's stated uncertainty, and of rotors that
-    were measured too seldom; where these tell no torque, it is NaN. NIS, status and
-    restarts are those of the filter, smoothed or not; NIS is NaN where there was no pose to compare
-    with.
+    Standard deviations include the noise, the vehicle's stated uncertainty, and seldom measured
+    rotors. With too few measurements of these, torque is NaN. NIS, status and restarts are the
+    filter's, smoothed or not; NIS is NaN without a pose to compare with.
 
     Attributes:
         t: (N,) s.
-        vehicle: as it was declared to the filter.
+        vehicle: as declared to the filter.
         tuning: of the filter.
         notes: sentences for the user.
-        loads: (N, 7, 3) what the vehicle's uncertainty scales, as the filter followed it.
+        loads: (N, 7, 3) scaled by the vehicle's uncertainty, as the filter followed them.
     """
 
     def __init__(
@@ -97,29 +95,28 @@ def estimate_log(
     """Estimate the external force and torque at every row of a log.
 
     The filter starts at the first pose. Each row's prediction uses the mean of its rotor speeds and
-    those of the row before, in steps of at most one median period; a row without a pose is
-    prediction alone, and what gyro and accelerometer measured, if they did. A log without a pose,
-    or with one too slow to tell the motion, is smoothed from its gyro and accelerometer. Poses that
-    jump are refused; after gaps and lasting jumps the filter restarts (``estimator.recovery``).
-    Rows before the first pose hold the filter's estimate at that pose: no wrench, and its standard
-    deviation.
+    the row's before, in steps of at most one median period. A row without a pose is prediction
+    alone, corrected by its readings of gyro and accelerometer. A log without a pose, or with one
+    too slow for the motion, is smoothed from its gyro and accelerometer. Poses that jump are
+    refused; after gaps and lasting jumps the filter restarts (``estimator.recovery``). Rows before
+    the first pose hold the filter's estimate at this pose: no wrench, and its standard deviation.
 
     Args:
         log: the flight.
-        vehicle: the declared vehicle; the wrench is what it and its declared effects do not
-            explain.
+        vehicle: the declared vehicle; the wrench is the part of the motion not explained by it and
+            its declared effects.
         tuning: default ``UKFTuning.for_vehicle(vehicle, log.period)``.
-        report: called now and then with the share that is done.
+        report: called now and then with the finished share.
         smooth: whether each row's estimate also uses the rows after it (``estimator.smoother``):
-            the best one of a whole log. Default: those before it alone, as the filter on the
-            vehicle would have it. ``nis`` is that of the filter either way, and nothing is smoothed
-            across a restart. Gyro and accelerometer are smoothed with the poses
-            (``inertial_wrench``) where the log has both.
-        gate: probability; poses whose NIS is beyond it and which jump from the pose before are
-            refused. None: none are, and each jump restarts the filter.
+            the best one of a whole log. Default: the rows before alone, like a filter on the
+            vehicle. ``nis`` is the filter's either way, and nothing is smoothed across a restart.
+            Gyro and accelerometer are smoothed with the poses (``inertial_wrench``) if the log has
+            both.
+        gate: probability; poses with a NIS beyond it and a jump from the pose before are refused.
+            None: none are, and each jump restarts the filter.
 
     Raises:
-        InputError: the log has no pose at all, is of other units or conventions than it declares
+        InputError: the log has no pose at all, has other units or conventions than declared
             (``screen_log``), or its rotor speeds make the filter's numbers overflow.
     """
     log, doubts = screen_log(log, vehicle, None)
@@ -136,20 +133,20 @@ def _estimate(
     gate: float | None = GATE,
     doubts: tuple[str, ...] = (),
 ) -> WrenchSeries:
-    """Return the estimate of a log as ``screen_log`` gives it back, with its doubts."""
+    """Return the estimate of a screened log (``screen_log``), with its doubts."""
     if log.commanded:
         vehicle = replace(vehicle, omega_source="commanded")
     both = log.gyro is not None and log.accelerometer is not None
     if reads_imu(log) or (smooth and both):
         tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
-        found, loads, notes = inertial_wrench(log, vehicle, tuning)
-        notes = (*log.notes, *doubts, *notes, *_slow_motors(log, vehicle, found))
-        return WrenchSeries(found, log.t, vehicle, tuning, notes, loads)
+        estimate, loads, notes = inertial_wrench(log, vehicle, tuning)
+        notes = (*log.notes, *doubts, *notes, *_slow_motors(log, vehicle, estimate))
+        return WrenchSeries(estimate, log.t, vehicle, tuning, notes, loads)
     first, count = int(np.flatnonzero(log.valid)[0]), len(log.t)
     ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, log.period, gate)
     numbers, std = np.empty((count, WITHOUT_COVARIANCE)), np.empty((count, 18))
     loads = np.zeros((count, *LOAD))
-    events = np.zeros(count, dtype=np.int64)  # of a recording filter: the one that ends a row
+    events = np.zeros(count, dtype=np.int64)  # last event of each row, of a recording filter
     ukf.reset(log.position[first], log.quaternion[first])
     numbers[: first + 1] = ukf.estimate.numbers[:WITHOUT_COVARIANCE]
     std[: first + 1] = ukf.estimate.std
@@ -168,17 +165,17 @@ def _estimate(
             f"{log.source or log.name}: the estimate overflows at t = {log.t[broken][0]:.6g} s; "
             f"expected rotor speeds and poses that {vehicle.name} can fly"
         )
-    found = ukf.smooth(events) if isinstance(ukf, RecordingUKF) else WrenchEstimate(numbers, std)
-    found.numbers[~log.valid, NIS] = np.nan
-    found.numbers[:first, STATUS] = COASTING
-    series = WrenchSeries(found, log.t, vehicle, ukf.tuning, (*log.notes, *doubts), loads)
-    series.notes += (*_notes(log, series, smooth), *_slow_motors(log, vehicle, found))
+    estimate = ukf.smooth(events) if isinstance(ukf, RecordingUKF) else WrenchEstimate(numbers, std)
+    estimate.numbers[~log.valid, NIS] = np.nan
+    estimate.numbers[:first, STATUS] = COASTING
+    series = WrenchSeries(estimate, log.t, vehicle, ukf.tuning, (*log.notes, *doubts), loads)
+    series.notes += (*_notes(log, series, smooth), *_slow_motors(log, vehicle, estimate))
     return series
 
 
 def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> tuple[str, ...]:
-    """Take from an estimate the torque of rotors that were measured too seldom for one, and widen
-    its force where they were measured too seldom for that; return what is to be said of it.
+    """Take the torque out of an estimate with seldom measured rotors, and widen the force with even
+    fewer measurements; return the notes on both.
     """
     rate, least = log.motor_rate, MOTOR_RATES
     if least.serves(rate, least.torque_hz):
@@ -200,9 +197,8 @@ def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> 
 
 
 def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
-    """Return what ``estimate_log`` notes of the poses of a log that was screened: how many jump
-    from those before, and where its filter restarted. For answers of other kinds from the same log;
-    none of one whose motion is that of its IMU.
+    """Return the notes of ``estimate_log`` on a screened log's poses: jumps, and restarts of the
+    filter. They are for other results of the same log; none if its motion is read from an IMU.
 
     Raises:
         InputError: rotor speeds make the filter's numbers overflow.
@@ -213,12 +209,12 @@ def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
 
 
 def counts(series: WrenchSeries) -> dict[str, int]:
-    """Return how many rows have each status: tracking, coasting, rejected, restarted."""
+    """Return the number of rows of each status: tracking, coasting, rejected, restarted."""
     return {name: int(np.sum(series.status_code == i)) for i, name in enumerate(STATUSES)}
 
 
 def uncertainty_note(series: WrenchSeries) -> str:
-    """Say how far force and torque are known, and what makes up most of that."""
+    """Return the accuracy of force and torque in words, with the largest part of it."""
     force = _largest_part(series, series.std_force, 3, "N")
     force = f"One standard deviation of the force is {force}"
     if not np.isfinite(series.std_torque).any():
@@ -227,7 +223,7 @@ def uncertainty_note(series: WrenchSeries) -> str:
 
 
 def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> str:
-    """Say the deviation (N, 3) of three numbers, the ``first`` of torque and force."""
+    """Return the deviation (N, 3) of three numbers in words; ``first`` of torque and force."""
     parts = {
         f"{NAMES[name]}, +-{100.0 * getattr(series.vehicle.uncertainty, name):.3g} %"
         f"{' between days' if name == 'command' else ''},": np.mean(
@@ -246,7 +242,7 @@ def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> st
 
 
 def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:
-    """Say what became of measurements that were not simply taken in."""
+    """Yield the fate of measurements that were not simply taken in."""
     refused = np.flatnonzero(series.status_code == REJECTED)
     restarts = np.repeat(log.t[1:], np.diff(series.restarts))  # s
     if refused.size:
@@ -265,13 +261,12 @@ def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:
 
 
 def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> NoiseFit:
-    """Find the tuning that suits a log, beside the given one, by default
+    """Return the fitted tuning of a log, beside the given one, by default
     ``UKFTuning.for_vehicle(vehicle, log.period)``; see ``estimator.noise_fit``.
 
     Raises:
-        InputError: the log is none to estimate a wrench from (``screen_log``), too few
-            poses are left to fit a tuning to, or its pose was filtered so that neither its noise
-            nor a walk is found.
+        InputError: the log does not suit a wrench estimate (``screen_log``), has too few poses for
+            a tuning, or has a filtered pose that hides both its noise and a walk.
     """
     fit = _of_poses(fit_noise, log, vehicle, tuning)
     on_bound = np.isnan(fit.deviation)
@@ -286,7 +281,7 @@ def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = Non
 def consistency_with_log(
     log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None
 ) -> Consistency:
-    """Return what a log's innovations say of a tuning, without a fit; otherwise as
+    """Return the consistency of a tuning with a log's innovations, without a fit; otherwise as
     ``tune_to_log``.
     """
     return _of_poses(consistency_of, log, vehicle, tuning)
@@ -295,7 +290,7 @@ def consistency_with_log(
 def _of_poses(
     judge: Callable[..., T], log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None
 ) -> T:
-    """Return what is found of a tuning in the columns of a log."""
+    """Return the judgement of a tuning by the columns of a log."""
     log, _ = screen_log(log, vehicle, None)
     if reads_imu(log):
         raise InputError(
@@ -311,8 +306,8 @@ def _of_poses(
 
 
 def calls_of(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tuple[np.ndarray, Rows]:
-    """Return the calls that take a filter to each of some rows from the one before, in equal steps
-    of at most one period, and correct it there with what was measured; and the row of each call.
+    """Return a filter's calls for some rows: each row from the row before in equal steps of at most
+    one period, and a correction by its measurements; and the row of each call.
     """
     steps = [steps_between(dt, ukf.period) for dt in (log.t[rows] - log.t[rows - 1]).tolist()]
     imu, read = np.zeros((len(rows), 6)), np.zeros(len(rows), dtype=np.int64)
@@ -354,7 +349,5 @@ def truth_rmse(series: WrenchSeries, log: FlightLog) -> tuple[Array, Array] | No
     """
     if log.force is None or log.torque is None:
         return None
-    return (
-        np.sqrt(np.mean(np.square(series.force - log.force), axis=0)),
-        np.sqrt(np.mean(np.square(series.torque - log.torque), axis=0)),
-    )
+    off = series.force - log.force, series.torque - log.torque
+    return np.sqrt(mean_square(off[0])), np.sqrt(mean_square(off[1]))

@@ -1,5 +1,5 @@
 """The wrench on a flight as a track for other programs' viewers: an MCAP file of ROS 2 messages,
-which Foxglove and PlotJuggler open.
+for Foxglove and PlotJuggler.
 """
 
 from pathlib import Path

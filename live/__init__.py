@@ -1,1 +1,1 @@
-"""Beside a vehicle that flies: streams from vehicles, and the filter exported to C."""
+"""Beside a vehicle in flight: streams of its messages, and the filter exported to C."""

@@ -2,8 +2,8 @@
 
 ``arrival = stamp / rate + offset + delay``. Transport only delays: the line of a clock lies below
 all its messages. The rate is the median of slopes over half a second: bursts and pauses are few
-among them. A device's clock agrees with ours to 1e-4; its offset is the least of 30 s and outlasts
-a busy link. A simulator's clock may change its rate at any time; its offset is the least of 1 s.
+among them. A device's clock agrees with ours to 1e-4. Its offset is the least of 30 s and outlasts
+a busy link. A simulator's clock may change its rate at any time. Its offset is the least of 1 s.
 """
 
 from collections import deque
@@ -11,11 +11,11 @@ from statistics import median
 
 from .messages import SECOND
 
-_BIN = SECOND // 4  # ns, of which the message with the least delay is kept
-_KEPT, _NEAR = 120, 4  # such bins: of a device, and of a simulator
-_SLOPES = 12  # bins, 3 s, whose slopes give the rate
-_MEAN, _LONG = 20, 40  # bins, 5 s and 10 s, for the mean rate and the latest one
-_DEVICE = 0.002  # by which a device's rate seems to differ from ours at most, with jitter of 5 ms
+_BIN = SECOND // 4  # ns; each bin keeps its message with the least delay
+_KEPT, _NEAR = 120, 4  # bins: a device's, and a simulator's
+_SLOPES = 12  # bins for the rate, 3 s
+_MEAN, _LONG = 20, 40  # bins, 5 s and 10 s, for the mean and the latest rate
+_DEVICE = 0.002  # largest measured difference of a device's rate, with jitter of 5 ms
 _SLOWEST, _FASTEST = 0.01, 100.0
 
 
@@ -23,9 +23,9 @@ class ClockLine:
     """The line of a clock.
 
     Args:
-        arrival: of its first message, ns.
-        stamp: of the same, ns.
-        horizon: ns; where all messages of a second are later than that, the clock stood still.
+        arrival: time of the first message, ns.
+        stamp: the first message's, ns.
+        horizon: largest delay, ns; after a second of longer delays the clock stood still.
     """
 
     def __init__(self, arrival: int, stamp: int, horizon: int) -> None:
@@ -33,16 +33,15 @@ class ClockLine:
         self.known = False  # whether the rate was measured
         self._horizon = horizon
         self._last = arrival
-        self._base = arrival, stamp  # a message on the line
+        self._base = arrival, stamp  # on the line
         self._low = deque([self._base], maxlen=_KEPT)  # the least delayed of each bin
-        self._first: tuple[int, int] | None = None  # that of the first 5 s
+        self._first: tuple[int, int] | None = None  # the least delayed message of the first 5 s
 
     def add(self, arrival: int, stamp: int) -> None:
         """Take in a message, ns."""
         silence, self._last = arrival - self._last, max(arrival, self._last)
         if min(silence, self.delay(arrival, stamp)) > self._horizon:
-            # the clock stood still, or the link held messages back; then the last of them comes at
-            # once, and is early
+            # the clock stood still, or the link held messages back: then the last one is early
             self._low, self._base = deque([(arrival, stamp)], maxlen=_KEPT), (arrival, stamp)
             return
         low = self._low
@@ -55,17 +54,17 @@ class ClockLine:
             self._base = arrival, stamp
 
     def delay(self, arrival: int, stamp: int) -> float:
-        """Return by how much a message came later than the line says, ns."""
+        """Return the delay of a message beyond the line, ns."""
         a, s = self._base
         return (arrival - a) - (stamp - s) / self.rate
 
     def arrival_of(self, stamp: int) -> int:
-        """Return when a message of a stamp arrives at the least delay, ns."""
+        """Return the arrival of a stamp at the least delay, ns."""
         a, s = self._base
         return a + round((stamp - s) / self.rate)
 
     def stamp_of(self, arrival: int) -> int:
-        """Return the stamp of a message that arrives at the least delay, ns."""
+        """Return the stamp of an arrival at the least delay, ns."""
         a, s = self._base
         return s + round((arrival - a) * self.rate)
 
@@ -80,7 +79,7 @@ class ClockLine:
 
     @property
     def latest_rate(self) -> float | None:
-        """The rate over the last 10 s in which messages came; None: not known yet."""
+        """The rate over the last 10 s with messages; None: not known yet."""
         low = self._low
         if len(low) <= _LONG:
             return None

@@ -1,10 +1,9 @@
-"""What the fields of a message mean, by the same map as the columns of a log
-(``identification.logs.log_map``): one message is a table of one row.
+"""Messages by a map of their fields (``identification.logs.log_map``), as the columns of a log: one
+message is a table of one row.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,86 +21,72 @@ from ..identification.logs.log_map import (
     load_map,
 )
 from ..identification.logs.magnitudes import Magnitudes
-from ..identification.logs.mapped_log import fitted, with_range
-from ..runtime.errors import InputError
-from .messages import SECOND, Array, Malformed, Sample
+from ..identification.logs.mapped_log import with_range
+from .messages import SECOND, Array, Malformed, Measurement
 
-_OUTSIDE = 0.01  # of a command's range, beyond which it is none of that range
+_OUTSIDE = 0.01  # of a command's range: its tolerance
 _LARGEST = Magnitudes().largest
-_OWN = (
-    "expected this kit's columns t, px, py, pz, qw, qx, qy, qz, omega1 ... omega4 (or cmd1 ... "
-    "cmd4), or --map, a file that says what the fields mean"
-)
-_FIELDS = {"rotors": "rotor_speeds", "commands": "command"}  # of a sample; others as the section
+_FIELDS = {
+    "rotors": "rotor_speeds",
+    "commands": "command",
+}  # others: as the section
 
 
 class FieldMap:
-    """From a message's fields to what it holds.
+    """From a message's fields to a measurement.
 
     Args:
-        log_map: what the fields mean; None: they are this kit's columns.
-        vehicle: whose motor curve states the range of commands that the map does not.
-        where: they come from, for errors.
+        log_map: meaning of the fields; None: this kit's columns.
+        vehicle: its motor curve states the range of commands where the map states none.
+        where: origin of the fields, for errors.
     """
 
     def __init__(self, log_map: LogMap | None, vehicle: Vehicle, where: str) -> None:
-        given = log_map or load_map(OWN_MAP)
-        if log_map is None and given.position is not None and given.attitude is not None:
-            given = replace(  # the filter needs a pose
-                given,
-                position=replace(given.position, optional=False),
-                attitude=replace(given.attitude, optional=False),
-            )
-        self.map, self.where = with_range(given, vehicle, where), where
+        self.map = with_range(log_map or load_map(OWN_MAP), vehicle, where)
         self._rows = 0
         self._sections = {name: self.map.ways(name) for name in self.map.sections}
         self._clocks = self.map.ways("time")
 
-    def check(self, names: Sequence[str]) -> None:
-        """Check that the fields of all messages are there.
-
-        Raises:
-            InputError: one is missing.
-        """
-        try:
-            fitted(names, self.where, self.map, None, "")
-        except InputError as error:
-            raise InputError(f"{error}; {_OWN}" if self.map.is_own else str(error)) from error
-
-    def sample(self, kind: str, fields: Mapping[str, Any], arrival: int) -> Sample:
-        """Return what a message holds.
+    def sample(self, fields: Mapping[str, Any], arrival: int) -> Measurement:
+        """Return the measurement in a message.
 
         Args:
-            kind: of message.
-            fields: by name: numbers; None, NaN or nothing where there is none.
-            arrival: ns, when it came.
+            fields: numbers by name; None, NaN or no entry: not measured.
+            arrival: of the message, ns.
 
         Raises:
-            Malformed: a part of it is there by halves, or is no number that a flight has.
+            Malformed: a quantity is incomplete, none is there, or a number is none of a flight.
         """
-        found = Sample(kind, self._stamp(fields), arrival)
+        sample = Measurement("row", self._stamp(fields), arrival)
         for section, parts in self._sections.items():
             for part in parts:
                 values = _values(part, section, fields)
                 if values is not None:
-                    self._take(found, section, part, values)
+                    self._take(sample, section, part, values)
                     break
-        if (found.position is None) != (found.quaternion is None):
-            missing = "attitude" if found.quaternion is None else "position"
+        if (sample.position is None) != (sample.quaternion is None):
+            missing = "attitude" if sample.quaternion is None else "position"
             raise Malformed(f"a pose without {missing}")
         poses = self._sections.get("position", ())
-        named = any(name in fields for part in poses for name in part.columns)
-        found.whole = found.has_motors and (found.has_pose or named)  # named: the pose was lost
-        return found
+        named = any(name in fields for part in poses for name in part.columns)  # a lost pose
+        sample.whole = sample.has_motors and (sample.has_pose or named)
+        if not sample.whole:
+            sample.kind = _kind(sample)
+        if not sample.kind:
+            raise Malformed(
+                f"none of the fields that are looked for; found {', '.join(fields)[:200]}; "
+                "expected such as px, omega1, gx, vbat, or those of --map"
+            )
+        return sample
 
-    def _take(self, found: Sample, section: str, part: Columns, values: Array) -> None:
+    def _take(self, sample: Measurement, section: str, part: Columns, values: Array) -> None:
         """Put a section's numbers (k,) into a sample, in the kit's units and axes."""
         if isinstance(part, Attitude):
-            found.quaternion = self._attitude(part, values)
+            sample.quaternion = self._attitude(part, values)
             return
         kit = in_kit_units(self.map, section, part, values[None])[0]
         if section == "battery":
-            found.voltage = float(kit[0]) if kit[0] > 0.0 else None
+            sample.voltage = float(kit[0]) if kit[0] > 0.0 else None
             return
         if section == "rotors":
             kit = np.abs(kit)
@@ -113,10 +98,10 @@ class FieldMap:
                     f"{high:g}"
                 )
             kit = np.clip(kit, 0.0, 1.0)
-        setattr(found, _FIELDS.get(section, section), kit)
+        setattr(sample, _FIELDS.get(section, section), kit)
 
     def _stamp(self, fields: Mapping[str, Any]) -> int | None:
-        """Return the time of a message, ns; None: it has no such field."""
+        """Return the time of a message, ns; None: no such field."""
         clock = next((c for c in self._clocks if c.column in fields), self.map.time)
         if not clock.column:
             self._rows += 1
@@ -124,11 +109,9 @@ class FieldMap:
         if clock.column not in fields:
             return None
         value = fields[clock.column]
-        if isinstance(value, int) and not isinstance(value, bool):
-            if abs(value) < 2**63:
-                return round(value * round(UNITS["time"][clock.unit] * SECOND))
-        elif isinstance(value, float) and math.isfinite(value) and abs(value) < 1e12:
-            return round(value * (UNITS["time"][clock.unit] * SECOND))
+        if type(value) in (int, float) and abs(value) < (2**63 if type(value) is int else 1e12):
+            stamp: int = round(value * round(UNITS["time"][clock.unit] * SECOND))
+            return stamp
         raise Malformed(f"field {clock.column}: {_shown(value)}; expected a time")
 
     def _attitude(self, part: Attitude, values: Array) -> Array:
@@ -143,8 +126,19 @@ class FieldMap:
         return np.asarray(in_kit_axes(self.map, part, quaternion)[0])
 
 
+def _kind(sample: Measurement) -> str:
+    """Return the names of the parts of a row; empty: there is none."""
+    parts = {
+        "pose": sample.has_pose,
+        "motors": sample.has_motors,
+        "imu": sample.has_imu,
+        "battery": sample.voltage is not None,
+    }
+    return "+".join(name for name, there in parts.items() if there)
+
+
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
-    """Return a section's numbers, with signs and scale; None where it has none."""
+    """Return a section's numbers, with signs and scale; None: it has none."""
     given: list[Any] = [fields.get(name) for name in part.columns]
     if all(type(x) is float and abs(x) <= _LARGEST for x in given):  # nearly always, and quick
         return scaled(part, np.array(given))
@@ -165,7 +159,7 @@ def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | N
 
 
 def _number(name: str, fields: Mapping[str, Any]) -> float:
-    """Return a field, or the constant that its name stands for; NaN: there is none."""
+    """Return a field, or the constant in its name; NaN: there is none."""
     fixed = constant(name)
     value = fields.get(name) if fixed is None else fixed
     if value is None:

@@ -1,14 +1,13 @@
-"""The filter on a stream of rows: what `windwrench estimate` does with a log, one row at a time.
+"""The filter on a stream of rows: `windwrench estimate`, one row at a time.
 
-A row that goes on from the last carries the filter there, in the same steps as offline, and
-corrects it. A row that lies in the past is fused where it belongs, by the filter with a clock
-(``estimator.late_poses``). The first rows are held back until their median step is known: it is the
-filter's period, and its tuning follows from it.
+A later row carries the filter to its time, in the same steps as offline, and corrects the filter
+there. A row in the past is fused at its time, by the filter with a clock
+(``estimator.late_poses``). The first rows are held back until their median step is known: this step
+is the filter's period, and the tuning is scaled by the period.
 """
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -21,37 +20,31 @@ from ..identification.wrench_series import GATE
 from .messages import Array, Row
 from .tallies import Tallies
 
-_FIRST_ROWS = 21  # whose median step is the period
-_FIRST_SECONDS = 1.0  # after which fewer do, of a source that is slow
-_STARTUP = 1.0  # s after a start or restart whose innovations do not count
+_FIRST_ROWS = 21  # their median step is the period
+_FIRST_SECONDS = 1.0  # enough of a slow source
+_STARTUP = 1.0  # s after a start or restart: innovations do not count
 
 
 @dataclass(frozen=True)
 class LiveSettings:
-    """How a stream is filtered, when it is said to be none, and when it is over."""
+    """Settings of the filter, and limits of the stream."""
 
-    gate: float | None = GATE  # as of a log
-    horizon: float = 0.3  # s that a row may lie in the past; later is too late
-    rate_hz: float | None = None  # of rows, where it is known; then none are held back
-    wait: float = 10.0  # s for the first estimate; 0: for ever
-    seconds: float | None = None  # s of the stream's time, after which it is over
-    tuning: UKFTuning | None = None  # of steps of 5 ms; default: that of the vehicle
+    gate: float | None = GATE  # as for a log
+    horizon: float = 0.3  # s, largest age of a row
+    rate_hz: float | None = None  # of rows, if known; then no row is held back
+    wait: float = 10.0  # s until the first estimate; 0: for ever
+    seconds: float | None = None  # s, length of the stream
+    tuning: UKFTuning | None = None  # for steps of 5 ms; default: the vehicle's
 
 
 @dataclass(slots=True)
 class Output:
-    """The estimate that a row has led to."""
+    """An estimate, and its row."""
 
     row: Row
     t: float  # s, stream's time, of the estimate
     estimate: WrenchEstimate
-    std: Array  # (6,) of force, N, and torque, Nm: of noise and of the vehicle's uncertainty
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance (6, 6) of the wrench; ``std`` is that of its diagonal."""
-        noise = np.roll(self.estimate.covariance[12:, 12:], (3, 3), axis=(0, 1))
-        return noise + np.diag(self.std**2 - np.diag(noise))
+    std: Array  # (6,) force, N, and torque, Nm, from noise and the vehicle's uncertainty
 
     @property
     def wrench(self) -> Array:
@@ -63,9 +56,9 @@ class LiveFilter:
     """The external wrench, row by row.
 
     Args:
-        vehicle: as it is declared.
-        tallies: where late, refused and left-out rows are counted.
-        settings: of the filter.
+        vehicle: the declared vehicle.
+        tallies: counts late, refused and left-out rows.
+        settings: the filter's.
     """
 
     def __init__(
@@ -83,16 +76,16 @@ class LiveFilter:
 
     @property
     def restarts(self) -> int:
-        """How often the filter restarted."""
+        """Restarts of the filter."""
         return 0 if self._timed is None else self._timed.estimate.restarts
 
     @property
     def tuning(self) -> UKFTuning | None:
-        """Of the filter, in its period; None: it has not begun."""
+        """The filter's tuning, in its period; None: before the start."""
         return None if self._timed is None else self._timed.ukf.tuning
 
     def take(self, row: Row) -> list[Output]:
-        """Return what a row leads to: nothing while rows are held back, then an estimate each."""
+        """Return the estimates after a row: none while rows are held back, then one each."""
         if self._timed is None:
             self._held.append(row)
             long = row.t - self._held[0].t > _FIRST_SECONDS and len(self._held) > 2
@@ -102,7 +95,7 @@ class LiveFilter:
         return self._process(row)
 
     def begin(self) -> list[Output]:
-        """Begin with the rows that are held back, however few; return what they lead to."""
+        """Begin with the rows held back, however few; return their estimates."""
         if self._timed is not None or len(self._held) < 2:
             return []
         held = sorted(self._held, key=lambda row: row.t)
@@ -116,9 +109,9 @@ class LiveFilter:
         given = self.settings.tuning
         tuning = None if given is None else given.scaled(PERIOD, period)
         ukf = WrenchUKF(self.vehicle, tuning, period, self.settings.gate)
-        self._white = ukf.record["innovation"][0]  # of the last pose, whitened
+        self._white = ukf.record["innovation"][0]  # the last pose's, whitened
         commanded = WrenchUKF(replace(self.vehicle, omega_source="commanded"), tuning, period)
-        # how uncertain the vehicle is with rotor speeds that were measured, or are of commands
+        # uncertainty of the vehicle with measured rotor speeds, and with commanded ones
         self._uncertain = tuple(one.record["uncertain"][0].copy() for one in (ukf, commanded))
         self._timed = TimedFilter(ukf, self.settings.horizon)
 
@@ -147,7 +140,7 @@ class LiveFilter:
         return [self._output(row, estimate)]
 
     def _carry(self, timed: TimedFilter, row: Row, now: float) -> WrenchEstimate:
-        """Carry the filter to a row, and correct it there."""
+        """Carry the filter to a row's time, and correct there."""
         before = self._before
         assert before is not None
         timed.ukf.record["uncertain"][0] = self._uncertain[row.commanded]
@@ -163,7 +156,7 @@ class LiveFilter:
         estimate = timed.predict(row.t, speeds, voltage)
         self._before = row
         estimate = self._correct(timed, row) or estimate
-        status = estimate.numbers[STATUS]  # what the pose says of the tuning
+        status = estimate.numbers[STATUS]  # a pose tests the tuning
         if row.has_pose and status == RESTARTED:
             self._settled = row.t + _STARTUP
         elif row.has_pose and status == TRACKING and row.t > self._settled:
@@ -172,7 +165,7 @@ class LiveFilter:
 
     @staticmethod
     def _correct(timed: TimedFilter, row: Row) -> WrenchEstimate | None:
-        """Take in what a row measured, at its time; None where that is nothing, or too late."""
+        """Fuse a row's measurements at its time; None: there are none, or too late."""
         estimate = None
         if row.has_imu:
             estimate = timed.correct_imu(row.t, row.gyro, row.accelerometer)
@@ -189,19 +182,20 @@ class LiveFilter:
 
 
 def warm_up(vehicle: Vehicle) -> None:
-    """Have everything compiled that a stream of this vehicle calls."""
+    """Compile all functions for a stream of this vehicle."""
     live = LiveFilter(vehicle, Tallies())
-    hover: dict[str, Any] = {
-        "rotor_speeds": np.full(4, vehicle.hover_rate),
-        "position": np.array([0.0, 0.0, 1.0]),
-        "quaternion": np.array([1.0, 0.0, 0.0, 0.0]),
-    }
-    imu: dict[str, Any] = {
-        "gyro": np.zeros(3),
-        "accelerometer": np.array([0.0, 0.0, vehicle.gravity]),
-    }
+    hover = Row(
+        0.0,
+        0,
+        rotor_speeds=np.full(4, vehicle.hover_rate),
+        position=np.array([0.0, 0.0, 1.0]),
+        quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
+        voltage=vehicle.voltage_ref or None,
+    )
+    up = np.array([0.0, 0.0, vehicle.gravity])
     for i in range(40):
-        live.take(Row(0.005 * i, 0, **hover, voltage=vehicle.voltage_ref or None))
-    live.take(Row(0.0501, 0, **hover))  # late
+        live.take(replace(hover, t=0.005 * i))
+    live.take(replace(hover, t=0.0501))  # late
     for i in range(40, 45):
-        live.take(Row(0.005 * i, 0, **hover, **imu))
+        row = replace(hover, t=0.005 * i, voltage=None)
+        live.take(replace(row, gyro=np.zeros(3), accelerometer=up))

@@ -1,8 +1,8 @@
-"""What comes from a vehicle, and the rows that are made of it.
+"""Messages of a vehicle, and the rows of a flight made from them.
 
-A source gives ``Sample``: what one message holds, in this kit's frames and units, with the time at
-which it was measured on the sender's clock and that at which it arrived here. A ``Row`` is what the
-filter and the recording take: a row of a flight log, on the stream's own time.
+A source returns a ``Measurement``: the quantities in one message in this kit's frames and units,
+the sender's time of measurement, and the time of arrival. The filter and the recording take a
+``Row``: a row of a flight log, in the stream's own time.
 """
 
 from dataclasses import dataclass, field, fields
@@ -16,12 +16,12 @@ SECOND = 1_000_000_000  # ns
 
 
 class Malformed(ValueError):  # noqa: N818 - of one message, not of the request
-    """A message that says nothing: why, in words."""
+    """A message without a usable measurement: the reason, in words."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Measured:
-    """Quantities of one time; None: not measured."""
+    """Quantities at one time; None: not measured."""
 
     position: Array | None = None  # (3,) m, world
     quaternion: Array | None = None  # (4,) body to world, scalar first, of length 1
@@ -30,7 +30,7 @@ class Measured:
     voltage: float | None = None  # V
     gyro: Array | None = None  # (3,) rad/s, body
     accelerometer: Array | None = None  # (3,) m/s2, body
-    force: Array | None = None  # (3,) N, world: the truth, where a simulator knows it
+    force: Array | None = None  # (3,) N, world: the true one, from a simulator
     torque: Array | None = None  # (3,) Nm, likewise
 
     @property
@@ -45,7 +45,7 @@ class Measured:
 
     @property
     def measured(self) -> dict[str, Any]:
-        """All that was measured or commanded, by name."""
+        """Measured and commanded quantities, by name."""
         values = ((name, getattr(self, name)) for name in QUANTITIES)
         return {name: value for name, value in values if value is not None}
 
@@ -59,22 +59,22 @@ QUANTITIES = tuple(one.name for one in fields(Measured))
 
 
 @dataclass(slots=True)
-class Sample(Measured):
+class Measurement(Measured):
     """One message."""
 
-    kind: str  # of message: those of one kind come from one clock
-    stamp: int | None  # ns, sender's clock, when it was measured; None: the message does not say
+    kind: str  # messages of one kind share a clock
+    stamp: int | None  # ns, time of measurement on the sender's clock; None: not stated
     arrival: int  # ns, this machine's monotonic clock
-    whole: bool = False  # it is a row by itself: pose and rotor speeds of one time
-    anew: bool = False  # the first of another sender, whose clock is another
+    whole: bool = False  # a row by itself: pose and rotor speeds at one time
+    anew: bool = False  # the first of another sender, with another clock
 
 
 @dataclass(slots=True)
 class Row(Measured):
-    """A row of the flight: all that is known of one time."""
+    """A row of the flight: all quantities at one time."""
 
     t: float  # s, stream's time
-    arrival: int  # ns, of the message that completed it
+    arrival: int  # ns, of its last message
     rotor_speeds: Array = field(kw_only=True)  # always known
-    commanded: bool = False  # the rotor speeds are those that the commands give
-    stamp: int | None = None  # ns, sender's clock, of the message that completed it
+    commanded: bool = False  # the rotor speeds follow from commands
+    stamp: int | None = None  # ns, sender's clock, of its last message

@@ -1,5 +1,5 @@
-"""Where rows and estimates go, in a thread of its own: the stream hands them over and goes on,
-whether they are taken, taken slowly, or not at all.
+"""Threads that pass rows and estimates on: the stream hands an item over and goes on, whether the
+sink takes the item, takes time, or fails.
 """
 
 import threading
@@ -13,44 +13,43 @@ from typing import Generic, TypeVar
 from .tallies import Tallies, reason_of
 
 Item = TypeVar("Item")
-# that wait for a sink: 41 s at 200 Hz, longer than a disk takes to wake or a card to erase; about
-# 10 MB of rows
+# items waiting for a sink: 41 s at 200 Hz, 10 MB of rows; a disk wakes and a card erases sooner
 WAITING = 8192
-_LAST = 5.0  # s that the end of a stream waits for a sink that still takes; a healthy one needs ms
+_LAST = 5.0  # s for a slow sink at the end of a stream; a healthy one needs ms
 
 
 class Sink(ABC, Generic[Item]):
-    """What takes items, and may stall or fail."""
+    """A taker of items; may stall or fail."""
 
     name = ""  # for people
-    lost = ""  # as what the items are counted that it does not take
-    pause = 0.0  # s without an item after which it is idle
+    lost = ""  # name in the counts of items not taken
+    pause = 0.0  # s without an item until ``idle`` is called
     rows = 0  # taken for good
-    held = 0  # taken, and lost if it fails
+    held = 0  # taken, and lost after a failure
 
     @abstractmethod
     def add(self, item: Item, /) -> None:
         """Take an item."""
 
     def idle(self) -> None:
-        """Finish what was taken: nothing has come for a while."""
+        """Finish the items so far, in a pause."""
 
     def end(self) -> None:
-        """Finish what was taken: nothing comes any more."""
+        """Finish the items: no further ones come."""
         self.idle()
 
     def close(self) -> None:
-        """Let go of what is open, after the end or a failure."""
+        """Close files, after the end or a failure."""
 
 
 class Outlet(Generic[Item]):
     """Hands items to a sink.
 
     Args:
-        sink: that takes them, in the order in which they come.
-        tallies: where what it does not take is counted and said.
+        sink: takes the items in their order.
+        tallies: counts and names lost items.
         failed: called once the sink has failed, in its thread.
-        waiting: items that wait for the sink, at most.
+        waiting: most items held for the sink.
     """
 
     def __init__(
@@ -61,7 +60,7 @@ class Outlet(Generic[Item]):
         waiting: int = WAITING,
     ) -> None:
         self.sink, self.problem = sink, ""
-        self.patience = 0.0  # s that the stream waits for room, where its source waits for it
+        self.patience = 0.0  # s of waiting for room; more than 0 if the source waits too
         self._tallies, self._failed, self._waiting = tallies, failed, waiting
         self._held: deque[Item] = deque()
         self._changed = threading.Condition()
@@ -70,7 +69,7 @@ class Outlet(Generic[Item]):
         self._thread.start()
 
     def put(self, item: Item) -> None:
-        """Hand an item over; where there is no room for it, it is left out and counted."""
+        """Hand an item over; without room the item is left out and counted."""
         with self._changed:
             begun = time.monotonic()
             while self._full() and not self._stalls and time.monotonic() - begun < self.patience:
@@ -87,7 +86,7 @@ class Outlet(Generic[Item]):
                 self._changed.notify_all()
 
     def close(self, wait: float = _LAST) -> None:
-        """Have the sink take what is held, for up to ``wait`` s, and end."""
+        """Let the sink take the held items, for up to ``wait`` s, and end."""
         with self._changed:
             self._over = True
             self._changed.notify_all()
@@ -126,7 +125,7 @@ class Outlet(Generic[Item]):
             return bool(self._held)
 
     def _end(self, problem: str) -> None:
-        """Take nothing more, count what is lost by it, and say so."""
+        """End, count the lost items, and say so."""
         with self._changed:
             self.problem = problem
             self._tallies.counts[self.sink.lost] += self.sink.held + len(self._held)

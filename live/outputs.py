@@ -1,4 +1,4 @@
-"""An estimate as it is told: the columns of ``wrench.csv``."""
+"""Estimates as text: the columns of ``wrench.csv``."""
 
 from typing import Any, TextIO
 
@@ -35,6 +35,6 @@ class Lines(Sink[Output]):
         self._file.write(",".join([repr(t), *numbers]) + "\n")
 
     def idle(self) -> None:
-        """Have what was written read."""
+        """Flush the lines so far."""
         self._file.flush()
         self.rows, self.held = self.rows + self.held, 0

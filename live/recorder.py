@@ -1,9 +1,9 @@
-"""A flight log that grows while the vehicle flies, and can be read whatever ends the writing.
+"""A flight log written during the flight, readable whatever ends the writing.
 
 Rows are held back for as long as a late one may still come, sorted, and written as whole lines a
-few times a second: a process that is killed loses less than the last second. The last column of a
-line is always 1, so a line that was cut within is told from a whole one: it has fewer fields than
-the header, and the reader of logs leaves it out.
+few times a second: a killed process loses less than the last second. The last column of a
+line is always 1. A line cut anywhere has fewer fields than the header, and the reader of logs
+leaves the line out.
 """
 
 import math
@@ -29,9 +29,9 @@ from .messages import Row
 from .outlets import Sink
 from .tallies import Tallies
 
-_SETTLES = 1.0  # s of rows that are looked at to see which channels there are
+_SETTLES = 1.0  # s of rows for the choice of channels
 _WRITTEN_EVERY = 0.25  # s, stream's time
-# columns of each quantity of a row, in their order
+# columns of each quantity in a row
 _CHANNELS = {
     "position": POSE[:3],
     "quaternion": POSE[3:],
@@ -43,26 +43,25 @@ _CHANNELS = {
     "accelerometer": ACCELEROMETER,
     "gyro": GYRO,
 }
-_KEPT = ("voltage", "force", "torque")  # rows without one have the last before
+_KEPT = ("voltage", "force", "torque")  # a row without one repeats the last
 
 
 class Recorder(Sink[Row]):
     """Writes rows to a new flight log (``.csv``).
 
-    Nothing is written before the stream has run for a second: one that turns out to be none leaves
-    no file.
+    Writing begins a second into the stream: a stream without rows leaves no file.
 
     Args:
-        path: the log; it must not exist.
-        vehicle: name of the vehicle that flies, or empty where the log must not state one.
-        tallies: where rows are counted that came too late to be recorded.
-        horizon: s that a row may be late.
+        path: a new log.
+        vehicle: name of the vehicle for the log; empty: not stated.
+        tallies: counts rows too late for the recording.
+        horizon: largest lateness of a row, s.
 
     Raises:
         InputError: the name is none of a ``.csv``, or no new file can be written there.
     """
 
-    lost, pause = "not recorded", 0.4  # s without a row after which everything is written
+    lost, pause = "not recorded", 0.4  # s without a row until all rows are written
 
     def __init__(self, path: Path, vehicle: str, tallies: Tallies, horizon: float) -> None:
         if path.suffix.lower() != ".csv":
@@ -80,7 +79,7 @@ class Recorder(Sink[Row]):
         name = f"vehicle={vehicle}"
         self._last = name if vehicle and VEHICLE.fullmatch(name) else "whole"
         self._held: list[Row] = []  # by time
-        self._channels: dict[str, tuple[str, ...]] = {}  # those that are written, and their columns
+        self._channels: dict[str, tuple[str, ...]] = {}  # written ones, with their columns
         self._latest: dict[str, Any] = {}  # values of ``_KEPT``
         self._file: int | None = None
         self._written = -math.inf  # s, time of the last row written
@@ -88,11 +87,11 @@ class Recorder(Sink[Row]):
 
     @property
     def held(self) -> int:  # type: ignore[override]
-        """How many rows wait to be written."""
+        """Rows not yet written."""
         return len(self._held)
 
     def add(self, row: Row) -> None:
-        """Record a row; one of a time that there is already is joined with it.
+        """Record a row; rows at the same time are joined.
 
         Raises:
             OSError: the log cannot be written.
@@ -116,12 +115,12 @@ class Recorder(Sink[Row]):
             self._due = newest + _WRITTEN_EVERY
 
     def idle(self) -> None:
-        """Write what is held of a log that is begun."""
+        """Write the rows held for a log already begun."""
         if self._file is not None:
             self._write(math.inf)
 
     def end(self) -> None:
-        """Write all that is left; fewer than two rows make no log."""
+        """Write the last rows; fewer than two rows make no log."""
         if self._file is not None or len(self._held) >= 2:
             self._write(math.inf)
 
@@ -149,7 +148,7 @@ class Recorder(Sink[Row]):
             data = data[done:]
 
     def _begin(self) -> None:
-        """Choose the columns by what has come, and write their names."""
+        """Choose the columns by the rows so far, and write their names."""
         measured = not all(row.commanded for row in self._held)
         if not measured:  # the first rows had no command yet
             self._held = [row for row in self._held if row.command is not None]

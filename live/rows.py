@@ -1,8 +1,8 @@
-"""From messages, each of which holds a part, to rows of the flight.
+"""From messages with parts of a row to rows of the flight.
 
-A message that is whole is a row. Otherwise each pose and each inertial measurement is one, with the
-rotor speeds of its time: between two that came, on a line between them, beyond the last, as they
-were last. Where poses stop, rotor speeds alone make rows, so that the estimate goes on.
+A whole message is a row. Otherwise each pose and each inertial measurement makes a row, with the
+rotor speeds at its time: interpolated linearly between two messages, and held after the
+last. Without poses rotor speeds alone make rows, and the estimate goes on.
 """
 
 from bisect import bisect_right
@@ -12,12 +12,12 @@ import numpy as np
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
-from .messages import Array, Row, Sample
+from .messages import Array, Measurement, Row
 from .tallies import Tallies
 
-_KEPT = 1.0  # s of rotor speeds that are kept; poses come much sooner
-_SILENT = 0.15  # s without a row from which on rotor speeds make rows: several poses at 30 Hz
-# s that measured rotor speeds are waited for where commands come: an ESC reports at 10 Hz or more
+_KEPT = 1.0  # s of rotor speeds kept; poses come much sooner
+_SILENT = 0.15  # s without a row until rotor speeds make rows: several poses at 30 Hz
+# s of commands alone until they count: an ESC reports measured rotor speeds at 10 Hz or more
 _MEASURED = 1.0
 _time = itemgetter(0)
 
@@ -26,8 +26,8 @@ class Joiner:
     """Makes rows of messages.
 
     Args:
-        vehicle: whose motor curve turns commands into rotor speeds where none are measured.
-        tallies: where poses are counted that came while no rotor speeds were known.
+        vehicle: its motor curve turns commands into rotor speeds if none are measured.
+        tallies: counts poses before any rotor speeds.
     """
 
     def __init__(self, vehicle: Vehicle, tallies: Tallies) -> None:
@@ -35,12 +35,12 @@ class Joiner:
         self._speeds: list[tuple[float, Array]] = []  # by time
         self._command: Array | None = None
         self._voltage: float | None = None
-        self._measured = False  # rotor speeds come, and commands are not asked for them
+        self._measured = False  # rotor speeds come; commands give none
         self._first_command: float | None = None  # s
         self._last_row = -np.inf
 
-    def take(self, sample: Sample, t: float) -> Row | None:
-        """Return the row that a message of time ``t``, s, completes, or None.
+    def take(self, sample: Measurement, t: float) -> Row | None:
+        """Return the row of a message at time ``t``, s, or None.
 
         Raises:
             InputError: commands come, no measured rotor speeds, and the vehicle states no motor
@@ -68,8 +68,8 @@ class Joiner:
             known |= {"position": None, "quaternion": None}
         return Row(t, sample.arrival, commanded=commanded, stamp=sample.stamp, **known)
 
-    def _take_motors(self, sample: Sample, t: float) -> bool:
-        """Keep rotor speeds; return whether they are those that commands give."""
+    def _take_motors(self, sample: Measurement, t: float) -> bool:
+        """Keep rotor speeds; return whether commands gave them."""
         if sample.rotor_speeds is not None:
             if not self._measured:
                 self._measured = True

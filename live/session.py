@@ -1,8 +1,8 @@
 """A stream from beginning to end: messages in, estimates out, a log beside it.
 
-Everything between a message's arrival and its estimate is done in one thread, one message after the
-other. Whoever records or tells does so behind an ``Outlet``, whoever shows looks at it from a
-thread of its own: that they fail or stall does not reach the stream.
+One thread does everything between a message's arrival and its estimate, one message after the
+other. Recording and printing run behind an ``Outlet``, and views in threads of their own: a failure
+or a stall there never reaches the stream.
 """
 
 import gc
@@ -17,27 +17,27 @@ from typing import Any
 from ..runtime.errors import InputError
 from .clocks import Clocks
 from .filtering import LiveFilter, LiveSettings, Output
-from .messages import SECOND, Row, Sample
+from .messages import SECOND, Measurement, Row
 from .outlets import WAITING, Outlet
 from .rows import Joiner
 from .sources.base import Source
 from .watch import Watch
 
-_VIEWED = 50.0  # estimates that a view shows, a second
-VIEWED = 1500  # in all: of the last 30 s
-SILENT = 0.5  # s without a message after which a source has stopped
-_POLL = 0.1  # s between two looks at whether to end
-_TURN = 2e-4  # s after which Python's threads take turns: an arrival waits no longer for the page
+_VIEWED = 50.0  # estimates a second in a view
+VIEWED = 1500  # in all: the last 30 s
+SILENT = 0.5  # s without a message until a source counts as stopped
+_POLL = 0.1  # s between two checks for the end
+_TURN = 2e-4  # s of a turn of Python's threads: the longest wait of an arrival for the page
 
 
 class Session:
     """One stream.
 
     Args:
-        source: of messages; it states the vehicle and counts.
-        settings: of the stream.
-        recording: where rows go; None: nowhere.
-        telling: where estimates go.
+        source: the messages, the vehicle and the counts.
+        settings: the stream's.
+        recording: takes the rows; None: no recording.
+        telling: takes the estimates.
     """
 
     def __init__(
@@ -57,18 +57,18 @@ class Session:
         self.watch = Watch(tallies, self.clocks, self.filter)
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages
-        self._begun = 0.0  # s, stream's time of the first estimate
+        self._begun = 0.0  # s, time of the first estimate in the stream
         self._unrecorded: deque[Row] = deque(maxlen=WAITING)
-        self._fresh: list[int] = []  # ns, arrivals whose estimates are being sent
+        self._fresh: list[int] = []  # ns, arrivals of the estimates being sent
         self.output: Output | None = None
-        # what a view shows
+        # for views
         self._recent: deque[Output] = deque(maxlen=VIEWED)
         self.estimates = 0
         self.ended = ""  # why, in words
 
     @property
     def outlets(self) -> list[Outlet[Any]]:
-        """Where rows and estimates go."""
+        """The outlets of rows and estimates."""
         return [one for one in (self.recording, self.telling) if one is not None]
 
     @property
@@ -83,24 +83,24 @@ class Session:
 
     @property
     def recorded(self) -> int:
-        """How many rows were recorded."""
+        """Number of recorded rows."""
         return 0 if self.recording is None else self.recording.sink.rows
 
     def since(self, t: float) -> list[Output]:
-        """Return the estimates of the last 30 s that lie after ``t``, s, from any thread."""
+        """Return the estimates of the last 30 s later than ``t``, s; from any thread."""
         return [output for output in self._recent.copy() if output.t > t]
 
     def stop(self) -> None:
-        """Have the stream end; from any thread."""
+        """End the stream; from any thread."""
         self._stop.set()
         for outlet in self.outlets:
             outlet.patience = 0.0
 
     def run(self) -> None:
-        """Open the source and deal with all that comes, until it ends or ``stop`` is called.
+        """Open the source and estimate, until the source ends or ``stop`` is called.
 
         Raises:
-            InputError: there is no such source, or what comes is none of its messages.
+            InputError: there is no such source, or its messages are of another kind.
         """
         try:
             self.source.open()
@@ -125,8 +125,8 @@ class Session:
                 outlet.close()
 
     def _once(self) -> bool:
-        """Deal with what has come; return whether there may be more."""
-        samples: list[Sample] | None = []
+        """Handle the messages so far; return whether more may come."""
+        samples: list[Measurement] | None = []
         failures = self.tallies.counts["not read"]
         with self.tallies.spared("not read", self.source.name):
             samples = self.source.receive(_POLL)
@@ -159,28 +159,28 @@ class Session:
             raise self._nothing(f"within {wait:g} s")
         return True
 
-    def take(self, sample: Sample) -> None:
-        """Deal with one message."""
+    def take(self, sample: Measurement) -> None:
+        """Handle one message."""
         self.tallies.rates[sample.kind].add(sample.arrival)
         late = self.tallies.counts["too late"]
         self._estimate(sample)
         if sample.has_pose:
             self.watch.count(max(self.tallies.counts["too late"] - late, 0))
 
-    def _estimate(self, sample: Sample) -> None:
+    def _estimate(self, sample: Measurement) -> None:
         t = self.clocks.time(sample)
         row = None if t is None else self._joiner.take(sample, t)
         if row is None:
             return
         for output in self.filter.take(row):
             self._out(output)
-            if output.row is row and self.source.paced:  # not one that was held back
+            if output.row is row and self.source.paced:  # not a row held back
                 self._fresh.append(row.arrival)
         if self.recording is not None:
             self._unrecorded.append(row)
 
     def _record(self) -> None:
-        """Record the rows that came, once there is an estimate and it is out."""
+        """Record the rows so far, after the first estimate is out."""
         while self.recording is not None and self.estimates and self._unrecorded:
             self.recording.put(self._unrecorded.popleft())
 
@@ -208,19 +208,19 @@ class Session:
         came = ", ".join(sorted(self.tallies.rates))
         bad, problems = self.tallies.counts["malformed"], self.source.problems
         if not came:
-            found = "no good message came" if bad else "no message came"
+            problem = "no good message came" if bad else "no message came"
         elif waiting:
-            found = f"poses came ({came}), and no rotor speeds"
+            problem = f"poses came ({came}), and no rotor speeds"
         else:
-            found = f"{came} came, which is no estimate yet"
+            problem = f"{came} came, which is no estimate yet"
         if problems:
             when += f"; {bad} malformed, the first: {problems[0]}"
-        return InputError(f"{self.source.name}: {found} {when}; expected {self.source.expected}")
+        return InputError(f"{self.source.name}: {problem} {when}; expected {self.source.expected}")
 
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Have other threads give way soon, and the collector of garbage leave what is there alone."""
+    """Let other threads give way soon, and keep present objects from the collector of garbage."""
     before = sys.getswitchinterval()
     sys.setswitchinterval(_TURN)
     gc.collect()

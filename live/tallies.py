@@ -1,4 +1,4 @@
-"""What is counted while a stream runs, in memory that does not grow with it."""
+"""Counts of a stream, in constant memory."""
 
 import math
 import time
@@ -14,11 +14,11 @@ from .messages import Malformed
 
 _BINS_PER_OCTAVE = 16
 _QUANTILES = np.array([0.5, 0.99])
-_WINDOW = 5_000_000_000  # ns, over which a rate is told
+_WINDOW = 5_000_000_000  # ns of a rate
 
 
 class Durations:
-    """How long something takes, as a histogram whose bins are 4 % wide."""
+    """Durations as a histogram with bins 4 % wide."""
 
     def __init__(self) -> None:
         self.longest = 1  # ns
@@ -31,7 +31,7 @@ class Durations:
 
     @property
     def median_and_most(self) -> tuple[float, float]:
-        """Median and 99 % quantile, ms, NaN where there is none; from any thread."""
+        """Median and 99 % quantile, ms, or NaN; from any thread."""
         counts = np.cumsum(self._bins)
         if not counts[-1]:
             return math.nan, math.nan
@@ -41,45 +41,44 @@ class Durations:
 
 
 class Rate:
-    """How often something comes: over the last 5 s, and in all."""
+    """A rate over the last 5 s, and a count in all."""
 
     def __init__(self) -> None:
         self.count = 0
         self._arrivals: deque[int] = deque()  # ns, of the last 5 s
 
     def add(self, now: int) -> None:
-        """Count one that came ``now``, ns."""
+        """Count one at ``now``, ns."""
         self.count += 1
         self._arrivals.append(now)
         while self._arrivals[0] < now - _WINDOW:
             self._arrivals.popleft()
 
     def hertz(self, now: int) -> float:
-        """Return the rate over the last 5 s before ``now``, ns, or since the first of them came."""
+        """Return the rate over the last 5 s before ``now``, ns, or since the first arrival."""
         recent = [arrival for arrival in self._arrivals.copy() if arrival > now - _WINDOW]
         lasted = _WINDOW if len(recent) < self.count else now - recent[0] if recent else 0
         return 1e9 * len(recent) / max(lasted, 1_000_000_000)
 
 
 class Tallies:
-    """Counts of what came, and of what became of it.
+    """Counts of messages, of losses and of failures.
 
-    The names of ``counts``: ``doubled`` (the same message again), ``late`` (measured before what
-    was known already, and fused where it belongs), ``too late`` (older than the horizon: left out),
-    ``lost`` (missing in the sender's own count, or in its regular times), ``malformed``, ``other
-    senders`` (messages of a second sender of the same), ``clock jumps``, ``implausible times``,
-    ``waiting`` (poses that came while no rotor speeds were known), ``stops`` (times that the source
-    was silent and came back), ``refused`` (poses that the gate took for outliers), ``not decoded``,
-    ``not read`` and ``not estimated`` (messages, reads of the link and rows at which this kit or a
-    library of it failed), ``not sent``, ``not recorded``, ``not told`` (what the link, the log or
-    standard output did not take), ``not drawn`` (a terminal that failed), ``not shown`` (events
-    that a browser was too slow for), ``turned away`` (browsers
-    beyond those that are served).
+    Names of ``counts`` for messages: ``doubled`` (the same again), ``late`` (fused at an earlier
+    time), ``too late`` (older than the horizon: left out), ``lost`` (missing in the sender's own
+    count), ``malformed``, ``other senders`` (a second sender of the same quantity), ``clock
+    jumps``, ``implausible times``, ``waiting`` (poses before any rotor speeds). For the source:
+    ``stops`` (silent for a while). For the filter: ``refused`` (poses gated as outliers).
+
+    For failures of this kit or its libraries: ``not decoded`` (messages), ``not read`` (reads of
+    the link), ``not estimated`` (rows). For items not taken: ``not sent`` (by the link), ``not
+    recorded`` (by the log), ``not told`` (by standard output), ``not drawn`` (by the terminal),
+    ``not shown`` (events too fast for a browser), ``turned away`` (browsers beyond the most).
     """
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
-        self._said: dict[str, bool] = {}  # lines for people, and whether they were taken
+        self._said: dict[str, bool] = {}  # lines for people: printed or not
         self.rates: defaultdict[str, Rate] = defaultdict(Rate)
         self.latency = Durations()
         self.processor = Durations()
@@ -88,7 +87,7 @@ class Tallies:
 
     @property
     def found(self) -> dict[str, int]:
-        """The counts that are not zero, from any thread."""
+        """The counts above zero, from any thread."""
         return {name: n for name, n in list(self.counts.items()) if n}
 
     @property
@@ -102,18 +101,18 @@ class Tallies:
         self._said.setdefault(line, False)
 
     def news(self) -> list[str]:
-        """Return the lines that were kept since the last call."""
+        """Return the lines kept since the last call."""
         lines = [line for line, taken in self._said.copy().items() if not taken]
         self._said.update(dict.fromkeys(lines, True))
         return lines
 
     @contextmanager
     def spared(self, count: str, what: str) -> Iterator[None]:
-        """Have the stream go on after a failure of the block: it is counted, and the first is said.
+        """Let the stream go on after a failure of the block: all are counted, the first is told.
 
         Raises:
-            InputError: it is its user's mistake, and no failure of ours.
-            Malformed: it is the sender's.
+            InputError: the user's mistake, no failure of ours.
+            Malformed: the sender's mistake.
         """
         try:
             yield
@@ -130,7 +129,7 @@ class Tallies:
 
 
 def reason_of(error: Exception) -> str:
-    """Return why something failed, on a line."""
+    """Return the reason of a failure, on a line."""
     error = error.__cause__ if isinstance(error.__cause__, OSError) else error
     said = " ".join(str(getattr(error, "strerror", None) or error).split())[:200]
     return said if isinstance(error, InputError | OSError) else f"{type(error).__name__}: {said}"

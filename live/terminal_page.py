@@ -1,4 +1,4 @@
-"""The stream as a terminal shows it, a few times a second."""
+"""The page of a stream on a terminal, drawn a few times a second."""
 
 import math
 
@@ -12,7 +12,7 @@ from .session import SILENT, Session
 
 _BAR = 20  # characters
 
-# words for counts that are good to know and no trouble
+# counts that are no trouble
 _HARMLESS = ("late", "doubled")
 
 
@@ -82,7 +82,7 @@ def _lines(session: Session) -> list[Text]:
 
 
 def tuning_words(consistency: Consistency) -> str:
-    """Return what the innovations say of the tuning, and what to do where it is too slow."""
+    """Return the innovations' verdict on the tuning, with advice for a slow one."""
     advice = (
         "; the tuning is too slow for this flight: --record it, have windwrench estimate fit one, "
         "and give that with --tuning"
@@ -91,5 +91,5 @@ def tuning_words(consistency: Consistency) -> str:
 
 
 def counts_words(counts: dict[str, int]) -> str:
-    """Return what was counted."""
+    """Return the counts in words."""
     return ", ".join(f"{name} {n}" for name, n in sorted(counts.items()))

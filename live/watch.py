@@ -1,4 +1,4 @@
-"""What a user must know of a stream: said once while it runs, and summed up at its end."""
+"""Warnings on a stream: printed once during the stream, and summed up at its end."""
 
 from collections import deque
 
@@ -11,18 +11,18 @@ from .messages import SECOND, Array
 from .tallies import Tallies
 
 _EVERY = SECOND  # ns between two looks
-_RATE = 0.01  # by which a clock differs from ours before it is told; devices' differ by 1e-4
-_LATE = 0.01  # share of poses; a link in order has none
-_POSES = 100  # poses before their share is told
-_NOISE, _LOOKS = 0.1, 50  # s between two looks at the noise, and looks whose median is told: 5 s
+_RATE = 0.01  # least difference of a clock from ours for a warning; devices differ by 1e-4
+_LATE = 0.01  # share of poses; a sound link has none
+_POSES = 100  # fewest poses for a share
+_NOISE, _LOOKS = 0.1, 50  # s between two looks at the noise, and looks in the median: 5 s
 
 
 class Watch:
     """Looks at a stream.
 
     Args:
-        tallies: where warnings are said.
-        clocks: of the stream.
+        tallies: takes the warnings.
+        clocks: the stream's.
         live: the filter.
     """
 
@@ -35,13 +35,13 @@ class Watch:
         self._said: set[str] = set()  # subjects
 
     def count(self, too_late: int) -> None:
-        """Count a pose that came, and how many were found too late by it."""
+        """Count a pose, and the poses found too late with this one."""
         self.poses += 1
         self._late += too_late
 
     @property
     def too_late(self) -> int:
-        """How many poses were too late; those that came while a clock jumped were not."""
+        """Number of poses too late, without those during a clock's jump."""
         return self._late - self._clocks.poses_at_jumps
 
     def add(self, output: Output) -> None:
@@ -51,7 +51,7 @@ class Watch:
             self._noise.append(output.estimate.noise_scales)
 
     def look(self, now: int) -> None:
-        """Warn of what is amiss, once a subject; ``now`` in ns."""
+        """Warn once a subject; ``now`` in ns."""
         if now < self._due:
             return
         self._due = now + _EVERY
@@ -74,7 +74,7 @@ class Watch:
 
     @property
     def noise_words(self) -> str:
-        """What is to be done where the poses' noise is not the declared one; else empty."""
+        """Advice if the poses' noise differs from the declared one; else empty."""
         scales, tuning = self.noise_scales, self._filter.tuning
         if scales is None or tuning is None:
             return ""
@@ -82,7 +82,7 @@ class Watch:
 
     @property
     def late_words(self) -> str:
-        """How many poses were too late; empty where that is hardly any."""
+        """Number of poses too late, in words; empty: hardly any."""
         if self.poses < _POSES or self.too_late <= _LATE * self.poses:
             return ""
         horizon = self._filter.settings.horizon
@@ -93,14 +93,14 @@ class Watch:
 
     @property
     def rate_words(self) -> str:
-        """How fast the sender's clock ran; empty where it ran as ours."""
+        """Rate of the sender's clock, in words; empty: the same as ours."""
         line = self._clocks.line
         rate = None if line is None else line.mean_rate or line.latest_rate
         return "" if rate is None or abs(rate - 1.0) <= _RATE else _clock_words(rate)
 
     @property
     def words(self) -> list[str]:
-        """What there is to tell at the end."""
+        """All warnings at the end."""
         return [words for words in (self.rate_words, self.late_words, self.noise_words) if words]
 
     def _warn(self, subject: str, words: str) -> None:

@@ -1,11 +1,11 @@
 """The stream as a page in a browser on this machine: the vehicle, the force as an arrow, the last
 30 s.
 
-Served on 127.0.0.1 alone; the page asks for nothing from elsewhere. A browser is told ten times a
-second what has come since, as server-sent events. Requests that name another host are refused: no
+The page is served on 127.0.0.1 alone and asks for nothing from elsewhere. A browser gets new
+estimates ten times a second as server-sent events. Requests for another host are refused: no
 page of another site reads the stream by pointing its name at this machine. One thread serves all
-browsers, and waits for none: it holds few connections, each for a time, and leaves out what a
-browser is too slow for.
+browsers without waiting. The thread holds few connections, each for a time, and skips events for a
+slow browser.
 """
 
 import asyncio
@@ -23,9 +23,9 @@ from .session import SILENT, VIEWED, Session
 
 _EVERY = 0.1  # s between two events
 _HOSTS = ("127.0.0.1", "localhost")
-_MOST = 16  # connections; a browser holds one, and asks for a page by another
-_TIMEOUT = 5.0  # s that a request may take to come, and that a browser may read nothing
-_HEAD = 8192  # bytes of a request
+_MOST = 16  # connections; a browser holds one for events, and one for the page
+_TIMEOUT = 5.0  # s, longest time of a request, and of a browser without reading
+_HEAD = 8192  # most bytes of a request
 _HEADERS = """HTTP/1.1 {status}
 Content-Type: {kind}
 Cache-Control: no-store
@@ -51,7 +51,7 @@ class WebView:
         self._session = session
         self._over = threading.Event()
         self._page = resources.files(__package__).joinpath("view.html").read_bytes()
-        # time, s, and text of the estimates that are shown
+        # time, s, and text of each estimate
         self._points: deque[tuple[float, str]] = deque(maxlen=VIEWED)
         self._open: set[asyncio.Task[None]] = set()  # connections
         try:
@@ -73,7 +73,7 @@ class WebView:
         self._thread.join(_TIMEOUT)
 
     def _run(self) -> None:
-        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # of browsers that go
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # browsers that go are no error
         with self._session.tallies.spared("not shown", "the page"), self._socket:
             asyncio.run(self._serve())
 
@@ -141,7 +141,7 @@ class WebView:
             await asyncio.sleep(_EVERY)
 
     def _look(self) -> None:
-        """Keep what there is to show, for all browsers."""
+        """Keep new estimates and the state, for all browsers."""
         for one in self._session.since(self._points[-1][0] if self._points else -math.inf):
             values = [one.t, *one.wrench, *one.std]
             point = [float(f"{x:.5g}") if i else round(x, 3) for i, x in enumerate(values)]
@@ -166,7 +166,7 @@ class WebView:
 
 
 def _asked(request: bytes) -> tuple[str, str]:
-    """Return the status of the answer to a request, and the path that is given; empty: none."""
+    """Return the status for a request, and the path to serve; empty: none."""
     first, *lines = request.decode("latin-1").split("\r\n")
     fields = dict(line.lower().split(":", 1) for line in lines if ":" in line)
     words, host = first.split(" "), fields.get("host", "").strip()

@@ -1,8 +1,8 @@
-"""Functions and memory by their addresses: a compiled loop calls the filter it was given and holds
-the code of no other.
+"""Functions and memory by their addresses: a compiled loop calls one given filter and holds the
+code of no other.
 
-So one compiled call works for environments that each have their own arrays, and code is compiled
-once, not once for each of its callers.
+So one compiled call serves environments with arrays of their own, and code is compiled once for all
+its callers.
 """
 
 from collections.abc import Callable
@@ -28,8 +28,8 @@ def _machine_code(function: Callable[..., Any], signature: Any) -> Any:
 
 
 def address_of(function: Callable[..., Any], signature: Any = STEP) -> int:
-    """Return the address of a plain function, a filter's step if nothing else is said, compiled now
-    if it was not.
+    """Return the address of a plain function (default: a filter's step), compiled now at the
+    latest.
     """
     return int(_machine_code(function, signature).address)
 
@@ -38,8 +38,8 @@ def address_of(function: Callable[..., Any], signature: Any = STEP) -> int:
 def call_step(
     _typing_context: Any, address: Any, record: Any, parts: Any, dt: Any, voltage: Any
 ) -> Any:
-    """Call the step at ``address`` for the filter in ``record``; what it returns are the parts of
-    ``record.z`` it used.
+    """Call the step at ``address`` for the filter in ``record``; return the parts of ``record.z``
+    in use.
     """
     signature = types.int64(types.int64, record, types.int64, types.float64, types.float64)
 
@@ -54,8 +54,8 @@ def call_step(
 
 @intrinsic  # type: ignore[untyped-decorator]
 def call_at(_typing_context: Any, address: Any, *arguments: Any) -> Any:
-    """Call the C function at ``address``, which returns nothing, with whole numbers of 64 bits;
-    addresses are such.
+    """Call the C function at ``address``, without a result, with whole numbers of 64 bits or
+    addresses.
     """
     signature = types.void(
         types.int64, types.StarArgTuple.from_types((types.int64,) * len(arguments))

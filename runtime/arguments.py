@@ -10,15 +10,15 @@ from .errors import InputError
 
 
 def real_numbers(value: object) -> NDArray[np.float64] | None:
-    """Return an array of real numbers as one of doubles, NaN where it is masked; None for anything
-    else, strings of digits among it.
+    """Return an array of real numbers as doubles, NaN where masked; None for anything else, strings
+    of digits among them.
     """
     try:
         array: NDArray[Any] = np.asanyarray(value)
         if array.dtype.kind not in "biuf":
             return None
         numbers = array.astype(np.float64)
-        # which a plain array need not be asked for: 1 us, in each step of a filter
+        # a plain array skips this: 1 us, in each step of a filter
         masked = isinstance(numbers, np.ma.MaskedArray)
         return np.asarray(np.ma.filled(numbers, np.nan) if masked else numbers)
     except (TypeError, ValueError):
@@ -26,8 +26,8 @@ def real_numbers(value: object) -> NDArray[np.float64] | None:
 
 
 def check_positive(settings: Any, three: Collection[str] = ()) -> None:
-    """Check that all fields of a data class are positive finite numbers; those named in ``three``
-    may be three of x, y and z.
+    """Check all fields of a data class: positive finite numbers; fields named in ``three`` may be
+    three of x, y and z.
 
     Raises:
         InputError: one is not.
@@ -45,7 +45,7 @@ def check_positive(settings: Any, three: Collection[str] = ()) -> None:
 
 
 def described(value: object) -> str:
-    """Return what an argument is, for a message: its type, or the shape of an array of numbers."""
+    """Describe an argument, for a message: its type, or the shape of an array of numbers."""
     array = real_numbers(value)
     kind = type(value).__name__
     if array is not None:

@@ -1,4 +1,4 @@
-"""Arrays by what they hold; their shapes stand where they are used."""
+"""Arrays by their numbers; shapes stand at each use."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -41,7 +41,7 @@ def connected(address: str) -> Iterator[Any]:
 
 
 def _reach(address: str) -> None:
-    """Check that someone listens at ``HOST:PORT``: Ray itself would try for minutes."""
+    """Check for a listener at ``HOST:PORT``: Ray itself would try for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     try:
         socket.create_connection((host, int(port)), timeout=10).close()

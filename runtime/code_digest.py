@@ -11,26 +11,21 @@ _SOURCES = (".py", ".yaml", ".xml")
 
 
 @cache
-def code_digest(
-    rooms: Sequence[str], files: Iterable[str] = (), without: Sequence[str] = ()
-) -> str:
+def code_digest(rooms: Sequence[str], files: Iterable[str] = ()) -> str:
     """Return a digest (16 hexadecimal digits) of the package's code.
 
     Args:
-        rooms: folders of the package, taken with all that lies in them.
+        rooms: folders of the package, with all files in them.
         files: more files.
-        without: folders that are left out of the rooms.
 
     All paths are below the package's folder, with ``/``; give tuples.
     """
-    found = {f"{_ROOT}/{name}" for name in files}
-    left_out = tuple(f"{_ROOT}/{folder}/" for folder in without)
+    sources = {f"{_ROOT}/{name}" for name in files}
     for room in rooms:
         for folder, _, names in os.walk(f"{_ROOT}/{room}"):
-            if not f"{folder}/".startswith(left_out):
-                found |= {f"{folder}/{name}" for name in names if name.endswith(_SOURCES)}
+            sources |= {f"{folder}/{name}" for name in names if name.endswith(_SOURCES)}
     digest = hashlib.sha256()
-    for path in sorted(found):
+    for path in sorted(sources):
         digest.update(path.removeprefix(f"{_ROOT}/").encode())
         with open(path, "rb") as source:  # pathlib takes three times as long
             digest.update(source.read())

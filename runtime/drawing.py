@@ -1,4 +1,4 @@
-"""The house style of pictures: one width, letters that can be read, and what each colour says.
+"""The house style of pictures: one width, readable letters, and a meaning for each colour.
 
 A page shows a picture 750 px wide, where the smallest letters, of 8 pt, are 9 px.
 """
@@ -40,7 +40,7 @@ _STYLE: dict[Any, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the house style within; a decorator of what draws, too."""
+    """Draw in the house style within; also a decorator of drawing functions."""
     # matplotlib takes half a second to import, and most of the kit never draws
     from cycler import cycler
     from matplotlib import rc_context
@@ -57,7 +57,7 @@ def new_figure(height: float) -> "Figure":
 
 
 def room_above(axes: Any, share: float = 0.25) -> None:
-    """Leave a share of the height above what is drawn, for a legend."""
+    """Leave a share of the height above the curves, for a legend."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + share * (high - low))
 

@@ -1,4 +1,4 @@
-"""Libraries that not everyone needs, and what to install where one is missing."""
+"""Optional libraries, and the package to install where one is missing."""
 
 from importlib.util import find_spec
 
@@ -6,10 +6,10 @@ from .errors import InputError
 
 
 def need(module: str, extra: str, where: object = "") -> None:
-    """Check that an optional library is there, for ``where`` if that is said.
+    """Check for an optional library, needed by ``where``, if given.
 
     Raises:
-        InputError: it is not; the message says how to install it.
+        InputError: the library is missing; the message names the extra to install.
     """
     if find_spec(module) is None:
         name = f"{where}{': ' if where else ''}{module.replace('_', '-')}"

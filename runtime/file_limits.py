@@ -1,10 +1,9 @@
-"""What a file may cost before it is refused: a few kilobytes may unpack to any size, and a short
-text may take any time.
+"""The largest cost of a file before its refusal: a few kilobytes may unpack to any size, and a
+short text may take any time.
 
-With these limits no file takes more than about 1 GB of memory before it is refused, and none more
-than 10 s before its rows are read: a table of 4 million rows whose last one is wrong takes 20 s.
-Files that pass take more. Everything is counted while it is unpacked; of a Parquet file's columns
-the sizes are believed that its footer states.
+With these limits a refusal takes at most about 1 GB of memory, and 10 s before the rows are read. A
+table of 4 million rows with a wrong last one takes 20 s. Valid files may take more. Everything is
+counted while it is unpacked; sizes of a Parquet file's columns are taken from its footer.
 """
 
 from dataclasses import dataclass
@@ -14,36 +13,37 @@ from .errors import InputError
 
 @dataclass(frozen=True)
 class FileLimits:
-    """Limits of what is read from files. Sizes are in bytes unpacked unless something else is said.
+    """Limits of files that are read. Sizes are in bytes unpacked unless something else is said.
 
     Attributes:
         table_text: characters of a CSV file, or bytes of a Parquet file and of each of its
             columns. A flight of three hours at 200 Hz with 20 columns has 7.5e8 characters.
         table_line: characters of one of its lines.
         table_rows: rows of a table or messages of a topic: more than an hour at 1 kHz.
-        table_numbers: rows times columns that are read; each number takes 8 bytes, and a flight
-            log is copied about twice. That flight has 4.3e7.
-        list_numbers: of all columns of lists and structs in a Parquet file, which are unpacked to
+        table_numbers: rows times columns; each number takes 8 bytes, and a flight log is copied
+            about twice. A flight of three hours has 4.3e7.
+        list_numbers: numbers in all columns of lists and structs of a Parquet file, unpacked to
             find their parts.
         arrays: bytes of the arrays in a MATLAB or NumPy file.
-        parquet_footer: items of a list, or bytes of a text, in what describes a Parquet file.
+        parquet_footer: items of a list, or bytes of a text, in the footer of a Parquet file.
         yaml_text: bytes of a YAML file, the settings of a vehicle or of a training.
-        yaml_values: values in it, with every alias written out.
-        yaml_depth: of values within values.
+        yaml_values: values of a YAML file, with every alias written out.
+        yaml_depth: levels of values within values.
         json_text: bytes of a JSON file: the card of a policy, the progress of a training.
-        policy_file: bytes of a policy's ``.npz``; those of the kit have some 100 kB.
-        policy_weights: of its arrays.
-        checkpoint: bytes of a training's checkpoint, which holds the replay memory, not packed.
-        bag_chunk: of a chunk of a ROS bag; recorders make chunks of some megabytes.
-        bag_unpacked: of all chunks that are unpacked to read one bag.
+        policy_file: bytes of a policy's ``.npz``; policies of the kit have some 100 kB.
+        policy_weights: bytes of a policy's arrays.
+        checkpoint: bytes of a training's checkpoint, with the replay memory, not packed.
+        bag_chunk: bytes of a chunk of a ROS bag; recorders make chunks of some megabytes.
+        bag_unpacked: bytes of all unpacked chunks of one bag.
         bag_index: entries in the index of a ROS 1 bag; there is one for each message.
         ulog_file: bytes of a PX4 log.
-        binary_log: bytes of a log that is read whole, of ArduPilot, Betaflight or a Crazyflie.
+        binary_log: bytes of a log of ArduPilot, Betaflight or a Crazyflie, read whole.
         log_fields: variables in one kind of its records; ArduPilot's have at most 16.
-        ulog_fields: fields of all topics that it subscribes to, those within fields written out;
-            PX4's logs have some 10,000.
-        ulog_texts: information, parameters, texts and dropouts in it; PX4's logs have some 2,000.
-        ulog_damages: places in it where no message can be read; each takes some 0.1 ms.
+        ulog_fields: fields of all its subscribed topics, nested fields written out; PX4's logs have
+            some 10,000.
+        ulog_texts: information, parameters, texts and dropouts of a PX4 log; PX4's logs have some
+            2,000.
+        ulog_damages: unreadable places of a PX4 log; each takes some 0.1 ms.
     """
 
     table_text: int = 2**30

@@ -1,5 +1,5 @@
-"""Forms: what a mapping from a file must hold, stated by the fields of a data class and checked by
-pydantic; an error is one line that names the file, the field and what was expected.
+"""Forms of mappings from files. The fields of a data class state the form, and pydantic checks it.
+An error is one line with the file, the field and the expected value.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,11 +23,11 @@ from .errors import InputError, unknown_name
 
 T = TypeVar("T")
 
-LARGEST = 1e12  # in SI units; products of a few numbers beyond it overflow
-# a form's `__pydantic_config__`: a key that is no field is refused
+LARGEST = 1e12  # in SI units; products of a few larger numbers overflow
+# a form's `__pydantic_config__`: unknown keys are refused
 STRICT = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
-# what pydantic's kinds of errors ask for
+# expected values by pydantic's kinds of errors
 _KINDS = {
     "string": "a text",
     "dict": "a mapping",
@@ -46,17 +46,17 @@ def _adapter(form: Any) -> TypeAdapter[Any]:
 
 
 def checked(form: type[T], data: object, where: str, sample: str = "") -> T:
-    """Return the form that a mapping fills.
+    """Return a form filled from a mapping.
 
     Args:
         form: a data class. A field's annotation may hold ``expected`` and pydantic's constraints;
             with ``STRICT`` as its ``__pydantic_config__`` unknown keys are refused.
         data: as read from a file.
         where: the file, and the section in it, for errors.
-        sample: some of the fields, for the error of what is no mapping.
+        sample: some of the fields, for the error of another value than a mapping.
 
     Raises:
-        InputError: no mapping; a key that is unknown, missing, or of another kind.
+        InputError: no mapping; an unknown or missing key, or a value of another kind.
     """
     if not isinstance(data, Mapping):
         known = sample or ", ".join(_names(form))
@@ -71,7 +71,7 @@ def checked(form: type[T], data: object, where: str, sample: str = "") -> T:
 
 
 def expected(text: str) -> WrapValidator:
-    """Return a validator that says what was expected where those before it refuse a value."""
+    """Return a validator with the error line for a value refused by the validators before."""
 
     def check(value: Any, inner: Callable[[Any], Any]) -> Any:
         try:
@@ -83,7 +83,7 @@ def expected(text: str) -> WrapValidator:
 
 
 def _without_bool(value: object) -> object:
-    """Return a number or a text that holds one; ``nominal 0.1`` stands for 0.1."""
+    """Return a number, or its text; ``nominal 0.1`` stands for 0.1."""
     if isinstance(value, bool):
         raise ValueError("a truth value")
     return value.removeprefix("nominal").strip() if isinstance(value, str) else value
@@ -116,19 +116,19 @@ def numbers(*shape: int) -> PlainValidator:
 
 def _one_line(error: ValidationError, form: type, data: Any, where: str) -> InputError:
     """Return the one line for an error: unknown keys come first, then missing ones."""
-    found = error.errors(include_url=False)
-    for one in found:
+    problems = error.errors(include_url=False)
+    for one in problems:
         if one["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
             *above, key = one["loc"]
             place = ": ".join([where, *_words(above, data)])
             return unknown_name("key", str(key), _names(_form_at(form, above)), place)
-    missing = [one for one in found if one["type"] in ("missing", "missing_argument")]
+    missing = [one for one in problems if one["type"] in ("missing", "missing_argument")]
     if missing:
         section = missing[0]["loc"][:-1]
         names = [str(one["loc"][-1]) for one in missing if one["loc"][:-1] == section]
         place = ": ".join([where, *_words(section, data)])
         return InputError(f"{place}: missing field(s) {', '.join(names)}")
-    one = found[0]
+    one = problems[0]
     key = ".".join(_words(one["loc"], data))
     if one["type"] == "dataclass_type":
         known = ", ".join(sorted(_names(_form_at(form, one["loc"]))))
@@ -151,10 +151,10 @@ def _one_line(error: ValidationError, form: type, data: Any, where: str) -> Inpu
 
 
 def _words(location: Any, data: Any) -> list[str]:
-    """Return the names on the way to a value; an entry of a list has its own name, where it
-    states one, and else its number from 1.
+    """Return the names on the way to a value. An entry of a list has its own name, or else its
+    number from 1.
     """
-    found = []
+    names = []
     for part in location:
         try:
             data = data[part]
@@ -162,10 +162,10 @@ def _words(location: Any, data: Any) -> list[str]:
             data = None
         if isinstance(part, int):
             named = data.get("name") if isinstance(data, Mapping) else None
-            found.append(str(named or f"entry {part + 1}"))
+            names.append(str(named or f"entry {part + 1}"))
         else:
-            found.append(str(part))
-    return found
+            names.append(str(part))
+    return names
 
 
 def _form_at(form: Any, location: Any) -> Any:

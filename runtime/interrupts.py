@@ -6,12 +6,14 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from types import FrameType
 
+Handler = Callable[[int, FrameType | None], object]
+
 INTERRUPTED, TERMINATED = 130, 143  # exit codes
-_AGAIN = 0.02  # s until an interrupt that was lost comes again
-# what ``sys.argv`` begins with while ``python -m`` looks for the package, and as a program
+_AGAIN = 0.02  # s until a lost interrupt comes again
+# first words of ``sys.argv``: while ``python -m`` looks for the package, and as a program
 _COMMAND = ("-m", "windwrench", "windwrench.exe", "windwrench-script.py")
 
 
@@ -21,31 +23,44 @@ def is_command() -> bool:
 
 
 @contextmanager
+def _answering(
+    number: signal.Signals, usual: "Handler | signal.Handlers", answer: Handler
+) -> Iterator[bool]:
+    """Have ``answer`` handle a signal in the block, and give whether it does: not where the usual
+    handler is replaced already, nor in another thread than the main one.
+    """
+    ours = (
+        threading.current_thread() is threading.main_thread() and signal.getsignal(number) is usual
+    )
+    if ours:
+        signal.signal(number, answer)
+    try:
+        yield ours
+    finally:
+        if ours:
+            signal.signal(number, usual)
+
+
+@contextmanager
 def leaving_at_once(active: bool = True) -> Iterator[None]:
     """Have an interrupt end the process at once while the block imports something.
 
-    Nothing is done yet, so nothing is lost; an exception raised within an import may be taken for
-    one of its own, and comes with many lines at best. Where someone else answers interrupts, or
-    this is not the main thread, nothing changes.
+    Nothing is done yet, so nothing is lost. An import may take the exception for one of its own,
+    and prints many lines at best. Another handler of interrupts stays as it is, as do other threads
+    than the main one.
     """
-    ours = active and threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    usual = signal.default_int_handler
+    with _answering(signal.SIGINT, usual, _leave) if active else nullcontext():
         yield
-        return
-    signal.signal(signal.SIGINT, _leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class _Interrupt(KeyboardInterrupt):
-    """An interrupt that comes again where something loses it: callbacks of Python's own do, as
-    every import has them, and modules in C that import others, as MuJoCo's.
+    """An interrupt, raised again where the first is lost: in callbacks of Python's own, as in every
+    import, and in modules in C with imports of their own, as MuJoCo's.
     """
 
-    taken = True  # by who answers it, or no command runs
-    number = signal.SIGINT  # of the signal that it came by
+    taken = True  # an answer came, or no command runs
+    number = signal.SIGINT  # signal of the interrupt
 
     def __del__(self) -> None:
         if not self.taken:
@@ -63,15 +78,15 @@ def _interrupt(number: int) -> None:
 
 
 def taken() -> None:
-    """Say that an interrupt has its answer, and does not come again."""
+    """Note the answer to an interrupt: it does not come again."""
     _Interrupt.taken = True
 
 
 @contextmanager
 def noted() -> Iterator[Callable[[], bool]]:
-    """Give a function that says whether an interrupt came in the block, and is its answer.
+    """Give a function that answers an interrupt in the block, and returns whether one came.
 
-    One that comes within the import of a module in C may end as an error of that import.
+    An interrupt within the import of a module in C may end as an import error.
     """
     came: list[int] = []
     told = sys.unraisablehook
@@ -84,26 +99,21 @@ def noted() -> Iterator[Callable[[], bool]]:
         taken()
         return bool(came)
 
-    usual = threading.current_thread() is threading.main_thread() and (
-        signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    )
-    if usual:
-        signal.signal(signal.SIGINT, note)
-        sys.unraisablehook = lambda lost: lost.exc_type is _Interrupt or told(lost)
-    try:
-        yield answer
-    finally:
-        taken()
-        if usual:
+    with _answering(signal.SIGINT, signal.default_int_handler, note) as ours:
+        if ours:
+            sys.unraisablehook = lambda lost: lost.exc_type is _Interrupt or told(lost)
+        try:
+            yield answer
+        finally:
+            taken()
             sys.unraisablehook = told
-            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager
 def terminable() -> Iterator[Callable[[], bool]]:
-    """Have a termination interrupt the block as Ctrl-C does, and give a function that says whether
-    one came. Whatever started the command may have it ignore interrupts, as a shell script does
-    behind ``&``: a termination is answered all the same.
+    """Have a termination interrupt the block as Ctrl-C does, and give a function that returns
+    whether one came. The parent process may have the command ignore interrupts, as a shell script
+    does behind ``&``: a termination is answered all the same.
     """
     came: list[int] = []
 
@@ -111,23 +121,15 @@ def terminable() -> Iterator[Callable[[], bool]]:
         came.append(number)
         _interrupt(number)
 
-    usual = threading.current_thread() is threading.main_thread() and (
-        signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    )
-    if usual:
-        signal.signal(signal.SIGTERM, end)
-    try:
+    with _answering(signal.SIGTERM, signal.SIG_DFL, end):
         yield lambda: bool(came)
-    finally:
-        if usual:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def forget() -> None:
-    """Have Python end with the exit code that it is given: where an interrupt ended the execution
-    of a text, as namedtuples and data classes do, it would kill itself in the end.
+    """Have Python end with the given exit code. After an interrupt during the execution of a text,
+    as by namedtuples and data classes, Python would kill itself in the end.
     """
-    exec("")  # nothing, but Python forgets what ended the last
+    exec("")  # no code, but Python forgets the end of the last text
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:

@@ -1,7 +1,7 @@
-"""Where machine code is kept: in a folder whose name is a digest of all sources it comes from.
+"""The place of machine code: a folder named by a digest of all its sources.
 
-Numba keeps a function's machine code until the function's own file changes. The code holds the
-functions it calls as well, and constants of other modules.
+Numba keeps a function's machine code until the function's own file changes. The code also holds
+called functions and constants of other modules.
 """
 
 import hashlib
@@ -23,20 +23,28 @@ from .code_digest import code_digest
 from .compile_notice import notice
 
 _ROOT = Path(__file__).resolve().parent.parent
-# all rooms with compiled functions, and all that those import
-ROOMS = ("runtime", "dynamics", "estimator", "controllers", "envs", "identification", "paper")
+# all rooms with compiled functions, and all rooms imported there
+ROOMS = (
+    "runtime",
+    "dynamics",
+    "estimator",
+    "controllers",
+    "envs",
+    "identification",
+    "reproduction",
+)
 _PREFIX = "windwrench-"
 _STARTED = time.time_ns()
-# ours, since then and before their import: the digest is of what was before
+# our files changed since then and before their import: the digest is of the older text
 _edited: list[Path] = []
-_KEPT = 8  # folders, those that were used last; one takes up to 30 MB
-_IN_USE = 3600.0  # s, that a folder stays in any case
+_KEPT = 8  # folders, the last used; one takes up to 30 MB
+_IN_USE = 3600.0  # s after its last use, a folder stays in any case
 
 
 @contextmanager
 def code_folder(function: Callable[..., Any]) -> Iterator[bool]:
     """Have Numba keep the machine code of ``function`` beside code of the same sources. Yields
-    whether there is a place for it.
+    whether there is a place.
     """
     folder = _folder_for(inspect.getfile(function))
     before = config.CACHE_DIR
@@ -78,7 +86,7 @@ def _digest_beside(file: str) -> str:
 
 @cache
 def _prepared(parent: str, digest: str) -> str:
-    """Return a folder for machine code, and remove those not used for longest."""
+    """Return a folder for machine code, and remove the folders unused for longest."""
     folder = Path(parent, f"{_PREFIX}{digest}")
     with suppress(OSError):
         folder.mkdir(exist_ok=True)
@@ -119,6 +127,6 @@ def _is_writable(path: Path, mode: int = 0o777) -> bool:
 
 def _is_private(path: Path) -> bool:
     """Return whether nobody else can have put machine code there: all users may write beside it."""
-    found = path.lstat()
-    mine = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
-    return mine and not found.st_mode & 0o022
+    status = path.lstat()
+    mine = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
+    return mine and not status.st_mode & 0o022

@@ -1,5 +1,5 @@
-"""The files that a page shows and that are kept with it: compact JSON, compressed tables, and one
-small picture a figure. The same content gives the same bytes.
+"""The files shown in a page and kept with the page: compact JSON, compressed tables, and one small
+picture a figure. The same content gives the same bytes.
 """
 
 import gzip
@@ -17,14 +17,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DPI = 110
-_COLOURS = 128  # of a picture; lines and their soft edges need no more
+_COLOURS = 128  # a picture; lines and their soft edges need no more
 
 
 @cache
 def page_template(package: str, name: str, html: bool = True) -> "Template":
-    """Return a package's template: in a page (HTML) every text is escaped, and a name that the
-    template was not given is an error. Filters: ``g6``, six significant digits; ``toml_float``, the
-    same as TOML's float.
+    """Return a package's template: in a page (HTML) every text is escaped, and a missing name is an
+    error. Filters: ``g6``, six significant digits; ``toml_float``, the same as TOML's float.
     """
     from jinja2 import Environment, StrictUndefined  # most of the kit writes no page
 
@@ -86,7 +85,7 @@ def write_png(figure: "Figure", path: Path) -> None:
 
 
 def write_figure(figure: "Figure", folder: Path, name: str) -> Path:
-    """Write NAME.png, which pages show, and NAME.svg, which git ignores; return the first's path.
+    """Write NAME.png, for pages, and NAME.svg, ignored by git; return the first's path.
 
     Raises:
         InputError: a file cannot be written.

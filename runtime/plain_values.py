@@ -1,6 +1,4 @@
-"""Values as files hold them: what JSON and YAML know in place of NumPy's, of paths and of data
-classes.
-"""
+"""Values as files hold them: types of JSON and YAML in place of NumPy's, paths and data classes."""
 
 import math
 from collections.abc import Mapping
@@ -9,8 +7,8 @@ from typing import Any
 
 
 def plain(value: Any, digits: int | None = None) -> Any:
-    """Return a value as strict JSON holds it: arrays and tuples as lists, paths as texts, what is
-    not finite as None.
+    """Return a value for strict JSON: arrays and tuples as lists, paths as texts, infinity and NaN
+    as None.
 
     Args:
         value: numbers, texts, arrays, and mappings, lists and data classes of them.
@@ -32,7 +30,7 @@ def plain(value: Any, digits: int | None = None) -> Any:
 
 
 def as_text(value: object) -> str:
-    """Return the text of a value, with a question mark for each byte of a file's name that is no
-    text.
+    """Return the text of a value, with a question mark for each byte of a file's name outside
+    UTF-8.
     """
     return str(value).encode("utf-8", "replace").decode()

@@ -10,29 +10,35 @@ from pathlib import Path
 from .. import __version__
 
 _ROOT = Path(__file__).resolve().parent.parent
-# what a result depends on
+# packages behind a result
 _PACKAGES = (
-    *("stable-baselines3", "sb3-contrib", "torch", "numpy", "scipy", "numba"),
-    *("mujoco", "gymnasium"),
+    "stable-baselines3",
+    "sb3-contrib",
+    "torch",
+    "numpy",
+    "scipy",
+    "numba",
+    "mujoco",
+    "gymnasium",
 )
 
 
 def package_versions() -> dict[str, str]:
-    """Return the versions of the packages that a result depends on, of those that are there."""
-    found = {}
+    """Return the versions of the installed packages behind a result."""
+    versions = {}
     for name in _PACKAGES:
         with suppress(metadata.PackageNotFoundError):
-            found[name] = metadata.version(name)
-    return found
+            versions[name] = metadata.version(name)
+    return versions
 
 
 @cache
 def commit(root: Path = _ROOT) -> str | None:
-    """Return the short hash of the checkout's commit, with ``-dirty`` where code differs from it;
-    None where the package is no checkout. Pages are no code: one is made after the other.
+    """Return the short hash of the checkout's commit, with ``-dirty`` where code differs; None
+    where the package is no checkout. Pages are no code: one is made after the other.
 
     A process asks once, and long runs ask before they begin: a commit made meanwhile is not the
-    code that runs.
+    running code.
 
     Args:
         root: the checkout; default: this package's folder.
@@ -48,11 +54,11 @@ def commit(root: Path = _ROOT) -> str | None:
 
 
 def git(root: Path, *words: str) -> str:
-    """Return what a git command prints in a checkout, without taking a lock.
+    """Return the output of a git command in a checkout, without taking a lock.
 
     Raises:
         OSError: there is no git.
-        subprocess.SubprocessError: it failed, or took longer than 30 s.
+        subprocess.SubprocessError: the command failed, or took longer than 30 s.
     """
     done = subprocess.run(
         ["git", "--no-optional-locks", *words],
@@ -66,12 +72,12 @@ def git(root: Path, *words: str) -> str:
 
 
 def made_by(command: str, commits: Iterable[str | None], version: str = __version__) -> str:
-    """Return the line of a page that says how it was made.
+    """Return the line of a page with its command, version and commits.
 
     Args:
         command: the whole command line.
-        commits: of the code that made what the page shows, as ``commit`` returned them.
-        version: of that code; default: this one's.
+        commits: of the code behind the page's results, as ``commit`` returned them.
+        version: version of the code; default: this one's.
     """
     known = list(dict.fromkeys(name for name in commits if name))
     words = f", commit{'s' * (len(known) > 1)} {', '.join(known)}" if known else ""

@@ -1,4 +1,4 @@
-"""Reading files that a user names: regular ones alone, and no more of them than is expected.
+"""Reading files named by a user: regular ones alone, up to the expected size.
 
 A pipe without a writer, or a device such as /dev/zero, would never end. A zip archive is counted by
 its list of contents before anything is unpacked: Python's reader unpacks no more of a member than
@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 from .errors import InputError
 from .file_limits import LIMITS
 
-_ARCHIVE = b"PK\x03\x04"  # a member's header; other readers look here for what kind of file it is
+_ARCHIVE = b"PK\x03\x04"  # header of a member; other readers tell the kind of a file by these bytes
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -29,10 +29,10 @@ _KINDS = (
 
 @contextmanager
 def _reading(path: Path, what: str) -> Iterator[None]:
-    """Have whatever the block raises say which file cannot be read."""
+    """Have any error of the block name the file."""
     try:
         yield
-    except Exception as error:  # whatever a parser makes of bytes that are something else
+    except Exception as error:  # any error of a parser on bytes of another kind
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise InputError(f"{path}: cannot be read as {what}: {reason}") from error
 
@@ -44,34 +44,34 @@ def _check_kind(path: Path, mode: int, what: str) -> None:
 
 
 def check_regular(path: Path, what: str, most: int | None = None) -> None:
-    """Check that a path names a regular file, for libraries that open it by its name.
+    """Check for a regular file at a path, for libraries with their own ``open``.
 
     Args:
         path: the file.
         what: it is, for errors: ``"a flight log"``.
-        most: bytes that it may have; None for any number.
+        most: largest size in bytes; None for any.
 
     Raises:
-        InputError: it does not exist, is of another kind, or is larger.
+        InputError: the file does not exist, is of another kind, or is larger.
     """
     with _reading(path, what):
-        found = path.stat()
-    _check_kind(path, found.st_mode, what)
-    if most is not None and found.st_size > most:
+        status = path.stat()
+    _check_kind(path, status.st_mode, what)
+    if most is not None and status.st_size > most:
         raise InputError(
-            f"{path}: more than {most} bytes ({found.st_size}); expected {what}, no larger"
+            f"{path}: more than {most} bytes ({status.st_size}); expected {what}, no larger"
         )
 
 
 def open_regular(path: Path, what: str) -> BinaryIO:
-    """Open a regular file for reading bytes; what is none is refused at once.
+    """Open a regular file for reading bytes; other kinds are refused at once.
 
     Raises:
-        InputError: it cannot be opened, or is a folder, a pipe or a device.
+        InputError: the file cannot be opened, or is a folder, a pipe or a device.
     """
     check_regular(path, what)  # opening a device may already do something
     with _reading(path, what):
-        # of a pipe that took its place meanwhile, nobody waits for the writer
+        # a pipe may have taken the file's place meanwhile: nobody waits for its writer
         file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb")
     try:
         _check_kind(path, os.fstat(file.fileno()).st_mode, what)
@@ -82,13 +82,13 @@ def open_regular(path: Path, what: str) -> BinaryIO:
 
 
 def read_bytes(path: Path, what: str, most: int) -> bytes:
-    """Return the bytes of a regular file that has at most ``most`` of them.
+    """Return the bytes of a regular file, at most ``most``.
 
     Raises:
-        InputError: it cannot be read, is no regular file, or is larger.
+        InputError: the file cannot be read, is no regular file, or is larger.
     """
     with open_regular(path, what) as file, _reading(path, what):
-        # what states too large a size is not read; what states none may still hold more
+        # a file with too large a stated size is not read; one without a size may still hold more
         large = os.fstat(file.fileno()).st_size > most
         data = b"" if large else file.read(most + 1)
     if large or len(data) > most:
@@ -100,7 +100,8 @@ def read_json(path: Path, what: str) -> Any:
     """Return the value in a JSON file.
 
     Raises:
-        InputError: it cannot be read, is larger than ``FileLimits.json_text``, or is not JSON.
+        InputError: the file cannot be read, is larger than ``FileLimits.json_text``, or is not
+            JSON.
     """
     data = read_bytes(path, what, LIMITS.json_text)
     if not data.strip():
@@ -110,17 +111,17 @@ def read_json(path: Path, what: str) -> Any:
 
 
 def check_archive(path: Path, data: BinaryIO, most: int, what: str, packed: bool = True) -> None:
-    """Check that an archive's members unpack to at most ``most`` bytes in all.
+    """Check the unpacked size of an archive's members: at most ``most`` bytes in all.
 
     Args:
         path: the file, for errors.
-        data: its bytes as a file, which is left at its beginning.
+        data: its bytes as a file, left at its beginning.
         most: bytes.
         what: it is, for errors: ``"a checkpoint"``.
         packed: members may be packed.
 
     Raises:
-        InputError: it is no archive, or unpacks to more.
+        InputError: no archive, or a larger unpacked size.
     """
     with _reading(path, what):
         if data.read(len(_ARCHIVE)) != _ARCHIVE:

@@ -9,20 +9,20 @@ from contextlib import ExitStack, contextmanager
 
 from threadpoolctl import threadpool_limits
 
-# for a process that is started: its libraries read it once, when they are loaded
+# for new processes: libraries read these once, when loaded
 SINGLE_THREADED = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _lock = threading.Lock()
 _inside = 0  # callers
-_before = ExitStack()  # puts back what was set
+_before = ExitStack()  # restores the settings from before
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Have linear algebra use one thread, here and in processes that are started meanwhile, until
-    the last caller leaves; then as many as before. Also a decorator.
+    """Have linear algebra use one thread, here and in processes started meanwhile, until the last
+    caller leaves; then as many as before. Also a decorator.
     """
     global _inside
-    # NumPy and SciPy have a library each, and only those that are loaded can be limited
+    # NumPy and SciPy have a library each; only loaded ones can be limited
     import scipy.linalg  # noqa: F401
 
     with _lock:

@@ -3,9 +3,8 @@ processor's vector unit.
 
 A function written for single numbers is compiled a second time for values of this kind, as a C++
 template is: arrays of them are indexed and sliced, records have them as fields, and each operation
-rounds as that of single numbers does. What differs is a question: a comparison has an answer for
-each lane, so code for both uses ``choose``, ``all_of`` and ``any_of`` where single numbers would do
-with ``if``.
+rounds like the one of single numbers. Comparisons differ: they have an answer for each lane. So
+code for both uses ``choose``, ``all_of`` and ``any_of`` in place of ``if``.
 """
 
 import math
@@ -25,8 +24,8 @@ from numba.core.typing import signature
 from numba.core.typing.templates import ConcreteTemplate, infer_global
 from numba.extending import intrinsic, overload
 
-# lanes: what a register of the processor holds, 512 or 256 bits of doubles; machine code on disk is
-# kept for each kind of processor
+# lanes in a register of the processor, 512 or 256 bits of doubles; machine code on disk is kept for
+# each kind of processor
 WIDTH = 8 if binding.get_host_cpu_features().get("avx512f", False) else 4
 
 _ALIGNMENT = 8 * WIDTH
@@ -37,7 +36,7 @@ _TRUTHS = ir.VectorType(ir.IntType(1), WIDTH)
 class _Lanes(types.Type):
     """``WIDTH`` doubles, or truth values of a comparison: a register of numbers of one type."""
 
-    bitwidth = 64 * WIDTH  # of doubles, which alone lie in memory
+    bitwidth = 64 * WIDTH  # doubles alone lie in memory
 
     def __init__(self, name: str, single: Any) -> None:
         self.single = single
@@ -134,7 +133,7 @@ for _function, _name in ((math.sqrt, "sqrt"), (math.floor, "floor"), (abs, "fabs
 
 
 def _of_library(name: str) -> Callable[..., Any]:
-    """Return what generates a function of C's library lane by lane: rare, and so with the digits of
+    """Return the generator of a function of C's library lane by lane: rare, and with the digits of
     single numbers.
     """
 
@@ -154,7 +153,7 @@ def _of_library(name: str) -> Callable[..., Any]:
 _define(math.cos, LANES, (LANES,), _of_library("llvm.cos.f64"))
 _define(math.sin, LANES, (LANES,), _of_library("llvm.sin.f64"))
 _define(math.atan2, LANES, (LANES, LANES), _of_library("atan2"))
-# finite: less than infinity in size, which NaN is not
+# finite: smaller than infinity in size; NaN is not
 _define(
     math.isfinite,
     ANSWERS,
@@ -196,7 +195,7 @@ def any_of(condition: Any) -> bool:
 
 
 _BITS = ir.IntType(WIDTH)
-# with single numbers each does what it says in Python
+# with single numbers each runs as in Python
 for _question in (choose, opposite, all_of, any_of):
     overload(_question, strict=False)(
         lambda *given, question=_question: None if ANSWERS in given else question
@@ -219,13 +218,13 @@ def first_column(numbers: Any, i: int) -> int:
     """Return the column from which on row ``i`` of a symmetric sum, of the size of ``numbers``
     (n, n), is worked out.
 
-    With single numbers whole rows are: that is what a vector unit does well. Lanes fill it as they
-    are, and what lies below the diagonal has the numbers from above it, bit for bit.
+    With single numbers whole rows are computed, good for a vector unit. Lanes fill the unit anyway;
+    below the diagonal are the numbers from above, bit for bit.
     """
     return 0
 
 
-_BEYOND = 1 << 62  # a constant: compilers then see that single numbers never come there
+_BEYOND = 1 << 62  # a constant: compilers see then: no row of single numbers lies there
 
 
 def first_below(numbers: Any, i: int) -> int:
@@ -301,11 +300,11 @@ overload(corners, strict=False)(
 
 
 class _LaneRecord(types.Record):
-    """A record some of whose fields are lanes."""
+    """A record with some fields in lanes."""
 
     @property
     def dtype(self) -> np.dtype:
-        """Of the memory, as far as numba asks for it."""
+        """Type of the memory, as far as numba asks."""
         return np.dtype((np.void, self.size))
 
 
@@ -317,10 +316,9 @@ class LaneRecord:
 
     Args:
         single: the structured type of single numbers.
-        lanes: names of the fields that become lanes; their numbers stand in the last axis,
-            ``WIDTH`` of them.
-        shared: names of the fields that stay single numbers, for all lanes.
-        nested: layouts of the fields that are records with lanes themselves.
+        lanes: names of the fields in lanes; the last axis has their ``WIDTH`` numbers.
+        shared: names of the fields with single numbers, for all lanes.
+        nested: layouts of the fields with records of lanes.
     """
 
     def __init__(
@@ -336,7 +334,7 @@ class LaneRecord:
         nested = self._nested
         forms: dict[str, Any] = {}
         fields, offset = [], 0
-        # lanes first: they are loaded from addresses that are multiples of their size
+        # lanes first: their addresses must be multiples of their size
         for name in (*nested, *lanes, *shared):
             kind = single[name]
             if name in nested:
@@ -384,7 +382,7 @@ class LaneRecord:
             layout.write(records[name], which, lanes, single[name])
 
     def share(self, records: Any, single: Any) -> None:
-        """Write what all lanes share of a ``single`` record into all ``records``."""
+        """Write the shared fields of a ``single`` record into all ``records``."""
         for name in self._shared:
             records[name] = single[name]
         for name, layout in self._nested.items():
@@ -396,8 +394,8 @@ class LaneRecord:
         return first + (self._nested[names[0]].offset(*names[1:]) if names[1:] else 0)
 
     def columns(self, records: np.ndarray) -> np.ndarray:
-        """Return records (n,) as numbers (n, m, WIDTH): those of a lane in one column, beside some
-        of those that all share.
+        """Return records (n,) as numbers (n, m, WIDTH): one lane in a column, beside some of the
+        shared ones.
         """
         return records.view(np.float64).reshape(len(records), -1, WIDTH)
 

@@ -1,8 +1,8 @@
 """Writing a file whole or not at all, whatever ends the process or the machine.
 
-The new file is on the disk before it takes the old one's place, and the folder says so before the
-writer goes on: without the first a file may be empty after a loss of power, without the second it
-may be the old one again.
+The new file is on the disk before it takes the old one's place, and the folder's entry before the
+writer goes on. Without the first a file may be empty after a loss of power, without the second the
+old one may be back.
 """
 
 import errno
@@ -20,12 +20,11 @@ _LONGEST_NAME = 220  # bytes; file systems allow 255, temporary names need some 
 
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside ``path`` that takes its place once the block has ended without
+    """Give a temporary path beside ``path``, renamed to ``path`` once the block has ended without
     an error.
 
-    Whoever reads ``path`` sees the old file or the whole new one, never a part, and so does whoever
-    looks after a loss of power, where the file system keeps what it is told to keep (``fsync``).
-    What a killed process has left beside it goes.
+    Readers of ``path`` see the old file or the whole new one, never a part. After a loss of power,
+    too, where the file system honours ``fsync``. Temporary files of killed processes go.
 
     Raises:
         InputError: the file cannot be written.
@@ -44,13 +43,13 @@ def replaced(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error}") from error
     finally:
-        with suppress(OSError):  # it took its place, or was never there
+        with suppress(OSError):  # renamed, or never there
             temporary.unlink()
 
 
 def _hidden(path: Path) -> str:
-    """Return how the names of a path's temporary files begin: like its own, where that leaves room
-    for more.
+    """Return how the names of a path's temporary files begin: like its own, where there is room for
+    more.
     """
     name = os.fsencode(path.name)
     if len(name) <= _LONGEST_NAME:
@@ -59,7 +58,7 @@ def _hidden(path: Path) -> str:
 
 
 def _make_folder(folder: Path) -> None:
-    """Make a folder and those above it that are missing, and have them kept."""
+    """Make a folder and the missing ones above, and have them kept."""
     missing = [above for above in (folder, *folder.parents) if not above.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     for above in missing:
@@ -67,17 +66,17 @@ def _make_folder(folder: Path) -> None:
 
 
 def _keep(path: Path) -> None:
-    """Have the disk keep a file or the names in a folder, where it can do that.
+    """Have the disk keep a file or the names in a folder, if possible.
 
     Raises:
         OSError: the disk cannot keep the file.
     """
-    # the descriptor needs no right to write for what others have written
+    # a descriptor for reading keeps the writes of others, too
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:
-        # file systems that know no fsync, of a folder above all
+        # file systems without fsync, for a folder above all
         if not path.is_dir() and error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS):
             raise
     finally:
@@ -85,7 +84,7 @@ def _keep(path: Path) -> None:
 
 
 def _sweep(path: Path) -> None:
-    """Remove the temporary files of ``path`` whose processes are gone."""
+    """Remove the temporary files of ``path`` left by processes now gone."""
     with suppress(OSError):
         for left in path.parent.glob(f"{escape(_hidden(path))}.*.tmp"):
             number = left.name.removesuffix(".tmp").rpartition(".")[2]

@@ -1,20 +1,18 @@
-"""Worker processes (pebble's, or a Ray cluster's) that outlive neither the work nor the process
-that started them. A worker that dies, or takes too long, costs its own task alone.
+"""Worker processes, of this machine or of a Ray cluster. They end with the work, and with their
+parent process. A death or a timeout of a worker costs its own task alone.
 """
 
-import math
 import multiprocessing
 import os
 import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing.managers import DictProxy, SyncManager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,26 +23,18 @@ from .threads import one_thread
 T = TypeVar("T")
 R = TypeVar("R")
 
-# forked workers would share the locks of compiled code and of linear algebra
-_CONTEXT = multiprocessing.get_context("spawn")
+# for new processes: forked workers would share the locks of compiled code and of linear algebra
+SPAWNED = multiprocessing.get_context("spawn")
 _FIRST_TO_GO = 500  # of 1000: where memory runs out, the system ends a worker before its parent
-_LOOK = 0.2  # s, after which tasks are looked at again
+_LOOK = 0.2  # s between two checks of the time and calls of ``idle``
 _ATTEMPTS = 4  # at a task of ``every``
-# errors of Ray for a process, a machine or a result that is gone
-_RAY_DEATHS = {
-    "RayActorError",
-    "WorkerCrashedError",
-    "OutOfMemoryError",
-    "NodeDiedError",
-    "ObjectLostError",
-}
 
 
 def end_with_parent() -> None:
-    """Have this process end as soon as the process that started it is gone, even if killed.
+    """Have this process end as soon as its parent process is gone, even if killed.
 
     For the initializer of any pool: a killed parent tells its workers nothing, and they would wait
-    for work for ever.
+    for ever.
     """
     parent = multiprocessing.parent_process()
     if parent is None:
@@ -61,69 +51,110 @@ def end_with_parent() -> None:
 
 @dataclass(frozen=True)
 class Lost:
-    """Why a task has no result: its process died, or was ended since it took too long."""
+    """Why a task has no result: its process died, or was ended after too long a time."""
 
     kind: str  # died, or time
     words: str
 
 
-class _Local:
-    """Tasks on processes of this machine, whose linear algebra has one thread each; a process that
-    is gone is replaced.
-    """
+class _Worker:
+    """One process, alone in its pool: no other task is lost with it."""
 
-    def __init__(self, work: Callable[[Any], Any], count: int, most_seconds: float | None) -> None:
-        self.count = count
-        self._work, self._most_seconds = work, most_seconds
-        self._before = {child.pid for child in multiprocessing.active_children()}
-        self._begin()
-
-    def _begin(self) -> None:
-        from pebble import ProcessPool  # most of the kit starts no process
-
-        self._pool: Any = ProcessPool(self.count, initializer=end_with_parent, context=_CONTEXT)
-        # threads and processes that start in the block see no interrupt: a key press in the
-        # terminal is the parent's to answer
-        with _interrupts_blocked():
-            assert self._pool.active
+    def __init__(self, work: Callable[[Any], Any]) -> None:
+        self._work = work
+        self._pool = ProcessPoolExecutor(1, SPAWNED, end_with_parent)
+        others = {child.pid for child in multiprocessing.active_children()}
+        # threads and processes started in the block see no interrupt: the parent answers key
+        # presses
+        with interrupts_blocked():
+            self._ready = self._pool.submit(callable, work)  # imports the work's modules
+            new = (c for c in multiprocessing.active_children() if c.pid not in others)
+            self._process = next(new, None)
 
     def start(self, task: Any) -> Future[Any]:
-        if not self._pool.active:  # a worker died while no worker had a task
-            self._pool.stop()
-            self._pool.join()
-            self._begin()
-        future: Future[Any] = self._pool.schedule(
-            self._work, args=(task,), timeout=self._most_seconds
-        )
+        """Start a task.
+
+        Raises:
+            BrokenProcessPool: the process is gone.
+        """
+        future = self._pool.submit(self._work, task)
+        self._begun = time.monotonic()
         return future
 
-    def wait(self, running: Iterable[Future[Any]], seconds: float | None) -> set[Future[Any]]:
-        return wait(running, seconds, FIRST_COMPLETED).done
+    def seconds(self) -> float:
+        """Return how long the task has run; the start of the process does not count."""
+        if not self._ready.done():
+            self._begun = time.monotonic()
+        return time.monotonic() - self._begun
+
+    def end(self) -> int | None:
+        """End the process at once, even in a task; return its exit code."""
+        if self._process is not None:
+            self._process.kill()
+        self._pool.shutdown(cancel_futures=True)  # waits for the process
+        return None if self._process is None else self._process.exitcode
+
+
+class _Local:
+    """Tasks on processes of this machine, each with one thread of linear algebra; dead processes
+    are replaced.
+    """
+
+    def __init__(self, work: Callable[[Any], Any], count: int) -> None:
+        self.count = count
+        self._work = work
+        self._resting: list[_Worker] = []
+        self._busy: dict[Future[Any], _Worker] = {}
+
+    def start(self, task: Any) -> Future[Any]:
+        worker = self._resting.pop() if self._resting else _Worker(self._work)
+        try:
+            future = worker.start(task)
+        except BrokenProcessPool:  # died without a task
+            worker.end()
+            return self.start(task)
+        self._busy[future] = worker
+        return future
+
+    def wait(self, seconds: float | None) -> set[Future[Any]]:
+        """Return the tasks that are done, once there is one or the time is over."""
+        return wait(self._busy, seconds, FIRST_COMPLETED).done
+
+    def seconds(self, future: Future[Any]) -> float:
+        return self._busy[future].seconds()
+
+    def stop(self, future: Future[Any]) -> None:
+        self._busy.pop(future).end()
+
+    def death(self, future: Future[Any]) -> str | None:
+        """Return how the process of a task that is done ended, in words; None if it did not."""
+        worker = self._busy.pop(future)
+        if not isinstance(future.exception(), BrokenProcessPool):
+            self._resting.append(worker)
+            return None
+        code = worker.end()
+        if code is None or code >= 0:
+            return f"its process ended with code {code}"
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+        memory = ", as where memory runs out" if -code == signal.SIGKILL else ""
+        return f"its process was ended by {name}{memory}"
 
     def end(self) -> None:
         """End the processes at once, whatever they do."""
-        self._pool.stop()
-        for child in multiprocessing.active_children():
-            if child.pid not in self._before:
-                child.kill()
-        self._pool.join()
+        for worker in (*self._busy.values(), *self._resting):
+            worker.end()
 
 
 class _OnCluster:
     """Tasks on a Ray cluster, one a core."""
 
     def __init__(
-        self,
-        ray: Any,
-        address: str,
-        work: Callable[[Any], Any],
-        jobs: int | None,
-        most_seconds: float | None,
+        self, ray: Any, address: str, work: Callable[[Any], Any], jobs: int | None
     ) -> None:
         cores = int(ray.cluster_resources().get("CPU", 1))
         self.count = min(jobs or cores, cores)
-        self._ray, self._address, self._most_seconds = ray, address, most_seconds
-        self._running: dict[Any, tuple[Future[Any], float]] = {}  # by Ray's reference, until when
+        self._ray, self._address = ray, address
+        self._running: dict[Future[Any], tuple[Any, float]] = {}  # Ray's reference, start (s)
 
         def task_of_windwrench(task: Any) -> Any:  # Ray takes no partial function
             return work(task)
@@ -133,19 +164,16 @@ class _OnCluster:
 
     def start(self, task: Any) -> Future[Any]:
         future: Future[Any] = Future()
-        until = math.inf if self._most_seconds is None else time.monotonic() + self._most_seconds
-        self._running[self._work.remote(task)] = future, until
+        self._running[future] = self._work.remote(task), time.monotonic()
         return future
 
-    def wait(self, running: Iterable[Future[Any]], seconds: float | None) -> set[Future[Any]]:
-        """Ask Ray, always from this thread: a thread that asks while Ray is shut down, or that
-        drops a reference then, ends the whole process.
+    def wait(self, seconds: float | None) -> set[Future[Any]]:
+        """Ask Ray, always from this thread: another thread that asks, or drops a reference, during
+        Ray's shutdown ends the whole process.
         """
-        first = min(until for _, until in self._running.values()) - time.monotonic()
-        left = max(min(first, math.inf if seconds is None else seconds), 0.0)
-        done, _ = self._ray.wait(list(self._running), timeout=None if math.isinf(left) else left)
-        for reference in done:
-            future, _ = self._running.pop(reference)
+        futures = {reference: future for future, (reference, _) in self._running.items()}
+        for reference in self._ray.wait(list(futures), timeout=seconds)[0]:
+            future = futures[reference]
             try:
                 future.set_result(self._ray.get(reference))
             except self._ray.exceptions.RayTaskError as error:
@@ -154,15 +182,22 @@ class _OnCluster:
                 future.set_exception(InputError(words))
             except self._ray.exceptions.RayError as error:
                 future.set_exception(error)
-        for reference, (future, until) in list(self._running.items()):
-            if time.monotonic() >= until:
-                del self._running[reference]
-                self._ray.cancel(reference, force=True)
-                future.set_exception(TimeoutError("Task timeout"))
-        return {future for future in running if future.done()}
+        return {future for future in self._running if future.done()}
+
+    def seconds(self, future: Future[Any]) -> float:
+        return time.monotonic() - self._running[future][1]
+
+    def stop(self, future: Future[Any]) -> None:
+        self._ray.cancel(self._running.pop(future)[0], force=True)
+
+    def death(self, future: Future[Any]) -> str | None:
+        """Return how the process of a task that is done ended, in words; None if it did not."""
+        del self._running[future]
+        died = isinstance(future.exception(), self._ray.exceptions.RayError)
+        return "its process on the cluster died" if died else None
 
     def end(self) -> None:
-        """Leave the rest to Ray, which ends a task with the program that asked for it."""
+        """Leave the rest to Ray: a task ends with its program."""
         self._running.clear()
 
 
@@ -175,32 +210,32 @@ def each(
     attempts: int = 2,
     idle: Callable[[], None] | None = None,
 ) -> Iterator[tuple[T, Any]]:
-    """Yield each task with its result, or with ``Lost``, as they come; tasks are taken when a
-    worker is free, so that no more than one a worker are held.
+    """Yield each task with its result, or with ``Lost``, as they come. A task is taken when a
+    worker is free: at most one a worker is held.
 
     Args:
-        work: what is done with a task; importable by its name.
-        tasks: what is given to the work.
-        most_seconds: that a task may take; None: any time.
+        work: function of a task; importable by its name.
+        tasks: arguments of the work.
+        most_seconds: the longest time of a task; None: any time.
         jobs: number of processes; default: one a core.
         cluster: a Ray cluster's address, or ``local`` for one on this machine; None: no Ray.
-        attempts: at a task whose process dies, which may be its neighbour's fault; the further
-            ones come last, one at a time.
+        attempts: at a task where its process dies; the further ones come last, one at a time.
         idle: called a few times a second while all wait.
 
     Raises:
         InputError: as ``runtime.cluster.connected``, or the work fails on a cluster.
-        Exception: what the work itself raises.
+        Exception: any error of the work itself.
     """
     with one_thread() if cluster is None else connected(cluster) as ray:
         crew: _Local | _OnCluster = (
-            _Local(work, jobs or os.cpu_count() or 1, most_seconds)
+            _Local(work, jobs or os.cpu_count() or 1)
             if cluster is None
-            else _OnCluster(ray, cluster, work, jobs, most_seconds)
+            else _OnCluster(ray, cluster, work, jobs)
         )
         coming = iter(tasks)
         again: deque[tuple[T, int]] = deque()
         running: dict[Future[Any], tuple[T, int]] = {}
+        look = None if most_seconds is None and idle is None else _LOOK
         try:
             while True:
                 while len(running) < crew.count and (task := next(coming, None)) is not None:
@@ -210,19 +245,20 @@ def each(
                         return
                     task, attempt = again.popleft()
                     running[crew.start(task)] = task, attempt + 1
-                for future in crew.wait(running, _LOOK if idle else None):
+                for future in crew.wait(look):
                     task, attempt = running.pop(future)
-                    error = future.exception()
-                    if error is None:
+                    words = crew.death(future)
+                    if words is None:
                         yield task, future.result()
-                    elif isinstance(error, TimeoutError) and error.args[:1] == ("Task timeout",):
-                        yield task, Lost("time", f"it took more than {most_seconds:g} s")
-                    elif (words := _death(error)) is None:
-                        raise error
                     elif attempt < attempts:
                         again.append((task, attempt))
                     else:
                         yield task, Lost("died", words)
+                if most_seconds is not None:
+                    for future in [f for f in running if crew.seconds(f) > most_seconds]:
+                        crew.stop(future)
+                        task, _ = running.pop(future)
+                        yield task, Lost("time", f"it took more than {most_seconds:g} s")
                 if idle:
                     idle()
         finally:
@@ -248,37 +284,8 @@ def every(
         yield task, result
 
 
-def _death(error: BaseException) -> str | None:
-    """Return how a process ended, in words; None for what the work raised."""
-    names = {kind.__name__ for kind in type(error).__mro__}
-    if names & _RAY_DEATHS:
-        return "its process on the cluster died"
-    if isinstance(error, BrokenProcessPool):
-        return "its process died"
-    if "ProcessExpired" not in names:
-        return None
-    code = getattr(error, "exitcode", None)
-    if code is None or code >= 0:
-        return f"its process ended with code {code}"
-    name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-    memory = ", as where memory runs out" if -code == signal.SIGKILL else ""
-    return f"its process was ended by {name}{memory}"
-
-
 @contextmanager
-def shared_dict(values: Mapping[str, Any]) -> Iterator["DictProxy[str, Any]"]:
-    """Give a dictionary that workers can change too; its ``copy`` is of one instant."""
-    manager = SyncManager(ctx=_CONTEXT)
-    with _interrupts_blocked():
-        manager.start(end_with_parent)
-    try:
-        yield manager.dict(dict(values))
-    finally:
-        manager.shutdown()
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
+def interrupts_blocked() -> Iterator[None]:
     """Hold interrupts back; processes that start in the block never see one."""
     from multiprocessing import resource_tracker
 

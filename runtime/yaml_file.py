@@ -14,8 +14,8 @@ _UNMADE = ("tag:yaml.org,2002:merge", "tag:yaml.org,2002:value")  # keys << and 
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML's safe loader, which also refuses deep values and a key that comes twice: the second
-    would overwrite the first.
+    """YAML's safe loader, without deep values and repeated keys: the second would overwrite the
+    first.
     """
 
     _depth = 0
@@ -65,11 +65,11 @@ def read_yaml(path: Path, what: str) -> Any:
 
 
 def parse_yaml(text: str, where: str) -> Any:
-    """Return the plain value (mappings, lists, texts, numbers, dates) that a YAML text stands for.
+    """Return the plain value (mappings, lists, texts, numbers, dates) of a YAML text.
 
     Raises:
         InputError: not valid YAML, a key twice in one mapping, an object of another kind, or
-            aliases that write out to too many values.
+            aliases for too many values.
     """
     try:
         loader = _Loader(text)
@@ -84,7 +84,7 @@ def parse_yaml(text: str, where: str) -> Any:
         return loader.construct_document(node)
     except InputError:
         raise
-    # what a constructor makes of a spoiled date or number is any error of Python's
+    # a constructor raises any error of Python's on a spoiled date or number
     except (
         yaml.YAMLError,
         ValueError,
@@ -99,7 +99,7 @@ def parse_yaml(text: str, where: str) -> Any:
 
 
 def _size(node: yaml.Node, known: dict[int, int], depth: int) -> int:
-    """Return how many values a node writes out to; an alias costs what it stands for."""
+    """Return the number of values of a node; an alias counts as its target does."""
     if depth > LIMITS.yaml_depth:
         raise ValueError("an alias within what it stands for")
     if id(node) not in known:

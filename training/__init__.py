@@ -1,1 +1,1 @@
-"""Policies that learn, and gains that are searched; the only room that knows torch."""
+"""Training of policies, and the search for gains; the only room with torch."""

@@ -1,9 +1,8 @@
-"""Checkpoints from which a run goes on as if it had never stopped.
+"""Checkpoints to resume a run without a trace.
 
-A checkpoint holds all that the rest of a run depends on: networks, optimisers, replay memory, the
-state of every random generator, and the number of each environment's episode. Whether it was killed
-there or not, a run begins the episodes that follow. A checkpoint is one file of tensors and text,
-and reading it runs no code.
+A checkpoint holds every input of the rest of a run: networks, optimisers, replay memory, the state
+of every random generator, and the number of each environment's episode. Killed there or not, a run
+begins the next episodes. A checkpoint is one file of tensors and text, and reading it runs no code.
 """
 
 import json
@@ -24,8 +23,8 @@ _NORMALS = ("_n_updates", "_episode_num", "num_timesteps")
 
 
 def save_checkpoint(learner: Any, env: FeatureVecEnv, extra: dict[str, Any], path: Path) -> None:
-    """Write where a run stands, between two calls of ``learn``, of which the next one begins new
-    episodes; ``extra`` is text, numbers and lists of the run's own.
+    """Write the state of a run, between two calls of ``learn``; the next one begins new episodes.
+    ``extra`` is text, numbers and lists of the run's own.
     """
     kind, keys, *rest = np.random.get_state()  # noqa: NPY002  the generator that SB3 draws from
     state: dict[str, Any] = {
@@ -59,7 +58,7 @@ def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, A
     ``extra``.
 
     Raises:
-        InputError: not a checkpoint of this configuration, or one that is cut or larger than
+        InputError: not a checkpoint of this configuration, a cut one, or one larger than
             ``FileLimits`` allows.
     """
     what = "a checkpoint"
@@ -81,8 +80,8 @@ def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, A
 
 
 def _check_tensors(value: Any, known: set[int]) -> None:
-    """Raise ValueError where a tensor has more numbers than its memory, and would grow once it is
-    copied; ``known`` are the containers that were looked at.
+    """Raise ValueError where a tensor has more numbers than its memory, and a copy would grow;
+    ``known`` are the visited containers.
     """
     if isinstance(value, torch.Tensor):
         if value.numel() * value.element_size() > value.untyped_storage().nbytes():

@@ -1,6 +1,4 @@
-"""Configurations of training, as data: one YAML file an algorithm, every key of which a run may
-override.
-"""
+"""Configurations of training, as data: one YAML file an algorithm; a run may override every key."""
 
 import copy
 from collections.abc import Sequence
@@ -8,34 +6,41 @@ from pathlib import Path
 from typing import Any
 
 from ..controllers.features import Features
+from ..controllers.registry import STANDARD_TASK
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.yaml_file import parse_yaml, read_yaml
 
 Config = dict[str, Any]
-IMITATIONS = ("imitation", "recurrent-imitation")
-ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", *IMITATIONS, "tune")
-_COUNTS = ("steps", "environments", "rounds", "state", "ahead", "checkpoint")
+ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "tune")
+_COUNTS = ("steps", "environments", "checkpoint")
 
 
-def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None = None) -> Config:
+def load_config(
+    algorithm: str,
+    overrides: Sequence[str] = (),
+    file: Path | None = None,
+    task: str | None = None,
+) -> Config:
     """Return an algorithm's configuration.
 
     Args:
         algorithm: one of ``ALGORITHMS``.
-        overrides: ``KEY=VALUE`` in YAML, with dots for what lies deeper: ``learner.gamma=0.98``.
-        file: a YAML file of such keys, nested, that changes the algorithm's own before
-            ``overrides`` do.
+        overrides: ``KEY=VALUE`` in YAML, with dots for deeper keys: ``learner.gamma=0.98``.
+        file: a YAML file of such keys, nested, merged before ``overrides``.
+        task: a task's name; one other than FanTracking has the values of ``tasks.yaml`` first.
 
     Raises:
-        InputError: an algorithm, key or value that does not exist or is of another kind.
+        InputError: an unknown algorithm or key, or a value of another kind.
     """
     if algorithm not in ALGORITHMS:
         raise unknown_name("algorithm", algorithm, ALGORITHMS)
-    config: Config = read_yaml(
-        Path(__file__).parent / "configs" / f"{algorithm}.yaml", "a configuration of training"
-    )
+    folder, what = Path(__file__).parent / "configs", "a configuration of training"
+    config: Config = read_yaml(folder / f"{algorithm}.yaml", what)
+    others = {} if task in (None, STANDARD_TASK) else read_yaml(folder / "tasks.yaml", what)
+    for key, value in others.get(algorithm, {}).items():
+        config[key] = {**config[key], **value} if isinstance(value, dict) else value
     if file is not None:
-        changes = read_yaml(file, "a configuration of training")
+        changes = read_yaml(file, what)
         if not isinstance(changes, dict):
             raise InputError(
                 f"{file}: expected keys and values, as in training/configs/{algorithm}.yaml"
@@ -90,7 +95,7 @@ def _like(old: Any, value: Any, where: str) -> Any:
 
 
 def _check(config: Config) -> None:
-    name, imitates = config["algorithm"], config["algorithm"] in IMITATIONS
+    name = config["algorithm"]
     counts = {key: config[key] for key in _COUNTS if key in config}
     counts |= {f"validation.{key}": count for key, count in config["validation"].items()}
     for key, count in counts.items():
@@ -99,19 +104,12 @@ def _check(config: Config) -> None:
     if not all(isinstance(n, int) and n > 0 for n in config["net"]):
         raise InputError(f"{name}: net must list sizes of hidden layers, got {config['net']}")
     words = {"activation": ("relu", "tanh"), "estimator": ("ukf", "constant-gain", "ukf-lanes")}
-    if imitates:
-        words["estimator"] = words["estimator"][:2]
-        words |= {"says": ("motion", "command"), "cell": ("lstm", "gru", "none")}
     for key, known in words.items():
         if config[key] not in known:
             raise unknown_name(key, config[key], known, name)
     features_of(config)
-    for key in ("gains", "dampings") if imitates else ():
-        numbers = all(isinstance(x, int | float) for x in config[key])
-        if not config[key] or not numbers:
-            raise InputError(f"{name}: {key} must list numbers, got {config[key]}")
 
 
 def features_of(config: Config) -> Features:
-    """Return what the configured policy sees."""
+    """Return the inputs of the configured policy."""
     return Features(tuple(config["features"]["frame"]), config["features"]["history"])

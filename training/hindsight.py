@@ -1,14 +1,13 @@
-"""What a law that had known all that came would have commanded: the teacher of the wind tasks.
+"""The commands of a law with knowledge of the future: the teacher of the wind tasks.
 
-The model of the flight loop and the vehicle under it is linear (``controllers.axis_models``). What
-a flight did beside it, from one decision to the next, is a disturbance, whatever it comes from:
-wind, a vehicle that is not the declared one, errors of the estimate that the flight loop flies by,
-a reference that turns. Once flown it is known, and the linear-quadratic regulator with preview
-(``controllers.preview``) says of each decision what would have been best in view of all that came.
-Where commands or poses are late, so are the motors of the model: what follows from a late command
-is no disturbance, and would be answered twice.
-The mean of that command, given what can be seen at the time, is the best command there is
-(certainty equivalence), and it is what a network learns that is fitted to it.
+The model of the flight loop and its vehicle is linear (``controllers.axis_models``). A flight's
+difference to the model, from one decision to the next, is a disturbance of any origin: wind, a
+vehicle other than the declared one, errors of the flight loop's estimate, a turning reference. Once
+flown, disturbances are known. The linear-quadratic regulator with preview (``controllers.preview``)
+gives the best command of each decision in view of all later ones. Late commands or poses make the
+model's motors late: the result of a late command is no disturbance, and would be answered twice.
+The mean of the best command, given the observations so far, is the best causal command (certainty
+equivalence). A network fitted to the best commands learns this mean.
 """
 
 from dataclasses import replace
@@ -65,14 +64,14 @@ def lanes_of(task: str, scenario: str, episodes: int) -> list[TaskLanes]:
 
 @lru_cache(maxsize=32)
 def _models(oracle: WindOracle, late: float) -> list[tuple[Array, ...]]:
-    """Return of each axis A (n, n) and B (n,) of a decision where commands are ``late`` by so many
-    s, and the gains of ``preview``.
+    """Return for each axis A (n, n) and B (n,) of a decision with commands ``late`` by so many s,
+    and the gains of ``preview``.
     """
-    found: list[tuple[Array, ...]] = []
+    models: list[tuple[Array, ...]] = []
     for axis in axis_models(oracle.vehicle, lag=MOTOR_LAG + late):
         A, B, _ = axis.held(WIND_PERIOD)
-        found.append((A, B[:, 0], *preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)))
-    return found
+        models.append((A, B[:, 0], *preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)))
+    return models
 
 
 class WindLesson:
@@ -89,11 +88,11 @@ class WindLesson:
         Args:
             task: WindHover or WindTrajectory.
             limit: on what is taught, in largest actions. The mean of limited commands is not the
-                mean, limited, and where it is noisy many are beyond 1 (to 40 % along x and y
-                of ``lqg`` in WindHover, to 7 % on ``base``); yet few that are far beyond would
-                rule the fit. Tried with one seed, RMSE against ``lqg`` on 96 validation episodes at
-                1, 1.5 and 4: WindHover's ``noisy`` -7, -10 and -8 %, WindTrajectory's ``noisy``
-                -11, -12 and -12 % and ``turbulent`` -2, 0 and 0 %; ``base`` the same within 1 %.
+                limited mean, and noise brings many beyond 1 (to 40 % along x and y of ``lqg`` in
+                WindHover, to 7 % on ``base``). Yet a few far beyond would rule the fit. Tried with
+                one seed, RMSE against ``lqg`` on 96 validation episodes at 1, 1.5 and 4:
+                WindHover's ``noisy`` -7, -10 and -8 %, WindTrajectory's ``noisy`` -11, -12 and -12
+                % and ``turbulent`` -2, 0 and 0 %; ``base`` the same within 1 %.
         """
         self._task, self._oracle, self._limit = task, WindOracle(), limit * self.largest
         self.scale = np.array(TASKS[task].environment.scales, dtype=np.float32)
@@ -106,7 +105,7 @@ class WindLesson:
         self._laws = [make_controller("lqg", self._task) for _ in range(envs.num_envs * leads)]
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Any]:
-        """Return scaled observations (n, 27), and the commands (n, 3) of ``lqg`` where it flies."""
+        """Return scaled observations (n, 27), and the commands (n, 3) of ``lqg`` in flight."""
         seen = observations.astype(np.float64)
         self._states.append(self._oracle.states(seen, infos | self._envs.truth()))
         self._commands.append(seen[:, LAST_ACTION:])
@@ -114,8 +113,8 @@ class WindLesson:
         return observations / self.scale, np.array(wanted)
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
-        """Return what would have been best (decisions, n, 3), and what counts (decisions, n):
-        decisions after which the vehicle was seen to fly on for ``AHEAD`` more.
+        """Return the best commands (decisions, n, 3), and weights (decisions, n): the vehicle flew
+        on for at least ``AHEAD`` further decisions.
         """
         given = np.array(self._commands[1:])
         best = np.empty_like(given)

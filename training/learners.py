@@ -1,5 +1,5 @@
-"""The learners of stable-baselines3, made from a configuration, and what they have learned as a
-policy's weights.
+"""The learners of stable-baselines3, made from a configuration, and their results as a policy's
+weights.
 """
 
 import itertools
@@ -19,7 +19,7 @@ ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 
 
 def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
-    """Return the SB3 algorithm that a configuration describes."""
+    """Return the SB3 algorithm of a configuration."""
     torch.set_num_threads(1)  # the networks are small: threads would only wait for each other
     algorithm = config["algorithm"]
     policy: dict[str, Any] = {
@@ -46,12 +46,9 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
     }
     kind: Any = {"sac": SAC, "td3": TD3, "ppo": PPO}.get(algorithm)
     network: Any = "MlpPolicy"
-    if algorithm == "sac" and config["activation"] == "relu":
-        from .fast_sac import FastSAC
-
-        kind = FastSAC
-    elif algorithm == "td3":
-        given["action_noise"] = NormalActionNoise(np.zeros(1), np.full(1, config["noise"]))
+    if algorithm == "td3":
+        size = env.action_space.shape
+        given["action_noise"] = NormalActionNoise(np.zeros(size), np.full(size, config["noise"]))
     elif algorithm == "recurrent-ppo":
         from sb3_contrib import RecurrentPPO
 

@@ -1,4 +1,4 @@
-"""A run of training in its folder: what the run is, how it goes, and the best policy so far."""
+"""A run of training in its folder: its request, its progress, and the best policy so far."""
 
 import platform
 import time
@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
 from ..evaluation.episodes import fly_episode
+from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
@@ -21,7 +23,7 @@ from .configuration import Config, features_of
 from .seeds import FIRST_VALIDATION_SEED, validation_seeds
 from .training_envs import check_training_env, make_training_env
 
-_SQUASHED = ("sac", "td3")  # algorithms whose policy sends its output through a tanh
+_SQUASHED = ("sac", "td3")  # algorithms with a tanh behind the policy's output
 
 
 @dataclass
@@ -30,8 +32,10 @@ class Progress:
 
     __pydantic_config__ = STRICT
 
-    steps: list[int] = field(default_factory=list)  # of each validation
-    rmse_m: list[float] = field(default_factory=list)  # mean over the validation episodes
+    steps: list[int] = field(default_factory=list)  # at each validation
+    # after 3 s, mean over the validation episodes; without errors minus the mean return
+    rmse_m: list[float] = field(default_factory=list)
+    by_error: bool = True
     lost: list[int] = field(default_factory=list)  # episodes of each validation
     best: int = -1  # index of the best
     seconds: float = 0.0  # of all parts of the run, validation included
@@ -41,24 +45,29 @@ class Progress:
         """The smallest validation RMSE, m."""
         return self.rmse_m[self.best]
 
+    def words(self, index: int) -> str:
+        """Return a validation's figure in words."""
+        figure = self.rmse_m[index]
+        return f"RMSE after 3 s {figure:.3f} m" if self.by_error else f"return {-figure:.1f}"
+
 
 def progress_from(data: Any, path: Path) -> Progress:
-    """Return the progress that a file holds.
+    """Return the progress from a file's data.
 
     Raises:
         InputError: the file holds something else.
     """
     try:
-        found = checked(Progress, data, str(path))
+        progress = checked(Progress, data, str(path))
     except InputError:
-        found = None
-    counts = {len(found.steps), len(found.rmse_m), len(found.lost)} if found else ()
-    if found is None or len(counts) > 1 or not -1 <= found.best < len(found.steps):
+        progress = None
+    counts = {len(progress.steps), len(progress.rmse_m), len(progress.lost)} if progress else ()
+    if progress is None or len(counts) > 1 or not -1 <= progress.best < len(progress.steps):
         raise InputError(
             f"{path}: does not hold the progress of a training "
             f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
         )
-    return found
+    return progress
 
 
 def read_progress(folder: Path) -> Progress | None:
@@ -74,12 +83,12 @@ def read_progress(folder: Path) -> Progress | None:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that a policy was trained with."""
+    """Return the versions behind a trained policy."""
     return {"windwrench": __version__, "python": platform.python_version(), **package_versions()}
 
 
 def origin(algorithm: str, scenario: str, seed: int, steps: int, activation: str) -> dict[str, Any]:
-    """Return the entries that the cards of all learned policies share."""
+    """Return the shared entries of all learned policies' cards."""
     return {
         "algorithm": algorithm,
         "scenario": scenario,
@@ -92,7 +101,7 @@ def origin(algorithm: str, scenario: str, seed: int, steps: int, activation: str
 
 
 def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, Any]:
-    """Return the card of a policy: all that is needed to fly the policy, and to train it again."""
+    """Return the card of a policy: everything needed to fly the policy, and to train another."""
     last = FIRST_VALIDATION_SEED + config["validation"]["episodes"] - 1
     return {
         **origin(config["algorithm"], scenario, seed, steps, config["activation"]),
@@ -106,31 +115,38 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
     }
 
 
-def validate(policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int) -> tuple[float, int]:
+def validate(
+    policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int
+) -> tuple[float, int, bool]:
     """Fly validation episodes with the full filter.
 
     Returns:
-        The mean RMSE (m), and how many episodes were lost.
+        The mean RMSE after 3 s (m), or minus the mean return; how many episodes were lost; and
+            whether the task states an error.
     """
     flown = [fly_episode(env, policy, seed) for seed in validation_seeds(episodes)]
-    return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
+    by_error = all(len(e.error) for e in flown)
+    figures = [e.rmse_settled if by_error else -e.total_reward for e in flown]
+    return float(np.mean(figures)), sum(e.lost for e in flown), by_error
 
 
 class Run:
     """A run of training in its folder.
 
-    The folder holds ``training.json`` (what the run is), ``progress.json``, and the policies
+    The folder holds ``training.json`` (the run's request), ``progress.json``, and the policies
     ``last.npz`` and ``best.npz`` with their cards.
 
     Args:
         config: as of ``load_config``.
         scenario: scenario or tier to train in.
-        seed: of the run.
+        seed: the run's.
         folder: for its files.
         report: called after each validation.
+        task: a name, as of ``evaluation.tasks.task_of``.
+        reward: one's own, as of ``evaluation.rewards.find_reward``; None: the task's.
 
     Raises:
-        InputError: a scenario that does not exist, or a folder with another run.
+        InputError: an unknown name, or a folder with another run.
     """
 
     def __init__(
@@ -140,19 +156,23 @@ class Run:
         seed: int,
         folder: Path,
         report: Callable[[Progress], None],
+        task: str = STANDARD_TASK,
+        reward: str | None = None,
     ) -> None:
-        check_training_env(scenario)
+        check_training_env(scenario, task)
         self.config, self.scenario, self.seed, self.folder = config, scenario, seed, folder
+        self.own = {} if task == STANDARD_TASK else {"task": task_of(task).name}
+        self.own |= {} if reward is None else {"reward": reward}
         self._claim()
         self.progress, self._report = Progress(), report
         self._began = time.perf_counter()
-        self.judge = make_training_env(scenario)
+        self.judge = make_training_env(scenario, task, reward)
         self.best = folder / "best.npz"
 
     def _claim(self) -> None:
-        """Write what the run is into its folder."""
+        """Write the run's request into its folder."""
         path = self.folder / "training.json"
-        run = {"config": self.config, "scenario": self.scenario, "seed": self.seed}
+        run = {"config": self.config, "scenario": self.scenario, "seed": self.seed, **self.own}
         if path.exists():
             kept = read_json(path, "what a training in this folder is")
             if not isinstance(kept, dict):
@@ -167,11 +187,6 @@ class Run:
                 )
         write_json({**run, "versions": versions()}, path)
 
-    def is_finished(self) -> bool:
-        """Whether the folder already holds the whole run."""
-        done = read_progress(self.folder)
-        return bool(done and done.steps and done.steps[-1] >= self.config["steps"])
-
     def resume(self, progress: Progress) -> None:
         """Go on from the progress of an earlier part of the run."""
         self.progress = progress
@@ -184,21 +199,25 @@ class Run:
         return last or steps // every > before // every
 
     def card(self, steps: int) -> dict[str, Any]:
-        """Return the card of the policy that ``steps`` decisions have taught."""
-        return card_of(self.config, self.scenario, self.seed, steps)
+        """Return the card of the policy after ``steps`` decisions."""
+        card = card_of(self.config, self.scenario, self.seed, steps) | self.own
+        unseen = ("features", "repeat") if "task" in card else ()
+        return {key: value for key, value in card.items() if key not in unseen}
 
-    def validate(self, policy: TrainedPolicy) -> tuple[float, int]:
-        """Return a policy's mean RMSE (m) on validation episodes, and how many were lost."""
+    def validate(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int, bool]:
+        """Return a policy's figures, as ``validate``."""
         return validate(policy, self.judge, self.config["validation"]["episodes"])
 
-    def take_stock(self, policy: TrainedPolicy) -> tuple[float, int]:
-        """Validate a policy, save the policy as the last one, and as the best if it is.
+    def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
+        """Validate a policy, save the policy as the last one, and as the best where no earlier one
+        is better.
 
         Returns:
-            As ``validate``.
+            Its RMSE and losses, as of ``validate``.
         """
-        rmse, lost = self.validate(policy)
+        rmse, lost, by_error = self.validate(policy)
         card, now = policy.card, self.progress
+        now.by_error = by_error
         now.steps.append(card["steps"])
         now.rmse_m.append(rmse)
         now.lost.append(lost)

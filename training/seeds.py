@@ -1,4 +1,4 @@
-"""Seeds of episodes: those of training, validation and test lie in ranges that do not meet."""
+"""Seeds of episodes: training, validation and test have separate ranges."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ FIRST_VALIDATION_SEED = 900_000  # below it: training
 
 
 def training_seed(seed: int, environment: int, episode: int) -> int:
-    """Return the seed of a training run's episode, the same whenever it is flown: 0 to
+    """Return the seed of a training run's episode, the same in any order of flights: 0 to
     ``FIRST_VALIDATION_SEED`` - 1.
     """
     words = np.random.SeedSequence((seed, environment, episode)).generate_state(1, np.uint64)

@@ -1,53 +1,52 @@
-"""Policies of the tasks beside ``FanTracking``: a GRU that is taught by who knows, and SAC.
+"""Policies taught by a law with knowledge in rounds of DAgger.
 
-``python -m windwrench.training.task_policies --task WindHover --kind gru --seed 0 --out FOLDER``.
+``python -m windwrench.training.task_policies --task WindHover --seed 0 --out FOLDER``.
 
-``gru`` is imitation with a memory (``imitation``): in the wind it is taught what would have been
-best in view of all that came (``hindsight``), in a mix of scenarios or in one of them; in
-``FanTracking2D`` the simulator says where the fan is and how it moves. ``sac`` is that of
-stable-baselines3 on the task's version 1. Beside the wind all learn on ``base``.
+In every round of DAgger (Ross, Gordon and Bagnell, 2011) the newest network flies, with the inputs
+of any policy. For every decision a law with knowledge gives the answer, and the network is fitted
+to all answers so far, over whole episodes. In the wind and in ``FanTracking`` the answers are the
+best commands in view of the future (``hindsight``, ``fan_hindsight``), in a mix of scenarios. In
+``FanTracking2D`` the simulator gives place and motion of the fan. ``linear`` is a linear law fitted
+in the wind to the same answers in one scenario, in seconds.
 """
 
 import argparse
 import time
+from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from ..controllers.trained_policy import TaskPolicy, save_policy
-from ..envs.plant import TICK
+from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
 from ..evaluation.tasks import TASKS
-from .belief_network import BeliefNetwork
-from .configuration import load_config
+from .fan_hindsight import FEATURES, FanHindsight, fan_lanes
 from .flown_sequences import Flights
 from .hindsight import MIX, WindLesson, lanes_of
-from .imitation import rounds as taught_in_rounds
-from .learners import make_learner, weights_of
+from .linear_policy import MEMORY, LinearLaw
 from .run import origin, validate
+from .taught_network import TaughtNetwork, fit
 
 Array = NDArray[np.float32]
 
-# of FanTracking2D and of the wind: sizes of the GRU and of the layer after it, rounds of DAgger,
-# episodes of a batch, and the learning rate
-_FIT: dict[bool, dict[str, Any]] = {
-    True: {"state": 48, "net": [32], "batch_size": 16, "learning_rate": 3e-3},
-    False: {"state": 64, "net": [64], "batch_size": 32, "learning_rate": 5e-3},
+FAN, FAN_PLANE, WIND = "FanTracking", "FanTracking2D", "wind"
+# of each kind of task: cell, its size, sizes of the layers after it; rounds of DAgger, episodes of
+# each, epochs of its fit (of the last thrice); episodes of a batch, the learning rate; an error
+# added to half of the flights: a share of the largest action, and s that it lasts
+_FIT: dict[str, dict[str, Any]] = {
+    FAN: {"cell": "lstm", "state": 96, "net": [64], "rounds": 4, "episodes": 1024, "epochs": 5}
+    | {"batch_size": 32, "learning_rate": 3e-3, "wander": (0.4, 1.0)},
+    FAN_PLANE: {"cell": "gru", "state": 48, "net": [32], "rounds": 4, "episodes": 256, "epochs": 4}
+    | {"batch_size": 16, "learning_rate": 3e-3, "wander": (0.3, 0.5)},
+    WIND: {"cell": "gru", "state": 64, "net": [64], "rounds": 4, "episodes": 256, "epochs": 4}
+    | {"batch_size": 32, "learning_rate": 5e-3, "wander": (0.3, 0.5)},
 }
+_LINEAR = {"rounds": 4, "episodes": 64}
+_LEAST_RATE = 0.1  # share of the learning rate that is left at the end of a round
 _ACTIVATION = "tanh"
-# of the error added to half of the flights: a share of the largest action, and s that it lasts
-_WANDER, _WANDER_TIME = 0.3, 0.5
-_SAC = (
-    "learner.gamma=0.9",
-    "learner.learning_rate=0.001",
-    "learning_rate_end=0.001",
-    "learner.tau=0.005",
-    "learner.train_freq=2",
-    "learner.gradient_steps=1",
-)
 # signs of a frame of FanTracking2D after half a turn about the jet's axis: it changes the sign of
 # all that is taught
 _TURNED = np.array([1, -1, -1, 1, -1, -1, -1, -1, -1, -1], dtype=np.float32)
@@ -56,21 +55,27 @@ VALIDATION = 10  # episodes
 BASE = "base"
 
 
+def _fit_of(task: str) -> dict[str, Any]:
+    return _FIT.get(task, _FIT[WIND])
+
+
 def _card(task: str, kind: str, scenario: str, seed: int, steps: int) -> dict[str, Any]:
     """Return the card of a policy."""
     env = TASKS[task].environment
-    told = {"task": task, "scale": [float(f"{x:.6g}") for x in env.scales]}
-    activation = _ACTIVATION if kind == "gru" else "relu"
-    return origin(kind, scenario, seed, steps, activation) | told | {"largest": env.largest_action}
+    card = origin(kind, scenario, seed, steps, _ACTIVATION)
+    if task == FAN:
+        return card | {"features": asdict(FEATURES), "repeat": 1}
+    scale = [float(f"{x:.6g}") for x in env.scales]
+    return card | {"task": task, "scale": scale, "largest": env.largest_action}
 
 
 class FanPlaneLesson:
     """FanTracking2D: scaled observations; the fan's offset from the vehicle (m) and its velocity
-    (m/s), both in the plane of the commands. A law that sees both flies the first round.
+    (m/s), both in the plane of the commands. A law with sight of both flies the first round.
     """
 
-    _kind = TASKS["FanTracking2D"].environment
-    decisions, period = _kind.decisions(), TICK * _kind.decision_ticks
+    _kind = TASKS[FAN_PLANE].environment
+    decisions, period = _kind.decisions(), 1.0 / _kind.decision_hz
     largest, scale = _kind.largest_action, np.array(_kind.scales, dtype=np.float32)
 
     def begin(self, envs: Any, leads: bool) -> None:
@@ -81,91 +86,153 @@ class FanPlaneLesson:
         """Return scaled observations (n, quantities) and the law's commands (n, 2)."""
         truth = np.hstack([infos["fan"] - infos["position"], infos["fan_velocity"]])
         self._truth.append(truth)
-        return observations / self.scale, truth @ _shares(True, _GAINS[1]).T
+        return observations / self.scale, truth @ _shares(FAN_PLANE).T
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
-        """Return what is taught (decisions, n, 4), and what counts (decisions, n)."""
+        """Return the taught quantities (decisions, n, 4), and weights (decisions, n)."""
         return np.array(self._truth[:-1]), kept[:-1]
 
 
-def _shares(of_fan: bool, gain: float) -> Array:
-    """Return what is commanded (axes, 4 or 3) of each quantity that is taught."""
-    if not of_fan:
-        return np.eye(3, dtype=np.float32)
-    return np.array([[gain, 0.0, 1.0, 0.0], [0.0, gain, 0.0, 1.0]], dtype=np.float32)
+def _shares(task: str, gain: float = _GAINS[1]) -> Array:
+    """Return the shares (axes, taught) of each taught quantity in the command."""
+    if task == FAN:
+        return np.eye(3, dtype=np.float32)[:1]
+    if task == FAN_PLANE:
+        return np.array([[gain, 0.0, 1.0, 0.0], [0.0, gain, 0.0, 1.0]], dtype=np.float32)
+    return np.eye(3, dtype=np.float32)
 
 
-def teach(
-    task: str, scenario: str, seed: int, rounds: int, episodes: int, epochs: int
-) -> TaskPolicy:
-    """Return a GRU that was taught in rounds of DAgger of so many episodes each."""
-    of_fan = task == "FanTracking2D"
-    lesson = FanPlaneLesson() if of_fan else WindLesson(task)
-    config = {
-        **_FIT[of_fan],
-        "rounds": rounds,
-        "epochs": epochs,
-        "last_epochs": 3 * epochs,
-        "wander": {"size": _WANDER * lesson.largest, "time": _WANDER_TIME},
-    }
+def _lesson(task: str, scenario: str, episodes: int) -> tuple[Any, list[Any], int, Array | None]:
+    """Return lesson, environments of a round, quantities of a frame, and the signs of a mirrored
+    one.
+    """
+    if task == FAN:
+        return FanHindsight(), fan_lanes(episodes), FEATURES.size, FEATURES.mirrored
+    plane = task == FAN_PLANE
+    lesson, envs = FanPlaneLesson() if plane else WindLesson(task), lanes_of
+    scales = len(TASKS[task].environment.scales)
+    return lesson, envs(task, scenario, episodes), scales, _TURNED if plane else None
+
+
+def _rounds(
+    network: TaughtNetwork,
+    flights: Flights,
+    shares: Array,
+    given: dict[str, Any],
+    order: torch.Generator,
+    mirrored: Array | None,
+    whitened: bool,
+) -> Iterator[Flights]:
+    """Fly and fit round after round.
+
+    Args:
+        network: to teach.
+        flights: to fly.
+        shares: (axes, taught) of the network's means that are commanded.
+        given: as ``_FIT``.
+        order: of the episodes.
+        mirrored: as of ``taught_network.fit``.
+        whitened: whether the network sees frames as ``TaughtNetwork.whiten`` has them, by the
+            first round.
+    """
+    for number in range(given["rounds"]):
+        flights.fly(None if number == 0 else network, shares)
+        flown, last = flights.sequences(), number == given["rounds"] - 1
+        if whitened and number == 0:
+            network.whiten(flown.seen)
+        epochs, rate = given["epochs"] * (3 if last else 1), given["learning_rate"]
+        rates = rate, 0.0 if last else _LEAST_RATE * rate
+        fit(network, flown, epochs, given["batch_size"], rates, order, mirrored)
+        yield flights
+
+
+def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | TrainedPolicy:
+    """Return a recurrent policy taught in rounds of DAgger.
+
+    Args:
+        task: its name.
+        scenario: of the tasks in the wind, or a mix of them: ``hindsight.MIX``.
+        seed: of flights and network.
+        **changed: entries of ``_FIT`` in place of the task's: ``rounds``, ``episodes``, ``epochs``.
+    """
+    given = _fit_of(task) | changed
+    lesson, envs, quantities, mirrored = _lesson(task, scenario, given["episodes"])
+    size, lasts = given["wander"]
     torch.manual_seed(seed)
-    shape = "gru", config["state"], config["net"], _ACTIVATION
-    network = BeliefNetwork(len(lesson.scale), 4 if of_fan else 3, *shape)
-    flights = Flights(lanes_of(task, scenario, episodes), lesson, config, seed)
-    mirrored = _TURNED if of_fan else None
-    shares = _shares(of_fan, _GAINS[1])
-    for last in taught_in_rounds(network, flights, shares, config, seed, mirrored, not of_fan):
-        print(f"{flights.episodes} episodes{', the last' if last else ''}", flush=True)
-    card = _card(task, "gru", scenario, seed, flights.episodes * lesson.decisions)
-    if not of_fan:
-        return TaskPolicy(card, network.policy_weights(shares))
+    shape, shares = (given["cell"], given["state"], given["net"], _ACTIVATION), _shares(task)
+    taught = 4 if task == FAN_PLANE else 3
+    network = TaughtNetwork(quantities, taught, *shape)
+    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
+    flights = Flights(envs, lesson, wander, seed)
+    order = torch.Generator().manual_seed(seed)
+    whitened = task != FAN_PLANE
+    for flown in _rounds(network, flights, shares, given, order, mirrored, whitened):
+        print(f"{flown.episodes} episodes, {time.process_time():.0f} s", flush=True)
+    card = _card(task, given["cell"], scenario, seed, flights.episodes * lesson.decisions)
+    card |= {"fit": {name: value for name, value in given.items() if name != "cell"}}
+    if task != FAN_PLANE:
+        kind = TrainedPolicy if task == FAN else TaskPolicy
+        return kind(card, network.policy_weights(shares))
     tried = [
-        TaskPolicy({**card, "gain": gain}, network.policy_weights(_shares(of_fan, gain)))
+        TaskPolicy({**card, "gain": gain}, network.policy_weights(_shares(task, gain)))
         for gain in _GAINS
     ]
     env = TASKS[task].environment(BASE)
     return min(tried, key=lambda each: validate(each, env, VALIDATION)[0])
 
 
-def sac(task: str, seed: int, steps: int) -> TaskPolicy:
-    """Return what SAC learns in ``steps`` decisions."""
-    from stable_baselines3.common.monitor import Monitor
-    from stable_baselines3.common.vec_env import DummyVecEnv
-
-    name = f"windwrench/{task}-v1"
-    env = DummyVecEnv([lambda: Monitor(gym.make(name, scenario=BASE))])
-    entropy = f"learner.target_entropy={-float(env.action_space.shape[0])}"
-    config = load_config("sac", [*_SAC, entropy, f"steps={steps}"])
-    learner = make_learner(config, env, seed)
-    learner.learn(steps)
-    return TaskPolicy(_card(task, "sac", BASE, seed, steps), weights_of(learner, "sac"))
+def linear(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy:
+    """Return a linear law of a task in the wind; arguments as of ``teach``."""
+    given = _LINEAR | changed
+    lesson, envs, _, _ = _lesson(task, scenario, given["episodes"])
+    size, lasts = _FIT[WIND]["wander"]
+    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
+    law, flights = LinearLaw(), Flights(envs, lesson, wander, seed)
+    for number in range(given["rounds"]):
+        flights.fly(law if number else None, _shares(task))
+        law.fit(flights.sequences())
+    card = _card(task, "linear", scenario, seed, flights.episodes * lesson.decisions)
+    return TaskPolicy(card | {"fit": given, "memory": list(MEMORY)}, law.weights())
 
 
 def main() -> None:
     """Train one policy and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--task", choices=[*TASKS], required=True)
-    parser.add_argument("--kind", choices=["gru", "sac"], default="gru")
+    parser.add_argument("--kind", choices=["taught", "linear"], default="taught")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--rounds", type=int, default=4, help="of DAgger")
-    parser.add_argument("--scenario", default=MIX, help=f"of the wind, or a mix of them: {MIX}")
-    parser.add_argument("--episodes", type=int, default=256, help="of each round")
-    parser.add_argument("--epochs", type=int, default=4, help="of each round; the last, thrice")
-    parser.add_argument("--steps", type=int, default=20_000, help="decisions of SAC")
-    parser.add_argument("--out", type=Path, default=Path("training/policies/tasks"))
+    parser.add_argument(
+        "--scenario", help=f"of the wind; default: {BASE} for a linear law, else a mix: {MIX}"
+    )
+    for name, said in (
+        ("rounds", "of DAgger"),
+        ("episodes", "of each round"),
+        ("epochs", "of each round; the last, thrice"),
+    ):
+        parser.add_argument(f"--{name}", type=int, help=f"{said}; default: the task's")
+    parser.add_argument("--out", type=Path, help="folder; default: that of the kit's policies")
     given = parser.parse_args()
     torch.set_num_threads(1)
-    began = time.process_time()
-    if given.kind == "sac":
-        policy = sac(given.task, given.seed, given.steps)
+    began, task = time.process_time(), given.task
+    usual = BASE if given.kind == "linear" else MIX
+    kind, scenario = _fit_of(task)["cell"], given.scenario or usual
+    if task in (FAN, FAN_PLANE):
+        scenario = "wide" if task == FAN else BASE
+    asked = {name: getattr(given, name) for name in ("rounds", "episodes", "epochs")}
+    changed = {name: count for name, count in asked.items() if count is not None}
+    if given.kind == "linear":
+        if task in (FAN, FAN_PLANE):
+            parser.error("--kind linear: expected a task in the wind")
+        kind = "linear"
+        policy: TaskPolicy | TrainedPolicy = linear(task, scenario, given.seed, **changed)
     else:
-        scenario = BASE if given.task == "FanTracking2D" else given.scenario
-        lesson = given.rounds, given.episodes, given.epochs
-        policy = teach(given.task, scenario, given.seed, *lesson)
-    given.out.mkdir(parents=True, exist_ok=True)
-    path = given.out / f"{given.task}-{given.kind}-{given.seed}.npz"
-    env = TASKS[given.task].environment(BASE)
-    rmse, lost = validate(policy, env, VALIDATION)
+        policy = teach(task, scenario, given.seed, **changed)
+    policies = Path("training/policies")
+    out, start = (policies, "") if task == FAN else (policies / "tasks", f"{task}-")
+    out = given.out or out
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{start}{kind}-{given.seed}.npz"
+    rmse, lost, _ = validate(policy, TASKS[task].environment(BASE), VALIDATION)
     policy.card |= {
         "validation": {"episodes": VALIDATION, "rmse_m": round(rmse, 5), "lost": lost},
         "training_cpu_s": round(time.process_time() - began),

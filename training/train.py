@@ -1,12 +1,15 @@
-"""Training a policy, with stable-baselines3 or by imitation."""
+"""Training a policy with stable-baselines3."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..controllers.trained_policy import TrainedPolicy
-from .configuration import IMITATIONS, Config, features_of
+from ..controllers.registry import STANDARD_TASK
+from ..controllers.trained_policy import TaskPolicy, TrainedPolicy
+from ..evaluation.rewards import WeightedTerms, find_reward
+from ..evaluation.tasks import import_files, task_of
+from .configuration import Config, features_of
 from .run import Progress, Run, progress_from
 from .seeds import training_seed
 from .training_envs import make_training_envs
@@ -20,40 +23,46 @@ def train(
     advance: Callable[[int], None] = lambda steps: None,
     report: Callable[[Progress], None] = lambda progress: None,
     stop_after: int | None = None,
+    task: str = STANDARD_TASK,
+    reward: str | None = None,
+    imports: Sequence[str] = (),
 ) -> Path:
     """Train a policy; return the path of the best one on the validation episodes.
 
     ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``,
-    ``training.json``, TensorBoard's events, and ``checkpoint.pt``. Called again after a run was
-    killed, it goes on from the last checkpoint and ends with the same policies, bit for bit, as a
-    run that was not. Imitation has neither events nor checkpoint and starts anew.
+    ``training.json``, TensorBoard's events, and ``checkpoint.pt``. A killed run resumes from its
+    last checkpoint at the next call. Its policies are, bit for bit, the ones of an undisturbed run.
 
     Args:
         config: as of ``load_config``.
         scenario: scenario or tier to train in.
-        seed: of the run.
+        seed: the run's.
         folder: for its files.
-        advance: called with the number of decisions (over all environments) that the run stands at.
+        advance: called with the number of decisions so far (over all environments).
         report: called after each validation.
-        stop_after: decisions after which to return early, at the next checkpoint; for tests.
+        stop_after: decisions before an early return, at the next checkpoint; for tests.
+        task: a name, as of ``evaluation.tasks.task_of``. FanTracking's policies see the features of
+            the configuration, those of other tasks the observation.
+        reward: one's own, as of ``evaluation.rewards.find_reward``; None: the configuration's in
+            FanTracking, else the task's.
+        imports: Python files that register a task, a scenario or a reward.
 
     Raises:
-        InputError: a scenario that does not exist, or a folder with another run.
+        InputError: an unknown name, a folder with another run, or a task without such a learner.
     """
-    run = Run(config, scenario, seed, folder, report)
-    if config["algorithm"] in IMITATIONS:
-        from .imitation import imitate
-
-        return imitate(run, advance)
+    import_files(imports)
+    standard = task == STANDARD_TASK
+    run = Run(config, scenario, seed, folder, report, task, reward)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv
 
-    features, algorithm, whole = features_of(config), config["algorithm"], config["steps"]
-    envs = make_training_envs(scenario, config["environments"], config["estimator"])
-    env = FeatureVecEnv(
-        envs, features, lambda i, episode: training_seed(seed, i, episode), config["reward"]
-    )
+    algorithm, whole = config["algorithm"], config["steps"]
+    features = features_of(config) if standard else None
+    envs = make_training_envs(scenario, config["environments"], config["estimator"], task)
+    own = find_reward(reward) if reward else WeightedTerms(config["reward"]) if standard else None
+    env = FeatureVecEnv(envs, features, lambda i, episode: training_seed(seed, i, episode), own)
+    seen = {} if standard else task_of(task).units(envs)
     learner = make_learner(config, env, seed)
     learner.set_logger(_logger(folder))
     checkpoint = folder / "checkpoint.pt"
@@ -66,7 +75,8 @@ def train(
         learner.learn(target - done, callback=follow, reset_num_timesteps=False, log_interval=4)
         done = learner.num_timesteps
         if run.is_due(done, done >= whole):
-            policy = TrainedPolicy(run.card(done), weights_of(learner, algorithm))
+            kind = TrainedPolicy if standard else TaskPolicy
+            policy = kind(run.card(done) | seen, weights_of(learner, algorithm))
             rmse, lost = run.take_stock(policy)
             learner.logger.record("validation/rmse_m", rmse)
             learner.logger.record("validation/lost", lost)
@@ -95,7 +105,7 @@ def _follower(advance: Callable[[int], None]) -> Any:
     from stable_baselines3.common.callbacks import BaseCallback
 
     class Follow(BaseCallback):  # type: ignore[misc]
-        """Tell how far the run is, and what the episodes of training that ended were worth."""
+        """Tell the decisions so far, and the RMSE of finished training episodes."""
 
         def _on_step(self) -> bool:
             advance(self.num_timesteps)

@@ -1,23 +1,26 @@
-"""The environments that policies are trained in: a scenario, or a tier that mixes several."""
+"""The environments of training: a scenario, or in FanTracking a tier, a mix of several."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
+from ..controllers.registry import STANDARD_TASK
 from ..envs.closed_loop import ClosedLoop
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.lanes.vector import TaskLanes
 from ..envs.scenarios import SCENARIOS
 from ..envs.vector import TaskVectorEnv
 from ..evaluation.episodes import DECISIONS
+from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError, unknown_name
 
 LANES = "ukf-lanes"
-_SCENARIO = 1  # second word of the seed that draws the scenario of an episode
+_SCENARIO = 1  # second word of the seed of an episode's scenario
 
-# a scenario that comes twice is drawn twice as often
+# a repeated scenario is drawn twice as often
 TIERS: dict[str, tuple[str, ...]] = {
     "base-fast": ("base", "fast"),
     "wide": (
@@ -35,74 +38,75 @@ TIERS: dict[str, tuple[str, ...]] = {
 }
 
 
-def check_training_env(name: str) -> None:
+def check_training_env(name: str, task: str = STANDARD_TASK) -> None:
     """Check the name of a training environment.
 
     Raises:
-        InputError: neither a scenario nor a tier.
+        InputError: neither a scenario of the task nor, in FanTracking, a tier.
     """
-    if name not in SCENARIOS and name not in TIERS:
+    if task != STANDARD_TASK:
+        task_of(task).scenario(name)
+    elif name not in SCENARIOS and name not in TIERS:
         raise unknown_name("scenario", name, [*SCENARIOS, *TIERS])
-
-
-def scenarios_of(name: str) -> tuple[str, ...]:
-    """Return the scenarios of a tier, as often as they are drawn, or the one scenario."""
-    return TIERS.get(name, (name,))
 
 
 class MixedFanTracking(FanTrackingEnv):
     """Each episode in one of several scenarios, drawn from the episode's seed."""
 
+    mixes = True
+
     def __init__(self, scenario: Sequence[str], **named: Any) -> None:
         super().__init__(scenario[0], **named)
         self._names = scenario
-        self._loops: dict[str, ClosedLoop | None] = {}  # of the scenarios that were flown
 
-    def draw_loop(self) -> None:
-        """Draw a scenario, and the closed loop of an episode in it.
+    def draw_loop(self, rng: np.random.Generator, kept: dict[Any, ClosedLoop]) -> ClosedLoop:
+        """Draw a scenario; return the closed loop of an episode in it.
 
         The state of the episode's generator seeds another one for the scenario: a draw of the
         former would settle the fan's motion, too.
         """
-        state = self.np_random.bit_generator.state["state"]["state"]
-        generator = np.random.default_rng((state, _SCENARIO))
+        generator = np.random.default_rng((rng.bit_generator.state["state"]["state"], _SCENARIO))
         name = self._names[int(generator.integers(len(self._names)))]
-        self.scenario, self._loop = SCENARIOS[name], self._loops.get(name)
+        self.scenario = SCENARIOS[name]
         self.fan = replace(self.fan, turbulence=self.scenario.turbulence)
-        super().draw_loop()
-        self._loops[name] = self._loop
+        return super().draw_loop(rng, kept)
 
 
-def make_training_env(name: str, **given: Any) -> FanTrackingEnv:
-    """Return the environment of a scenario or a tier, with other arguments of ``FanTrackingEnv``.
+def make_training_env(name: str, task: str = STANDARD_TASK, reward: str | None = None) -> Any:
+    """Return the environment of a scenario or a tier, in SI units; ``reward`` is one's own.
 
     Raises:
         InputError: a name that does not exist.
     """
-    check_training_env(name)
-    return (
-        MixedFanTracking(TIERS[name], **given) if name in TIERS else FanTrackingEnv(name, **given)
-    )
+    check_training_env(name, task)
+    if name in TIERS and task == STANDARD_TASK:
+        return MixedFanTracking(TIERS[name])
+    return task_of(task).make(name, reward)
 
 
-def make_training_envs(name: str, count: int, estimator: str = "ukf") -> TaskVectorEnv:
+def make_training_envs(
+    name: str, count: int, estimator: str = "ukf", task: str = STANDARD_TASK
+) -> gym.vector.VectorEnv:
     """Return ``count`` training environments side by side.
 
     Args:
         name: scenario or tier.
         count: how many.
         estimator: of the environments: ``ukf``, ``constant-gain``, its fast stand-in, or
-            ``ukf-lanes``: the full filter, with plant and flight loop beside it in the lanes of a
-            vector unit.
+            ``ukf-lanes``: the full filter, plant and flight loop in the lanes of a vector unit.
+        task: a name, as of ``evaluation.tasks.task_of``.
 
     Raises:
-        InputError: a name that does not exist, or ``ukf-lanes`` with a tier.
+        InputError: an unknown name, or ``ukf-lanes`` with a tier.
     """
-    check_training_env(name)
+    check_training_env(name, task)
+    if task != STANDARD_TASK:
+        given = {"plant": "lanes"} if estimator == LANES else {"estimator": estimator}
+        return task_of(task).make_many(count, name, **({} if estimator == "ukf" else given))
     if estimator == LANES:
         if name in TIERS:
             raise InputError(f"training: {LANES} flies one scenario, got {name!r}")
-        return TaskLanes(count, DECISIONS, scenario=name)
+        return TaskLanes(count, DECISIONS, task=FanTrackingEnv, scenario=name)
     kind = MixedFanTracking if name in TIERS else FanTrackingEnv
     world = TIERS.get(name, name)
     return TaskVectorEnv(count, DECISIONS, task=kind, scenario=world, estimator=estimator)

@@ -24,12 +24,14 @@ _PRUNE_AFTER = 10  # episodes
 
 
 def check_request(task: str, law: str, scenario: str, trials: int, episodes: int) -> None:
-    """Check what ``tune`` is asked for.
+    """Check a request to ``tune``.
 
     Raises:
         InputError: an unknown task, law or scenario, no trials, or too many episodes.
     """
     environment = task_of(task).environment
+    if task not in RANGES:
+        raise unknown_name("task", task, RANGES, "train tune")
     if law not in RANGES[task]:
         raise unknown_name("law", law, RANGES[task])
     if task == STANDARD_TASK:
@@ -42,8 +44,8 @@ def check_request(task: str, law: str, scenario: str, trials: int, episodes: int
 
 
 def first_gains(task: str, law: str) -> dict[str, float]:
-    """Return the gains with which a search begins: those of ``STARTS``, or the law's defaults,
-    limited to the ranges.
+    """Return the first gains of a search: from ``STARTS``, or the law's defaults, limited to the
+    ranges.
     """
     defaults = {**vars(TASKS[task].laws[law]()), **STARTS.get(law, {})}
     ranges = RANGES[task][law].items()
@@ -64,10 +66,10 @@ def tune(
 
     Args:
         law: a key of ``RANGES[task]``.
-        scenario: of the task; of FanTracking also a tier.
-        trials: gains tried; the first are those of ``first_gains``.
+        scenario: one of the task's; for FanTracking also a tier.
+        trials: number of gains tried, ``first_gains`` first.
         episodes: validation episodes of each; a trial far behind is given up after ten.
-        seed: of the search.
+        seed: the search's.
         advance: called with the number of trials done.
         task: one of ``evaluation.tasks.TASKS``.
 
@@ -124,8 +126,8 @@ def tune(
     }
 
 
-def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
-    """Write what a search found into a file of tuned gains, in place of the entry for this law and
+def keep_gains(result: dict[str, Any], path: Path, command: str) -> None:
+    """Write a search's gains into a file of tuned gains. They replace the entry for this law and
     scenario of FanTracking, or for this law of another task.
 
     Raises:
@@ -138,11 +140,11 @@ def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
             raise InputError(
                 f"{path}: expected laws, scenarios and their gains, as in controllers/tuned.yaml"
             )
-    places = ("law", "scenario") if found["task"] == STANDARD_TASK else ("task", "law")
-    rounded = {name: float(f"{value:.4g}") for name, value in found["gains"].items()}
-    kept.setdefault(found[places[0]], {})[found[places[1]]] = {
+    places = ("law", "scenario") if result["task"] == STANDARD_TASK else ("task", "law")
+    rounded = {name: float(f"{value:.4g}") for name, value in result["gains"].items()}
+    kept.setdefault(result[places[0]], {})[result[places[1]]] = {
         "gains": rounded,
-        **{k: v for k, v in found.items() if k not in ("gains", "task", "law", places[1])},
+        **{k: v for k, v in result.items() if k not in ("gains", "task", "law", places[1])},
         "command": command,
     }
     write_text(yaml.safe_dump(kept, sort_keys=False, width=120), path)

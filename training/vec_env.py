@@ -1,8 +1,8 @@
-"""The training environments as stable-baselines3 wants them, with the policy's features
-for observations.
+"""The training environments as stable-baselines3 wants them, in FanTracking with the policy's
+features for observations.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -12,61 +12,75 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from ..controllers.features import Features, History
 from ..envs.fan_tracking import LOST_OFFSET
-from ..envs.vector import TaskVectorEnv
+from ..evaluation.episodes import error_of
+from ..evaluation.rewards import Reward, total_of
 
 Array = NDArray[np.float32]
 
 
 class FeatureVecEnv(VecEnv):  # type: ignore[misc]
-    """An SB3 ``VecEnv`` over a Gymnasium vector environment of fan-tracking environments.
+    """An SB3 ``VecEnv`` over a Gymnasium vector environment.
 
-    Each environment on its own: where an episode ends, ``infos[i]["terminal_observation"]`` holds
-    the features that ended it, ``infos[i]["TimeLimit.truncated"]`` says that only the clock ended
-    it, and the observation returned is the first of its next episode. Every episode's seed is given
-    by ``seed_of``. ``episode`` (n,) holds the numbers of the episodes in flight: set to those of
-    another run, ``reset`` goes on with the episodes that follow.
+    Each environment on its own: at an episode's end, ``infos[i]["terminal_observation"]`` holds its
+    last features, and ``infos[i]["TimeLimit.truncated"]`` is True where only the clock ended the
+    episode. The returned observation is the first of the next episode. Every episode's seed is
+    given by ``seed_of``. ``episode`` (n,) holds the numbers of the episodes in flight: set to those
+    of another run, ``reset`` goes on with the episodes that follow.
 
     Args:
-        envs: of FanTracking.
-        features: of the policy.
+        envs: of Gymnasium, with the option ``reset_mask``.
+        features: of a policy of FanTracking; None: the observations as they are.
         seed_of: from environment and episode to the episode's seed.
-        reward: weights of the terms ``tracking``, ``change`` and ``squared`` (minus the squared
-            offset in m2).
+        reward: of ``infos``; None: the environments' own.
     """
 
     render_mode: str | None = None  # SB3 asks for it
 
     def __init__(
         self,
-        envs: TaskVectorEnv,
-        features: Features,
+        envs: Any,
+        features: Features | None,
         seed_of: Callable[[int, int], int],
-        reward: Mapping[str, float] | None = None,
+        reward: Reward | None = None,
     ) -> None:
         self.envs, self.features = envs, features
-        self._seed_of = seed_of
-        self._weights = dict(reward or {"tracking": 1.0, "change": 1.0, "squared": 0.0})
-        space = gym.spaces.Box(-10.0, 10.0, (features.size,), np.float32)
+        self._seed_of, self._reward = seed_of, reward
+        space = envs.single_observation_space
+        if features is not None:
+            space = gym.spaces.Box(-10.0, 10.0, (features.size,), np.float32)
         super().__init__(envs.num_envs, space, envs.single_action_space)
-        self._history = History(features, self.num_envs)
+        self._history = None if features is None else History(features, self.num_envs)
+        self._seen: Array = np.zeros((self.num_envs, *(space.shape or ())), dtype=np.float32)
         self.episode = np.full(self.num_envs, -1)  # none has begun
         self._length = np.zeros(self.num_envs, dtype=np.int64)  # decisions since the start
         self._returns, self._squares = np.zeros(self.num_envs), np.zeros(self.num_envs)
         self._commands = np.zeros((self.num_envs, 1), dtype=np.float32)
 
-    def _begin(self, which: NDArray[np.bool_]) -> None:
-        """Start the next episode of the environments ``which``."""
+    def _look(self, observations: Array, begun: NDArray[np.bool_] | None = None) -> Array:
+        """Return the learner's observations (n, size); episodes have ``begun`` in some."""
+        if self._history is None or self.features is None:
+            new = slice(None) if begun is None else begun
+            self._seen[new] = observations[new]
+            return self._seen.copy()
+        frames = self.features.frames(observations)
+        if begun is None:
+            self._history.push(frames)
+        else:
+            self._history.restart(frames, begun)
+        return self._history.flat()
+
+    def _begin(self, which: NDArray[np.bool_]) -> Array:
+        """Start the next episode of the environments ``which``; return all observations."""
         self.episode[which] += 1
         seeds = [self._seed_of(i, int(e)) for i, e in enumerate(self.episode)]
         observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": which.copy()})
-        self._history.restart(self.features.frames(observations), which)
         for sums in (self._length, self._returns, self._squares):
             sums[which] = 0
+        return self._look(observations, which)
 
     def reset(self) -> Array:
         """Start the next episode everywhere; return the features (n, size) of its beginning."""
-        self._begin(np.ones(self.num_envs, dtype=np.bool_))
-        return self._history.flat()
+        return self._begin(np.ones(self.num_envs, dtype=np.bool_))
 
     def step_async(self, actions: Array) -> None:
         """Keep the actions (n, 1) for ``step_wait``."""
@@ -76,21 +90,17 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         """Fly one decision everywhere; return features (n, size), rewards (n,), dones (n,) and
         infos.
         """
-        observations, _, lost, over, infos = self.envs.step(self._commands)
-        offset = np.minimum(np.abs(infos["offset"]), LOST_OFFSET)
-        rewards = (
-            self._weights["tracking"] * infos["reward_tracking"]
-            + self._weights["change"] * infos["reward_change"]
-            - self._weights["squared"] * offset**2
-        ).astype(np.float32)
+        observations, rewards, lost, over, infos = self.envs.step(self._commands)
+        if self._reward is not None:
+            rewards = total_of(self._reward, infos)[0]
+        rewards, error = rewards.astype(np.float32), error_of(infos)
         self._returns += rewards
-        self._squares += offset**2
+        self._squares += np.nan if error is None else np.minimum(error, LOST_OFFSET) ** 2
         self._length += 1
-        self._history.push(self.features.frames(observations))
+        last = self._look(observations)
         dones = lost | over
         told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if dones.any():
-            last = self._history.flat()
             for i in np.flatnonzero(dones).tolist():
                 length = int(self._length[i])
                 told[i] = {
@@ -99,8 +109,8 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
                     "episode": {"r": float(self._returns[i]), "l": length, "t": 0.0},
                     "rmse": float(np.sqrt(self._squares[i] / length)),
                 }
-            self._begin(dones)
-        return self._history.flat(), rewards, dones, told
+            last = self._begin(dones)
+        return last, rewards, dones, told
 
     def close(self) -> None:
         """Close the environments."""
@@ -123,7 +133,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         )
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Say that episodes are counted here, so that SB3 reads ``infos[i]["episode"]``."""
+        """Tell SB3 to read ``infos[i]["episode"]``: episodes are counted here."""
         return [wrapper_class.__name__ == "Monitor" for _ in self._get_indices(indices)]
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:

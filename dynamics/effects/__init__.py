@@ -1,9 +1,9 @@
 """The library of physical effects: one file an effect, found by its file's name.
 
 ``get("rotor_drag")`` is the ``EFFECT`` of ``rotor_drag.py``. ``compile_effects`` prepares a
-vehicle's effects for compiled code. Folders of a user's own join the library: those in the
-environment variable ``WINDWRENCH_EFFECTS``, which every command and its workers know, and those
-given to ``add_folder``.
+vehicle's effects for compiled code. Folders of a user's own join the library: the environment
+variable ``WINDWRENCH_EFFECTS`` names some, for every command and its workers, and ``add_folder``
+adds more.
 """
 
 import os
@@ -52,11 +52,10 @@ _NOT_EFFECTS = {"__init__", "__main__", "base", "call", "declaration", "parts", 
 
 
 def add_folder(folder: str | Path) -> tuple[str, ...]:
-    """Let the files of a folder be effects, here and in processes that this one starts; return
-    their names.
+    """Let the files of a folder be effects, here and in child processes; return their names.
 
     Raises:
-        InputError: there is no such folder, or a file has the name of an effect that is there.
+        InputError: no such folder, or a file with the name of a known effect.
     """
     folders = tuple(dict.fromkeys((*_folders(), str(Path(folder).resolve()))))
     for known in (_files_in, names):
@@ -85,7 +84,7 @@ def _files() -> dict[str, Path]:
 
 @cache
 def _files_in(folders: tuple[str, ...]) -> dict[str, Path]:
-    found = {path.stem: path for path in _effects_in(Path(__file__).parent)}
+    files = {path.stem: path for path in _effects_in(Path(__file__).parent)}
     for folder in map(Path, folders):
         if not folder.is_dir():
             raise InputError(
@@ -93,12 +92,12 @@ def _files_in(folders: tuple[str, ...]) -> dict[str, Path]:
                 f"{os.pathsep} between them"
             )
         for path in _effects_in(folder.resolve()):
-            if found.setdefault(path.stem, path) != path:
+            if files.setdefault(path.stem, path) != path:
                 raise InputError(
-                    f"{path}: an effect {path.stem} is there already ({found[path.stem]}); "
+                    f"{path}: an effect {path.stem} is there already ({files[path.stem]}); "
                     f"expected another name"
                 )
-    return found
+    return files
 
 
 @cache
@@ -112,8 +111,8 @@ def get(name: str) -> Effect:
     """Return an effect by its name.
 
     Raises:
-        InputError: no effect has this name, a user's own file holds none, or its law does nothing
-            but with several coefficients at once and says not where a fit starts.
+        InputError: no such effect, none in a user's own file, or a law without starting points
+            whose coefficients do nothing alone.
     """
     if name not in names():
         raise unknown_name("effect", name, names())
@@ -151,12 +150,12 @@ def of_family(*families: Family, among: Iterable[str] | None = None) -> frozense
 
 
 def needing(*needs: Need) -> frozenset[str]:
-    """Return the effects of the library that cannot be told where logs lack any of these."""
+    """Return the effects of the library that need any of these from logs."""
     return frozenset(name for name in names() if set(needs) & set(get(name).needs))
 
 
 def model_in_words(name: str) -> str:
-    """Return what an effect's file says of its equation: its docstring."""
+    """Return an effect's equation in words: the docstring of its file."""
     return (_module(name).__doc__ or "").strip()
 
 
@@ -199,7 +198,7 @@ def parse_setting(text: str, vehicle: Vehicle | None = None) -> EffectSetting:
     kg.
 
     Raises:
-        InputError: the text is not of that form, or names no known effect or coefficient.
+        InputError: another form, or an unknown effect or coefficient.
     """
     name, _, rest = text.partition(":")
     if name not in names():
@@ -228,16 +227,16 @@ class Bundle:
     """
 
     vehicle: Vehicle  # with the body effects applied
-    constants: Array  # (VEHICLE_SIZE,) what effect models may know of it
+    constants: Array  # (VEHICLE_SIZE,) of the vehicle, for effect models
     wrench_models: np.ndarray  # (n,) int64 addresses
     wrench_coefficients: Array  # (n, ROW_SIZE)
-    wrench_hooks: np.ndarray  # (n,) int64 addresses of what carries a state on; 0: it has none
+    wrench_hooks: np.ndarray  # (n,) int64 addresses of ``advance``; 0: no state of its own
     rotor_models: np.ndarray  # (m,) int64 addresses
     rotor_coefficients: Array  # (m, 8)
-    rotor_memory: int  # columns of the memory (m, rotor_memory) that the rotor models need
+    rotor_memory: int  # columns of the rotor models' memory (m, rotor_memory)
     sensing_models: np.ndarray  # (k,) int64 addresses
     sensing_coefficients: Array  # (k, 8)
-    sensing_memory: int  # columns of the memory (k, sensing_memory) that the sensing models need
+    sensing_memory: int  # columns of the sensing models' memory (k, sensing_memory)
 
 
 def compile_effects(vehicle: Vehicle) -> Bundle:

@@ -10,8 +10,8 @@ from .base import CENTRAL
 
 
 def effects_page() -> str:
-    """Return the page (Markdown) of all effects: model, coefficients, sizes, sources, and what
-    distinguishes them.
+    """Return the page (Markdown) of all effects: model, coefficients, sizes, sources, and the
+    flight to distinguish them.
     """
     return page_template(__package__ or "", "page.md.j2", html=False).render(
         effects=[get(name) for name in names()],

@@ -2,29 +2,28 @@
 of a log.
 
 An effect is one file in this folder with an ``EFFECT``. Its equation, the effect model, is compiled
-to a C function that is called through its address, so that every user of it (a tick of the plant, a
-sigma point of the filter, a sample of a log) runs the same machine code and a new effect recompiles
-none of them. There are four kinds:
+to a C function, called through its address. All its callers (a tick of the plant, a sigma point of
+the filter, a sample of a log) run the same machine code. A new effect recompiles none of them.
+There are four kinds:
 
 ``rotor input``
-    changes what the rotors really deliver. Model ``(c, vehicle, rotors, memory)``: rewrites the
-    four rotor speeds in ``rotors``, once a step, in the order in which the vehicle lists the
-    effects.
+    changes the delivered rotor speeds. Model ``(c, vehicle, rotors, memory)``: rewrites the four
+    rotor speeds in ``rotors``, once a step, in the order in which the vehicle lists the effects.
 ``wrench``
     adds force (world frame) and torque (body frame, about the centre of mass). Model
-    ``(c, vehicle, state, wrench)``: adds to the six numbers in ``wrench``. It is asked many times a
-    step. One that has a state of its own keeps it in ``c`` from ``HIDDEN`` on, all zero at the
-    start, and carries it on in ``advance(c, vehicle, state, rotors)``, called once a step before
-    the model is asked; ``rotors[STEP]`` is the step's length.
+    ``(c, vehicle, state, wrench)``: adds to the six numbers in ``wrench``. It is called many times
+    a step. A state of its own lies in ``c`` from ``HIDDEN`` on, all zero at the start. ``advance(c,
+    vehicle, state, rotors)`` carries the state on, once a step before the first call of the model;
+    ``rotors[STEP]`` is the step's length.
 ``body``
     changes the rigid body itself. ``amend(vehicle, coefficients)`` returns the changed vehicle.
 ``sensing``
-    changes what the log holds. Model ``(c, vehicle, sample, memory)``: rewrites the parts of
-    ``sample`` that are there, from the truth to what is reported where ``sample[DIRECTION]`` is +1
-    (the plant), and back where it is -1 (an estimator that knows of the effect).
+    changes the logged values. Model ``(c, vehicle, sample, memory)``: rewrites the given parts of
+    ``sample``. With ``sample[DIRECTION]`` +1 (the plant) it turns truth into report, with -1 (an
+    estimator with the effect in its model) report into truth.
 
-``c`` holds the coefficients in the order in which the effect declares them; ``vehicle``, ``state``,
-``rotors`` and ``sample`` are laid out by the constants below.
+``c`` holds the coefficients in their declared order. The constants below lay out ``vehicle``,
+``state``, ``rotors`` and ``sample``.
 """
 
 from collections.abc import Callable, Mapping
@@ -42,10 +41,10 @@ from .declaration import Family, Implausible, Need, Role, StartingPoints, check_
 Array = NDArray[np.float64]
 
 _POINTER = types.CPointer(types.float64)
-EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # of the C function
+EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # C function of a model
 compiled_model: Any = compiled_callback(EFFECT_MODEL)  # the decorator of an effect model
 
-# vehicle: what a model may know of it
+# vehicle: numbers for a model
 MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
 COM = 7  # 3, m
 ROTOR_POSITION = 10  # 4 x 3, m, from the geometric centre
@@ -53,7 +52,7 @@ SPIN = 22  # 4, turning sense about body +z
 REACTION = 26  # 4, Nm/(rad/s)^2
 VEHICLE_SIZE = 30
 
-# state of the flight at which a wrench model is asked
+# state of the flight for a wrench model
 POSITION = 0  # 3, m, world, of the geometric centre
 ROTATION = 3  # 3 x 3, body to world
 VELOCITY = 12  # 3, m/s, world
@@ -66,26 +65,26 @@ TIME = 30  # s
 ROTOR_ACCELERATION = 31  # 4, rad/s2, delivered, mean over the step
 STATE_SIZE = 35
 
-# rotors: the rotor speeds that a rotor-input model rewrites, and what it may know
+# rotors: the rotor speeds rewritten by a rotor-input model, and further inputs
 SPEED = 0  # 4, rad/s
 STEP = 4  # s, since the model was last called
 ROTOR_VOLTAGE = 5  # V; 0: not known
 ROTOR_TIME = 6  # s, since the start
 ROTORS_SIZE = 7
 
-# sample: what a sensing model rewrites, and what it may know
+# sample: values rewritten by a sensing model, and inputs
 SAMPLE_SPEED = 0  # 4, rad/s
 SAMPLE_POSITION = 4  # 3, m, world
 SAMPLE_QUATERNION = 7  # 4, body to world
 SAMPLE_STEP = 11  # s, since the model was last called
-# 1 where that part is there; a quaternion is always readable
+# 1 where the part is given; a quaternion is always readable
 HAS_SPEED, HAS_POSITION, HAS_QUATERNION = 12, 13, 14
 DIRECTION = 15  # +1: from truth to report, -1: back
 SAMPLE_SIZE = 16
 
-PARAMETERS = 8  # coefficients that an effect may have
-HIDDEN = 8  # where a wrench effect's own state starts in ``c``
-ROW_SIZE = 16  # of ``c`` of a wrench effect
+PARAMETERS = 8  # most coefficients of an effect
+HIDDEN = 8  # first place of a wrench effect's own state in ``c``
+ROW_SIZE = 16  # size of ``c`` of a wrench effect
 
 
 @dataclass(frozen=True)
@@ -93,19 +92,17 @@ class Coefficient:
     """One coefficient of an effect, with its typical size for a 0.45 kg and for a
     0.03 kg vehicle.
 
-    Before any flight is seen a coefficient is as likely positive as negative within its range, zero
-    on average, and of the order of its typical size: that is the scale by which a diagnosis
-    measures it.
+    Before any flight a coefficient is as likely positive as negative within its range, and zero on
+    average. Its order is the typical size: the scale of a diagnosis.
 
     Attributes:
         name: as vehicle files write it.
         unit: SI, "1" for a pure number.
         typical: in ``unit``, for a vehicle of 0.45 kg and one of 0.03 kg.
         meaning: in words.
-        minimum: in ``unit``, least value that a vehicle's file may state.
-        maximum: in ``unit``, largest value that a vehicle's file may state.
-        plausible: in ``unit``, size beyond which it is no physics of this effect, but the trace of
-            another.
+        minimum: in ``unit``, least value in a vehicle's file.
+        maximum: in ``unit``, largest value in a vehicle's file.
+        plausible: in ``unit``, largest size of this effect's physics; more is the trace of another.
     """
 
     name: str
@@ -117,7 +114,7 @@ class Coefficient:
     plausible: float = np.inf
 
 
-# of effects that act rotor by rotor: draws the rotors towards the centre
+# draws the rotors towards the centre, for effects rotor by rotor
 CENTRAL = Coefficient(
     "central",
     "1",
@@ -136,7 +133,7 @@ def along(
     axes: str = "xyz",
     **bounds: float,
 ) -> tuple[Coefficient, ...]:
-    """Return one coefficient for each axis, which stands for ``{}`` in name and meaning."""
+    """Return one coefficient for each axis, put for ``{}`` in name and meaning."""
     return tuple(
         Coefficient(name.format(axis), unit, typical, meaning.format(axis), **bounds)
         for axis in axes
@@ -145,38 +142,35 @@ def along(
 
 @dataclass(frozen=True)
 class Effect:
-    """A physical effect: its model, coefficients and source, and what it declares itself to be. The
+    """A physical effect: its model, coefficients, source, and declared kind of physics. The
     docstring of its file states the equation.
 
     Attributes:
         name: as vehicle files and reports write it.
-        kind: what it changes: rotor input, wrench, rigid body or sensing.
+        kind: changed part: rotor input, wrench, rigid body or sensing.
         coefficients: each with its unit.
         source: of equation and sizes.
-        excitation: what flight tells it from the effects that can leave much the same traces in a
-            log.
+        excitation: flight to tell the effect from others with much the same traces in a log.
         model: compiled C function, for rotor input, wrench and sensing.
-        advance: compiled C function, for a wrench that has a state of its own.
-        memory: numbers that a rotor-input or sensing model keeps from step to step; all zero before
-            its first.
-        sets_wind: a wrench effect that changes the wind in ``state``: asked before all others.
+        advance: compiled C function, for a wrench with a state of its own.
+        memory: numbers kept by a rotor-input or sensing model from step to step; all zero at first.
+        sets_wind: a wrench effect changes the wind in ``state``: called before all others.
         amend: function from a vehicle and coefficients to the changed vehicle, for an effect on
             the rigid body.
-        family: what kind of physics it is; the words are explained in ``declaration``.
-        role: what it is to a fit that must know one effect by what it does, not by its name.
-        needs: what a flight must have to show it.
-        any_size: what it changes may be of any size: a load, a fault of assembly. Others are of
-            the order of their typical sizes.
-        scales_noise: a sensing effect that multiplies what is measured, and with it the
-            measurement's noise.
-        starting_points: of a law whose coefficients do nothing one by one: sets of coefficients of
-            which one is near enough to whatever a flight may hold.
+        family: kind of physics; ``declaration`` explains the words.
+        role: part in a fit, for code without knowledge of names.
+        needs: properties of logs without which the effect cannot be told.
+        any_size: the change may be of any size: a load, a fault of assembly. Others are of the
+            order of their typical sizes.
+        scales_noise: a sensing effect multiplies the measurement, and its noise.
+        starting_points: for a law without effect of any coefficient alone: sets of coefficients,
+            one of them near enough to any flight's.
         possible: joint bounds: whether a vehicle can have these coefficients together.
-        implausible: why found coefficients are no physics of this effect, as the rest of a sentence
-            that begins with its name; empty where they are.
+        implausible: why fitted coefficients are no physics of this effect, as the rest of a
+            sentence after its name; empty where they are.
 
     Raises:
-        InputError: a word that there is not, or coefficients that the role does not have.
+        InputError: an unknown word, or coefficients of another role.
     """
 
     name: str

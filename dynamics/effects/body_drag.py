@@ -13,11 +13,11 @@ from .base import Effect, along, compiled_model
 from .declaration import Family, Found, Role
 from .parts import add_force_at, air_velocity
 
-# share of a body's drag along its most exposed axis, that another axis must have: true ones, as
-# found on six seeds, had 0.78 and more, RotorPy's 0.34 and more, and what was named body_drag where
-# the library lacked the rotors' inflow 0.00 to 0.02
+# share of a body's drag along its most exposed axis, that another axis must have. On six seeds true
+# drags had 0.78 and more, RotorPy's 0.34 and more. Without the rotors' inflow in the library,
+# wrongly named ones had 0.00 to 0.02
 _LEAST_SHARE_OF_LARGEST = 0.15
-_SIGNIFICANCE = 2.0  # standard deviations by which it is less
+_SIGNIFICANCE = 2.0  # standard deviations of the difference
 
 
 @compiled_model

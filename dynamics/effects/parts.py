@@ -1,4 +1,4 @@
-"""Parts that several effect models share, on the pointers that a model is given."""
+"""Shared parts of effect models, on the pointers given to a model."""
 
 import math
 from typing import Any
@@ -18,8 +18,7 @@ from .base import (
 )
 
 _SPACING = 0.0045  # s, least time between two kept entries of a delay line
-# the longest of three steps between entries over the shortest, up to which a cubic is drawn through
-# all four
+# largest ratio of the longest of three steps to the shortest, for a cubic through all four
 _EVEN = 2.5
 
 # An array of a C function, in the layout of base.py
@@ -136,12 +135,12 @@ def delay(
 ) -> None:
     """Replace ``width`` numbers of ``values`` from ``at`` on by what they were ``wanted`` s ago.
 
-    ``memory`` is the delay line: how many entries there are, the time since the last was added (the
-    caller adds to it), and the entries, each an age and its numbers, the newest first. Between
-    entries runs the cubic through the nearest four, within their range: a line between two would
-    damp noise by how far from either it is, and the delay that fits a noisy log best would be the
-    one that damps most. Where the four are not about evenly apart a line must do; before the oldest
-    it holds. A line that is fed faster than 200 Hz keeps no more than 200 entries a second.
+    ``memory`` is the delay line: the number of entries, the time since the last new one (summed by
+    the caller), and the entries. The newest is first; an entry is an age and its numbers. Between
+    entries runs the cubic through the nearest four, within their range. A line between two would
+    damp noise by its distance from both. The best fit of a noisy log would be the delay with most
+    damping. Four unevenly spaced entries get a line; before the oldest the value is held. A delay
+    line fed faster than 200 Hz keeps at most 200 entries a second.
     """
     size = width + 1
     count = int(memory[0])

@@ -3,8 +3,8 @@
 from .base import RATE, Effect, along, compiled_model
 from .declaration import Family, Found, Need, Role
 
-# share of the damping about z that must act about x and y: rotors at the arms, which climb and
-# sink, damp these axes more
+# least share of the damping about z, about x and y: rotors at the arms climb and sink, and damp
+# these axes more
 _LEAST_SHARE_OF_YAW = 0.3
 
 

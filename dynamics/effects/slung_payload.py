@@ -32,7 +32,7 @@ from .base import (
 from .declaration import Coefficients, Family, Found, Role, Unexplained
 from .parts import add_force_at
 
-_LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, of cables from which a fit starts
+_LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, cables at the start of a fit
 _DAMPINGS = (0.3, 2.0)  # 1/s, the same
 _LEAST_LENGTH = 0.1  # typical lengths
 _MOST_DAMPING_RATIO = 0.2  # of a load that swings in air

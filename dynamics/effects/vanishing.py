@@ -1,8 +1,9 @@
 """Whether a law does nothing while all its coefficients but one are zero.
 
-A diagnosis adds an effect by what each of its coefficients changes beside a model that lacks it. A
-wind and its drag, or a load's mass and its cable, do nothing alone: no such column leads to them,
-and they would never be proposed. Such a law must say where a fit starts (``starting_points``).
+A diagnosis adds an effect by the change from each of its coefficients beside a model without the
+effect. A wind and its drag, or a load's mass and its cable, do nothing alone: no such column leads
+to them, and they would never be proposed. Such a law must say where a fit starts
+(``starting_points``).
 """
 
 import ctypes
@@ -32,8 +33,8 @@ def does_nothing_alone(effect: Effect) -> bool:
     """Return whether none of an effect's coefficients does anything to random states of a random
     vehicle while the others are zero, though together they do.
 
-    Where it acts at no state nothing is known, and so it is for a body effect, which has no model
-    of a flight.
+    Without an action at any state nothing is known; nor for a body effect, without a model of a
+    flight.
     """
     if effect.model is None:
         return False
@@ -52,7 +53,7 @@ def does_nothing_alone(effect: Effect) -> bool:
 
 
 def _flown(effect: Effect, coefficients: Array) -> Array:
-    """Return what a law makes of each random state (samples, ...)."""
+    """Return a law's result at each random state (samples, ...)."""
     rng = np.random.default_rng(1)
     c, wrench = np.zeros(ROW_SIZE), np.zeros(6)
     c[: len(coefficients)] = coefficients

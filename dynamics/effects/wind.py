@@ -34,9 +34,9 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
-    """Return winds along the mean force, and along the part of the force that goes like a slow
-    wind's part of a drag: a wind does nothing without a drag, nor this drag without a wind. Where
-    the vehicle has another drag, a wind may act on this one alone.
+    """Return winds along the mean force, and along the force's part with the form of a slow wind's
+    drag: a wind does nothing without a drag, nor this drag without a wind. Where the vehicle has
+    another drag, a wind may act on this one alone.
 
     That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may act.
     """

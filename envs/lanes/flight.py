@@ -1,15 +1,15 @@
 """A tick of several closed loops side by side: the plant's, the flight loop's and the filter's own
 functions, compiled for lanes (``runtime.vector_lanes``).
 
-MuJoCo is not called here. What it does with a free rigid body, one semi-implicit Euler step, is
-``fly_freely``, whose equations of motion are those of the filter's prediction.
+MuJoCo is not called here. Its semi-implicit Euler step of a free rigid body is ``fly_freely``, by
+the equations of motion of the filter's prediction.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...controllers.flight import FLIGHT, FlightGains, move_setpoint
+from ...controllers.flight import FLIGHT, FlightGains, move_setpoint, steer
 from ...dynamics.motion import BODY, Array, accelerations, rotor_wrench
 from ...dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ...estimator.ukf_lanes import (
@@ -29,10 +29,8 @@ from ..closed_loop import (
     ClosedLoop,
     accelerate,
     blow_at,
-    fly_beside,
 )
 from ..fan import FAN, STATIONS
-from ..observing import Episodes, Motion
 from ..plant import (
     NOISE,
     PLANT,
@@ -47,15 +45,16 @@ from ..plant import (
     lose_pose,
     measure,
 )
+from ..state import Episodes, Motion
 
 
 def _between(form: np.dtype, first: str, last: str) -> tuple[str, ...]:
-    """Return the names of a structured type's fields from one to another."""
+    """Return the names of a structured type's fields from ``first`` to ``last``."""
     names = form.names or ()
     return names[names.index(first) : names.index(last) + 1]
 
 
-# the true body is each vehicle's own, the declared one that of all
+# the true body is each vehicle's own, the declared one everybody's
 _BODY = LaneRecord(BODY, ("mass", "inertia", "inverse_inertia"), ("gravity", "com", "k", "mixing"))
 _PLANT = LaneRecord(
     PLANT,
@@ -73,25 +72,18 @@ _FAN = LaneRecord(
     ("speed", "rotor_drag", "hull_area", "gusts", "y", "height", "air"),
     ("turbulence", "keep", "mixing", "stations", "blown"),
 )
-# fields of a closed loop's own record that differ from lane to lane, and that do not
+# fields of a closed loop's own record: each lane's own, and common to all
 _OWN = (
     *("qpos", "qvel", "xfrc", "acceleration", "noise"),
     *("action", "specific", "thrust", "accelerometer_bias"),
 )
 _COMMON = ("none", "accelerometer_sigma")
-LOOPS = LaneRecord(
-    LOOP,
-    _OWN,
-    _COMMON,
-    {"plant": _PLANT, "flight": _FLIGHT, "fan": _FAN},
-)
+LOOPS = LaneRecord(LOOP, _OWN, _COMMON, {"plant": _PLANT, "flight": _FLIGHT, "fan": _FAN})
 _loop_at = LOOPS.at
 
 
-class Drawn(NamedTuple):
-    """Fields of the blocks' records that ``fly_blocks`` reads and writes beside their motion,
-    (blocks, ..., WIDTH).
-    """
+class BlockFields(NamedTuple):
+    """Fields (blocks, ..., WIDTH) of the records for ``fly_blocks``, beside the motion."""
 
     noise: Array
     fan_y: Array
@@ -130,13 +122,12 @@ def fly_freely(loop: Record, dt: float) -> None:
 
 @compiled
 def tick_lanes(
-    address: int, work: int, step: int, jet: Array, accelerates: bool, feels: bool
+    address: int, work: int, step: int, jet: Array, follows: bool, kind: int, feels: bool
 ) -> None:
-    """Do what ``closed_loop.run_ticks`` does in a tick but for its winds, and then MuJoCo, with the
-    loops whose record lies at ``address``.
+    """Fly a tick of the loops with their record at ``address``: ``closed_loop.run_ticks`` without
+    winds, and then the rigid body.
 
-    Their filters are in hand in the record at ``work``, and ``step`` is the address of those's
-    step.
+    The record at ``work`` holds their filters in hand; ``step`` is the address of their step.
     """
     loop, f = _loop_at(address), in_hand(work)
     plant, flight, fan, qpos, qvel = loop.plant, loop.flight, loop.fan, loop.qpos, loop.qvel
@@ -146,9 +137,9 @@ def tick_lanes(
     for i in range(11):
         f.z[i] = plant.z[i]
     call_at(step, work)
-    if not accelerates:
+    if not follows:
         move_setpoint(flight, f.x, TICK)
-    fly_beside(flight, f.x, loop.action)
+    steer(flight, f.x, loop.action, kind, TICK)
     follow(plant, flight.command)
     log_speeds(plant, plant.speeds)
     rotor_wrench(plant.body, plant.speeds, plant.rotor_wrench)
@@ -171,7 +162,7 @@ def fly_blocks(
     work: int,
     step: int,
     jet: Array,
-    drawn: Drawn,
+    fields: BlockFields,
     motion: Motion,
     generators: Any,
     slots: np.ndarray,
@@ -180,7 +171,10 @@ def fly_blocks(
     winds: np.ndarray,
     ticks: int,
     noise_size: int,
-    accelerates: bool,
+    follows: bool,
+    kind: int,
+    moves: bool,
+    places: np.ndarray,
 ) -> None:
     """Fly blocks ``begin`` to ``end - 1`` of loops side by side.
 
@@ -189,19 +183,22 @@ def fly_blocks(
         end: likewise.
         loops: address of the first block's record, of ``LOOPS``, and a record's bytes.
         kept: the same of the blocks' filters, of ``ukf_lanes``.
-        work: address of a record for a block of filters in hand, this thread's own.
+        work: address of this thread's own record for a block of filters in hand.
         step: address of the step of a block of filters.
-        jet: (2, COUNT_X, COUNT_R) of the jet's table.
-        drawn: what this writes into the records.
-        motion: of the blocks.
-        generators: (n,) of the environments; a typed list.
-        slots: (lanes,) the environment in each lane; -1: none flies there, and none draws.
-        episodes: of the environments; ticks are written.
-        calls: (n, winds, 2) of the environments' winds.
-        winds: (n,) how many they are.
-        ticks: of ``TICK`` s.
+        jet: (2, COUNT_X, COUNT_R) table of the jet.
+        fields: parts of the records, written here.
+        motion: the blocks' motion.
+        generators: (n,) the environments' own, as a typed list.
+        slots: (lanes,) the environment in each lane; -1: no flight and no draws.
+        episodes: the environments' episodes; ticks are written.
+        calls: (n, winds, 2) the environments' winds.
+        winds: (n,) their number.
+        ticks: number of ticks of ``TICK`` s.
         noise_size: unit normals of a tick.
-        accelerates: whether commands are accelerations beside a reference, or velocities.
+        follows: whether the set point is a row of the reference, or moves by itself.
+        kind: of the commands, as of ``controllers.flight.steer``.
+        moves: whether commands are velocities of the set point.
+        places: (commands,) indices of the commands in the set point, or in the loop's ``action``.
     """
     pose, rotation, time = np.empty(7), np.empty((3, 3)), np.empty(1)
     points, air = np.empty((3, STATIONS)), np.empty((3, STATIONS))
@@ -216,10 +213,10 @@ def fly_blocks(
         for lane in range(WIDTH):
             n = members[lane]
             for i in range(episodes.commands.shape[1] if n >= 0 else 0):
-                if accelerates:
-                    drawn.action[b, i, lane] = episodes.commands[n, i]
+                if moves:
+                    fields.setpoint[b, places[i], lane] = episodes.commands[n, i]
                 else:
-                    drawn.setpoint[b, 4 + i, lane] = episodes.commands[n, i]
+                    fields.action[b, places[i], lane] = episodes.commands[n, i]
         for k in range(ticks):
             for lane in range(WIDTH):
                 n = members[lane]
@@ -227,23 +224,22 @@ def fly_blocks(
                     continue
                 now = max(first[n] + k, 0)
                 row = min(now, episodes.paths.shape[1] - 1)
-                drawn.fan_y[b, lane] = episodes.paths[n, row, 0]
-                drawn.fan_height[b, lane] = episodes.paths[n, row, 1]
-                if accelerates:
+                fields.fan_y[b, lane] = episodes.paths[n, row, 0]
+                fields.fan_height[b, lane] = episodes.paths[n, row, 1]
+                if follows:
                     row = min(now, episodes.references.shape[1] - 1)
                     for i in range(episodes.references.shape[2]):
-                        drawn.setpoint[b, i, lane] = episodes.references[n, row, i]
+                        fields.setpoint[b, i, lane] = episodes.references[n, row, i]
                 if winds[n] > 0 and (first[n] + k) % WIND_EVERY == 0:
                     time[0] = now * TICK
                     pose[:] = motion.position[b, :, lane]
-                    blow_at(
-                        calls[n, : winds[n]], time, pose, drawn.stations[b], rotation, points, air
-                    )
+                    own = calls[n, : winds[n]]
+                    blow_at(own, time, pose, fields.stations[b], rotation, points, air)
                     motion.air[b, :, :, lane] = air.T
                 generator = generators[n]
                 for i in range(noise_size):
-                    drawn.noise[b, i, lane] = generator.standard_normal()
-            tick_lanes(loop, work, step, jet, accelerates, feels)
+                    fields.noise[b, i, lane] = generator.standard_normal()
+            tick_lanes(loop, work, step, jet, follows, kind, feels)
         for n in members:
             if n >= 0:
                 first[n] += ticks
@@ -252,11 +248,10 @@ def fly_blocks(
         put_down(block, work)
 
 
-class Blocks:
-    """Memory of closed loops side by side, as many to a block as there are lanes.
+class LoopBlocks:
+    """Memory of closed loops side by side, one to each lane of a block.
 
-    All stand where ``like`` stands, whose settings are those of all but for what can vary from
-    episode to episode.
+    All stand where ``like`` stands, and share the settings of ``like`` but for an episode's own.
     """
 
     def __init__(self, count: int, like: ClosedLoop) -> None:
@@ -264,7 +259,7 @@ class Blocks:
         LOOPS.share(self.loops, _single(like))
         for block in range(count):
             self.put(block, slice(None), like)
-        # what ``fly_blocks`` takes: addresses and bytes of the records of loops and filters
+        # addresses and bytes of the records of loops and filters, for ``fly_blocks``
         self.addresses = tuple(
             (int(records.ctypes.data), records.itemsize) for records in (self.loops, self.filters)
         )
@@ -275,11 +270,12 @@ class Blocks:
             loops["qvel"],
             loops["plant"]["external"],
             self.filters["x"],
+            self.filters["P"],
             loops["specific"],
             loops["thrust"],
             fan["air"],
         )
-        self.drawn = Drawn(
+        self.fields = BlockFields(
             loops["noise"],
             fan["y"],
             fan["height"],
@@ -289,7 +285,7 @@ class Blocks:
         )
 
     def __len__(self) -> int:
-        """Return how many blocks there are."""
+        """Return the number of blocks."""
         return len(self.loops)
 
     def put(self, block: int, lanes: slice, loop: ClosedLoop) -> None:
@@ -297,7 +293,7 @@ class Blocks:
         LOOPS.write(self.loops, block, lanes, _single(loop))
         write_lanes(self.filters, block, lanes, loop.ukf.record)
 
-    def take(self, block: int, lane: int, other: "Blocks", source: int) -> None:
+    def take(self, block: int, lane: int, other: "LoopBlocks", source: int) -> None:
         """Let a lane of a block stand where the same lane of another's block stands."""
         for mine, theirs in (
             (LOOPS.columns(self.loops), LOOPS.columns(other.loops)),
@@ -307,7 +303,7 @@ class Blocks:
 
 
 def _single(loop: ClosedLoop) -> dict[str, Any]:
-    """Return what a closed loop's record and MuJoCo hold, by the names of ``LOOPS``."""
+    """Return the contents of a closed loop's record and of MuJoCo, by the names of ``LOOPS``."""
     record = loop.record[0]
     names = ("plant", "flight", "fan", *_OWN, *_COMMON)
     pose = {"qpos": loop.world.qpos, "qvel": loop.world.qvel}

@@ -2,30 +2,27 @@
 
 from collections import deque
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
-from gymnasium.utils.seeding import np_random
 from numba import typed, typeof
 
+from ...controllers.flight import BESIDE
 from ...dynamics.motion import Array
 from ...estimator.ukf_lanes import new_work, step_address
 from ...runtime.compiled import compiled
-from ...runtime.errors import InputError, unknown_name
+from ...runtime.errors import InputError
 from ...runtime.vector_lanes import WIDTH
 from ..closed_loop import ClosedLoop
-from ..fan_tracking import FanTrackingEnv
-from ..fan_tracking_2d import FanTracking2DEnv
-from ..observing import Flags, Motion
+from ..definition import TaskDefinition
 from ..plant import TICK
-from ..task import SETTLE_TICKS, Task, true_motion
-from ..vector import TaskVectorEnv
+from ..state import Flags, gather
+from ..truth import true_motion
+from ..vector import SETTLE_TICKS, TaskVectorEnv
 from ..wind.field import Sum
-from ..wind_tasks import WindHoverEnv, WindTrajectoryEnv
-from .flight import Blocks, fly_blocks
+from .flight import LoopBlocks, fly_blocks
 
-_LARGEST = 1e10  # of a number that MuJoCo goes on with
+_LARGEST = 1e10  # beyond it MuJoCo starts over
 _GENERATOR = typeof(np.random.default_rng(0))
 
 
@@ -33,51 +30,40 @@ class TaskLanes(TaskVectorEnv):
     """``TaskVectorEnv`` without MuJoCo: plant, filter and flight loop side by side, an environment
     in each lane of a vector unit.
 
-    An episode is that of the MuJoCo environment with its seed, to rounding: the same draws of the
-    same generators, the same equations in the same order, and MuJoCo's integrator written out for
-    the one free body there is. It is the same bit for bit for any ``num_envs`` and ``threads``.
-    Observation, reward, ``infos`` and autoreset modes are those of ``TaskVectorEnv``.
+    An episode equals the MuJoCo environment's with its seed, to rounding: the same draws of the
+    same generators and the same equations in the same order. MuJoCo's integrator is written out
+    for the one free body. Bits depend on neither ``num_envs`` nor ``threads``. Observation, reward,
+    ``infos`` and autoreset modes are those of ``TaskVectorEnv``.
 
     All scenarios fly, with any ``vehicle``, ``truth``, ``fan``, ``settings``, ``fan_path``,
-    ``gains``, view and compiled ``winds``. What does not, and is refused: effects other than those
-    of the rigid body (mass, inertia, com_offset), declared or not; ``estimator="constant-gain"``;
-    ``render_mode``; ``stages`` and winds of one's own; a task with its own ``fly``, ``draw_loop``
-    or ``_begin``. One environment draws the episodes of all: an override of ``hover`` or
-    ``make_loop`` must keep nothing from episode to episode.
+    ``gains``, action, observation and compiled ``winds``. Effects beyond the rigid body's (mass,
+    inertia, com_offset) are refused, declared or not. So are ``estimator="constant-gain"``,
+    ``render_mode``, ``stages``, winds of one's own, and a task that ``mixes`` scenarios.
 
     Args:
-        num_envs: how many.
+        num_envs: number of environments.
         *args: as of ``TaskVectorEnv``.
         **kwargs: likewise.
 
     Raises:
-        InputError: what does not fly in lanes, or what ``TaskVectorEnv`` refuses.
+        InputError: lanes or ``TaskVectorEnv`` refuse an argument.
     """
 
-    called = TaskVectorEnv.called - {"_begin", "draw_loop", "fly"}
-
-    def _make_envs(self, kwargs: dict[str, Any]) -> list[Task]:
-        """Return one environment: it says what all are, and never flies."""
-        return [self.task(**kwargs)]
-
-    def _make_memory(self) -> Motion:
-        """Make what ``_fly`` works on; return the motion of all."""
-        env = self.envs[0]
-        self._like = env.make_loop(env.truth, env.fan)
-        _refuse(env, self._like)
-        # each environment's own; one that was not reset yet has another's
-        self._generators = generator_list([np.random.default_rng(0)] * self.num_envs)
+    def _make_memory(self) -> None:
+        self._like = self.task.make_loop(self.task.truth, self.task.fan)
+        _refuse(self.task, self._like)
+        # the loop of which all are drawn; the next draw overwrites it
+        self._kept = [{self.task.scenario: self._like}] * self.num_envs
+        self._typed = generator_list(self.generators)
         self._step = step_address()
-        self._flying = Blocks(-(-self.num_envs // WIDTH), self._like)
-        self._settling = Blocks(0, self._like)
+        self._flying = LoopBlocks(-(-self.num_envs // WIDTH), self._like)
+        self._settling = LoopBlocks(0, self._like)
         self._works: deque[np.ndarray] = deque()
-        self._seeded = np.zeros(self.num_envs, dtype=np.bool_)
-        self._blowing: list[Sum] = [Sum()] * self.num_envs  # what ``_calls`` has the addresses of
+        self._blowing: list[Sum] = [Sum()] * self.num_envs  # keeps the winds at ``_calls``
         self._lay_calls()
-        return self._flying.motion
 
     def _lay_calls(self) -> None:
-        """Write down where the winds of all environments are: (n, winds, 2), and how many."""
+        """Write down the addresses (n, winds, 2) and numbers (n,) of the environments' winds."""
         most = max(len(winds.calls) for winds in self._blowing)
         self._calls = np.zeros((self.num_envs, most, 2), dtype=np.int64)
         self._winds = np.array([len(winds.calls) for winds in self._blowing])
@@ -85,45 +71,46 @@ class TaskLanes(TaskVectorEnv):
             self._calls[i, : len(winds.calls)] = winds.calls
 
     def truth(self) -> dict[str, Array]:
-        """Return the true motion and the integral of the flight loop as ``Task`` tells an oracle of
-        them, a row an environment.
-        """
-        loops, vehicle = self._flying.loops, self.envs[0].vehicle
-        values = *self._motion[:2], loops["plant"]["speeds"], loops["flight"]["sum"]
+        """Return an oracle's true motion and the flight loop's integral, a row an environment."""
+        loops, vehicle = self._flying.loops, self.task.vehicle
+        values = *self._flying.motion[:2], loops["plant"]["speeds"], loops["flight"]["sum"]
         rows = zip(*map(self._rows, values), strict=True)
         known = [true_motion(vehicle, *row) for row in rows]
         return {name: np.array([one[name] for one in known]) for name in known[0]}
 
+    def _rows(self, values: Array) -> Array:
+        """Return values (rows, size, lanes) of the vehicles as (num_envs, size)."""
+        rows: Array = np.moveaxis(values, 1, 2).reshape(-1, values.shape[1])
+        return rows[: self.num_envs]
+
     def late(self) -> Array:
-        """Return by how much (n,) s an answer of the flight loop is late: that of the actuators
-        and that of the pose.
-        """
+        """Return the delay (n,) s of the flight loop's answer: actuators and pose."""
         plant = self._flying.loops["plant"]
         ticks: Array = plant["actuator_late"] + plant["pose_late"]
         return TICK * ticks.ravel()[: self.num_envs]
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
-        for name in ("_like", "_motion", "_settling", "_works"):
+        for name in ("_like", "_kept", "_settling", "_works", "_calls", "_typed"):
             del state[name]
-        memory = self._flying.loops, self._flying.filters
-        return state | {"_generators": list(self._generators), "_flying": memory}
+        return state | {"_flying": (self._flying.loops, self._flying.filters)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._motion = self._make_memory()
-        self._generators = generator_list(state["_generators"])
-        self._seeded, self._blowing = state["_seeded"], state["_blowing"]
+        super().__setstate__(state)
+        self._make_memory()
+        self._blowing = state["_blowing"]
         self._flying.loops[...], self._flying.filters[...] = state["_flying"]
         self._lay_calls()
 
-    def _fly_blocks(self, blocks: Blocks, slots: np.ndarray, ticks: int) -> None:
-        """Fly blocks in which ``slots`` (lanes,) say whose vehicle is in a lane; -1: nobody's. Each
-        thread has a record of its own for the filters in hand.
+    def _fly_blocks(self, blocks: LoopBlocks, slots: np.ndarray, ticks: int, kind: int) -> None:
+        """Fly blocks with the vehicles of ``slots`` (lanes,) in their lanes; -1: none. Each thread
+        has a record of its own for the filters in hand.
         """
         count = len(slots) // WIDTH
         parts = 1 if self.threads == 1 else count
-        given = self._generators, slots, self._episodes, self._calls, self._winds, ticks
+        flown = self.task.flown
+        given = self._typed, slots, self.episodes, self._calls, self._winds, ticks
+        how = self._like.noise_size, flown.follows, kind, flown.moves, flown.places
 
         def fly(part: int) -> None:
             try:
@@ -133,9 +120,9 @@ class TaskLanes(TaskVectorEnv):
             try:
                 first, last = part * count // parts, (part + 1) * count // parts
                 memory = *blocks.addresses, work.ctypes.data, self._step, self._like.jet_table
-                flown = blocks.drawn, blocks.motion, *given
-                kind = self._like.noise_size, self.envs[0].accelerates
-                self._call(fly_blocks, first, last, *memory, *flown, *kind)
+                self._call(
+                    fly_blocks, first, last, *memory, blocks.fields, blocks.motion, *given, *how
+                )
             finally:
                 self._works.append(work)
 
@@ -144,53 +131,46 @@ class TaskLanes(TaskVectorEnv):
     def _fly(self, which: Flags) -> None:
         slots = np.full(len(self._flying) * WIDTH, -1)
         slots[: self.num_envs][which] = np.flatnonzero(which)
-        self._fly_blocks(self._flying, slots, self.envs[0].decision_ticks)
-        self._call(start_over, which, *self._motion[:2], self._episodes.broken)
+        self._fly_blocks(self._flying, slots, self.task.decision_ticks, self.task.flown.kind)
+        self._start_over(which)
 
-    def _hover(self, which: list[int], seeds: Sequence[int | None]) -> None:
-        env, vehicles = self.envs[0], {}
-        for i, seed in ((i, seeds[i]) for i in which):
-            if not self._seeded[i] or seed is not None:
-                self._generators[i], self._seeded[i] = np_random(seed)[0], True
-            env.np_random = self._generators[i]
-            env.draw_loop()
-            vehicles[i] = env.loop, env.drawn
-        for _ in range(env.draws):
-            self._settle(which, vehicles)
-            drawn = np.isin(np.arange(self.num_envs), which)
-            self._call(start_over, drawn, *self._motion[:2], self._episodes.broken)
-            self._call(
-                self.task.look, drawn, self._episodes, self._motion, self._whole, self._table
-            )
-            which = np.flatnonzero(drawn & self._table["lost"]).tolist()
-            if not which:
-                return
-        env.refuse_draws()
+    def _start_over(self, which: Flags) -> None:
+        """Let environments with numbers too large start over, and gather the state of all."""
+        motion, episodes, s = self._flying.motion, self.episodes, self.state
+        self._call(start_over, which, *motion[:2], episodes.broken)
+        self._call(gather, 0, self.num_envs, 0, motion, episodes, s.rows, s.flying)
 
-    def _settle(self, which: list[int], vehicles: dict[int, Any]) -> None:
-        """Draw episodes for drawn vehicles, and let these hover at the start."""
-        env, places = self.envs[0], _places(which)
-        count = 1 + max((block for block, _ in places.values()), default=-1)
-        if count > len(self._settling):
-            self._settling = Blocks(count, self._like)
-        settling, slots = self._settling, np.full(count * WIDTH, -1)
-        for i, (block, lane) in places.items():
-            env.np_random = self._generators[i]
-            env.take_loop(*vehicles[i])
-            env.hover()
-            self._draw(i, env)
-            self._blowing[i] = env.loop.winds
-            settling.put(block, slice(lane, lane + 1), env.loop)
-            slots[WIDTH * block + lane], self._episodes.ticks[i] = i, -SETTLE_TICKS
-            self._episodes.commands[i] = 0.0
+    def _hover(self, which: list[int]) -> None:
+        """Let drawn vehicles hover at the start, each in its own lane of a block of others."""
+        taken, self._places = [0] * WIDTH, {}
+        for i in which:
+            self._places[i] = taken[i % WIDTH], i % WIDTH
+            taken[i % WIDTH] += 1
+        if max(taken) > len(self._settling):
+            self._settling = LoopBlocks(max(taken), self._like)
+        super()._hover(which)
+
+    def _place(self, i: int, loop: ClosedLoop) -> None:
+        block, lane = self._places[i]
+        self._settling.put(block, slice(lane, lane + 1), loop)
+        self._blowing[i], self.episodes.ticks[i] = loop.winds, -SETTLE_TICKS
+        self._typed[i] = self.generators[i]
+
+    def _settle(self, which: list[int]) -> None:
+        slots = np.full(len(self._settling) * WIDTH, -1)
+        for i in which:
+            block, lane = self._places[i]
+            slots[WIDTH * block + lane] = i
         self._lay_calls()
-        self._fly_blocks(settling, slots, SETTLE_TICKS)
-        for i, (block, lane) in places.items():
-            self._flying.take(i // WIDTH, lane, settling, block)
+        self._fly_blocks(self._settling, slots, SETTLE_TICKS, BESIDE)
+        for i in which:
+            block, lane = self._places[i]
+            self._flying.take(i // WIDTH, lane, self._settling, block)
+        self._start_over(np.isin(np.arange(self.num_envs), which))
 
 
 def generator_list(generators: Sequence[np.random.Generator]) -> Any:
-    """Return generators as a typed list, which compiled code takes at no cost a generator."""
+    """Return generators as a typed list, at no cost a generator in compiled code."""
     listed = typed.List.empty_list(_GENERATOR)
     for generator in generators:
         listed.append(generator)
@@ -199,7 +179,7 @@ def generator_list(generators: Sequence[np.random.Generator]) -> Any:
 
 @compiled
 def start_over(which: Flags, position: Array, velocity: Array, broken: Flags) -> None:
-    """Let environments start over, as MuJoCo does, whose numbers are too large or not finite."""
+    """Let environments with numbers too large or not finite start over, as MuJoCo does."""
     for n in np.flatnonzero(which):
         b, lane = n // WIDTH, n % WIDTH
         p, v = position[b, :, lane], velocity[b, :, lane]
@@ -209,20 +189,8 @@ def start_over(which: Flags, position: Array, velocity: Array, broken: Flags) ->
             p[3] = 1.0
 
 
-def _places(which: list[int]) -> dict[int, tuple[int, int]]:
-    """Return block and lane in which each environment settles: in its own lane, of the first block
-    that has the lane free.
-    """
-    taken = [0] * WIDTH
-    places = {}
-    for i in which:
-        places[i] = taken[i % WIDTH], i % WIDTH
-        taken[i % WIDTH] += 1
-    return places
-
-
-def _refuse(env: Task, loop: ClosedLoop) -> None:
-    """Refuse what does not fly in lanes."""
+def _refuse(task: TaskDefinition, loop: ClosedLoop) -> None:
+    """Refuse arguments without a flight in lanes."""
     record = loop.record[0]
     called = any(
         record[part][f"{kind}_count"]
@@ -230,40 +198,12 @@ def _refuse(env: Task, loop: ClosedLoop) -> None:
         for kind in ("wrench", "rotor", "sensing")
     )
     for wrong, what in (
-        (env.render_mode is not None, f"is not drawn, got render_mode={env.render_mode!r}"),
-        (env.estimator != "ukf", f"flies the full filter 'ukf', got estimator={env.estimator!r}"),
+        (task.render_mode is not None, f"is not drawn, got render_mode={task.render_mode!r}"),
+        (task.estimator != "ukf", f"flies the full filter 'ukf', got estimator={task.estimator!r}"),
         (called, "flies no effects but mass, inertia and com_offset, and the vehicle has others"),
-        (env.stages, "runs no stages of your own"),
-        (Sum(*(getattr(env, "winds", None) or ())).own, "has no winds of your own"),
+        (task.stages, "runs no stages of your own"),
+        (task.mixes, "flies one scenario"),
+        (Sum(*(task.winds or ())).own, "has no winds of your own"),
     ):
         if wrong:
-            raise InputError(f"{env.name}: plant='lanes' {what}; plant='mujoco' does it")
-
-
-PLANTS: dict[str, type[TaskVectorEnv]] = {"mujoco": TaskVectorEnv, "lanes": TaskLanes}
-
-
-def make_vector(
-    task: type[Task], num_envs: int = 1, plant: str = "mujoco", **kwargs: Any
-) -> TaskVectorEnv:
-    """Return ``num_envs`` environments of a task side by side.
-
-    Args:
-        task: the class of its environment.
-        num_envs: how many.
-        plant: ``"mujoco"``, the reference (``TaskVectorEnv``), or ``"lanes"``, the same flight in
-            the lanes of a vector unit (``TaskLanes``): several times as fast.
-        **kwargs: of the class.
-
-    Raises:
-        InputError: an unknown plant, or what the class refuses.
-    """
-    if plant not in PLANTS:
-        raise unknown_name("plant", str(plant), PLANTS, f"{task.name}: plant")
-    return PLANTS[plant](num_envs, task=task, **kwargs)
-
-
-make_fan_tracking_vector = partial(make_vector, FanTrackingEnv)
-make_fan_tracking_2d_vector = partial(make_vector, FanTracking2DEnv)
-make_wind_hover_vector = partial(make_vector, WindHoverEnv)
-make_wind_trajectory_vector = partial(make_vector, WindTrajectoryEnv)
+            raise InputError(f"{task.name}: plant='lanes' {what}; plant='mujoco' does it")

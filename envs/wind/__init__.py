@@ -1,9 +1,8 @@
 """Winds: velocity fields of the air, evaluated at points of the world and in time.
 
 A wind is anything with ``velocity(points (n, 3) m, time s) -> (n, 3) m/s``, world frame. The winds
-of this room are compiled, which a flight needs that evaluates them at the stations of a vehicle 100
-times a second; they add up with ``+``. Any other wind flies as it is, and faster as a grid that it
-was sampled on (``on_grid``).
+of this room are compiled, for 100 evaluations a second at the stations of a vehicle; they add up
+with ``+``. Any other wind flies as it is, and faster sampled on a grid (``on_grid``).
 """
 
 from .adapters import (
@@ -12,7 +11,6 @@ from .adapters import (
     WindDrag,
     blow_crazyflow,
     blow_pybullet_drones,
-    isaac_lab_multirotor_type,
     pyflyt_wind_type,
 )
 from .field import CompiledWind, Sum, Wind, winds_of
@@ -37,7 +35,6 @@ __all__ = [
     "WindDrag",
     "blow_crazyflow",
     "blow_pybullet_drones",
-    "isaac_lab_multirotor_type",
     "low_altitude",
     "on_grid",
     "pyflyt_wind_type",

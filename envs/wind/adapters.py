@@ -1,8 +1,8 @@
-"""The same wind in other simulators, none of which is needed to make one.
+"""The same wind in other simulators, without an import of any.
 
 PyFlyt and RotorPy ask for the wind at points of the world in m, z up, and take m/s, as these winds
-do. crazyflow, gym-pybullet-drones and Isaac Lab take force and torque: those of ``WindDrag``. What
-drag a simulator has of its own comes on top.
+do. crazyflow and gym-pybullet-drones take force and torque: those of ``WindDrag``. A simulator's
+own drag comes on top.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class PyFlytWind:
 
     Args:
         wind: any.
-        np_random: PyFlyt's generator, which is not used: a wind has a seed of its own.
+        np_random: PyFlyt's generator, not used: a wind has a seed of its own.
     """
 
     def __init__(self, wind: Wind, np_random: np.random.Generator | None = None) -> None:
@@ -39,9 +39,9 @@ class PyFlytWind:
 
 
 def pyflyt_wind_type(wind: Wind) -> Callable[..., Any]:
-    """Return what PyFlyt's ``wind_type`` takes: a class whose objects are this wind.
+    """Return a class of this wind, for PyFlyt's ``wind_type``.
 
-    Where PyFlyt is installed the class counts as one of its ``WindFieldClass``.
+    With PyFlyt installed the class counts as one of its ``WindFieldClass``.
     """
 
     class _Field(PyFlytWind):
@@ -78,7 +78,7 @@ _CORNERS = np.sqrt(0.5) * np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 
 
 @dataclass(frozen=True)
 class WindDrag:
-    """What a wind does to quadrotors: linear drag of each rotor in the air where it is."""
+    """Drag of quadrotors in a wind: linear for each rotor, in the air at the rotor."""
 
     wind: Wind
     arm: float  # m, from the centre to each rotor
@@ -87,9 +87,14 @@ class WindDrag:
     def wrench(
         self, time: float, position: Array, rotation: Rotation, velocity: Array, rate: Array
     ) -> tuple[Array, Array]:
-        """Return force (n, 3) N and torque (n, 3) Nm about the centre, world, on n vehicles at
-        ``position`` m with ``rotation`` body to world, ``velocity`` m/s and angular velocity
-        ``rate`` rad/s, (n, 3), world.
+        """Return force (n, 3) N and torque (n, 3) Nm about the centre, world, on n vehicles.
+
+        Args:
+            time: s.
+            position: (n, 3) m, world.
+            rotation: body to world.
+            velocity: (n, 3) m/s, world.
+            rate: (n, 3) rad/s, world.
         """
         reach = np.stack([rotation.apply(self.arm * corner) for corner in _CORNERS], axis=1)
         points = (position[:, None] + reach).reshape(-1, 3)
@@ -124,7 +129,7 @@ def blow_pybullet_drones(env: Any, drag: WindDrag) -> None:
     Tested with its commit 90b178a and PyBullet 3.2.7.
 
     Raises:
-        InputError: several physics steps a control step, of which only the first would feel it.
+        InputError: several physics steps a control step; only the first would feel the wind.
     """
     import pybullet
 
@@ -136,31 +141,5 @@ def blow_pybullet_drones(env: Any, drag: WindDrag) -> None:
     time, rotation = env.step_counter * env.PYB_TIMESTEP, Rotation.from_quat(env.quat)
     force, torque = drag.wrench(time, env.pos, rotation, env.vel, env.ang_v)
     for body, at, f, t in zip(env.DRONE_IDS, env.pos, force, torque, strict=True):
-        place = -1, f, at, pybullet.WORLD_FRAME, env.CLIENT
-        pybullet.applyExternalForce(body, *place)
+        pybullet.applyExternalForce(body, -1, f, at, pybullet.WORLD_FRAME, env.CLIENT)
         pybullet.applyExternalTorque(body, -1, t, pybullet.WORLD_FRAME, env.CLIENT)
-
-
-def isaac_lab_multirotor_type(drag: WindDrag, clock: Callable[[], float]) -> type:
-    """Return a ``MultirotorCfg.class_type`` of Isaac Lab that flies in the wind; ``clock`` returns
-    the time in s, as ``lambda: sim.current_time``.
-
-    **Never run in Isaac Lab**: written by the documentation of 2.3.2, tested with a stand-in.
-    """
-    from isaaclab_contrib.assets import Multirotor
-
-    class WindyMultirotor(Multirotor):  # type: ignore[misc]
-        def _combine_thrusts(self) -> None:
-            super()._combine_thrusts()
-            data = self.data
-            moving = data.root_pos_w, data.root_quat_w, data.root_lin_vel_w, data.root_ang_vel_w
-            place, quaternion, velocity, rate = (
-                part.cpu().numpy().astype(np.float64) for part in moving
-            )
-            rotation = Rotation.from_quat(quaternion, scalar_first=True)
-            wrench = drag.wrench(clock(), place, rotation, velocity, rate)
-            targets = self._internal_force_target_sim, self._internal_torque_target_sim
-            for target, world in zip(targets, wrench, strict=True):
-                target[:, 0] += target.new_tensor(rotation.inv().apply(world))
-
-    return WindyMultirotor

@@ -1,4 +1,4 @@
-"""What a wind is, and how a flight evaluates one."""
+"""Winds as velocity fields, and their evaluation in a flight."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ...runtime.errors import InputError
 Array = NDArray[np.float64]
 Calls = NDArray[np.int64]
 
-# of a compiled wind's function: the address of its parameters, a count of points, and the addresses
-# of the time (1,) in s, of the points (3, count) in m and of the velocities (3, count) in m/s, to
-# which it adds
+# A compiled wind's function takes the address of its parameters, a count of points, and three more
+# addresses: time (1,) in s, points (3, count) in m, and velocities (3, count) in m/s, to be added
+# to.
 SIGNATURE = types.void(*[types.int64] * 5)
 
 
@@ -54,13 +54,13 @@ def add_winds(calls: Calls, time: Array, points: Array, velocities: Array) -> No
 class CompiledWind:
     """A wind of this room: its formula as a compiled function, and the formula's parameters.
 
-    A flight adds up the winds at the stations of a vehicle without Python: it holds the addresses
-    of the function and of the parameters alone, so that all kinds of winds are called alike.
+    A flight adds up the winds at the stations of a vehicle without Python. A flight holds the
+    addresses of function and parameters alone, and calls all kinds of winds alike.
 
     Args:
         function: the formula, a plain function of ``SIGNATURE``, compiled at its first use.
-        parameters: (1,) of a structured type, which states the fields and their units.
-        tables: arrays, by the fields that hold the address of their first number.
+        parameters: (1,) of a structured type, with stated fields and units.
+        tables: arrays, by the fields with the address of their first number.
 
     Attributes:
         calls: as ``add_winds`` takes them.
@@ -76,7 +76,7 @@ class CompiledWind:
         self._bind()
 
     def _bind(self) -> None:
-        """Write down where this process has the formula, its parameters and its tables."""
+        """Write down this process's addresses of the formula, its parameters and its tables."""
         function, parameters, tables = self._formula
         for name, table in tables.items():
             parameters[name] = table.ctypes.data
@@ -94,7 +94,7 @@ class CompiledWind:
         in s.
 
         Raises:
-            InputError: points of another shape, or numbers that are not finite.
+            InputError: points have another shape, or numbers are not finite.
         """
         rows, now = check_points(points, time), np.array([time], dtype=np.float64)
         out = np.zeros_like(rows)
@@ -106,7 +106,7 @@ class CompiledWind:
 
 
 class Sum(CompiledWind):
-    """The sum of winds: those of this room, and behind them ``own``, the user's own.
+    """The sum of winds: this room's, and behind them ``own``, the user's own.
 
     Raises:
         InputError: one of them is no wind.
@@ -144,7 +144,7 @@ def check_points(points: ArrayLike, time: float) -> Array:
     """Return points (n, 3) as rows (3, n).
 
     Raises:
-        InputError: another shape, or numbers that are not finite.
+        InputError: the shape is another, or numbers are not finite.
     """
     given = np.asarray(points, dtype=np.float64)
     if given.ndim != 2 or given.shape[1] != 3 or not np.all(np.isfinite(given)):
@@ -169,7 +169,7 @@ def vector(value: ArrayLike, name: str) -> Array:
 
 
 def number(value: float, name: str, above: float = -math.inf, least: float = -math.inf) -> float:
-    """Return a finite number that is greater than ``above``, and no less than ``least``.
+    """Return a finite number greater than ``above``, and no less than ``least``.
 
     Raises:
         InputError: something else.

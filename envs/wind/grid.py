@@ -1,9 +1,9 @@
 """Winds on a grid in time and space: from a file, or sampled from any other wind.
 
-Files: ``.npz`` with ``t`` (s), ``x``, ``y``, ``z`` (m), each (n,) and evenly spaced, and ``wind``
-(t, x, y, z, 3) m/s; or netCDF (``.nc``) with the coordinates ``time``, ``x``, ``y``, ``z`` in the
-same units and the variables ``u``, ``v``, ``w`` in any order of dimensions (needs xarray). A file
-without a time is steady.
+A file is ``.npz`` with ``t`` (s), ``x``, ``y``, ``z`` (m), each (n,) and evenly spaced, and
+``wind`` (t, x, y, z, 3) m/s. Or it is netCDF (``.nc``, needs xarray) with the coordinates ``time``,
+``x``, ``y``, ``z`` in the same units and the variables ``u``, ``v``, ``w`` in any order of
+dimensions. A file without a time is steady.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _LARGEST = 400_000_000  # bytes of a grid in memory
 
 GRID = np.dtype(
     [
-        ("first", "f8", (4,)),  # s and m, where the grid begins: t, x, y, z
+        ("first", "f8", (4,)),  # s and m, the grid's beginning: t, x, y, z
         ("step", "f8", (4,)),  # likewise, from point to point
         ("field", "i8"),  # address of the velocities (*counts, 3) m/s
         ("counts", "i8", (4,)),  # points along each
@@ -66,7 +66,7 @@ def _grid(parameters: int, count: int, time: int, points: int, velocities: int) 
 
 
 class GridWind(CompiledWind):
-    """A wind on a grid, interpolated linearly; beyond its ends it is as at the end.
+    """A wind on a grid, interpolated linearly; beyond an end as at the end.
 
     Args:
         axes: times (s) and places (m) of the grid along x, y and z, each (n,), evenly spaced.
@@ -74,7 +74,7 @@ class GridWind(CompiledWind):
         where: named in errors.
 
     Raises:
-        InputError: shapes that do not fit, axes that are not even, numbers that are not finite.
+        InputError: shapes do not fit, axes are not even, or numbers are not finite.
     """
 
     def __init__(
@@ -99,9 +99,7 @@ class GridWind(CompiledWind):
         if not np.all(np.isfinite(self.wind)):
             raise InputError(f"{where}: wind must be finite numbers in m/s")
         first = [axis[0] for axis in self.axes]
-        widths = [
-            (axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0 for axis in self.axes
-        ]
+        widths = [np.ptp(axis) / (len(axis) - 1) if len(axis) > 1 else 1.0 for axis in self.axes]
         parameters = np.array([(first, widths, 0, shape[:4])], dtype=GRID)
         super().__init__(_grid, parameters, {"field": self.wind})
 
@@ -109,17 +107,17 @@ class GridWind(CompiledWind):
 def on_grid(
     wind: Wind, low: ArrayLike, high: ArrayLike, step: float, times: ArrayLike = (0.0,)
 ) -> GridWind:
-    """Return any wind as it is on a grid, so that it can fly.
+    """Return any wind as a compiled one, sampled on a grid.
 
     Args:
         wind: with ``velocity(points (n, 3), time) -> (n, 3)``.
         low: (3,) m, a corner of the box.
         high: (3,) m, the opposite corner.
-        step: at most so far from point to point, m.
+        step: largest distance from point to point, m.
         times: (n,) s, evenly spaced.
 
     Raises:
-        InputError: no box, a grid that would be too large, or a wind that returns another shape.
+        InputError: no box, too large a grid, or a wind of another shape.
     """
     a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     when = np.atleast_1d(np.asarray(times, dtype=np.float64))
@@ -164,7 +162,7 @@ def read_wind(path: str | Path) -> GridWind:
         axes, wind = read(file)
     except InputError:
         raise
-    except Exception as error:  # whatever a parser makes of bytes that are none of its form
+    except Exception as error:  # a parser's own, on bytes of another form
         raise InputError(f"{file}: cannot be read as {what}: {error}") from error
     return GridWind((axes[0], axes[1], axes[2], axes[3]), wind, str(file))
 

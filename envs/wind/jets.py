@@ -1,8 +1,8 @@
 """Winds of rotors: walls of fans whose speeds change, and the wash of another vehicle.
 
-Each rotor blows the mean jet of ``dynamics.mean_jet``. Where jets overlap, their momentum fluxes
-add (Reichardt's hypothesis, which that jet follows, too): ``u^2 = sum u_i^2``; the air that they
-draw in adds as velocity.
+Each rotor blows the mean jet of ``dynamics.mean_jet``. The momentum fluxes of overlapping jets add:
+``u^2 = sum u_i^2``. This is Reichardt's hypothesis, also behind the mean jet. The air drawn in adds
+as velocity.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _SLOWEST = 1e-3  # m/s, at which a jet counts as off
 
 JETS = np.dtype(
     [
-        # addresses of the jet's tables (COUNT_X, COUNT_R), of the rotors' places (place_steps,
-        # jets, 3) m and speeds (steps, jets) m/s, and of the gusts' plane waves (waves, 7)
+        # addresses: the jet's tables (COUNT_X, COUNT_R), the rotors' places (place_steps, jets, 3)
+        # m and speeds (steps, jets) m/s, and the gusts' plane waves (waves, 7)
         *[(name, "i8") for name in ("axial", "radial", "places", "speeds", "modes")],
         *[(name, "i8") for name in ("place_steps", "steps", "jets", "waves")],
         ("axes", "f8", (3, 3)),  # rows: the jets' axes in the world, the one along the jets first
@@ -88,7 +88,7 @@ def _jets(parameters: int, count: int, time: int, positions: int, velocities: in
 
 
 def _axes(direction: Array) -> Array:
-    """Return axes (3, 3), rows, of which the first is ``direction``."""
+    """Return axes (3, 3), rows, the first along ``direction``."""
     along = direction / np.linalg.norm(direction)
     helper = np.array([0.0, 0.0, 1.0]) if abs(along[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
     side = np.cross(helper, along)
@@ -111,9 +111,8 @@ class _Jets(CompiledWind):
         number(gust_length, "gust_length", 0.0)
         table = np.zeros((0, 7))
         if turbulence > 0.0:
-            rng = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
             sizes = np.full(3, turbulence), np.full(3, gust_length)
-            table = waves(rng, "dryden", *sizes, 24, 0.4 * gust_length)
+            table = waves(np.random.default_rng(seed), "dryden", *sizes, 24, 0.4 * gust_length)
         self.axes = _axes(direction)  # rows: along the jet, and two across
         self.places, self.speeds = np.ascontiguousarray(places), np.ascontiguousarray(speeds)
         self.radius = radius
@@ -128,25 +127,25 @@ class _Jets(CompiledWind):
 
 
 class FanWall(_Jets):
-    """A wall of fans side by side, each with a speed of its own that may change with time.
+    """A wall of fans side by side, each with a speed of its own over time.
 
     Args:
-        speeds: U0 of each fan's jet, m/s: (rows * columns,), or (steps, rows * columns) at times
-            that are 0.02 s apart (``switching`` makes them), after which the last holds. Fans are
-            counted row by row from the bottom, each row from left to right as seen by the wind.
-        rows: how many fans stand above each other.
-        columns: and side by side.
+        speeds: U0 of each fan's jet, m/s: (rows * columns,), or (steps, rows * columns) every
+            0.02 s, as from ``switching``; the last row holds on. Fans are counted row by row from
+            the bottom, each row from left to right as seen by the wind.
+        rows: number of fans above each other.
+        columns: number of fans side by side.
         pitch: m, from fan to fan.
         centre: (3,) m, of the wall.
-        direction: (3,), into which it blows.
+        direction: (3,), downwind.
         radius: m, of a fan; its hub has ``hub_radius``.
         hub_radius: m.
         turbulence: standard deviation of the gusts as a share of the local speed along the jet.
-        gust_length: m, over which gusts at two points are alike.
-        seed: of the gusts.
+        gust_length: m, correlation length of the gusts.
+        seed: for the gusts.
 
     Raises:
-        InputError: a shape or a number that cannot be.
+        InputError: an impossible shape or number.
     """
 
     def __init__(
@@ -169,12 +168,8 @@ class FanWall(_Jets):
         if not np.any(heading):
             raise InputError("wind: FanWall: direction must not be zero")
         table = np.atleast_2d(np.asarray(speeds, dtype=np.float64))
-        if (
-            table.ndim != 2
-            or table.shape[1] != rows * columns
-            or not np.all(np.isfinite(table))
-            or table.min() < 0.0
-        ):
+        fits = table.ndim == 2 and table.shape[1] == rows * columns
+        if not (fits and np.all(np.isfinite(table)) and table.min() >= 0.0):
             raise InputError(
                 f"wind: FanWall: speeds must be numbers from 0 on, shape ({rows * columns},) or "
                 f"(steps, {rows * columns}), got shape {table.shape}"
@@ -182,11 +177,9 @@ class FanWall(_Jets):
         number(radius, "radius, above hub_radius,", number(hub_radius, "hub_radius", least=0.0))
         number(pitch, "pitch", 0.0)
         axes = _axes(heading)
-        right = pitch * (np.arange(columns) - 0.5 * (columns - 1))
-        up = pitch * (np.arange(rows) - 0.5 * (rows - 1))
-        places = (
-            vector(centre, "centre") - right[None, :, None] * axes[1] + up[:, None, None] * axes[2]
-        )
+        right, up = (pitch * (np.arange(n) - 0.5 * (n - 1)) for n in (columns, rows))
+        aside = vector(centre, "centre") - right[None, :, None] * axes[1]
+        places = aside + up[:, None, None] * axes[2]
         gusts = turbulence, gust_length, seed
         places = places.reshape(1, rows * columns, 3)
         super().__init__(heading, places, table, radius, hub_radius, gusts)
@@ -201,10 +194,10 @@ def switching(
     on: float = 0.6,
     lag: float = 0.3,
 ) -> Array:
-    """Return speeds (steps, fans) m/s of fans that are switched at random, for ``FanWall``.
+    """Return speeds (steps, fans) m/s of fans switched at random, for ``FanWall``.
 
-    Each fan by itself is on with probability ``on``, at a speed drawn from ``speed``, until it is
-    drawn anew after a time drawn from ``every`` (s); it follows with a first-order ``lag`` (s).
+    Each fan by itself is on with probability ``on``, at a speed drawn from ``speed``. A new draw
+    follows after a time drawn from ``every`` (s). The fan has a first-order ``lag`` (s).
     """
     steps = math.ceil(seconds / TABLE_PERIOD) + 1
     table = np.zeros((steps, fans))
@@ -212,8 +205,8 @@ def switching(
     for fan in range(fans):
         k = 0
         while k < steps:
-            value = float(rng.uniform(*speed)) if rng.random() < on else 0.0
-            end = k + max(1, round(float(rng.uniform(*every)) / TABLE_PERIOD))
+            value = rng.uniform(*speed) if rng.random() < on else 0.0
+            end = k + max(1, round(rng.uniform(*every) / TABLE_PERIOD))
             table[k:end, fan] = value
             k = end
     for k in range(1, steps):
@@ -222,24 +215,24 @@ def switching(
 
 
 class VehicleWash(_Jets):
-    """The wash of another multirotor that flies above: one jet straight down.
+    """The wash of another multirotor above: one jet straight down.
 
-    Momentum theory: rotors of the disc area A that carry the thrust T draw air through with
-    ``v = sqrt(T / (2 rho A))``; the wake below has contracted to A / 2 and sinks with 2 v. From
-    there on it spreads as the mean jet does.
+    Momentum theory: rotors of the disc area A and the thrust T draw air through with
+    ``v = sqrt(T / (2 rho A))``. The wake below has contracted to A / 2 and sinks with 2 v. From
+    there on the wake spreads as the mean jet does.
 
     Args:
-        path: places (steps, 3) m of that vehicle at times 0.02 s apart, after which it stays; or
-            (3,), where it hovers.
+        path: the other vehicle's places (steps, 3) m every 0.02 s, and then its last place; or the
+            place (3,) of its hover.
         thrust: N.
         rotor_radius: m.
-        rotors: how many.
-        turbulence: of the wash, as a share of its local speed.
+        rotors: number of rotors.
+        turbulence: share of the wash's local speed.
         gust_length: m.
-        seed: of the gusts.
+        seed: for the gusts.
 
     Raises:
-        InputError: a shape or a number that cannot be.
+        InputError: an impossible shape or number.
     """
 
     def __init__(

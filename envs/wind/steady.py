@@ -15,7 +15,7 @@ from .field import CompiledWind, number, vector
 _FOOT = 0.3048  # m
 # MIL-F-8785C 3.7.3.4: roughness length, ft, of flight phases near the ground (category C), and else
 ROUGHNESS = {"terminal": 0.15 * _FOOT, "open": 2.0 * _FOOT}
-_LAWS = {"none": 0, "log": 1, "power": 2}
+_LAWS = {"log": 1, "power": 2}  # 0: none
 
 STEADY = np.dtype(
     [
@@ -24,12 +24,12 @@ STEADY = np.dtype(
         ("reference", "f8"),  # m
         ("roughness", "f8"),  # m, or the exponent of the power law
         ("floor", "f8"),  # m, below which the height counts as this
-        # of a gust: direction of travel (3,), its speed (m/s), where its front is at ``start``
+        # a gust's direction of travel (3,), its speed (m/s), and its front's place at ``start``
         ("travel", "f8", (3,)),
         ("front", "f8", (3,)),
         ("speed", "f8"),
         ("start", "f8"),
-        ("length", "f8"),  # m, in which it grows; 0: no gust
+        ("length", "f8"),  # m, of the rise; 0: no gust
         ("falls", "i8"),
     ]
 )
@@ -77,7 +77,7 @@ class Uniform(CompiledWind):
 
 
 class Shear(CompiledWind):
-    """A wind that grows with height.
+    """A wind growing with height.
 
     ``log``: ``u(h) = u_ref ln(h / z0) / ln(h_ref / z0)``, MIL-F-8785C 3.7.3.4, which states
     ``h_ref`` = 20 ft; zero below ``z0``. ``power``: ``u(h) = u_ref (h / h_ref)^exponent``.
@@ -88,7 +88,7 @@ class Shear(CompiledWind):
         law: ``log`` or ``power``.
         roughness: z0 in m, of the log law; MIL-F-8785C: 0.0457 near the ground (category C), 0.61
             else.
-        exponent: of the power law; 1/7 over open, flat land.
+        exponent: the power law's; 1/7 over open, flat land.
 
     Raises:
         InputError: an unknown law, or a number out of range.
@@ -102,8 +102,8 @@ class Shear(CompiledWind):
         roughness: float = ROUGHNESS["terminal"],
         exponent: float = 1.0 / 7.0,
     ) -> None:
-        if law not in ("log", "power"):
-            raise unknown_name("law", law, ("log", "power"), "wind: Shear")
+        if law not in _LAWS:
+            raise unknown_name("law", law, _LAWS, "wind: Shear")
         parameters = np.zeros(1, dtype=STEADY)
         w = parameters[0]
         w["velocity"], w["law"] = vector(velocity, "velocity"), _LAWS[law]
@@ -121,20 +121,20 @@ class Shear(CompiledWind):
 
 
 class Gust(CompiledWind):
-    """A single gust of the form 1 - cos, which travels.
+    """A single travelling gust of the form 1 - cos.
 
-    ``v = v_m / 2 (1 - cos(pi s / d))`` where its front is ``0 < s < d`` ahead of the point. Behind
-    ``d`` the wind stays at ``v_m`` (MIL-F-8785C 3.7.2.3), or, where it ``falls``, comes down again
-    by the same law until ``2 d`` (14 CFR 25.341).
+    ``v = v_m / 2 (1 - cos(pi s / d))`` with the front ``0 < s < d`` ahead of the point. Behind
+    ``d`` the wind stays at ``v_m`` (MIL-F-8785C 3.7.2.3). A gust that ``falls`` comes down again by
+    the same law until ``2 d`` (14 CFR 25.341).
 
     Args:
         velocity: v_m, (3,) m/s, world.
         length: d in m.
         start: s, when the front is at ``front``.
-        speed: of travel, m/s.
-        direction: of travel, (3,); default: that of ``velocity``.
+        speed: m/s, of travel.
+        direction: (3,), of travel; default: that of ``velocity``.
         front: (3,) m.
-        falls: whether it comes down again.
+        falls: whether the gust comes down again.
 
     Raises:
         InputError: a number out of range, or no direction.

@@ -1,14 +1,14 @@
-"""Turbulence with the spectra of Dryden and von Karman, as a field in space that the mean wind
-carries along.
+"""Turbulence with the spectra of Dryden and von Karman, as a field in space carried along by the
+mean wind.
 
-A field is a sum of plane waves with random directions, each normal to its own direction (so that
-the air keeps its volume), whose energies follow the three-dimensional spectrum E(k) that belongs to
-the one-dimensional ones of MIL-F-8785C. Where lengths and strengths are the same on all axes, the
-spectrum along any line is then the stated one, of the component along the line and of those across
-it, and gusts at two points of a vehicle are as alike as the theory says. Near the ground
-MIL-F-8785C states other lengths and strengths on each axis, which no isotropic field has: there
-each component is drawn from a field of its own, whose spectrum along the mean wind is the stated
-one. It is frozen (Taylor's hypothesis): a point sees ``u(x - U t)``.
+A field is a sum of plane waves with random directions, each normal to its own direction: the air
+keeps its volume. The waves' energies follow the three-dimensional spectrum E(k) of the
+one-dimensional ones in MIL-F-8785C. With the same length and strength on all axes, the spectrum
+along any line is the stated one, for the component along the line and for those across. Gusts at
+two points of a vehicle are then as alike as in theory. Near the ground MIL-F-8785C states other
+lengths and strengths on each axis, impossible for an isotropic field. There each component comes
+from a field of its own with the stated spectrum along the mean wind. The field is frozen (Taylor's
+hypothesis): a point sees ``u(x - U t)``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def add_modes(table: Array, advection: Array, time: float, p: Array, out: Array)
 
     Args:
         table: (count, 7) wave number (3) in turns per m, phase in turns, amplitude (3) in m/s.
-        advection: (3,) m/s, which carries the waves along.
+        advection: (3,) m/s, velocity of the waves.
         time: s.
         p: points.
         out: velocities.
@@ -79,11 +79,11 @@ def _turbulence(parameters: int, count: int, time: int, points: int, velocities:
 def spectrum(form: str, axis: str, wave_number: ArrayLike, sigma: float, length: float) -> Array:
     """Return the one-dimensional spectrum of MIL-F-8785C 3.7.1, (m/s)^2 per rad/m.
 
-    It is one-sided: its integral over the wave number (rad/m) from zero is ``sigma``^2.
+    The spectrum is one-sided: its integral over the wave number (rad/m) from zero is ``sigma``^2.
 
     Args:
         form: ``dryden`` or ``von-karman``.
-        axis: ``along`` the line on which the wave number is taken, or ``across``.
+        axis: ``along`` the line of the wave number, or ``across``.
         wave_number: Omega, rad/m.
         sigma: m/s.
         length: L, m.
@@ -122,10 +122,10 @@ FORMS = ("dryden", "von-karman")
 def waves(
     rng: np.random.Generator, form: str, sigma: Array, length: Array, count: int, smallest: float
 ) -> Array:
-    """Return plane waves (m, 7) in axes of which the first is that of the mean wind.
+    """Return plane waves (m, 7) in axes with the mean wind along the first.
 
-    Wave numbers are drawn one from each of ``count`` strata, even in the logarithm between a
-    tenth of 1 / L and that of eddies of ``smallest`` m.
+    One wave number is drawn from each of ``count`` strata, even in the logarithm. They reach from
+    a tenth of 1 / L to eddies of ``smallest`` m.
     """
     alike = bool(np.ptp(sigma) == 0.0 and np.ptp(length) == 0.0)
     parts = []
@@ -141,11 +141,8 @@ def waves(
         normal = np.cross(direction, other)
         normal *= (amplitude / np.linalg.norm(normal, axis=1))[:, None]
         kept = sigma if alike else np.where(np.arange(3) == axis, sigma, 0.0)
-        parts.append(
-            np.column_stack(
-                [direction * k[:, None] / (2.0 * math.pi), rng.random(count), normal * kept]
-            )
-        )
+        number_of_waves = direction * k[:, None] / (2.0 * math.pi)
+        parts.append(np.column_stack([number_of_waves, rng.random(count), normal * kept]))
     return np.concatenate(parts)
 
 
@@ -159,15 +156,15 @@ class Turbulence(CompiledWind):
     """Turbulence in a mean wind; the mean wind itself is another wind to add.
 
     Args:
-        seed: of the field, or a generator; the same seed gives the same field.
+        seed: a number or a generator; the same seed gives the same field.
         sigma: standard deviation, m/s: one number, or (3,) along the mean wind, across, and up.
         length: L, m, likewise.
-        advection: (3,) m/s, the mean wind that carries the field along.
+        advection: (3,) m/s, the mean wind.
         form: ``dryden`` or ``von-karman``.
-        modes: plane waves an axis; variance and spectrum are right on average for any number, a
-            single field is the more even the more there are.
-        smallest: m, of the smallest eddies that are there. What a spectrum has beyond is left out:
-            with L = 3 m and 0.2 m, 2 % of the variance of Dryden's, 6 % of von Karman's.
+        modes: plane waves an axis. Variance and spectrum are right on average for any number; more
+            waves make a single field more even.
+        smallest: m, of the smallest eddies. The rest of the spectrum is left out: with L = 3 m and
+            0.2 m, 2 % of the variance of Dryden's, 6 % of von Karman's.
 
     Raises:
         InputError: an unknown form, or a number out of range.
@@ -185,18 +182,15 @@ class Turbulence(CompiledWind):
     ) -> None:
         if form not in FORMS:
             raise unknown_name("form", form, FORMS, "wind: turbulence")
-        sizes, lengths = (
-            _three(sigma, "sigma", at_least_zero=True),
-            _three(length, "length", at_least_zero=False),
-        )
+        sizes = _three(sigma, "sigma", at_least_zero=True)
+        lengths = _three(length, "length", at_least_zero=False)
         if modes < 1 or number(smallest, "smallest", 0.0) >= 0.5 * lengths.min():
             raise InputError(
                 f"wind: turbulence: modes must be at least 1 and smallest less than half of every "
                 f"length, got {modes} and {smallest:g} m"
             )
         carried = vector(advection, "advection")
-        rng = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
-        table = waves(rng, form, sizes, lengths, modes, smallest)
+        table = waves(np.random.default_rng(seed), form, sizes, lengths, modes, smallest)
         heading = math.atan2(carried[1], carried[0])
         c, s = math.cos(heading), math.sin(heading)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

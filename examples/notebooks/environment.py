@@ -20,7 +20,7 @@ import matplotlib.pyplot as plt
 import windwrench  # noqa: F401  # registers the environments
 from windwrench.runtime.drawing import GREY, SERIES
 
-env = gym.make("windwrench/FanTracking-v0", scenario="base")
+env = gym.make("windwrench/FanTracking-v1", scenario="base", normalize=False)
 print(env.observation_space, env.action_space)
 
 # %% [markdown]
@@ -56,9 +56,9 @@ def fly(controller, seed=4):
     offsets = [info["offset"]]
     over = False
     while not over:
-        observation, _, lost, ended, info = env.step(controller(observation))
+        observation, _, terminated, truncated, info = env.step(controller(observation))
         offsets.append(info["offset"])
-        over = lost or ended
+        over = terminated or truncated
     return offsets
 
 

@@ -1,1 +1,1 @@
-"""What changed between two sets of flights of one vehicle, without a model that is true."""
+"""Changes between two sets of flights of one vehicle, without a true model."""

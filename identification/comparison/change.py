@@ -1,13 +1,13 @@
-"""Which rotor or side changed between two sets of flights, and how sure that is.
+"""The rotor or side that changed between two sets of flights, with its probability.
 
 Each flight has four numbers: the differences of left and right, of front and rear, and of the
-diagonals, each in parts of the total, and the total itself, as a logarithm. Between flights of one
-unchanged vehicle they scatter, from session to session more than within one (``sessions``). To this
-comes what the battery does to the total: a rotor's thrust for a request follows the voltage by a
-power that depends on the vehicle's motor controllers and on whether its firmware makes up for the
-battery, so that a difference of voltage makes the total less certain.
+diagonals, each in parts of the total, and the logarithm of the total. Between flights of one
+unchanged vehicle they scatter, from session to session more than within one (``sessions``). The
+battery acts on the total, too. A rotor's thrust for a request follows a power of the voltage. The
+power depends on the motor controllers, and on whether the firmware makes up for the battery. A
+difference of voltage therefore makes the total less certain.
 
-What may have changed, each by an amount that is integrated over:
+Possible changes, each by an amount that is integrated over:
 
 * nothing;
 * a rotor delivers less than before for the same command (a cut propeller, a weak motor): its own
@@ -16,8 +16,8 @@ What may have changed, each by an amount that is integrated over:
 * all rotors are asked for more (the vehicle is heavier, the air thinner, the battery weaker);
 * something else: the four numbers moved in a way of their own (two rotors at once, a bent arm).
 
-A weaker rotor and a weight under it move the centre of thrust alike. They differ in the diagonals,
-where a real rotor near its limit does what neither says; so the place has a probability of its own,
+A weaker rotor and a weight under this rotor move the centre of thrust alike. They differ in the
+diagonals, but a real rotor near its limit fits neither; so the place has a probability of its own,
 summed over the kinds.
 """
 
@@ -43,45 +43,45 @@ _ROTORS = {
     "rotor 4 (front-right)": (-1.0, 1.0),
 }
 _SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
-# what may have changed at each place
+# possible changes at each place
 _KINDS = {
     **dict.fromkeys(_ROTORS, ("weaker", "carries more")),
     **dict.fromkeys((*_SIDES, "all rotors"), ("carries more",)),
     SOMETHING_ELSE: ("",),
 }
 
-_AMOUNTS = 80  # of a change, over which its evidence is summed
+_AMOUNTS = 80  # amounts of a change in the sum of its evidence
 
-# share of the weight, or of one rotor's thrust, by which something that changed has changed:
-# the scale of a half-normal prior
+# usual amount of a change, as a share of the weight or of one rotor's thrust: the scale of a
+# half-normal prior
 _USUAL_AMOUNT = 0.15
-# standard deviation of the power by which the request for one thrust falls with the battery's
-# voltage: 0 where the firmware makes up for the battery, up to 2 where rotor speed follows it
+# standard deviation of the power of the battery's voltage in the request for one thrust: 0 if the
+# firmware makes up for the battery, up to 2 if rotor speed follows the voltage
 _VOLTAGE_POWER = 0.5
-# how far a real rotor's request leaves what a linear one would need, as a share of the change.
-# A bent curve changes by how much one rotor's request rises, and this moves all four numbers
-# alike; drag and thrust of a cut propeller do not shrink alike, which shows in the diagonals.
+# distance of a real rotor's request from a linear one's, as a share of the change. A bent curve
+# changes the rise of one rotor's request, and moves all four numbers alike. Drag and thrust of a
+# cut propeller do not shrink alike, so the diagonals move.
 # Cuts of 2 to 4 mm moved the diagonals 0.9, and the total 1.0 times as much as the sides
 _BEND = (0.1, 0.1, 0.25, 0.25)
-# probability of nothing, before the flights are looked at: who compares has a reason
+# prior probability of no change: a comparison has a reason
 _UNCHANGED = 0.4
-SURE = 0.95  # probability from which a place is named without a doubt
+SURE = 0.95  # least probability of a place named without a doubt
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What changed from the flights ``before`` to the flights ``after``."""
+    """The change from the flights ``before`` to the flights ``after``."""
 
     before: tuple[Trim, ...]
     after: tuple[Trim, ...]
     difference: Array  # (4,) left - right, front - rear, diagonals, logarithm of the total
-    std: Array  # (4,) of it, if nothing changed
-    # of "nowhere", each rotor, each side, "all rotors" and "something else"; they sum to one
+    std: Array  # (4,) deviation of the difference, if nothing changed
+    # probabilities of "nowhere", each rotor, each side, "all rotors" and "something else"; sum: 1
     places: dict[str, float]
-    # of the likeliest place, if it is a rotor: that the rotor is weaker, that it carries more
+    # probabilities of either kind at the likeliest place, if a rotor: weaker, or a weight there
     weaker: float
     carries_more: float
-    amount: float  # share of one rotor's thrust, or of the weight: mean, given that place and kind
+    amount: float  # share of one rotor's thrust, or of the weight: mean, given place and kind
     amount_std: float
 
     @property
@@ -96,34 +96,34 @@ class Change:
 
 
 def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
-    """Find what changed between two sets of flights of one vehicle.
+    """Find the change between two sets of flights of one vehicle.
 
     Args:
         after: the flights in question.
-        before: those that they are compared with.
+        before: the reference flights.
 
     Raises:
         InputError: a set is empty.
     """
     if not (len(after) and len(before)):
         raise InputError("compare: expected at least one flight in each of the two sets")
-    found = difference(after, before)
-    moved, unchanged = found.mean[:, None], found.variance
+    ways = difference(after, before)
+    moved, unchanged = ways.mean[:, None], ways.variance
     unchanged[:, 3] += (_VOLTAGE_POWER * _voltage_ratio(after, before)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
 
     def logs_of(means: Array, spread: Array) -> Array:
-        """Logarithms (n,) of how likely the difference is, for changes whose ``means`` (n, 4) and
-        standard deviations beside the scatter, ``spread`` (n, 4), are given.
+        """Return the log-likelihoods (n,) of the difference for changes of given ``means`` (n, 4)
+        and standard deviations beside the scatter, ``spread`` (n, 4).
         """
         variance = unchanged[:, None] + spread**2
         off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
-        return np.asarray(logsumexp(found.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
+        return np.asarray(logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
 
     amounts = np.linspace(0.02, 4.0, _AMOUNTS) * _USUAL_AMOUNT
     prior = log_softmax(-0.5 * np.square(amounts / _USUAL_AMOUNT))
     nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
-    # by place and kind: the logarithm of how likely it is; mean and deviation of the amount
+    # log posterior, and mean and deviation of the amount; keys: place and kind
     logs = {(NOWHERE, ""): nothing + math.log(_UNCHANGED)}
     sizes = {(NOWHERE, ""): (0.0, 0.0)}
     for place, kind in ((place, kind) for place, kinds in _KINDS.items() for kind in kinds):
@@ -143,11 +143,11 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in logs}
     likeliest = max(places, key=places.__getitem__)
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
-    share = np.exp(found.log)
+    share = np.exp(ways.log)
     return Change(
         tuple(before),
         tuple(after),
-        share @ found.mean,
+        share @ ways.mean,
         np.sqrt(share @ unchanged),
         places,
         kinds.get("weaker", 0.0),
@@ -159,8 +159,8 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
 def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
     """Return the logarithm of the mean voltages' ratio; zero where a flight has none.
 
-    It says how much less the total may be trusted, and is not taken off the total: a heavier
-    vehicle draws more and pulls its battery down, so that would hide what is looked for.
+    The ratio makes the total less certain, and is not taken off the total: a heavier vehicle draws
+    more and pulls its battery down, so a correction would hide the change in question.
     """
     levels = [
         np.mean([math.nan if trim.voltage is None else math.log(trim.voltage) for trim in group])

@@ -1,12 +1,12 @@
-"""The balance of torque and thrust in four channels, and how likely a change makes it.
+"""The balance of torque and thrust in four channels, and the likelihood of a change.
 
-* Angular acceleration about x, y and z: ``a (s . g) + b + d w + e w' w''``, where ``g`` are the
-  rotors' thrusts, ``s`` the signs of their moments, ``w`` the angular velocity (damping) and
-  ``w' w''`` the product of the other two (gyroscopic); about z also parts of what x and y do.
+* Angular acceleration about x, y and z: ``a (s . g) + b + d w + e w' w''``. The rotors' thrusts are
+  ``g``, the signs of their moments ``s``, the angular velocity (damping) ``w`` and the product of
+  the other two (gyroscopic) ``w' w''``; about z also parts of the acceleration about x and y.
 * Specific force along z: ``a`` times the sum of ``g``.
 
 The coefficients ``a`` are positive and otherwise free, so neither mass, inertia nor arm has to be
-known. Innovations of a column that begins at some time are worked out for all times at once, from
+known. Innovations of a column beginning at some time are worked out for all times at once, from
 sums that run backwards.
 """
 
@@ -23,14 +23,14 @@ from .fault_noise import Noise, fit_noise
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
 _SIGNS = np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]], dtype=np.float64)
-_AROUND = 5  # intervals, around a strong acceleration in which the model may be as wrong
-_TURNING = 0.1  # of activity, per (rad/s)^2: what the model lacks when the vehicle turns
+_AROUND = 5  # intervals around a strong acceleration: the model may be as wrong there
+_TURNING = 0.1  # activity per (rad/s)^2: the model's error while the vehicle turns
 
 
 class Begin(NamedTuple):
-    """How a loss comes."""
+    """The course of a loss."""
 
-    part: float  # of the first interval that is over when it begins
+    part: float  # elapsed part of the first interval
     # as the rotors' speed falls (a motor that fails), or at once (a propeller that breaks)
     lagged: bool
 
@@ -48,24 +48,23 @@ class FaultBalance:
             np.column_stack([ones, w[:, [i]], (w[:, (i + 1) % 3] * w[:, (i + 2) % 3])[:, None]])
             for i in range(3)
         ] + [np.zeros((len(w), 0))]
-        # a gyro that is mounted askew by a few degrees shows a part of what the strong axes do
-        # about the weak one
+        # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
         free[2] = np.column_stack([free[2], turning[:, :2]])
         y, moment = np.column_stack([turning, samples.specific_force]), thrust @ _SIGNS.T
-        # of each channel what is measured, the moment, and the free columns
+        # each channel's measurement, moment and free columns
         self.columns = [
             np.column_stack([y[:, c], moment[:, c], each]) for c, each in enumerate(free)
         ]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
         away += _TURNING * np.square(w).sum(axis=1) + samples.between
-        # where a fault begins, what is wrong of its shape grows with what it does
+        # at the start of a fault the error of its shape grows with the acceleration
         strong = maximum_filter1d(np.linalg.norm(turning[:, :2], axis=1), _AROUND)
         away += strong / max(float(strong.max()), 1e-300)
-        # a rotor that is late by an interval is wrong there too
+        # a rotor late by an interval is wrong there too
         self.activity = np.maximum(away, np.concatenate([away[:1], away[:-1]]))
 
     def ramp(self, begin: Begin) -> Array:
-        """Return the share (J,) of a loss that has come in each interval; 1 after that."""
+        """Return the elapsed share (J,) of a loss in each interval; 1 afterwards."""
         lag = self.lag if begin.lagged else 0.0
         count = 1 + math.ceil(4.0 * lag / STEP)
         x = STEP * np.arange(count + 1)
@@ -76,7 +75,7 @@ class FaultBalance:
         return share
 
     def share(self, row: int, begin: Begin) -> Array:
-        """Return the share (N,) of something that begins at a row that has come."""
+        """Return the elapsed share (N,) of a change beginning at a row."""
         share = np.zeros(len(self.thrust))
         ramp = self.ramp(begin)
         share[row:] = 1.0
@@ -84,8 +83,8 @@ class FaultBalance:
         return share
 
     def channels(self, *step: Array) -> "list[BalanceChannel]":
-        """Return the channels, each with the noise that fits what is left where nothing happens, or
-        beside a ``step`` (N,).
+        """Return the channels, each with noise fitted to the residual of no change, or beside a
+        ``step`` (N,).
         """
         fitted = []
         for columns in self.columns:
@@ -99,12 +98,12 @@ class FaultBalance:
         return fitted
 
     def lost(self, rotor: int, share: Array) -> Array:
-        """Return what each channel (N, 4) misses where a ``share`` (N,) of rotor 0 to 3 goes."""
+        """Return each channel's loss (N, 4) if a ``share`` (N,) of rotor 0 to 3 goes."""
         return np.asarray((self.thrust[:, rotor] * share)[:, None] * _SIGNS[:, rotor])
 
 
 class BalanceChannel:
-    """Innovations of what a channel measures and of its moment, the free columns projected out."""
+    """Innovations of a channel's measurement and moment, the free columns projected out."""
 
     def __init__(self, columns: Array, noise: Noise) -> None:
         self.noise, self.white = noise, noise.whiten(columns)
@@ -134,21 +133,22 @@ class BalanceChannel:
         return -b / a, math.sqrt(max(float(slope @ covariance[:2, :2] @ slope), 1e-12))
 
     def steps(self, rows: Index, ramp: Array) -> Array:
-        """Return the log-likelihoods (K,) of a step that begins at each of ``rows`` by a ramp, of
-        whatever size explains it best, at the price of a normal prior as wide as that size, or of
-        one that is worth a single sample where that is wider.
+        """Return the log-likelihoods (K,) of a step beginning at each of ``rows`` by a ramp.
+
+        The size is the best one, at the price of a normal prior: as wide as this size, or as wide
+        as a single sample's if wider.
         """
         sy, sm, ss = self._beginning(rows, ramp)
         own_share = np.maximum(ss - sm * sm / self.mm, 1e-12 * ss + 1e-300)
         gain = np.square(sy - sm * self.my / self.mm) / own_share
         width = np.log(np.maximum(gain / self.noise.variance, 1.0))
         price = 0.5 * np.maximum(1.0 + width, math.log(self.noise.whole.sum()))
-        found: Array = self.noise.log_likelihood(self.yy - self.gain * self.my - gain) - price
-        return found
+        logs: Array = self.noise.log_likelihood(self.yy - self.gain * self.my - gain) - price
+        return logs
 
     def _beginning(self, rows: Index, ramp: Array) -> Array:
-        """Return products (3, K) of a share of 1 that begins at each of ``rows`` (K,) by a ramp:
-        with y, with the moment, with itself; after projection.
+        """Return products (3, K) of a share of 1 beginning at each of ``rows`` (K,) by a ramp: with
+        y, with the moment, with itself; after projection.
         """
         noise, early = self.noise, len(self.noise.filter) - 1 + len(ramp)
 
@@ -160,7 +160,7 @@ class BalanceChannel:
         full = np.where(noise.whole, noise.filtered(np.ones(len(against))), 0.0)
         late = np.column_stack([full[:, None] * against, full**2])
         sums = padded(np.cumsum(late[::-1], axis=0)[::-1])[rows + early]
-        # the first outputs of the filter after each beginning, while it has begun in part only
+        # the first outputs of the filter after each beginning, during the ramp
         at = rows[:, None] + np.arange(early)
         begun = padded(1.0 / noise.scale)[at]
         begun[:, : len(ramp)] *= ramp

@@ -1,9 +1,9 @@
-"""What a search for rotor faults looks at: gyro, accelerometer and motor commands, each at its own
+"""The input of a search for rotor faults: gyro, accelerometer and motor commands, each at its own
 rate, on one uniform grid of short intervals.
 
-Over an interval the mean angular acceleration is the difference of the gyro at its ends, exactly;
-specific force and thrust are means over the same interval. So nothing is differentiated or filtered
-by a window that would smear the time of a fault.
+The mean angular acceleration over an interval is exactly the difference of the gyro at both ends.
+Specific force and thrust are means over the same interval. No window of a derivative or filter
+smears the time of a fault.
 """
 
 from dataclasses import dataclass
@@ -25,15 +25,15 @@ from ..logs.streams import Stream, readable
 from ..motion.smoothing import lagged, resampled, runs_of
 
 _PX4 = "px4_ulog"  # the reader
-_CHANNELS = ("gyro", "accelerometer", "commands")  # of a PX4 log that are needed
-STEP = 0.02  # s, of the grid: a rotor takes about that long to follow
-FINE = 0.004  # s, on which commands are filtered by the rotors' lag
-SETTLED = 1.5  # s after the rotors first carry the vehicle: it has left the ground
-LEAST_SECONDS = 3.0  # in flight: less says nothing of what is usual
-LONGEST_GAP = 0.1  # s without a sample, across which nothing is interpolated
-SHORTEST = 0.2  # s of unbroken samples; the noise of a shorter run has no past to be told from
-# an axis is clipped where it stays this long within this share of its magnitude, near the end of
-# a range that gyros have (a calibration moves that a little) or at the largest value of the log
+_CHANNELS = ("gyro", "accelerometer", "commands")  # needed in a PX4 log
+STEP = 0.02  # s, grid: a rotor takes about as long to follow
+FINE = 0.004  # s, grid of commands for the rotors' lag
+SETTLED = 1.5  # s after the rotors first carry the vehicle, until it is off the ground
+LEAST_SECONDS = 3.0  # in flight: a shorter one does not show the usual motion
+LONGEST_GAP = 0.1  # s without a sample; nothing is interpolated across a longer gap
+SHORTEST = 0.2  # s of unbroken samples; the noise of a shorter run has no past
+# an axis is clipped if it stays this long within this share of its magnitude, near the end of a
+# usual range of gyros (moved a little by a calibration) or at the largest value of the log
 CLIPPED_SECONDS, CLIPPED_SHARE = 0.04, 0.01
 RANGES = np.array([250.0, 500.0, 1000.0, 2000.0]) * np.pi / 180.0  # rad/s
 RANGE_SHARE = 0.08
@@ -47,7 +47,7 @@ class Channels:
     name: str
     gyro: Stream  # (N, 3) rad/s, body
     accelerometer: Stream  # (M, 3) m/s2, body: +g along z in a hover
-    command: Stream  # (K, 4) motor commands, in any unit that grows with thrust, 0: none
+    command: Stream  # (K, 4) motor commands, in any unit growing with thrust, 0: none
     # the command is thrust itself but for a factor (rotor speeds squared): no curve is looked for
     thrust_known: bool = False
     motor_names: tuple[str, ...] | None = None  # the log's own, of rotors 1 to 4
@@ -61,12 +61,12 @@ class Samples:
     angular_acceleration: Array  # (N, 3) rad/s2, means
     angular_velocity: Array  # (N, 3) rad/s, means
     specific_force: Array  # (N,) m/s2 along body z, means
-    follows: Mask  # (N,) the interval before it is there too
-    # (N,) how far the command may be off between its own samples, in parts of the median: half of
+    follows: Mask  # (N,) the interval before is there too
+    # (N,) possible error of the command between its own samples, in parts of the median: half of
     # the change from one to the next in the middle, nothing at either
     between: Array
     channels: Channels
-    ended: str  # why nothing later was looked at; empty: the log's end
+    ended: str  # reason for the end of the search; empty: the log's end
 
     def thrust(self, lag: float, bend: float, dead: float) -> Array:
         """Return the rotors' relative thrusts (N, 4): 1 at the median command while flying.
@@ -75,9 +75,9 @@ class Samples:
         x``, as in PX4's THR_MDL_FAC.
 
         Args:
-            lag: s, time constant by which they follow the command.
-            bend: 0, thrust is linear in the command, to 1, it goes with the square.
-            dead: command at which thrust vanishes, in parts of the median.
+            lag: s, time constant of the rotors behind the command.
+            bend: 0 for thrust linear in the command, to 1 for the square.
+            dead: largest command without thrust, in parts of the median.
         """
         command = self.channels.command
         fine = np.arange(command.t[0], command.t[-1] + FINE, FINE)
@@ -94,9 +94,10 @@ def read_channels(
     log_map: str | None = None,
     log: FlightLog | None = None,
 ) -> tuple[Channels, tuple[str, ...]]:
-    """Return a file's gyro, accelerometer and commands, and notes on where they came from: those of
-    a PX4 log at their own rates, which are in the file alone, others as their reader gives them;
-    ``log`` is what was read already.
+    """Return a file's gyro, accelerometer and commands, and notes on their origin.
+
+    A PX4 file alone has the channels' own rates. Other files go through their reader; ``log`` is a
+    log already read.
 
     Raises:
         InputError: the file cannot be read, or lacks one of the three.
@@ -106,18 +107,17 @@ def read_channels(
         log = log or read_log(path, reader, vehicle, log_map)
         return channels_of_log(log), log.notes
     recording = px4_ulog.channels(path, has_ranges=False)
-    found: dict[str, Any] = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
-    if missing := [part for part, stream in found.items() if stream is None]:
+    streams: dict[str, Any] = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
+    if missing := [part for part, stream in streams.items() if stream is None]:
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
     assert recording.log_map.commands is not None
     names = tuple(f"PX4 motor {i}" for i in recording.log_map.commands.order)
-    gyro, accelerometer, command = found.values()
+    gyro, accelerometer, command = streams.values()
     return Channels(str(path), gyro, accelerometer, command, False, names), tuple(recording.notes)
 
 
 def channels_of_log(log: FlightLog) -> Channels:
-    """Return the streams of a log in the kit's format: commands where it has them, else rotor
-    speeds.
+    """Return the streams of a log in the kit's format: commands if any, else rotor speeds.
 
     Raises:
         InputError: gyro, accelerometer, or both commands and rotor speeds are missing.
@@ -131,7 +131,7 @@ def channels_of_log(log: FlightLog) -> Channels:
     if known and not log.has_rotor_speeds:
         raise InputError(f"{name}: no motor commands and no rotor speeds; expected one of them")
     command = np.square(log.rotor_speeds) if log.command is None else log.command
-    # a command that is held between two of its own samples says so by its changes
+    # a held command changes at its own samples alone
     new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
     new[-1] = True
     return Channels(
@@ -147,7 +147,7 @@ def sample(channels: Channels) -> Samples:
     """Put the streams on the grid.
 
     Raises:
-        InputError: fewer than 3 s of flight, or samples that come too seldom.
+        InputError: fewer than 3 s of flight, or too few samples a second.
     """
     c = channels
     times = (c.gyro.t, c.accelerometer.t, c.command.t)
@@ -194,7 +194,7 @@ def sample(channels: Channels) -> Samples:
 
 
 def _between(c: Channels, t: Array) -> Array:
-    """Return how far a command may be off between its samples (N,); see ``Samples``."""
+    """Return the command's possible error between its samples (N,); see ``Samples``."""
     at, command = c.command.t, c.command.values
     after = np.clip(np.searchsorted(at, t), 1, len(at) - 1)
     start, end = at[after - 1], at[after]
@@ -206,7 +206,7 @@ def _between(c: Channels, t: Array) -> Array:
 
 
 def _means(times: Array, values: Array, middles: Array) -> Array:
-    """Return the means (N, d) over the grid's intervals of what is linear between ``times``."""
+    """Return the means (N, d) over the grid's intervals; values are linear between ``times``."""
     new = np.diff(times, prepend=-np.inf) > 0.0
     integral = make_interp_spline(times[new], values[new], k=1).antiderivative()
     low, high = (
@@ -216,8 +216,8 @@ def _means(times: Array, values: Array, middles: Array) -> Array:
 
 
 def _end(c: Channels) -> tuple[float, str]:
-    """Return when the model ends to hold, and why: a gyro that clips, or an impact."""
-    found = [(np.inf, "")]
+    """Return the end of the model's validity, and its reason: a clipped gyro, or an impact."""
+    ends = [(np.inf, "")]
     count = max(3, round(CLIPPED_SECONDS / float(np.median(np.diff(c.gyro.t)))))
     for axis in c.gyro.values.T:
         size = np.abs(axis)
@@ -228,11 +228,11 @@ def _end(c: Channels) -> tuple[float, str]:
         if clipped.any():
             # the filters look half their width to either side
             first = max(0, int(np.argmax(clipped)) - count // 2)
-            found.append((float(c.gyro.t[first]), "the gyro was at its limit"))
+            ends.append((float(c.gyro.t[first]), "the gyro was at its limit"))
     hit = np.linalg.norm(c.accelerometer.values, axis=1) > IMPACT
     # take-off may be hard: an impact counts once the rotors carry the vehicle
     aloft = c.command.t[carrying(c.command.values.sum(axis=1))]
     hit &= c.accelerometer.t > aloft[0] + SETTLED if len(aloft) else False
     if hit.any():
-        found.append((float(c.accelerometer.t[np.argmax(hit)]) - STEP, "the vehicle hit something"))
-    return min(found)
+        ends.append((float(c.accelerometer.t[np.argmax(hit)]) - STEP, "the vehicle hit something"))
+    return min(ends)

@@ -1,14 +1,14 @@
-"""Which rotor lost thrust, when and how much.
+"""The rotor that lost thrust, the time and the amount.
 
-The thrusts follow the commands with a lag and a curve, both fitted. A quadrotor with one rotor in
-each quadrant is all that is assumed. Two questions are asked apart:
+The thrusts follow the commands with a lag and a curve, both fitted. The only assumption is a
+quadrotor with one rotor in each quadrant. Two questions are asked apart:
 
-* Did torque or force jump, and when? A likelihood ratio over every time, with a step of whatever
-  size in each channel of the balance (``balance.py``) against none.
-* What jumped? Each channel says by itself what share of a rotor's thrust would be lost. For the
-  rotor that failed, they agree, within what the model gets wrong of a rotor that suddenly works
-  elsewhere; for another rotor they contradict each other in sign. Rivals are all rotors together,
-  and a force and a torque that no rotor makes (a gust, a load that fell, a collision).
+* Did torque or force jump, and when? A likelihood ratio over every time, with a step of any size in
+  each channel of the balance (``fault_balance.py``) against none.
+* The cause of the jump: each channel by itself gives a lost share of a rotor's thrust. For the
+  failed rotor the shares agree, within the model's error for a rotor at a new working point. For
+  another rotor they contradict each other in sign. Rivals are all rotors together, and a force and
+  a torque without a rotor (a gust, a lost load, a collision).
 """
 
 import math
@@ -27,44 +27,43 @@ from .fault_channels import STEP, Channels, Samples, sample
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
 
 _LOSSES = (0.05, 1.0)  # share of a rotor's thrust
-_ALL_LOSE = 0.5  # the most that is tried of all rotors together
+_ALL_LOSE = 0.5  # the largest share tried for all rotors together
 _LAGS = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
 # curves of thrust against command: the square's share, and the dead zone in parts of the
 # median command
 _CURVES = ((0.0, 0.0), (0.2, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.3), (1.0, 0.3))
-# before the log is looked at: nothing, one of the rotors, all rotors, another force or torque
+# prior: nothing, one of the rotors, all rotors, another force or torque
 _PRIOR = (0.5, 0.3, 0.05, 0.15)
-# what the model gets wrong of a loss, as a share of it: curve, lag and inflow of rotors that
-# suddenly work elsewhere
+# the model's error of a loss, as a share: curve, lag and inflow of rotors at a new working point
 _ERROR = 0.25
-_BEFORE = 25  # intervals of flight before a fault, at least: what is usual
-_AFTER = 4  # intervals after a fault, at least, that show it
-_PLACES = 2000  # where a fault may begin, at most
-_STEPS = 39  # of ``_LOSSES`` that are tried
-_PARTS = (0.0, 0.25, 0.5, 0.75)  # of an interval, where a fault may begin
-# standard deviation of a jump that no rotor makes, about x, y, z and along z, in parts of what
-# one rotor's usual thrust does there: a load of a third of the weight that falls
+_BEFORE = 25  # least intervals of usual flight before a fault
+_AFTER = 4  # least intervals after a fault
+_PLACES = 2000  # most rows for the start of a fault
+_STEPS = 39  # shares tried within ``_LOSSES``
+_PARTS = (0.0, 0.25, 0.5, 0.75)  # starts of a fault within an interval
+# standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
+# usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
-_ROUNDS = 2  # of fitting the noise and looking again
-_SURE = 0.95  # probability from which a fault is named without a doubt
+_ROUNDS = 2  # each fits the noise and searches again
+_SURE = 0.95  # least probability of a fault named without a doubt
 _BEGINS = [Begin(part, lagged) for lagged in (False, True) for part in _PARTS]
 
 
 @dataclass(frozen=True, eq=False)
 class RotorFault:
-    """What a search found in one flight."""
+    """The result of a search in one flight."""
 
-    samples: Samples  # of the flight
-    # of "nothing", rotors "1" to "4", "all rotors" and "another force or torque"; they sum to one
+    samples: Samples
+    # "nothing", rotors "1" to "4", "all rotors" and "another force or torque"; sum: 1
     probabilities: dict[str, float]
-    # of the likeliest rotor: median (of the thrust, mean) and the ends of a 95 % interval
+    # the likeliest rotor; onset as median, thrust as mean, each with a 95 % interval
     rotor: int
-    onset: tuple[float, float, float]  # s, of the log's clock
-    remaining: tuple[float, float, float]  # share of its thrust that is left
+    onset: tuple[float, float, float]  # s, on the log's clock
+    remaining: tuple[float, float, float]  # remaining share of thrust
 
     @property
     def seconds(self) -> float:
-        """Seconds of flight that were looked at."""
+        """Seconds of the flight in the search."""
         return len(self.samples.t) * STEP
 
     @property
@@ -91,8 +90,8 @@ def find_fault(channels: Channels) -> RotorFault:
     each, shares, weights = _patterns(best)
     prior = np.array([*[_PRIOR[1] / 4] * 4, _PRIOR[2], _PRIOR[3]])
     logs = np.log(prior) + each
-    # the prior of an event of some kind is in ``prior``; how likely it is that there was one, with
-    # sizes left free, is the search's
+    # ``prior`` holds the prior of each kind of event; the search, with free sizes, gives the
+    # likelihood of an event
     whole = math.log(_PRIOR[0]) + max(one.nothing for one in tried)
     happened = evidence + math.log(float(prior.sum()))
     chances = softmax(np.append(whole, happened + log_softmax(logs)))
@@ -108,8 +107,8 @@ def find_fault(channels: Channels) -> RotorFault:
 
 
 class _Tried(NamedTuple):
-    """One lag and curve: the channels with the noise that fits them best, the likeliest jump with
-    that, and the log-likelihood of none.
+    """One lag and curve: the channels with their best noise, the likeliest jump, and the
+    log-likelihood of no jump.
     """
 
     balance: FaultBalance
@@ -121,7 +120,7 @@ class _Tried(NamedTuple):
 
 
 def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
-    """Return what was tried: lags, and then curves, each from the best so far."""
+    """Return all trials: lags, and then curves, each from the best so far."""
     rows, tried = _rows(len(samples.t)), dict[tuple[float, float, float], _Tried]()
 
     def best_of(keys: Iterable[tuple[float, float, float]]) -> tuple[float, float, float]:
@@ -139,7 +138,7 @@ def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
 
 
 def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
-    """Return a lag and curve with its noise, which is fitted beside the likeliest jump."""
+    """Return a lag and curve with noise fitted beside the likeliest jump."""
     channels = balance.channels()
     nothing = sum(channel.nothing() for channel in channels)
     for _ in range(_ROUNDS):
@@ -160,9 +159,7 @@ def _steps(
 def _jump(
     balance: FaultBalance, channels: list[BalanceChannel], rows: Index
 ) -> tuple[float, int, Begin]:
-    """Return the log-likelihood, the row and the kind of the likeliest jump, also at rows that are
-    left out between ``rows``.
-    """
+    """Return log-likelihood, row and kind of the likeliest jump, also at rows between ``rows``."""
     k = int(np.argmax(_steps(balance, channels, rows, _BEGINS[:1])))
     around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
     logs = _steps(balance, channels, around, _BEGINS)
@@ -171,9 +168,7 @@ def _jump(
 
 
 def _onsets(samples: Samples, best: _Tried) -> tuple[float, Array, Array]:
-    """Return the log-evidence of a jump, when it may have begun (T,) in s, and how likely each time
-    is (T,).
-    """
+    """Return the log-evidence of a jump, times (T,) in s of its start and their probabilities."""
     every = _rows(len(samples.t))
     rows = np.arange(max(best.row - 5, _BEFORE), min(best.row + 6, every[-1] + 1))
     logs, fine = (_steps(best.balance, best.channels, some, _BEGINS) for some in (every, rows))
@@ -185,30 +180,30 @@ def _onsets(samples: Samples, best: _Tried) -> tuple[float, Array, Array]:
 
 
 def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
-    """Return the log-evidence (6,) of rotors 1 to 4, of all rotors and of another force and torque
-    from what the channels say; shares (E,) that may be lost, and how likely each is by each rotor
-    (4, E).
+    """Return the log-evidence (6,) of rotors 1 to 4, all rotors, and another force and torque.
+
+    Beside it stand the shares (E,) of a loss and their probabilities for each rotor (4, E).
     """
     shares = np.linspace(*_LOSSES, _STEPS)
     lost = shares[shares <= _ALL_LOSE, None]
     share = best.balance.share(best.row, best.begin)
 
     def seen(columns: Array) -> Array:
-        """Return the part (4,) of a column that each channel sees, and its deviation (4,)."""
+        """Return the visible part (4,) of a column in each channel, and its deviation (4,)."""
         pairs = zip(best.channels, columns.T, strict=True)
         return np.array([channel.part(column) for channel, column in pairs]).T
 
-    # what each channel sees, its standard deviation, and by the hypothesis: means and their spread
+    # each channel's visible part, its standard deviation, and the hypothesis' means and spread
     tried: list[tuple[Array, Array, Array, Array]] = []
     for rotor in range(4):
         loss = seen(best.balance.lost(rotor, share))
         tried.append((*loss, shares[:, None] * np.ones(4), _ERROR * shares[:, None]))
-    # a jump of each channel, in parts of what one rotor's usual thrust does there
+    # a jump of each channel, in parts of one rotor's usual torque or force there
     jumps = seen(np.repeat(share[:, None], 4, axis=1))
     means, spread = lost * [0.0, 0.0, 0.0, 4.0], _ERROR * lost * [2.0, 2.0, 2.0, 4.0]
     tried.append((*jumps, means, spread))
     tried.append((*jumps, np.zeros((1, 4)), np.array([_OTHER])))
-    # only what speaks under every hypothesis, so that all explain the same numbers
+    # channels finite under every hypothesis, so all hypotheses explain the same numbers
     says = np.isfinite([std for _, std, *_ in tried]).all(axis=0)
     logs = [
         norm.logpdf(part[says], means[:, says], np.hypot(std, spread)[:, says]).sum(axis=1)
@@ -219,8 +214,8 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
 
 
 def _rows(count: int) -> Index:
-    """Return where a fault may begin: everywhere, or in a long flight evenly spread and everywhere
-    near the end, where little is left to see it by.
+    """Return the rows for the start of a fault: all, or in a long flight an even spread and all
+    rows near the end, with few samples after them.
     """
     rows = np.arange(_BEFORE, count - _AFTER)
     if len(rows) > _PLACES:

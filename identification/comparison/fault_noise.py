@@ -1,7 +1,7 @@
-"""The noise of one channel: larger where the rotors work away from what is usual, and correlated.
+"""The noise of one channel: correlated, and larger while the rotors work unusually.
 
-The weights are the size of the model's own error: a share of what the rotors do besides the mean.
-The correlation is an autoregression, fitted by least squares; its filter turns the residual into
+The weights are the size of the model's own error: a share of the rotors' deviation from the mean.
+The correlation is an autoregression, fitted by least squares. Its filter turns the residual into
 innovations (Willsky and Jones, *A generalized likelihood ratio approach to the detection and
 estimation of jumps in linear systems*, IEEE Transactions on Automatic Control 21, 1976).
 """
@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from ...runtime.arrays import Array, Mask
 
 ORDER = 10
-SHARES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of activity against the quiet level, tried in turn
+SHARES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # activity over the quiet level, tried in turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,19 +25,19 @@ class Noise:
     scale: Array  # (N,) relative standard deviation
     filter: Array  # (p + 1,) the autoregression's, first 1
     whole: Mask  # (N,) the p samples before are there, without a gap
-    variance: float  # of the innovations that it was fitted to
+    variance: float  # fitted innovations
 
     def whiten(self, values: Array) -> Array:
         """Return innovations (n, ...) of values (N, ...), at the rows ``whole``."""
         return self.filtered(values)[self.whole]
 
     def filtered(self, values: Array) -> Array:
-        """Return the filter's output (N, ...); rows that are not ``whole`` mean nothing."""
+        """Return the filter's output (N, ...); rows outside ``whole`` mean nothing."""
         return np.asarray(lfilter(self.filter, 1.0, (values.T / self.scale).T, axis=0))
 
     def log_likelihood(self, rest: Array) -> Array:
-        """Return the log-likelihood of innovations whose squares sum to ``rest``, with their
-        variance at its best.
+        """Return the log-likelihood of innovations with ``rest`` as the sum of squares, at the best
+        variance.
         """
         n = int(self.whole.sum())
         log_scale = float(np.log(self.scale[self.whole]).sum())
@@ -49,7 +49,7 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
 
     Args:
         residual: (N,).
-        activity: (N,) what the rotors do besides the mean, relative.
+        activity: (N,) relative deviation of the rotors from the mean.
         follows: (N,) the sample before is there.
     """
     whole = np.convolve(follows, np.ones(ORDER))[: len(follows)] == ORDER

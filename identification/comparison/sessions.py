@@ -1,13 +1,13 @@
-"""By how much two sets of a vehicle's flights differ, where flights scatter from one to the next
-and from session to session.
+"""The difference of two sets of a vehicle's flights, with scatter from flight to flight and from
+session to session.
 
 A battery is never put in twice at the same place, and a vehicle is taken apart between two days:
 all flights of one session are off by the same, and by more than they differ among each other. So
-ten flights of one session say little more of the vehicle than two. Which flights belong together is
-named by the user; or told by the batteries (a voltage that rises from one flight to the next) and
-by the flights themselves: every way to cut their sequence into sessions counts by its likelihood.
-What all flights of a session are off by cancels where it has flights of both sets. How much one
-vehicle scatters more or less than others, at either level, is summed over likewise.
+ten flights of one session say little more of the vehicle than two. The user names the flights of a
+session. Without names, batteries (a voltage that rises from one flight to the next) and the flights
+themselves tell: every way to cut their sequence into sessions counts by its likelihood. The common
+error of a session cancels if both sets have flights in the session. The vehicle's own scale of the
+scatter, at either level, is summed over likewise.
 """
 
 import itertools
@@ -20,40 +20,40 @@ from scipy.special import log_softmax
 from ...runtime.arrays import Array, Index
 from .trim import Trim
 
-# How unchanged flights differ, in the four numbers of a trim, measured on 89 flights of one
+# Scatter of unchanged flights in the four numbers of a trim. Measured on 89 flights of one
 # Crazyflie, 7 of them unchanged (CrazyPAD, vehicle E8; Masalimov and others, Data 2024, 9, 79).
-# Standard deviations between sessions, of the differences of sides and of the diagonals, in parts
-# of the total, and of the total's logarithm; a centre of mass that moves by 1 % of the arm is 0.01
-# of a side
+# Standard deviations between sessions: the differences of sides and of the diagonals, in parts of
+# the total, and the total's logarithm. A shift of the centre of mass by 1 % of the arm is 0.01 of a
+# side
 SESSION_STD = (0.015, 0.01, 0.01, 0.02)
 # between flights of a session
 FLIGHT_STD = (0.0035, 0.0035, 0.005, 0.006)
-# standard deviation of the logarithm by which one vehicle scatters more or less, at a level
+# standard deviation of the logarithm of one vehicle's own scale of scatter, at a level
 _SPREAD = 0.5
-_SCALES = 7  # of either level, within two standard deviations, over which is summed
-# probability that a session ends between two flights; and where the voltage rises there, by at
+_SCALES = 7  # scales in the sum at either level, within two standard deviations
+# probability of a session's end between two flights, and the same at a rise of the voltage by at
 # least this share
 _ENDS = 0.3
 _ENDS_AT_RISE = 0.9
 _RISE = 0.01
-_MOST_ENDS = 8  # places where a session may end, those where flights differ most
-_LEAST_LOG = -12.0  # below the likeliest way; what is less likely does not count
+_MOST_ENDS = 8  # possible ends of sessions: the largest differences between flights
+_LEAST_LOG = -12.0  # below the likeliest way; less likely ways do not count
 
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """What the difference (4,) of two sets may be, if nothing changed between them but the vehicle:
-    a normal density of each of n ways, which are cuts into sessions and scales of the scatter.
+    """The difference (4,) of two sets, if nothing but the vehicle changed between them: a normal
+    density for each of n ways (cuts into sessions and scales of the scatter).
     """
 
     mean: Array  # (n, 4)
     variance: Array  # (n, 4)
-    log: Array  # (n,) logarithm of how likely the flights are in that way, normalised
+    log: Array  # (n,) log-likelihood of the flights in this way, normalised
 
 
 def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
-    """Return what the difference of two sets of flights may be, in the likeliest ways; either set
-    is in the order of time.
+    """Return the difference of two sets of flights in the likeliest ways; either set is in the
+    order of time.
     """
     # flights of one name stand together, behind those without a name
     every = [*((trim, 0.0) for trim in before), *((trim, 1.0) for trim in after)]
@@ -94,9 +94,10 @@ def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[Index, fl
 def _of_cut(
     x: Array, later: Array, noise: Array, cut: Index, log: float
 ) -> tuple[Array, Array, Array]:
-    """Return mean and variance (k, 4) of the difference between flights (n, 4) that are ``later``
-    (n,) and those that are not, and the logarithm (k,) of how likely they are, at each pair of
-    scales of the scatter; the vehicle's mean is integrated out.
+    """Return mean and variance (k, 4) of the difference, and the flights' log-likelihood (k,).
+
+    The difference is between flights (n, 4), ``later`` (n,) against earlier, at each pair of scales
+    of the scatter; the vehicle's mean is integrated out.
     """
     scale = np.linspace(-2.0, 2.0, _SCALES)
     wider = np.exp(2.0 * _SPREAD * scale)[:, None]
@@ -105,8 +106,8 @@ def _of_cut(
     prior = -0.5 * np.add.outer(scale**2, scale**2).ravel()
     weight = 1.0 / (flight[:, None] + noise)  # (k, n, 4)
     of = np.eye(int(cut[-1]) + 1)[cut]  # (n, sessions)
-    # of the vehicle's mean, the difference, and the flights: products under the inverse covariance
-    # of flights that share their session's error (Woodbury)
+    # products of the vehicle's mean, the difference, and the flights under the inverse covariance;
+    # flights of a session share its error (Woodbury)
     parts = np.stack([np.ones_like(x), np.broadcast_to(later[:, None], x.shape), x])
     sums = np.einsum("ns,knf,pnf->pksf", of, weight, parts)
     shrink = session[:, None] / (1.0 + session[:, None] * sums[0])

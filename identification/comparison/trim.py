@@ -1,13 +1,13 @@
-"""The trim of a flight: how the rotors share the work while the vehicle neither climbs nor turns.
+"""The trim of a flight: the rotors' shares of the work while the vehicle neither climbs nor turns.
 
-On the mean of a flight the rotors' moments balance what acts on the vehicle all the time, so the
-mean thrusts tell where it weighs and which rotor delivers less than it is asked for. That needs no
-true model: only that a thrust is proportional to the square of a rotor's speed, or to a command
-that is linear in thrust. A log without a pose will do: where all rotors together push steadily with
-about the weight, the vehicle neither climbs nor lands.
+On the mean of a flight the rotors' moments balance all constant loads. The mean thrusts therefore
+tell the centre of mass, and a rotor with less thrust than requested. No true model is needed: a
+thrust is proportional to the square of a rotor's speed, or to a command linear in thrust. A log
+without a pose will do: while all rotors together push steadily with about the weight, the vehicle
+neither climbs nor lands.
 
-How far the mean of one flight is off, its noise, comes from the means of batches, each longer than
-what correlates within a flight (Schmeiser, *Batch size effects in the analysis of simulation
+The noise of one flight's mean comes from the means of batches, each longer than the correlation
+within a flight (Schmeiser, *Batch size effects in the analysis of simulation
 output*, Operations Research 30, 1982).
 """
 
@@ -24,9 +24,9 @@ from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, flight_phases, flying
 from ..motion.smoothing import runs_of
 
-LEAST_SECONDS = 3.0  # of steady flight: a mean over less follows single manoeuvres
+LEAST_SECONDS = 3.0  # steady flight: a mean over less follows single manoeuvres
 CALM = 1.5  # m/s: faster, the airflow decides how the rotors share the work
-# of a log without a pose:
+# for a log without a pose:
 EDGE = 1.5  # s after the rotors start and before they stop: taking off and landing
 NEAR = 0.1  # of the median thrust: further off, the vehicle climbs, sinks or pulls
 _SMOOTH = 0.25  # s
@@ -36,18 +36,18 @@ _MIX = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, 1.0], [1.0, -1.0, 1.0
 
 @dataclass(frozen=True, eq=False)
 class Trim:
-    """One flight's mean thrusts, in any unit that is linear in thrust and the same in each flight.
+    """One flight's mean thrusts, in any unit linear in thrust and common to all flights.
 
     Rotors are in this kit's order: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right.
     """
 
     name: str
     thrust: Array  # (4,)
-    seconds: float  # that it is a mean of
+    seconds: float  # length of the mean
     # (4,) variance of ``features`` as means of one flight; zero: not known
     noise: Array = field(default_factory=lambda: np.zeros(4))
     voltage: float | None = None  # V, mean over the same time
-    session: str = ""  # flights of one name share it; empty: not known
+    session: str = ""  # common name of a session's flights; empty: not known
 
     @property
     def total(self) -> float:
@@ -61,8 +61,9 @@ class Trim:
 
 
 def features_of(thrust: Array) -> Array:
-    """Return of thrusts (4,) the difference of left and right, front and rear, and of the two
-    diagonals (1 and 3 less 2 and 4), each in parts of the total, and the logarithm of the total.
+    """Return the four numbers of thrusts (4,): differences in parts of the total, and log(total).
+
+    The differences are left less right, front less rear, and rotors 1 and 3 less 2 and 4.
     """
     total = thrust.sum()
     return np.append(_MIX @ thrust / total, math.log(total))
@@ -72,11 +73,11 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
     """Return the trim of a flight.
 
     Args:
-        name: of the flight.
+        name: the flight's name.
         t: (N,) s, increasing.
         thrust: (N, 4), linear in thrust.
-        steady: (N,) rows that count.
-        voltage: (N,) V, of the battery.
+        steady: (N,) rows of the mean.
+        voltage: (N,) V, battery.
 
     Raises:
         InputError: fewer than 3 s count, or the rotors do not turn.
@@ -149,7 +150,7 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
 
 
 def carrying(t: Array, total: Array) -> Mask:
-    """Return in which rows (N,) the rotors carry the vehicle steadily, from their thrust alone.
+    """Return the rows (N,) of steady flight, from the rotors' thrust alone.
 
     Args:
         t: (N,) s.
@@ -167,7 +168,7 @@ def carrying(t: Array, total: Array) -> Mask:
 
 
 def _smooth(values: Array, t: Array) -> Array:
-    """Return a running mean, so that the noise of a pose is not taken for motion."""
+    """Return a running mean: the noise of a pose is no motion."""
     width = max(1, round(_SMOOTH / float(np.median(np.diff(t)))))
     smooth: Array = uniform_filter1d(values, width, mode="nearest")
     return smooth

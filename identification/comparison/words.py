@@ -1,6 +1,4 @@
-"""What changed between two sets of flights, and which rotor lost thrust during one: sentences,
-data and pictures.
-"""
+"""Changes between two sets of flights, and rotor faults within one: sentences, data, pictures."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -26,12 +24,12 @@ from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
 _PLACES = ("front-left", "rear-left", "rear-right", "front-right")
-_NAMED = 0.05  # probability from which a rival is mentioned
+_NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
 
 def _cannot_tell(chances: Mapping[str, float], likeliest: str, name: Callable[[str], str]) -> str:
-    """Return that the likeliest finding is not sure, and its rivals."""
+    """Return a sentence on an unsure finding and its rivals."""
     rivals = [
         f"{name(rival)} ({p:.2f})"
         for rival, p in sorted(chances.items(), key=lambda item: -item[1])
@@ -42,7 +40,7 @@ def _cannot_tell(chances: Mapping[str, float], likeliest: str, name: Callable[[s
 
 
 def change_headline(change: Change) -> str:
-    """Return what changed, as sure as it is."""
+    """Return a sentence on the change, with its probability."""
     place, chance = change.place, change.places[change.place]
     if place == NOWHERE:
         if change.sure:
@@ -110,10 +108,15 @@ def write_change(change: Change, folder: Path) -> tuple[Path, Path]:
     Raises:
         InputError: a file cannot be written.
     """
-    data, picture = folder / "change.json", folder / "change.png"
-    write_json(change_data(change), data)
-    write_png(_draw_change(change), picture)
-    return data, picture
+    return _written(folder / "change.json", change_data(change), _draw_change(change))
+
+
+def _written(path: Path, data: Any, figure: Any) -> tuple[Path, Path]:
+    """Write data, and a figure beside them; return both paths."""
+    picture = path.with_suffix(".png")
+    write_json(data, path)
+    write_png(figure, picture)
+    return path, picture
 
 
 @styled()
@@ -124,7 +127,7 @@ def _draw_change(change: Change) -> Any:
         (change.before, BEFORE, "before"),
         (change.after, AFTER, "after"),
     ):
-        # as seen from above, front up: what lies to the left is drawn to the left
+        # seen from above, front up: the vehicle's left is the picture's
         x, y = np.transpose([[-100.0, 100.0] * trim.features[:2] for trim in trims])
         left.plot(x, y, "o", color=colour, label=label, ms=7, alpha=0.8)
     left.axhline(0.0, color=PALE, lw=1)
@@ -145,14 +148,14 @@ def _draw_change(change: Change) -> Any:
 
 
 def place_of(fault: RotorFault, rotor: int) -> str:
-    """Return the name of a rotor (1 to 4), and the log's own name where it has one."""
+    """Return the name of a rotor (1 to 4), with the log's own name if any."""
     names = fault.samples.channels.motor_names
     own = "" if names is None else f"; {names[rotor - 1]} in the log"
     return f"rotor {rotor} ({_PLACES[rotor - 1]}{own})"
 
 
 def fault_headline(fault: RotorFault) -> str:
-    """Return which rotor lost thrust, when and how much, as sure as that is."""
+    """Return a sentence on the rotor fault, its time and size, with its probability."""
     likeliest = fault.likeliest
     chance = fault.probabilities[likeliest]
     sure = f"(probability {chance:.2f})" if chance < 0.9995 else "(probability above 0.999)"
@@ -186,41 +189,39 @@ def _finding(fault: RotorFault, name: str) -> str:
 def fault_data(fault: RotorFault) -> dict[str, Any]:
     """Return the finding as plain data."""
     names = {str(i): f"rotor {i}" for i in range(1, 5)}
-    found, motors = fault.likeliest in names, fault.samples.channels.motor_names
+    of_rotor, motors = fault.likeliest in names, fault.samples.channels.motor_names
     return {
         "log": fault.samples.channels.name,
         "headline": fault_headline(fault),
         "found": names.get(fault.likeliest, fault.likeliest),
         "sure": fault.sure,
         "probabilities": {names.get(k, k): p for k, p in fault.probabilities.items()},
-        "rotor": fault.rotor if found else None,
-        "motor": motors[fault.rotor - 1] if found and motors else None,
-        "onset_s": fault.onset[0] if found else None,
-        "onset_ci95_s": list(fault.onset[1:]) if found else None,
-        "remaining": fault.remaining[0] if found else None,
-        "remaining_ci95": list(fault.remaining[1:]) if found else None,
+        "rotor": fault.rotor if of_rotor else None,
+        "motor": motors[fault.rotor - 1] if of_rotor and motors else None,
+        "onset_s": fault.onset[0] if of_rotor else None,
+        "onset_ci95_s": list(fault.onset[1:]) if of_rotor else None,
+        "remaining": fault.remaining[0] if of_rotor else None,
+        "remaining_ci95": list(fault.remaining[1:]) if of_rotor else None,
         "flight_s": fault.seconds,
         "ended_because": fault.samples.ended or None,
     }
 
 
-def write_faults(found: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:
+def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:
     """Write ``rotor_faults.json`` and ``rotor_faults.png`` into a folder and return their paths.
 
     Raises:
         InputError: a file cannot be written.
     """
-    data, picture = folder / "rotor_faults.json", folder / "rotor_faults.png"
-    write_json([fault_data(fault) for fault in found], data)
-    write_png(_draw_faults(found), picture)
-    return data, picture
+    data = [fault_data(fault) for fault in faults]
+    return _written(folder / "rotor_faults.json", data, _draw_faults(faults))
 
 
 @styled()
-def _draw_faults(found: Sequence[RotorFault]) -> Any:
-    figure = new_figure(3.4 * len(found))
-    axes = figure.subplots(len(found), 2, squeeze=False)
-    for fault, (left, right) in zip(found, axes, strict=True):
+def _draw_faults(faults: Sequence[RotorFault]) -> Any:
+    figure = new_figure(3.4 * len(faults))
+    axes = figure.subplots(len(faults), 2, squeeze=False)
+    for fault, (left, right) in zip(faults, axes, strict=True):
         samples, command = fault.samples, fault.samples.channels.command
         commands = resampled(samples.t, command.t, command.values)
         turning = samples.angular_acceleration

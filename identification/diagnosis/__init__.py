@@ -1,5 +1,5 @@
-"""What the model of a vehicle lacks, by its flights: columns of effects, the evidence of sets of
-them, and the findings.
+"""Effects missing in the model of a vehicle, by its flights: columns of effects, the evidence of
+sets of them, and the findings.
 """
 
 from .diagnosing import diagnose

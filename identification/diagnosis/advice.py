@@ -1,5 +1,5 @@
-"""What a diagnosis says beside its findings, in sentences: what else may be the cause, where the
-fit does not reach, and what to fly.
+"""Sentences beside a diagnosis' findings: other possible causes, flight outside the range of the
+fit, and flights to fly next.
 """
 
 import itertools
@@ -7,17 +7,15 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Need, Role, get, needing, playing
 from ...dynamics.vehicle import Vehicle
 from ..findings import NamedEffect
+from ..logs.table import Array
 from ..motion.inertial_signals import pose_rate
 from .log_offsets import ROTOR_TIME_OFFSET
-from .regression import CENTRAL, Flights, Setting, moves_time, unit_of_change
+from .regression import CENTRAL, RegressedFlights, Setting, moves_time, unit_of_change
 from .worth import BY_CHANCE
-
-Array = NDArray[np.float64]
 
 FILTERED = (
     "the pose was filtered before the log was written. Whether the named effects act on the "
@@ -25,22 +23,22 @@ FILTERED = (
     "so all names are tentative. Log the pose as it was measured"
 )
 LEAST_ROTOR_TIME_OFFSET = 0.001  # s, worth a note
-# from when on two changes are alike: standard deviations, of any component, that they may be apart,
-# and the share of the changes to which effect models are alike
+# when two changes are alike: most standard deviations between any two components, and the share of
+# the changes to which effect models agree
 MOST_APART, SHARE = 2.5, 0.1
-# quantile of the fitted rows up to which the fit knows a quantity, and the share of other rows
-# beyond it from which these are said to lie outside
+# quantile of the fitted rows up to which the fit knows a quantity, and the least share of other
+# rows beyond it for a note
 KNOWN, OUTSIDE = 0.995, 0.05
 
 
 def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str]:
-    """Yield which single effect may be the cause of two of a setting.
+    """Yield the single effect as a possible cause of two effects of a setting.
 
-    Thrust is known by what it moves: only its ratios to mass and to inertia show. So of mass,
-    inertia and a scale of thrust any two that change alike are the third, the other way round.
+    Only the ratios of thrust to mass and to inertia show. So of mass, inertia and a scale of thrust
+    any two with like changes equal the third with the opposite change.
 
     Args:
-        vehicle: as it is declared.
+        vehicle: as declared.
         setting: coefficients of effects.
         std: their standard deviations.
     """
@@ -60,18 +58,18 @@ def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str
 def _relative(
     vehicle: Vehicle, effect: str, values: Mapping[str, float], std: Mapping[str, float]
 ) -> Array:
-    """Return the relative changes of what an effect changes, and their standard deviations."""
+    """Return the relative changes by an effect, and their standard deviations."""
     names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
     unit = np.array([unit_of_change((effect, name), vehicle) for name in names])
     both = np.array([[values[name], std.get(name, 0.0)] for name in names])
     return np.asarray(both.T / unit)
 
 
-def outside_the_fit(flights: Flights) -> Iterator[str]:
-    """Yield of each quantity in which held-out flight leaves the range of the fit how far it does.
+def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
+    """Yield, for each quantity outside the range of the fit in held-out flight, how far outside.
 
-    A coefficient that was fitted at 6 m/s says what happens at 14 m/s only if the effect's form
-    holds that far, which the fit cannot know.
+    A coefficient fitted at 6 m/s holds at 14 m/s only if the effect's form holds so far. No fit
+    knows this.
     """
     seen, vehicle = flights.fit_rows, flights.vehicle
     thrust = vehicle.rotor_wrench(flights.at_rows("rotor_speeds"))[:, 0]
@@ -90,8 +88,8 @@ def outside_the_fit(flights: Flights) -> Iterator[str]:
             )
 
 
-def inertial_notes(flights: Flights, named: Sequence[str]) -> Iterator[str]:
-    """Yield what follows from a motion that is read from an IMU."""
+def inertial_notes(flights: RegressedFlights, named: Sequence[str]) -> Iterator[str]:
+    """Yield the consequences of reading the motion from an IMU."""
     if not flights.inertial:
         return
     rates = [pose_rate(log) for log in flights.logs]
@@ -108,9 +106,9 @@ def inertial_notes(flights: Flights, named: Sequence[str]) -> Iterator[str]:
 
 
 def late_rotors(
-    flights: Flights, effects: Iterable[str], sensors: Mapping[str, tuple[float, float]]
+    flights: RegressedFlights, effects: Iterable[str], sensors: Mapping[str, tuple[float, float]]
 ) -> Iterator[str]:
-    """Yield by how much rotor speeds act later than they are logged, where no effect says so;
+    """Yield the delay of the rotor speeds against their log, unless an effect covers it;
     ``sensors``: time offsets and their standard deviations.
     """
     offset, std = sensors.get(ROTOR_TIME_OFFSET[1], (0.0, math.inf))
@@ -132,7 +130,7 @@ def advice(
     filtered: bool,
     needs_pose: Sequence[str],
 ) -> Iterator[str]:
-    """Yield what to fly, and to log, to separate what these logs cannot."""
+    """Yield the flights, and the channels to log, for questions these logs leave open."""
     if filtered:
         lost = needing(Need.FAST_MOTION)
         yield (
@@ -145,7 +143,7 @@ def advice(
             group = (effect.name, *effect.indistinguishable_from)
             yield (
                 f"{' or '.join(group)}: these logs cannot tell them apart. To separate them, fly: "
-                + "; ".join(f"{name}: {get(name).excitation}" for name in group)
+                f"{_excitations(group)}"
             )
     if remainder == "structured":
         yield (
@@ -155,15 +153,16 @@ def advice(
         )
     if needs_pose:
         yield (
-            "An IMU alone does not show "
-            + ", ".join(needs_pose)
-            + ": they need a velocity, a position or an attitude that no gyro and accelerometer "
-            "know. To identify one of them, log the pose as well."
+            f"An IMU alone does not show {', '.join(needs_pose)}: they need a velocity, a position "
+            "or an attitude that no gyro and accelerometer know. To identify one of them, log the "
+            "pose as well."
         )
     if not_identifiable:
         yield (
-            "Not identifiable from these flights: "
-            + ", ".join(not_identifiable)
-            + ". To identify one of them, fly: "
-            + "; ".join(f"{name}: {get(name).excitation}" for name in not_identifiable[:4])
+            f"Not identifiable from these flights: {', '.join(not_identifiable)}. To identify one "
+            f"of them, fly: {_excitations(not_identifiable[:4])}"
         )
+
+
+def _excitations(effects: Iterable[str]) -> str:
+    return "; ".join(f"{name}: {get(name).excitation}" for name in effects)

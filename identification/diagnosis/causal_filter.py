@@ -1,47 +1,46 @@
-"""The causal filter of a flight: from the poses of the past to the state at each sample, and what a
-coefficient changes in its innovations.
+"""The causal filter of a flight: the state at each sample from past poses, and the derivative of
+its innovations by a coefficient.
 
 The state is position, velocity, attitude, angular velocity and the disturbance's force and torque
-as accelerations: 18 numbers. Rolls and pitches are told about the world's x and y, turned with the
-heading: there each axis has a steady gain, on whatever way the vehicle yaws. So the filter is an
-observer of fixed gains: what an innovation changes with a coefficient follows from linear
-recursions, exactly but for second order. Rotor speeds move linearly between samples.
+as accelerations: 18 numbers. Rolls and pitches are about the world's x and y, turned with the
+heading. There each axis has a steady gain, whatever the yaw. So the filter is an observer of fixed
+gains, and linear recursions give the derivatives of its innovations, exactly but for second order.
+Rotor speeds move linearly between samples.
 """
 
 import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
+from ...dynamics.model import apply_effects, drive
 from ...dynamics.motion import acceleration_of, angular_acceleration_of, body_numbers
 from ...dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ...dynamics.vehicle import Vehicle
-from ...runtime.compiled import Record, compiled, compiled_for_vectors
+from ...runtime.compiled import Record, compiled, compiled_for_vectors, compiled_inline
+from ..logs.table import Array
+from ..motion.residual import loaded_model, model_numbers
 from .steady_filter import PARTNER, SteadyFilter
 
-Array = NDArray[np.float64]
-_MODEL = np.dtype(MODEL_FIELDS)
-STRAIGHT = (0, 1, 2, 5)  # axes that the heading does not turn
+STRAIGHT = (0, 1, 2, 5)  # axes not turned by the heading
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """An unbroken piece of a flight as it was measured, evenly spaced (n samples)."""
+    """An unbroken piece of a flight as measured, evenly spaced (n samples)."""
 
     t: Array  # (n,) s
     period: float  # s
     position: Array  # (n, 3) m
     quaternion: Array  # (n, 4), of continuous sign
     rotor_speeds: Array  # (n, 4) rad/s, at the samples
-    voltage: Array  # (n,) V; 0 where it is not known
+    voltage: Array  # (n,) V; 0 where unknown
     velocity: Array  # (3,) m/s, at the start
     angular_velocity: Array  # (3,) rad/s, body, at the start
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class FlightState:
     """A piece of flight (n samples)."""
 
     t: Array  # (n,) s
@@ -50,30 +49,37 @@ class State:
     velocity: Array  # (n, 3) m/s, world
     angular_velocity: Array  # (n, 3) rad/s, body
     acceleration: Array  # (n, 3) m/s2, world; of a track (n, 6), and rad/s2, body
-    rotors: Array  # (n, 4) what the rotors' thrust and torques accelerate: m/s2, rad/s2, body
+    rotors: Array  # (n, 4) accelerations by the rotors' thrust and torques: m/s2, rad/s2, body
 
 
 @dataclass(frozen=True, eq=False)
-class Track(State):
-    """A piece of a flight as the filter saw it, half a step on from what is known at sample k. Row
-    k is of the step from sample k to k + 1, but for the predictions, which are of sample k. The
-    acceleration is that of the model and its disturbance.
+class Track(FlightState):
+    """A piece of a flight as the filter saw it, half a step on from sample k.
+
+    Row k describes the step from sample k to k + 1; its predictions are of sample k. The
+    acceleration includes the disturbance.
     """
 
     model: Array  # (n, 6) acceleration of the model alone
-    predicted: Array  # (n, 7) position and quaternion at sample k, from samples before it
+    predicted: Array  # (n, 7) position and quaternion at sample k, from the samples before
     heading: Array  # (n, 2) cosine and sine, at sample k
     innovations: Array  # (n, 6) m, world; rad, as ``level`` returns them
     disturbance: Array  # (n, 6) m/s2, world; rad/s2
 
 
 def level(heading: Array, x: Array) -> Array:
-    """Return vectors (n, 3) in body axes, about the world's x and y as the heading (n, 2) turns
-    them, and body z.
+    """Return vectors (n, 3) in body axes about three others: the world's x and y, turned with the
+    heading (n, 2), and body z.
     """
     (c, s), out = heading.T, x.copy()
     out[:, 0], out[:, 1] = c * x[:, 0] - s * x[:, 1], s * x[:, 0] + c * x[:, 1]
     return out
+
+
+@compiled_inline
+def _turned(ahead: float, left: float, x: float, y: float) -> tuple[float, float]:
+    """Return a vector about axes turned by a heading, with cosine ``ahead`` and sine ``left``."""
+    return ahead * x + left * y, ahead * y - left * x
 
 
 @compiled
@@ -87,24 +93,20 @@ def _turn(q: Array, w: Array, out: Array) -> None:
 def _add(
     said: Array, ahead: float, left: float, moving: Array, turning: Array, turn: Array
 ) -> None:
-    """Add what is said (6, 3) of pose, rate and disturbance of each axis, in the directions of
-    ``Track.innovations``, to those of position (3, 3) and to rate and disturbance of the attitude
-    (2, 3); write what it turns the attitude by (3,).
+    """Add corrections (6, 3) of pose, rate and disturbance, in the directions of
+    ``Track.innovations``, to the states of position (3, 3) and to the attitude's rate and
+    disturbance (2, 3); write the attitude's turn (3,).
     """
     for s in range(3):
         for i in range(3):
             moving[s, i] += said[i, s]
-        x, y, z = (
-            ahead * said[3, s] + left * said[4, s],
-            ahead * said[4, s] - left * said[3, s],
-            said[5, s],
-        )
+        x, y = _turned(ahead, left, said[3, s], said[4, s])
         if s == 0:
-            turn[0], turn[1], turn[2] = x, y, z
+            turn[0], turn[1], turn[2] = x, y, said[5, s]
         else:
             turning[s - 1, 0] += x
             turning[s - 1, 1] += y
-            turning[s - 1, 2] += z
+            turning[s - 1, 2] += said[5, s]
 
 
 @compiled
@@ -147,23 +149,20 @@ def _run(
         if size > 0.0:
             ahead, left = r[0, 0] / size, r[1, 0] / size
         heading[k, 0], heading[k, 1] = ahead, left
-        # what the last sample's rotors said
+        # the correction by the last sample's rotors
         _add(known[k], ahead, left, moving, turning, step)
         _turn(q, step, q2)
-        for i in range(4):
-            q[i] = q2[i]
-        for i in range(3):
-            predicted[k, i] = p[i]
-        for i in range(4):
-            predicted[k, 3 + i] = q[i]
-        # what the pose of this sample says
+        q[:] = q2
+        predicted[k, :3], predicted[k, 3:] = p, q
+        # the correction by this sample's pose
         o, m = q, quaternion[k]
         sign = 1.0 if o[0] * m[0] + o[1] * m[1] + o[2] * m[2] + o[3] * m[3] > 0.0 else -1.0
         e0 = sign * (o[0] * m[1] - o[1] * m[0] - o[2] * m[3] + o[3] * m[2])
         e1 = sign * (o[0] * m[2] + o[1] * m[3] - o[2] * m[0] - o[3] * m[1])
         e2 = sign * (o[0] * m[3] - o[1] * m[2] + o[2] * m[1] - o[3] * m[0])
         e = innovations[k]
-        e[3], e[4], e[5] = 2 * (ahead * e0 - left * e1), 2 * (left * e0 + ahead * e1), 2 * e2
+        x, y = _turned(ahead, -left, e0, e1)
+        e[3], e[4], e[5] = 2 * x, 2 * y, 2 * e2
         for i in range(3):
             e[i] = position[k, i] - p[i]
         for i in range(6):
@@ -171,7 +170,7 @@ def _run(
                 say[i, s] = gain[i, s, 0] * e[i] + gain[i, s, 1] * e[PARTNER[i]]
         _add(say, ahead, left, moving, turning, step)
         _turn(q, step, q2)
-        # half a step on, where the model is asked; the acceleration is that of the step before
+        # half a step on, for the model; the acceleration is the last step's
         for i in range(3):
             v2[i], w2[i] = v[i] + half * before[i], w[i] + half * before[3 + i]
             mid[i] = p[i] + half * v[i]
@@ -183,12 +182,10 @@ def _run(
         drive(f, both, period, voltage[k])
         apply_effects(f, mid, r, v2, w2)
         f.time += period
-        u, g = f.rotor_wrench, f.effect_wrench
-        turn = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
-        thrust, effects = (u[0], u[1], u[2], u[3]), (g[0], g[1], g[2], g[3], g[4], g[5])
+        turn, thrust, effects = model_numbers(f, r)
         a = acting[k]
         x, y, z = angular_acceleration_of(b, turn, (w[0], w[1], w[2]), thrust, nothing, effects)
-        # of gyroscopic torque the rate half a step on counts, of this step's own acceleration
+        # gyroscopic torque is by the rate half a step on, with this step's own acceleration
         omega = (
             w[0] + half * (x + torque[0]),
             w[1] + half * (y + torque[1]),
@@ -203,12 +200,9 @@ def _run(
         for i in range(3):
             a[i] = before[i] = model[k, i] + d[i]
             a[3 + i] = before[3 + i] = model[k, 3 + i] + torque[i]
-        for i in range(3):
-            at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v2[i], omega[i]
-            for j in range(3):
-                at_rotation[k, i, j] = r[i, j]
-        for i in range(4):
-            rotors[k, i] = f.rotor_wrench[i]
+            at_rate[k, i] = omega[i]
+        at_position[k], at_velocity[k], at_rotation[k] = mid, v2, r
+        rotors[k] = f.rotor_wrench
         # on to the next sample
         for i in range(3):
             p[i] += period * (v[i] + half * acting[k, i])
@@ -216,9 +210,8 @@ def _run(
             step[i] = period * (w[i] + half * acting[k, 3 + i])
             w[i] += period * acting[k, 3 + i]
             d[i] *= keep[i]
-        x = keep[3] * (ahead * torque[0] - left * torque[1])
-        y = keep[4] * (left * torque[0] + ahead * torque[1])
-        torque[0], torque[1] = ahead * x + left * y, ahead * y - left * x
+        x, y = _turned(ahead, -left, torque[0], torque[1])
+        torque[0], torque[1] = _turned(ahead, left, keep[3] * x, keep[4] * y)
         torque[2] *= keep[5]
         _turn(q2, step, q)
 
@@ -228,20 +221,18 @@ def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> T
 
     Args:
         poses: the piece.
-        vehicle: with the model.
+        vehicle: the model.
         steady: the filter's gains.
-        known: (n, 6, 3) what is added to pose, rate and disturbance of each axis before the pose of
-            sample k is read; in the directions of ``Track.innovations``.
+        known: (n, 6, 3) corrections of pose, rate and disturbance of each axis before the pose of
+            sample k is read, in the directions of ``Track.innovations``.
     """
-    models = np.zeros(1, dtype=_MODEL)
-    load_model(models[0], vehicle)
     n = len(poses.t)
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
     out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
     measured = (poses.rotor_speeds, poses.voltage, poses.position, poses.quaternion)
     speeds, voltage, position, quaternion = map(np.ascontiguousarray, measured)
     _run(
-        models,
+        loaded_model(vehicle)[0].copy(),
         poses.period,
         speeds,
         voltage,
@@ -282,21 +273,21 @@ def sensitivities(
     Args:
         period: s.
         gain: (6, 3, 2) of the axes, of ``SteadyFilter``.
-        keep: (6,) what is left of a disturbance after a period.
+        keep: (6,) share of a disturbance left after a period.
         heading: (n, 2) of the track.
-        pull: (n, 3, 2) by how much the acceleration (world) grows with an error of the attitude
-            about body x and y.
+        pull: (n, 3, 2) derivative of the acceleration (world) by an error of the attitude about
+            body x and y.
         rate: (n, 3) angular velocity.
-        gyration: (n, 3, 3) by how much the angular acceleration grows with the angular velocity.
-        acting: (n, 6, a) what a unit of the first ``a`` columns adds to the model's acceleration.
-        moved: (n, 6, b) by how much a unit of the last ``b`` of those moves the measured pose.
-        jumps: (n, 6, e) what a unit of the columns behind them adds to one state of each axis,
-            before the pose of sample k is read.
+        gyration: (n, 3, 3) derivative of the angular acceleration by the angular velocity.
+        acting: (n, 6, a) acceleration of the model by a unit of the first ``a`` columns.
+        moved: (n, 6, b) shift of the measured pose by a unit of the last ``b`` of these.
+        jumps: (n, 6, e) jump of one state of each axis by a unit of the next columns, before the
+            pose of sample k is read.
         jump_state: (e,) the state: 0 the pose, 1 its rate, 2 the disturbance.
-        slopes: (6, 7, m) what a unit of the last columns adds to the gains of each axis, in the
-            order of ``gain``, and to ``keep``.
-        innovations: (n, 6) to which the filter answers.
-        disturbance: (n, 6) that it has, when it has read a pose.
+        slopes: (6, 7, m) change of the gains of each axis, in the order of ``gain``, and of
+            ``keep``, by a unit of the last columns.
+        innovations: (n, 6) of the filter.
+        disturbance: (n, 6) of the filter, after a pose is read.
         state: (6, 3, c) carried from one call to the next.
         out: (n, 6, c).
     """
@@ -311,17 +302,16 @@ def sensitivities(
             s = jump_state[j]
             for i in STRAIGHT:
                 state[i, s, a + j] += jumps[k, i, j]
-            x, y = jumps[k, 3, j], jumps[k, 4, j]
-            state[3, s, a + j] += ahead * x + left * y
-            state[4, s, a + j] += ahead * y - left * x
+            x, y = _turned(ahead, left, jumps[k, 3, j], jumps[k, 4, j])
+            state[3, s, a + j] += x
+            state[4, s, a + j] += y
         for i in range(6):
             for j in range(c):
                 out[k, i, j] = state[i, 0, j]
             for j in range(b):
                 out[k, i, a - b + j] -= moved[k, i, j]
         for j in range(c):
-            x, y = out[k, 3, j], out[k, 4, j]
-            out[k, 3, j], out[k, 4, j] = ahead * x - left * y, left * x + ahead * y
+            out[k, 3, j], out[k, 4, j] = _turned(ahead, -left, out[k, 3, j], out[k, 4, j])
         for i in range(6):
             o = PARTNER[i]
             for s in range(3):
@@ -336,9 +326,9 @@ def sensitivities(
                 for j in range(c):
                     state[i, s, j] += say[i, s, j]
             for j in range(c):
-                x, y = say[3, s, j], say[4, s, j]
-                state[3, s, j] += ahead * x + left * y
-                state[4, s, j] += ahead * y - left * x
+                x, y = _turned(ahead, left, say[3, s, j], say[4, s, j])
+                state[3, s, j] += x
+                state[4, s, j] += y
         for i in range(3):
             for j in range(c):
                 mid[i, j] = state[3 + i, 0, j] + 0.5 * period * state[3 + i, 1, j]
@@ -370,18 +360,14 @@ def sensitivities(
                 )
                 state[3 + i, 1, j] += period * g
         for j in range(c):
-            x, y = state[3, 2, j], state[4, 2, j]
-            mid[0, j], mid[1, j] = (
-                keep[3] * (ahead * x - left * y),
-                keep[4] * (left * x + ahead * y),
-            )
+            x, y = _turned(ahead, -left, state[3, 2, j], state[4, 2, j])
+            mid[0, j], mid[1, j] = keep[3] * x, keep[4] * y
         x, y = disturbance[k, 3], disturbance[k, 4]
         for j in range(m):
             mid[0, f + j] += slopes[3, 6, j] * x
             mid[1, f + j] += slopes[4, 6, j] * y
         for j in range(c):
-            x, y = mid[0, j], mid[1, j]
-            state[3, 2, j], state[4, 2, j] = ahead * x + left * y, ahead * y - left * x
+            state[3, 2, j], state[4, 2, j] = _turned(ahead, left, mid[0, j], mid[1, j])
         for i in STRAIGHT:
             for j in range(c):
                 state[i, 2, j] *= keep[i]

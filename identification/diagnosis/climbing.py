@@ -1,4 +1,4 @@
-"""The mode of the posterior of some effects' coefficients, whatever likelihood it is of."""
+"""The mode of the posterior of some effects' coefficients, for any likelihood."""
 
 import math
 from collections.abc import Callable
@@ -8,21 +8,20 @@ import numpy as np
 from ...runtime.errors import InputError
 from .evidence import set_evidence
 from .priors import Base, Setting, declared
-from .regression import Flights, coefficient
+from .regression import RegressedFlights, coefficient
 
-# minus the logarithm of likelihood and prior at a setting, and what returns the mode of the
+# minus the logarithm of likelihood and prior at a setting, and a function for the mode of the
 # linearised posterior there
 Height = tuple[float, Callable[[], Setting]]
 
-
 ROUNDS = 8
 SHARES = (1.0, 0.5, 0.2, 0.05)  # of a step, tried in turn
-LEAST_GAIN = 0.3  # nats; a step that gains less is the last
+LEAST_GAIN = 0.3  # nats; a step with less gain is the last
 
 
 def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
     """Return the mode of the posterior from a setting on (damped Gauss-Newton); ``at`` raises an
-    error where no vehicle is like that.
+    error for an impossible vehicle.
     """
     here, (value, target) = start, height(start, at)
     for _ in range(ROUNDS):
@@ -44,16 +43,18 @@ def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
 
 
 def height(setting: Setting, at: Callable[[Setting], Height]) -> Height:
-    """Return how high the posterior is at a setting; infinite where no vehicle is like that."""
+    """Return the height of the posterior at a setting; infinite for an impossible vehicle."""
     try:
         return at(setting)
     except (InputError, np.linalg.LinAlgError):
         return math.inf, lambda: setting
 
 
-def linearised(flights: Flights, base: Base, setting: Setting, power: float = 1.0) -> Height:
-    """Return the height of a quadratic likelihood at the setting about which it is one, and its
-    mode within the limits of the coefficients.
+def linearised(
+    flights: RegressedFlights, base: Base, setting: Setting, power: float = 1.0
+) -> Height:
+    """Return the height of a quadratic likelihood at the setting of its linearisation, and its mode
+    within the limits of the coefficients.
     """
     at, every = base.at(base.asked), range(len(base.asked))
     m = base.marginal(at, base.plain, power=power)
@@ -62,9 +63,9 @@ def linearised(flights: Flights, base: Base, setting: Setting, power: float = 1.
     value = 0.5 * (float(z @ z) - m.explained(every, z)) - m.constant
 
     def target() -> Setting:
-        found = set_evidence(m, every, base.low[at], base.high[at])
+        best = set_evidence(m, every, base.low[at], base.high[at]).mode * base.size[at]
         out: Setting = {e: dict(values) for e, values in setting.items()}
-        for c, x in zip(base.asked, (found.mode * base.size[at]).tolist(), strict=True):
+        for c, x in zip(base.asked, best.tolist(), strict=True):
             limits = coefficient(c)
             out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)
         return out

@@ -1,16 +1,14 @@
-"""Logs whose rotor speeds are worked out from commands (PWM, thrust): what a regression may use of
-them, and what it must allow for.
+"""Logs with rotor speeds from commands (PWM, thrust): their use in a regression, and its limits.
 
 The rotors' moments are only commanded ones, and the ground carries too. So only the time in the air
-counts, and torque is left out. What differs from flight to flight, thrust and the motion capture's
-vertical, is for ``row_nuisances`` to say.
+counts, and torque is left out. Thrust and the motion capture's vertical differ from flight to
+flight: see ``row_nuisances``.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Role, playing
 from ...dynamics.vehicle import Vehicle
@@ -19,24 +17,21 @@ from ..logs.flight_phases import FLIGHT, flight_phases, usual_thrust
 from ..motion.signals import Signals
 from ..motion.smoothing import CUTOFFS, low_pass
 
-Array = NDArray[np.float64]
-
-
-PERIOD = 0.02  # s, of the samples that are used
-# of the usual thrust, from which rotors carry the vehicle, and s that taking off and landing
-# last beyond: where no height shows them
+PERIOD = 0.02  # s, of the used samples
+# without a height: share of the usual thrust from which rotors carry the vehicle, and s of take-off
+# and landing beyond these rows
 CARRYING_SHARE = 0.7
 TAKE_OFF = 1.0
-# relative standard deviation of the thrust that a command makes where nobody stated the motor
-# curve: of three kinds of vehicle, measured flights had 0.69 to 1.12 of what was assumed
+# relative standard deviation of a command's thrust without a stated motor curve: measured flights
+# of three kinds of vehicle had 0.69 to 1.12 of the assumed thrust
 UNSTATED_THRUST_STD = 0.3
-# what an error of the assumed thrust makes exactly
+# the exact effect of an error of the assumed thrust
 THRUST_FACTORS = (Role.THRUST, Role.MASS)
 
 
 def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
-    """Return the rows of a log between take-off and landing; the log itself where it shows neither,
-    or no flight at all.
+    """Return the rows of a log between take-off and landing; the log itself if it shows neither, or
+    no flight at all.
     """
     seen = log.valid
     if not seen.any():
@@ -51,8 +46,8 @@ def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
 
 
 def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
-    """Return the rows of a log without a height between take-off and landing, as the rotors' thrust
-    shows them; the log itself where they carry the vehicle all the time.
+    """Return the rows of a log without a height between take-off and landing, by the rotors'
+    thrust; the log itself if they carry the vehicle all the time.
     """
     thrust = np.square(log.rotor_speeds) @ vehicle.k
     if len(thrust) * log.period > 1.0 / CUTOFFS.flying_hz:
@@ -69,9 +64,7 @@ def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
 
 
 def downsampled(signals: Signals) -> Signals:
-    """Return signals at 50 Hz or a little more, with the rotor speeds through the same filter as
-    the pose.
-    """
+    """Return signals at 50 Hz or a little more, with the pose's filter on the rotor speeds."""
     step = max(1, int(PERIOD / signals.period + 1e-6))
     if step == 1:
         return signals
@@ -81,14 +74,14 @@ def downsampled(signals: Signals) -> Signals:
 
 
 def thrust_is_assumed(logs: Sequence[FlightLog], vehicle: Vehicle) -> bool:
-    """Return whether rotor speeds are worked out from commands, and the vehicle states no curve
-    (``motor_curve``) that says how much thrust a command makes.
+    """Return whether rotor speeds come from commands, and no curve (``motor_curve``) of the vehicle
+    states a command's thrust.
     """
     return vehicle.motor_curve is None and any(log.commanded for log in logs)
 
 
 def assumed_thrust_doubts(effects: Sequence[str]) -> tuple[str, ...]:
-    """Return, as sentences, which effects rest on a thrust that nobody measured."""
+    """Return, as sentences, the effects that rest on an unmeasured thrust."""
     return tuple(
         f"{effect}: the log holds motor commands and the vehicle file states no motor curve, so "
         "how much thrust a command makes is an assumption, and this effect may be its error alone. "

@@ -1,5 +1,5 @@
-"""What is known of flights before effects are asked about, where the rotors are known by commands:
-calibrations, which any such vehicle has, and the delay that its turns show.
+"""Facts of flights with rotors known by commands, before effects are asked about: calibrations of
+any such vehicle, and the delay shown by its turns.
 """
 
 from collections.abc import Sequence
@@ -8,28 +8,28 @@ from dataclasses import dataclass
 from ...dynamics.effects import Role, get, playing
 from ..findings import NamedEffect
 from .commanded_rotors import THRUST_FACTORS
-from .regression import CENTRAL, Flights
+from .regression import CENTRAL, RegressedFlights
 from .turning_delay import turning_delay
 
 
 @dataclass(frozen=True)
 class Given:
-    """What needs no evidence."""
+    """Facts without need of evidence."""
 
-    library: list[str]  # effects that are asked about
-    first: dict[str, dict[str, float]]  # any set has them; with coefficients where a fit begins
+    library: list[str]  # effects to ask about
+    first: dict[str, dict[str, float]]  # in every set; with coefficients where a fit begins
     fixed: dict[str, dict[str, float]]  # known from elsewhere, with their coefficients
-    # the delay of commands, which the vehicle's turns show and no force; None where none is known
+    # the delay of commands, from the vehicle's turns and not from a force; None if unknown
     late: NamedEffect | None = None
 
 
-def what_commands_show(flights: Flights, library: Sequence[str]) -> Given:
-    """Return what is known of flights before effects of a library are asked about; nothing where
-    rotor speeds were measured.
+def what_commands_show(flights: RegressedFlights, library: Sequence[str]) -> Given:
+    """Return the facts of flights before effects of a library are asked about; nothing for measured
+    rotor speeds.
 
-    How much thrust a command makes and when, how it bends, and how it goes with voltage and time
-    are fitted in every set, and are no discovery. Of thrust and mass a flight shows the ratio: one
-    of them is enough.
+    Fitted in every set, and no discovery: a command's thrust and delay, the curve of thrust, and
+    its change with voltage and time. A flight shows only the ratio of thrust to mass: one of them
+    is enough.
     """
     library = list(library)
     if not flights.commanded:
@@ -39,8 +39,7 @@ def what_commands_show(flights: Flights, library: Sequence[str]) -> Given:
     delays = playing(Role.DELAY, among=library)
     delay = next((effect for effect in delays if get(effect).kind == "rotor input"), None)
     if delay:
-        # a lag delays slow changes as much, and a log whose clock is off looks like one whose
-        # commands are late
+        # a lag delays slow changes as much, and a wrong clock of the log looks like late commands
         same = [x for x in playing(Role.LAG, Role.DELAY, among=library) if x != delay]
         library = [e for e in library if e not in same]
         if shown := turning_delay(seen, flights.vehicle, flights.logs[0].period):
@@ -65,7 +64,7 @@ def what_commands_show(flights: Flights, library: Sequence[str]) -> Given:
         | dict(flights.coefficients({}, e))
         for e in (*calibrations, *(e for e in library if e == delay))
     }
-    if thrust:  # thrust over mass is known, and neither alone
+    if thrust:  # only thrust over mass is known
         library = [e for e in library if e in first or get(e).role not in THRUST_FACTORS]
     fixed = {late.name: dict(late.coefficients)} if late else {}
     return Given(library, first, fixed, late)

@@ -1,21 +1,19 @@
-"""From flight logs to the effects that their vehicle's model lacks: the whole of a diagnosis.
+"""From flight logs to the effects missing in their vehicle's model: the whole of a diagnosis.
 
-Effects and coefficients are chosen on the fitted blocks of flight; the errors before and after are
-those of blocks, or logs, that the fit never saw. A name is sure where it is probable, where what it
-does is at least as large as what is left unexplained beyond the sensors' noise, and where little
-speaks for a cause outside the library. The rule is the same for every kind of log; what differs is
-whose likelihood it is: that of the poses, where they and the rotors were measured as they were, or
-that of the wrench's balance.
+Effects and coefficients are chosen on the fitted blocks of flight. The errors before and after are
+of blocks, or logs, outside the fit. A name is sure under three conditions: it is probable; its
+effect is at least as large as the unexplained residual beyond the sensors' noise; and little speaks
+for a cause outside the library. The rule is the same for every kind of log. The likelihood differs:
+of the poses, where poses and rotors were logged as measured, or of the wrench's balance.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import get, names, playing
 from ...dynamics.vehicle import Vehicle
@@ -34,8 +32,9 @@ from ..findings import (
 )
 from ..logs.flight_log import FlightLog
 from ..logs.screening import LEAST_SECONDS, screen_log
+from ..logs.table import Array
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
-from ..motion.smoothing import CUTOFFS
+from ..motion.smoothing import CUTOFFS, mean_square
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
 from .advice import FILTERED, advice, composites, inertial_notes, late_rotors, outside_the_fit
@@ -45,7 +44,7 @@ from .priors import NUISANCE
 from .ranking import LEAST_RIVAL, rank, rank_by_rows
 from .regression import (
     CENTRAL,
-    Flights,
+    RegressedFlights,
     coefficient,
     typical_size,
     unit_of_change,
@@ -58,12 +57,10 @@ from .traces import carrying_channels, signature
 from .unknown import signs, unknown
 from .worth import BY_CHANCE, worth
 
-Array = NDArray[np.float64]
-
-LEAST_STATED = 0.001  # probability of an alternative that is reported
+LEAST_STATED = 0.001  # probability of a reported alternative
 LEAST_SIZE = 0.1  # typical sizes, from which a calibration is worth a name
-# deviance by which an effect of typical size is sure: of one of some thirty effects, before which
-# one is expected, 20 to 1 afterwards
+# deviance of a typical size, from which an effect would be sure: for one of some thirty effects,
+# with one expected before, 20 to 1 afterwards
 LEAST_SHOWN = 13.0
 
 
@@ -76,20 +73,19 @@ def diagnose(
     report: Callable[[str], None] | None = None,
     settings: DiagnosisSettings = DIAGNOSIS,
 ) -> Diagnosis:
-    """Return what the logs of one vehicle say about its model.
+    """Return the findings of one vehicle's logs about its model.
 
     Args:
         logs: flights to learn from.
-        vehicle: as it is declared. An effect that it declares with some coefficients left out has
-            those fitted.
-        test: flights on which alone the error is reported; default: 3 s of each 12 s of ``logs``,
-            which the fit never sees.
-        without: effects that are taken out of the library.
+        vehicle: as declared. Coefficients missing in a declared effect are fitted.
+        test: flights for the error alone; default: 3 s of each 12 s of ``logs``, left out of the
+            fit.
+        without: effects taken out of the library.
         report: called with a line of progress.
         settings: which logs are taken, and when a name is sure.
 
     Raises:
-        InputError: a log that is not what it claims to be, or an unknown effect.
+        InputError: a log contradicts its declaration, or an effect is unknown.
     """
     for name in without:
         if name not in names():
@@ -103,13 +99,16 @@ def diagnose(
         LEAST_SECONDS if len(every) == 1 and not every[0].commanded else settings.least_seconds_each
     )
     checked = [screen_log(log, vehicle, least) for log in every]
-    doubts = [f"{log.name}: {note}" for log, found in checked for note in found]
-    flights = Flights(logs, vehicle, test)
-    notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
-    notes += [f"{log.name}: {note}" for log in every for note in filtering_notes(log)]
-    notes += [f"{log.name}: {note}" for log, _ in checked for note in pose_notes(log, vehicle)]
+    flights = RegressedFlights(logs, vehicle, test)
+    noted = [
+        *((log, log.notes) for log in flights.logs),
+        *checked,
+        *((log, filtering_notes(log)) for log in every),
+        *((log, pose_notes(log, vehicle)) for log, _ in checked),
+    ]
+    notes = [f"{log.name}: {note}" for log, own in noted for note in own]
     said = Judged(flights, [n for n in names() if n not in without], settings, report)
-    effects, found, setting = said.effects, said.balance, said.setting
+    effects, residuals, setting = said.effects, said.balance, said.setting
     sure = said.remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
@@ -130,10 +129,10 @@ def diagnose(
         remainder=said.remainder,
         effects=effects,
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
-        before=Errors(*found.error_before, *predicted[vehicle]),
-        after=Errors(*found.error_after, *predicted[amended]),
-        floor_force_rms=found.floor[0],
-        floor_torque_rms=found.floor[1],
+        before=Errors(*residuals.error_before, *predicted[vehicle]),
+        after=Errors(*residuals.error_after, *predicted[amended]),
+        floor_force_rms=residuals.floor[0],
+        floor_torque_rms=residuals.floor[1],
         advice=tuple(
             advice(effects, sorted(unseen), said.remainder, flights.filtered, sorted(hidden))
         ),
@@ -141,14 +140,15 @@ def diagnose(
         candidates=said.candidates,
         traces=tuple(said.traces()),
         signatures=tuple(
-            signature(flights, setting, e.name, said.parts[e.name], found.after) for e in effects
+            signature(flights, setting, e.name, said.parts[e.name], residuals.after)
+            for e in effects
         ),
         structure=said.structure,
         gusts=said.gusts,
         pushes=said.pushes,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
-        amended=amended if found.better else vehicle,
+        amended=amended if residuals.better else vehicle,
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in every)),
@@ -162,27 +162,27 @@ def diagnose(
 
 
 class Judged:
-    """What acts on flights, by the evidence of sets of effects, and what is left.
+    """The effects behind flights, by the evidence of sets of effects, and the residual.
 
     Args:
-        flights: of the vehicle.
-        library: effects that may be named.
+        flights: the vehicle's flights.
+        library: effects for a name.
         rule: when a name is sure.
         report: called with a line of progress.
 
-    Public attributes are those of ``Diagnosis``, and beside them:
+    Public attributes are as in ``Diagnosis``, and beside them:
 
     Attributes:
-        setting: coefficients of the effects; under no name what the sensors have.
+        setting: coefficients of the effects; under no name the sensors' errors.
         balance: the residual with them.
-        parts: by how much the residual (rows, 6) grows where one effect is left out.
-        hidden: effects that would show if the errors of an IMU were known.
-        unseen: effects of which these flights would not show a typical size.
+        parts: growth of the residual (rows, 6) with one effect left out.
+        hidden: effects hidden by the errors of an IMU alone.
+        unseen: effects whose typical size these flights would not show.
     """
 
     def __init__(
         self,
-        flights: Flights,
+        flights: RegressedFlights,
         library: Sequence[str],
         rule: DiagnosisSettings,
         report: Callable[[str], None],
@@ -191,36 +191,36 @@ class Judged:
         library = [e for e in library if e not in flights.not_identifiable]
         given = self._given = what_commands_show(flights, library)
         report("asking how probable each effect is")
-        found = self._found = (
+        fitted = self._fitted = (
             rank(flights, library, report)
             if flights.has_raw_poses
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
-        self.ranking, best = found.ranking, found.ranking.sets[0]
-        self.setting = {e: dict(x) for e, x in {**given.fixed, **found.setting}.items()}
-        if found.sensors:
-            self.setting[""] = {name: value for name, (value, _) in found.sensors.items()}
+        self.ranking, best = fitted.ranking, fitted.ranking.sets[0]
+        self.setting = {e: dict(x) for e, x in {**given.fixed, **fitted.setting}.items()}
+        if fitted.sensors:
+            self.setting[""] = {name: value for name, (value, _) in fitted.sensors.items()}
         self.balance = balance(flights, self.setting)
         self.parts = {
             e: flights.residual(without(self.setting, e)) - self.balance.after
             for e in self.setting
             if e
         }
-        self.gusts = found.gusts
+        self.gusts = fitted.gusts
         self.pushes = tuple(transient_disturbances(flights, self.setting))
         known = {e: self._differs(e) for e in given.first if e in best.effects}
-        named = [e for e in found.setting if known.get(e, 1.0) >= rule.least_sure_probability]
+        named = [e for e in fitted.setting if known.get(e, 1.0) >= rule.least_sure_probability]
         disturbed = beyond_calm(self.gusts, flights.vehicle)
-        structure = found.ranking.structure
+        structure = fitted.ranking.structure
         some = any(e not in known for e in named)
         strange = unknown(signs(structure, disturbed, bool(self.pushes), some))
         rivals = {e: self._rivals(e) for e in named}
-        for e in named:  # one of some effects, which flights do not tell apart
-            alike = [x.probability for x in found.ranking.sets if {e, *rivals[e]} & {*x.effects}]
+        for e in named:  # an effect, or its rivals in these flights
+            alike = [x.probability for x in fitted.ranking.sets if {e, *rivals[e]} & {*x.effects}]
             known.setdefault(e, min(sum(alike), 1.0))
         self.doubts = self._doubts(named, strange)
         unsure = bool(set(self.doubts) - {"assumed thrust"})
-        sizes = worth(flights, given.fixed, given.first, found.setting)
+        sizes = worth(flights, given.fixed, given.first, fitted.setting)
         effects = [self._named(e, known[e], sizes[e], unsure, rivals[e]) for e in named]
         names = {e: (1.0 - strange) * known[e] for e in named}
         if given.late:
@@ -229,49 +229,52 @@ class Judged:
         self.effects = tuple(effects)
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
-        if structured:  # the column of the dictionary that explains most beside the likeliest set
-            (_, name), _, gained = found.posterior.strangest()
+        if structured:  # the dictionary's best column beside the likeliest set
+            (_, name), _, gained = fitted.posterior.strangest()
             group, what = name.removeprefix("unknown ").split(": ", 1)
             column, _, channel = what.rpartition(" in ")
             where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
-            self.structure = (Structure(group, where, gained / found.posterior.left()),)
+            self.structure = (Structure(group, where, gained / fitted.posterior.left()),)
         some = self.balance.noisy or disturbed > 0.0 or bool(self.pushes)
         self.remainder = "structured" if structured else "random" if some else "none"
         biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
-        by_bias = found.posterior.shown(biases)
-        unseen = {e for e, x in found.posterior.shown().items() if x < LEAST_SHOWN}
+        by_bias = fitted.posterior.shown(biases)
+        unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
         self.hidden = {e for e in unseen if by_bias[e] >= LEAST_SHOWN}
         self.unseen = unseen - self.hidden
-        alone = sorted(found.posterior.alone().items(), key=lambda x: -x[1])
+        alone = sorted(fitted.posterior.alone().items(), key=lambda x: -x[1])
         self.candidates = tuple(Candidate(e, gain, e in named) for e, gain in alone)
         self.notes = (
             *inertial_notes(flights, named),
             *(sentence for sentences in self.doubts.values() for sentence in sentences),
-            *late_rotors(flights, found.setting, found.sensors),
+            *late_rotors(flights, fitted.setting, fitted.sensors),
         )
         stated = tuple(
             Alternative(tuple(e for e in x.effects if e not in given.first), p)
-            for x in found.ranking.sets
+            for x in fitted.ranking.sets
             if (p := x.probability * (1.0 - strange)) >= LEAST_STATED
         )
         self.probabilities = Probabilities(names, stated, strange)
 
     def _std(self, effect: str) -> dict[str, float]:
-        """Return the standard deviations of an effect in the likeliest set; of what stands for the
-        thrust of commands, with what a flight's thrust differs by from what is usual.
+        """Return the standard deviations of an effect in the likeliest set. For a factor on the
+        thrust of commands, they include the spread of thrust from flight to flight.
         """
         flights, std = self._flights, self.ranking.sets[0].std[effect]
         if not flights.commanded or get(effect).role not in THRUST_FACTORS:
             return dict(std)
-        off = THRUST_STD / math.sqrt(len(flights.logs))
+        return self._widened(effect, std, THRUST_STD / math.sqrt(len(flights.logs)))
+
+    def _widened(self, effect: str, std: Mapping[str, float], relative: float) -> dict[str, float]:
+        """Return standard deviations of coefficients with a relative one besides."""
         return {
-            name: math.hypot(x, off * unit_of_change((effect, name), flights.vehicle))
+            name: math.hypot(x, relative * unit_of_change((effect, name), self._flights.vehicle))
             for name, x in std.items()
         }
 
     def _differs(self, effect: str) -> float:
-        """Return the probability that a calibration, which is in every set, differs from what the
-        vehicle states; 0 where it does so by too little for a name.
+        """Return the probability of a calibration, in every set, to differ from the vehicle's
+        statement; 0 where the difference is too small for a name.
         """
         flights, best = self._flights, self.ranking.sets[0]
         own, stds, most = flights.coefficients({}, effect), self._std(effect), 0.0
@@ -283,8 +286,8 @@ class Judged:
         return most
 
     def _rivals(self, effect: str) -> tuple[str, ...]:
-        """Return the effects that, in the place of one of the likeliest set, explain the flights
-        nearly as well.
+        """Return the effects with nearly the likelihood of one in the likeliest set, in its
+        place.
         """
         if effect in self._given.first:
             factors = playing(*THRUST_FACTORS)
@@ -299,9 +302,9 @@ class Judged:
         return tuple(e for one in more if len(one) == 1 and effect not in one for e in one)
 
     def _doubts(self, named: Sequence[str], strange: float) -> dict[str, tuple[str, ...]]:
-        """Return for each check, by its name, the sentences that say why a name may be wrong."""
-        flights, rule, found = self._flights, self._rule, self._found
-        alike = composites(flights.vehicle, found.setting, self.ranking.sets[0].std)
+        """Return for each check, by its name, sentences with a reason to doubt a name."""
+        flights, rule, fitted = self._flights, self._rule, self._fitted
+        alike = composites(flights.vehicle, fitted.setting, self.ranking.sets[0].std)
         doubts = {"composite": tuple(alike)}
         if strange > rule.most_unknown:
             doubts["unknown"] = (
@@ -324,7 +327,7 @@ class Judged:
         doubts["hidden cause"] = tuple(
             f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like it. "
             "Log the pose to tell them apart"
-            for effect, hidden in found.behind.items()
+            for effect, hidden in fitted.behind.items()
         )
         if flights.thrust_std > 0.0:
             doubts["assumed thrust"] = assumed_thrust_doubts(named)
@@ -333,25 +336,24 @@ class Judged:
     def _named(
         self, effect: str, probability: float, size: float, unsure: bool, others: tuple[str, ...]
     ) -> NamedEffect:
-        flights, rule, found = self._flights, self._rule, self._found
+        flights, rule, fitted = self._flights, self._rule, self._fitted
         std = self._std(effect)
-        # that an effect acts at the rotors, as it is written, is nothing to report
+        # the point of action of an effect at the rotors, as declared, is nothing to report
         values = {
             name: x
-            for name, x in found.setting[effect].items()
+            for name, x in fitted.setting[effect].items()
             if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
         }
         uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
         if uncertain:
-            unit = {name: unit_of_change((effect, name), flights.vehicle) for name in std}
-            std = {name: math.hypot(x, flights.thrust_std * unit[name]) for name, x in std.items()}
+            std = self._widened(effect, std, flights.thrust_std)
         sizes = [
             abs(x) / typical_size((effect, name), flights.vehicle)
             for name, x in values.items()
             if name != CENTRAL
         ]
-        # of the residual's energy without it, each channel over its sensors' noise
-        after, over = self.balance.after, np.square(flights.visible_noise).mean(axis=0) ** 0.5
+        # shares of the residual's energy without it, each channel over its sensors' noise
+        after, over = self.balance.after, mean_square(flights.visible_noise) ** 0.5
         left, whole = (
             float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
             for x in (after, after + self.parts[effect])
@@ -368,29 +370,29 @@ class Judged:
             indistinguishable_from=others,
             evidence={
                 "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
-                "log_bayes_factor": found.posterior.log_bayes_factor(effect),
+                "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
                 "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
                 "size_over_what_is_left": size,
             },
-            channels=carrying_channels(flights, found.setting, effect),
+            channels=carrying_channels(flights, fitted.setting, effect),
         )
 
     def traces(self) -> Iterator[Trace]:
         """Yield the residual of each piece of flight over time."""
-        flights, found = self._flights, self.balance
+        flights, residuals = self._flights, self.balance
         for rows in flights.runs:
             yield Trace(
                 flights.logs[flights.log[rows[0]]].name,
                 flights.period,
                 flights.t[rows],
-                found.before[rows],
-                found.after[rows],
+                residuals.before[rows],
+                residuals.after[rows],
                 ~flights.fit_rows[rows],
                 {effect: part[rows] for effect, part in self.parts.items()},
             )
 
 
-def _segments(flights: Flights) -> list[tuple[int, float, float]]:
+def _segments(flights: RegressedFlights) -> list[tuple[int, float, float]]:
     """Return the held-out stretches of flight: log, from, to (s)."""
     blocks = np.unique(flights.block[~flights.fit_rows])
     ends = [np.flatnonzero(flights.block == b)[[0, -1]] for b in blocks]
@@ -398,7 +400,7 @@ def _segments(flights: Flights) -> list[tuple[int, float, float]]:
 
 
 def _predicted(
-    flights: Flights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]]
+    flights: RegressedFlights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]]
 ) -> tuple[float, float]:
     """Return how far a model's predictions of the held-out stretches are off: NIS, and m RMS."""
     nis, distance, weight = [], [], []

@@ -1,7 +1,6 @@
-"""What an effect that is in no library may depend on: a dictionary of columns, of which it follows
-one.
+"""A dictionary of columns for an effect outside the library: one of these is its variable.
 
-They are of the state as the filter predicts it, so none knows the noise of the pose to come.
+The columns are of the filter's predicted state: none holds the noise of the pose to come.
 """
 
 import itertools
@@ -9,39 +8,37 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter
 
 from ...dynamics.vehicle import Vehicle
-from .causal_filter import State
+from ..logs.table import Array
+from ..motion.signals import in_body
+from .causal_filter import FlightState
 from .priors import UNKNOWN
-from .regression import Column, Flights
+from .regression import Column, RegressedFlights
 
-Array = NDArray[np.float64]
-
-
-TORQUE_ARM = 0.25  # of the arm, at which a weight is a torque's unit
+TORQUE_ARM = 0.25  # of the arm: times the weight, the unit of a torque
 HEIGHTS = (0.2, 0.6)  # m above the lowest place: where a bump falls off
 # Hz: a load on a cable of 0.1 to 1.5 m, and a part on a soft mount
 LOAD_HZ = (0.4, 0.55, 0.75, 1.0, 1.4)
 MOUNT_HZ = (1.0, 1.6, 2.5, 4.0, 6.0)
-DAMPING_RATIO = 0.08  # of these
-# times ``sets.UNKNOWN_SIZES``: share of an effect's own wrench by which its coefficients
-# change with a variable, at a standard deviation of it
+DAMPING_RATIO = 0.08  # of both
+# times ``sets.UNKNOWN_SIZES``: change of an effect's coefficients, as a share of its own wrench,
+# with one standard deviation of a variable
 SHARE_OF_EFFECT = 30.0
 CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """A column (n, 6) that is made of its factors a part at a time: ten minutes of 150 columns
-    would take 0.9 GB.
+    """A column (n, 6), multiplied out a part at a time: ten minutes of 150 columns would take 0.9
+    GB.
     """
 
     scale: float
     x: Array  # (n,)
     y: Array | None  # (n, k); None: one
-    channels: slice | None = None  # k of six, the others zero; None: these are all
+    channels: slice | None = None  # k of six, the others zero; None: all six
 
     def __getitem__(self, rows: slice) -> Array:
         """Return some rows (m, 6)."""
@@ -64,11 +61,11 @@ def weight_and_torque(vehicle: Vehicle) -> Array:
     return vehicle.weight * np.repeat([1.0, TORQUE_ARM * vehicle.arm_l], 3)
 
 
-def joined(tracks: Sequence[State]) -> tuple[State, Array]:
-    """Return all pieces, one after the other, and where they end but the last."""
+def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Array]:
+    """Return all pieces, one after the other, and their ends without the last."""
     ends = np.cumsum([len(track.position) for track in tracks])[:-1]
-    columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(State))
-    return State(*columns), ends
+    columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(FlightState))
+    return FlightState(*columns), ends
 
 
 def _scaled(x: Array) -> Array:
@@ -77,19 +74,19 @@ def _scaled(x: Array) -> Array:
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(whole: State, ends: Array, flights: Flights) -> Columns:
+def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFlights) -> Columns:
     """Return accelerations (n, 6) by column, each of a standard deviation of the weight, or of the
     weight times the arm.
 
     Args:
         whole: all pieces.
-        ends: where pieces end but the last.
-        flights: of the vehicle.
+        ends: the pieces' ends without the last.
+        flights: the vehicle's flights.
     """
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
-    rate, body = whole.angular_velocity, np.einsum("nij,ni->nj", rotation, whole.velocity)
+    rate, body = whole.angular_velocity, in_body(whole.velocity, rotation)
     above = position[:, 2] - position[:, 2].min()
-    shapes: list[tuple[str, str, Array, tuple[int, ...]]] = []  # group, name, of which channels
+    shapes: list[tuple[str, str, Array, tuple[int, ...]]] = []  # group, name, variable, channels
     every = tuple(range(6))
     for i, axis in enumerate("xyz"):
         shapes += [
@@ -147,27 +144,27 @@ def discrepancy_columns(whole: State, ends: Array, flights: Flights) -> Columns:
 
 
 def _change(x: Array) -> Array:
-    """Return differences from the sample before: those to come know the poses' noise."""
+    """Return differences from the sample before: later samples hold the poses' noise."""
     return np.diff(x, prepend=x[:1])
 
 
 def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
-    # s'' = -a - rate^2 s - 2 damping rate s', which pulls by rate^2 s + 2 damping rate s'
+    # s'' = -a - rate^2 s - 2 damping rate s'; the pull is rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
     damping = 2.0 * DAMPING_RATIO * rate
     shape = bilinear([-damping, -(rate**2)], [1.0, damping, rate**2], 1.0 / period)
     return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
 
 
-def variables(whole: State) -> dict[str, Array]:
-    """Return what a coefficient may change with: variables (n,) by name, of mean zero and standard
+def variables(whole: FlightState) -> dict[str, Array]:
+    """Return the variables (n,) of a changing coefficient by name, of mean zero and standard
     deviation one.
     """
     position, rotation, velocity = whole.position, whole.rotation, whole.velocity
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     speed = np.linalg.norm(velocity, axis=1)
-    found = {
+    raw = {
         "speed": speed,
         "speed, squared": speed**2,
         "climb rate": velocity[:, 2],
@@ -180,19 +177,19 @@ def variables(whole: State) -> dict[str, Array]:
         "thrust": whole.rotors[:, 0],
         "yaw rate": whole.angular_velocity[:, 2],
     }
-    scaled = {name: _scaled(x) for name, x in found.items()}
+    scaled = {name: _scaled(x) for name, x in raw.items()}
     return {name: x for name, x in scaled.items() if x.any()}
 
 
-def changing_columns(parts: Mapping[str, Array], found: Mapping[str, Array]) -> Columns:
-    """Return columns of coefficients that change with a variable.
+def changing_columns(parts: Mapping[str, Array], followed: Mapping[str, Array]) -> Columns:
+    """Return columns of coefficients changing with a variable.
 
     Args:
-        parts: what each effect of a set adds (n, channels).
-        found: ``variables``.
+        parts: wrench of each effect of a set (n, channels).
+        followed: ``variables``.
     """
     shares = {effect: SHARE_OF_EFFECT * part for effect, part in parts.items()}
     return {
         ("", f"{CHANGING}{effect} with {name}"): Product(1.0, x, share)
-        for (effect, share), (name, x) in itertools.product(shares.items(), found.items())
+        for (effect, share), (name, x) in itertools.product(shares.items(), followed.items())
     }

@@ -1,8 +1,8 @@
 """The evidence of a set of effects, from sums of products: a coefficient's prior, its bounds, and
 Laplace's integral.
 
-Everything is in prior standard deviations. What any flight may have beside effects is integrated
-out first, so a set costs a small Cholesky factor.
+Everything is in prior standard deviations. The nuisances of any flight are integrated out first: a
+set costs a small Cholesky factor.
 """
 
 import math
@@ -15,34 +15,34 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from ...runtime.compiled import compiled
+from ..logs.table import Array
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """A quadratic log-likelihood of the coefficients that are asked about, with all others
-    integrated out: ``constant + right @ z - z @ normal @ z / 2``.
+    """A quadratic log-likelihood of the coefficients asked about, with all others integrated out:
+    ``constant + right @ z - z @ normal @ z / 2``.
     """
 
     normal: Array  # (c, c)
     right: Array  # (c,)
-    deviance: float  # where those asked about are zero, and the others at their mode
-    log_volume: float  # of what was integrated out: minus its logarithm
+    deviance: float  # with the coefficients at zero, and the others at their mode
+    log_volume: float  # minus the logarithm of the integrated volume
 
     @property
     def constant(self) -> float:
-        """The log-likelihood where those asked about are zero."""
+        """The log-likelihood with all coefficients at zero."""
         return -0.5 * self.deviance - self.log_volume
 
     @property
     def own(self) -> Array:
-        """The columns' products with themselves (c,), less what the others have already."""
+        """The columns' products with themselves (c,), less the others' share."""
         return np.maximum(np.diagonal(self.normal), 1e-9)
 
     def explained(self, index: Sequence[int], z: Array) -> float:
-        """Return the deviance that some columns explain at coefficients ``z``."""
+        """Return the deviance explained by some columns at coefficients ``z``."""
         right, normal = self.right[index], self.normal[np.ix_(index, index)]
         return float(2.0 * right @ z - z @ normal @ z)
 
@@ -52,9 +52,9 @@ def marginal(products: Array, asked: Index, others: Index, size: Array) -> Margi
 
     Args:
         products: (c + 1, c + 1) of all columns, in prior standard deviations, and of the residual:
-            the last is -2 log-likelihood where all coefficients are zero.
-        asked: columns that stay.
-        others: columns that go; they may be among those that stay as well.
+            the last is -2 log-likelihood with all coefficients at zero.
+        asked: columns to keep.
+        others: columns to integrate out; they may be among the kept ones as well.
         size: (len(others),) standard deviations of their prior.
     """
     kept = np.append(asked, len(products) - 1)
@@ -69,7 +69,7 @@ def marginal(products: Array, asked: Index, others: Index, size: Array) -> Margi
 
 @dataclass(frozen=True, eq=False)
 class SetEvidence:
-    """The evidence of one set of effects, and where its posterior has its mode."""
+    """The evidence of one set of effects, and the mode of its posterior."""
 
     log_evidence: float
     mode: Array  # (len(index),) in prior standard deviations
@@ -80,7 +80,7 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
     """Return the evidence of a set.
 
     The prior of a coefficient is normal with mean zero and standard deviation one, cut off at its
-    bounds. Where the mode is at a bound, the integral is that of a normal density cut off there.
+    bounds. With the mode at a bound, the integral is of a normal density cut off there.
 
     Args:
         m: the likelihood.
@@ -89,7 +89,7 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
         high: (c,) at least zero.
 
     Raises:
-        numpy.linalg.LinAlgError: columns of the set that no prior tells apart.
+        numpy.linalg.LinAlgError: no prior tells columns of the set apart.
     """
     value, mode, std = _evidence(m.normal, m.right, np.array(index, dtype=np.intp), low, high)
     return SetEvidence(m.constant + value, mode, std)
@@ -120,13 +120,13 @@ def _evidence(
 
 @compiled
 def _normal(x: float) -> float:
-    """Return how much of a standard normal density lies below ``x``."""
+    """Return the share of a standard normal density below ``x``."""
     return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 
 @compiled
 def _log_tail(z: float) -> float:
-    """Return ``z**2 / 2`` plus the logarithm of how much of a standard normal density lies beyond
+    """Return ``z**2 / 2`` plus the logarithm of the share of a standard normal density beyond
     ``z``, at least zero.
     """
     if z < 10.0:
@@ -137,8 +137,8 @@ def _log_tail(z: float) -> float:
 
 @compiled
 def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
-    """Return the maximum (n,) of ``right @ x - x @ normal @ x / 2`` within bounds: what leaves them
-    is held there, the farthest first, and what is pulled back is free again.
+    """Return the maximum (n,) of ``right @ x - x @ normal @ x / 2`` within bounds. Coefficients
+    outside are held at their bounds, the farthest first, and are free again if pulled back.
     """
     n = len(right)
     mode = np.empty(n)
@@ -165,47 +165,46 @@ def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
 
 
 def tempering(blocks: Array, chosen: Index) -> float:
-    """Return the power of the likelihood that its own scatter over blocks allows, at most one.
+    """Return the power of the likelihood by its own scatter over blocks, at most one.
 
-    Blocks are summed as if they were independent. Where what the model lacks lasts longer than a
-    sample, as the rounding of rotor speeds does that hardly leave their steps, the scores of the
-    blocks scatter by more than the sums of squares say, and by as much the likelihood is too sure.
+    The sum over blocks assumes their independence. An error of the model may last longer than a
+    sample, like the rounding of rotor speeds that hardly leave their steps. Then the scores of the
+    blocks scatter more than their sums of squares, and the likelihood is too sure by as much.
     (The magnitude adjustment of composite likelihoods: F. Pauli, W. Racugno and L. Ventura,
     Statistica Sinica 21 (2011), 149-164.)
 
     Args:
         blocks: (blocks, c + 1, c + 1) products of columns and residual, in prior standard
             deviations.
-        chosen: columns that are fitted.
+        chosen: the fitted columns.
     """
     total = blocks.sum(axis=0)
     normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
     mode = np.linalg.solve(normal, total[chosen, -1])
     scores = blocks[:, chosen, -1] - blocks[:, chosen[:, None], chosen] @ mode
-    known = np.diagonal(total)[chosen] > 1.0  # columns of which the flight says more than the prior
+    known = np.diagonal(total)[chosen] > 1.0  # columns better known by the flight than by the prior
     if not known.any():
         return 1.0
-    # the scores as independent ones: in the eigenvectors of what they should be
+    # the scores as independent ones: in the eigenvectors of their expected products
     size, axes = np.linalg.eigh(total[np.ix_(chosen, chosen)][np.ix_(known, known)])
     keep = size > 1e-6 * size[-1]
     ratio = np.square(scores[:, known] @ axes[:, keep]).sum(axis=0) / size[keep]
-    # their sum over all blocks is zero where they are fitted: that costs one block of all
+    # a fit brings their sum over all blocks to zero: the cost is one block of all
     spread = float(np.mean(ratio)) * len(blocks) / max(len(blocks) - 1, 1)
     return 1.0 / max(1.0, spread)
 
 
 def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[float]) -> float:
-    """Return the logarithm of the Bayes factor of one further column, no one knows which, against
+    """Return the logarithm of the Bayes factor of one further column, any of those tried, against
     none.
 
-    Each of the columns is as likely as each other, of each size. An effect that is in no library
-    follows few of the many things that a dictionary holds: a variance for all of them at once would
-    pay for each.
+    Each of the columns is equally likely, with each size. An effect outside the library follows few
+    of the many variables of a dictionary: a variance for all of them at once would pay for each.
 
     Args:
         m: the likelihood of further columns beside a model.
-        tried: those of them that it may be.
-        sizes: standard deviations that their coefficients may have.
+        tried: the possible ones of these columns.
+        sizes: possible standard deviations of their coefficients.
     """
     square, left = np.square(np.asarray(sizes))[:, None], m.own[tried]
     gained = 0.5 * square * np.square(m.right[tried]) / (1.0 + square * left)

@@ -1,9 +1,9 @@
 """The likelihood of a flight's poses as a regression of whitened innovations: one Gram matrix.
 
-Everything that a model may lack is a column: a unit of a coefficient, through the same causal
-filter as the poses. The noise of each axis is fitted first, at maximum likelihood. With it the
-innovations are white, and the log-likelihood of any set of coefficients near the setting follows
-from sums of products alone.
+Everything a model may lack is a column: a unit of a coefficient, through the same causal filter as
+the poses. The noise of each axis is fitted first, at maximum likelihood. With this noise the
+innovations are white. Sums of products then give the log-likelihood of any set of coefficients near
+the setting.
 """
 
 import math
@@ -13,7 +13,6 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
@@ -22,6 +21,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
 from ..logs.flight_log import FlightLog
+from ..logs.table import Array, Mask
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
@@ -54,7 +54,7 @@ from .regression import (
     CENTRAL,
     STEP,
     Column,
-    Flights,
+    RegressedFlights,
     is_delay,
     typical_size,
     without,
@@ -62,18 +62,11 @@ from .regression import (
 from .rotor_innovations import DRIVEN, rotor_innovations, unrounded
 from .steady_filter import OWN, PAIRS, PoseNoise, SteadyFilter, steady_filter
 
-Array = NDArray[np.float64]
-
-STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
+STATES = (0, 1, 2)  # pose, rate and disturbance of an axis
 # rad of tilt for a rad/s2 of roll or pitch: the unit of gains of sideways states
 SIDEWAYS = 0.01
-
-
-FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
-
-
-# of the gains of a pair on the rotors' innovations, of thrust, of torque and of a turn aside: the
-# state that jumps
+FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, where the search for the noise begins
+# the state that jumps, by the gains of a pair on the rotors' innovations: thrust, torque, turn
 JUMP_STATE = np.tile(STATES, 3)
 
 
@@ -81,17 +74,16 @@ class Likelihood:
     """The likelihood of flights with measured rotors near a setting of coefficients.
 
     Args:
-        flights: of the vehicle.
-        setting: the coefficients about which all is linear.
-        near: the likelihood of the same flights near another setting, whose noise is where the
-            search for this one's begins; default: it begins with what any flight may have.
-        same_noise: whether that noise is taken as it is, and the columns of what any flight may
-            have.
+        flights: the vehicle's flights.
+        setting: the coefficients, about which the model is linearised.
+        near: the likelihood of the same flights near another setting. The search for the noise
+            begins at its noise; default: at the sensor noise of the first log.
+        same_noise: take that noise without a search, and the columns any flight may have.
     """
 
     def __init__(
         self,
-        flights: Flights,
+        flights: RegressedFlights,
         setting: Setting,
         near: "Likelihood | None" = None,
         same_noise: bool = False,
@@ -101,34 +93,30 @@ class Likelihood:
         self.pieces: list[Poses]
         self.tracks: list[Track]
         self.known: list[Array]
-        self._fit: list[NDArray[np.bool_]]  # (n,) samples that the fit may see
+        self._fit: list[Mask]  # (n,) samples open to the fit
         if near is not None and sensing_of(near.vehicle) == sensing_of(self.vehicle):
             self.pieces, self._fit = near.pieces, near._fit
         else:
             finer = iter(near.finer if near else ())
-            found = [
-                (i, piece)
-                for i, log in enumerate(flights.logs)
-                if flights.fit_rows[flights.log == i].any()  # no test log
-                for piece in read_poses(log, self.vehicle, finer)
-            ]
-            self.pieces = [piece for _, piece in found]
-            # those of whose block the rows are
-            self._fit = []
-            for i, piece in found:
+            self.pieces, self._fit = [], []
+            for i, log in enumerate(flights.logs):
                 rows = flights.log == i
-                at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
-                self._fit.append(flights.fit_rows[rows][at])
+                if not flights.fit_rows[rows].any():  # a test log
+                    continue
+                for piece in read_poses(log, self.vehicle, finer):
+                    at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
+                    self.pieces.append(piece)
+                    self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
         self.period = self.pieces[0].period
         lengths = [len(piece.t) for piece in self.pieces]
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
             near = None
         same = near if same_noise else None
         self.noise: PoseNoise = near.noise if near else self._first_noise()
-        # by which the states answer the rotors' innovations
+        # on the rotors' innovations
         self.gains: Array = near.gains if near else np.zeros((len(PAIRS), len(JUMP_STATE)))
-        # what is added to the rotor speeds (n, 4) of each piece that the log rounds; and what they
-        # do that the past does not predict, as a filter sees it that follows the pose closely
+        # of each piece: the rounding error of its logged rotor speeds (n, 4), which is added back,
+        # and the rotors' innovations, by a filter that follows the pose closely
         self.finer: list[Array] = near.finer if near else []
         self.answers: list[Array] = near.answers if near else []
         if near:
@@ -143,9 +131,9 @@ class Likelihood:
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
         self._base = self._accelerations(setting, self.signals)
-        # what a unit of each column adds to the accelerations, or to the measured pose (n, 6), of
-        # all pieces in turn; a column that was asked for once is kept. What any flight may have
-        # changes little with effects
+        # the effect of a unit of each column on the accelerations, or on the measured pose (n, 6),
+        # of all pieces in turn, kept once computed. Columns any flight may have change little with
+        # effects
         self._acting: Columns = {}
         self._posed: Columns = {}
         if same:
@@ -183,16 +171,11 @@ class Likelihood:
 
     @staticmethod
     def _said(jumps: Iterable[Array], gains: Array) -> list[Array]:
-        """Return what the rotors' innovations add to the states of each piece (n, 6, 3)."""
+        """Return the jumps of each piece's states (n, 6, 3) by the rotors' innovations."""
         said = [np.split(x * (OWN @ gains), len(JUMP_STATE) // len(STATES), axis=2) for x in jumps]
         return [np.add.reduce(parts) for parts in said]
 
     # Noise
-
-    @property
-    def _units(self) -> Array:
-        """What a unit of acceleration makes of an axis' states in a period."""
-        return np.array([self.period**2, self.period, 1.0])
 
     def _first_noise(self) -> PoseNoise:
         floor = sensor_noise(self.flights.logs[0], self.vehicle)
@@ -210,8 +193,8 @@ class Likelihood:
         return self.vehicle.omega_lsb / math.sqrt(12.0) if known else 0.0
 
     def _rounding(self) -> Array:
-        """Return the standard deviation of the accelerations (6,) that the rotor speeds' rounding
-        makes: m/s2 and rad/s2.
+        """Return the standard deviation of the accelerations (6,) by the rounding of rotor
+        speeds: m/s2 and rad/s2.
         """
         speeds = np.concatenate([p.rotor_speeds for p in self.pieces]).mean(axis=0)
         off = self._rounding_std * np.vstack([np.zeros(4), np.eye(4)])
@@ -226,7 +209,7 @@ class Likelihood:
         """Take the likeliest noise, and the likeliest gains on the rotors' innovations.
 
         Args:
-            explained: (n, 2, 6) of each piece, what is known to move the pose, and to accelerate,
+            explained: (n, 2, 6) of each piece: known changes of the pose and of the acceleration
                 beside the model.
         """
         jumps = self._jumps()
@@ -258,19 +241,19 @@ class Likelihood:
         self._run(self.steady, self._said(jumps, self.gains))
 
     def _blocks(self, track: Track) -> Iterator[slice]:
-        """Return the parts of a piece of which the columns are in memory at a time."""
+        """Return the parts of a piece. One part's columns are in memory at a time."""
         length, n = round(BLOCK / self.period), len(track.t)
         return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
 
-    def _counts(self, piece: int) -> NDArray[np.bool_]:
-        """Return which samples of a piece the fit may see."""
+    def _counts(self, piece: int) -> Mask:
+        """Return the samples of a piece in the fit."""
         out = self._fit[piece].copy()
         out[: round(SETTLING_TIME / self.period)] = False
         return out
 
     def gusts(self) -> tuple[Disturbance, ...]:
-        """Return the disturbance of each channel, of which the rotors show a part: a flight loop
-        that reads a gyro answers most of a gust's torque before the pose shows it.
+        """Return the disturbance of each channel. The rotors show a part: a flight loop on a gyro
+        answers most of a gust's torque before the pose shows any.
         """
         out = []
         sizes, times = self.flights.inertias * self.noise.disturbance, self.noise.time.tolist()
@@ -284,7 +267,7 @@ class Likelihood:
     # Columns
 
     def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> Array:
-        """Return the accelerations (n, 6) that a setting makes along the pieces' signals."""
+        """Return the accelerations (n, 6) of a setting along the pieces' signals."""
         wrench = np.concatenate([self.flights.acting(s, setting) for s in signals])
         turning = np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T
         return np.column_stack([wrench[:, :3] / self.flights.vehicle.mass, turning])
@@ -292,16 +275,14 @@ class Likelihood:
     def _change(
         self, setting: Setting, step: float = 1.0, signals: Iterable[Signals] | None = None
     ) -> Array:
-        """Return what another setting, and other signals, add to the acceleration (n, 6), over a
-        step.
+        """Return the change of the acceleration (n, 6) with another setting and other signals, over
+        a step.
         """
-        found = self._accelerations(setting, self.signals if signals is None else signals)
-        return np.asarray((found - self._base) / step)
+        there = self._accelerations(setting, self.signals if signals is None else signals)
+        return np.asarray((there - self._base) / step)
 
     def _add(self, column: Column) -> None:
-        """Add what a unit of a coefficient does, but where it is known already, or where no vehicle
-        can be like that.
-        """
+        """Add a coefficient's column, unless it is there already or no such vehicle is possible."""
         effect, name = column
         if column in self._acting or column in self._posed:
             return
@@ -324,8 +305,8 @@ class Likelihood:
             self._acting[column] = change
 
     def _moved(self, column: Column) -> Array:
-        """Return by how much a unit of a sensing effect moves the pose (n, 6), at the pose that the
-        filter predicts: so the pose's own noise is no part of it.
+        """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
+        predicted pose. So the column holds no noise of the measured pose.
         """
         effect, name = column
         delta = STEP * typical_size(column, self.flights.vehicle)
@@ -343,12 +324,11 @@ class Likelihood:
         return np.concatenate(out)
 
     def base(self, library: Iterable[str], starts: Starts, unknown: bool = False) -> Base:
-        """Return the likelihood of the coefficients of effects, and of what any flight may have.
-
-        All columns that were asked for before are in it as well.
+        """Return the likelihood of the coefficients of effects, and of everything any flight may
+        have, with all columns of earlier calls.
 
         Args:
-            library: names of effects. What the vehicle's file fixes of them is not asked.
+            library: names of effects. Coefficients fixed by the vehicle's file are not fitted.
             starts: columns of whole effects, with the coefficients of each.
             unknown: whether the discrepancy's columns are wanted.
         """
@@ -368,7 +348,7 @@ class Likelihood:
         return self._products(starts)
 
     def _add_changing_coefficients(self) -> None:
-        """Add the dictionary's columns of effects of the setting whose coefficients change."""
+        """Add the dictionary's columns: effects of the setting with changing coefficients."""
         parts, poses = {}, {}
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
@@ -376,14 +356,14 @@ class Likelihood:
                 poses[effect] = np.sum(moved, axis=0)
             else:
                 parts[effect] = self._change(without(self.setting, effect), -1.0)
-        found = variables(joined(self.tracks)[0])
-        self._acting |= changing_columns(parts, found)
-        self._posed |= changing_columns(poses, found)
+        followed = variables(joined(self.tracks)[0])
+        self._acting |= changing_columns(parts, followed)
+        self._posed |= changing_columns(poses, followed)
 
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
         self._add(ROTOR_TIME_OFFSET)
-        bent = []  # beside the straight line, by the second difference
+        bent = []  # away from the straight line, by the second difference
         for s in self.signals:
             # the speeds are of k + 1/2: nothing later than sample k + 1
             u = s.rotor_speeds.copy()
@@ -393,18 +373,18 @@ class Likelihood:
         self._add_model_errors()
         moved = []
         for track in self.tracks:
-            # the rate before the sample is read: after it, it knows that sample's noise
+            # the rate before the sample is read: the rate after holds the sample's noise
             rate = track.angular_velocity + 0.5 * self.period * track.acceleration[:, 3:]
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
             moved.append(np.column_stack([np.zeros_like(rate), -rate]))
         self._posed[ATTITUDE_TIME_OFFSET] = np.concatenate(moved)
 
     def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
-        """Return the likelihood of the same columns with the noise that is likeliest beside them
-        all, at these coefficients.
+        """Return the likelihood of the same columns, with the likeliest noise beside them all at
+        these coefficients.
 
-        What an effect explains counts as a disturbance where the effect is not known. Beside the
-        whole library the noise is that of a flight of which everything is known.
+        An unknown effect's deviance counts as a disturbance. Beside the whole library the noise is
+        the noise of a flight without unknown effects.
         """
         out = copy(self)
         out._search_noise(self._explained(coefficients))
@@ -420,7 +400,7 @@ class Likelihood:
         return out._products(starts)
 
     def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
-        """Return what the columns move the pose of each piece by, and accelerate (n, 2, 6)."""
+        """Return the change of the pose and of the acceleration (n, 2, 6) of each piece."""
         whole, ends = joined(self.tracks)
         x = np.zeros((len(whole.t), 2, 6))
         for i, columns in enumerate((self._posed, self._acting)):
@@ -433,12 +413,12 @@ class Likelihood:
         return np.split(x, ends)
 
     def _swing(self, column: Column, change: Array) -> None:
-        """Have a centre of mass move the measured point as a marker does that lies as far on the
-        other side; its torque alone acts.
+        """Have a centre of mass move the measured point like a marker as far on the other side; its
+        torque alone acts.
 
-        That the point swings about the centre would else be two columns, of the model's angular
-        acceleration and of the filter's attitude, and their difference, which is noise, would fit
-        the poses' own noise: of equal offsets of both only the torque of the thrust is left.
+        As a force, the swing of the point about the centre would be two columns: the model's
+        angular acceleration and the filter's attitude. Their difference is noise and would fit the
+        poses' own noise. With equal offsets of both, only the torque of the thrust remains.
         """
         change[:, :3] = 0.0
         axis = [c.name for c in get(column[0]).coefficients].index(column[1])
@@ -447,11 +427,11 @@ class Likelihood:
         self._posed[column] = -place
 
     def _add_model_errors(self) -> None:
-        """Add the columns of forces and torques that are a small share larger, and of what of a
-        torque the flight loop's answer to the state predicts.
+        """Add the columns of slightly larger forces and torques, and of the torques expected from
+        the flight loop's answer to the state.
 
-        The latter may be too small by the share of it that is rounding (errors in variables): a
-        hover holds little torque, and rounding hides it.
+        Rounding biases an expected torque low, by its share of the variance (errors in variables):
+        a hover holds little torque, and rounding hides it.
         """
         rounded, (whole, _) = 2.0 * np.square(self._rounding()[3:]), joined(self.tracks)
         expected = whole.rotors[:, 1:] - np.concatenate(self.answers)[:, 1:]
@@ -468,28 +448,29 @@ class Likelihood:
             }
 
     def _jumps(self) -> list[Array]:
-        """Return what a unit of each gain of a pair of axes adds to the states (n, 6, e) of each
-        piece.
+        """Return the jumps of the states (n, 6, e) of each piece for a unit of each gain of a pair
+        of axes.
 
-        Thrust and torques say something of the axes that they drive. And a loop that rolls or
-        pitches the vehicle has seen where it is, and what pushes it aside.
+        Thrust and torques inform about the axes they drive. A loop that rolls or pitches the
+        vehicle has seen its position and the force aside.
         """
         out = []
         tilt = SIDEWAYS * self.flights.vehicle.gravity
-        for found, track in zip(self.answers, self.tracks, strict=True):
-            # an innovation of sample k changes the state after it: the jump is before sample k + 1
-            found = np.vstack([np.zeros(4), found[:-1]])
-            x = np.zeros((len(found), 6, len(JUMP_STATE) // len(STATES)))
-            x[:, :3, 0] = found[:, :1] * track.rotation[:, :, 2]
-            x[:, 3:, 1] = level(track.heading, found[:, 1:])
+        units = np.array([self.period**2, self.period, 1.0])  # states after a period, of one m/s2
+        for answer, track in zip(self.answers, self.tracks, strict=True):
+            # the innovation of sample k changes the state after k: the jump is before sample k + 1
+            answer = np.vstack([np.zeros(4), answer[:-1]])
+            x = np.zeros((len(answer), 6, len(JUMP_STATE) // len(STATES)))
+            x[:, :3, 0] = answer[:, :1] * track.rotation[:, :, 2]
+            x[:, 3:, 1] = level(track.heading, answer[:, 1:])
             x[:, 0, 2], x[:, 1, 2] = tilt * x[:, 4, 1], tilt * x[:, 3, 1]
-            out.append((x[..., None] * self._units).reshape(len(x), 6, -1))
+            out.append((x[..., None] * units).reshape(len(x), 6, -1))
         return out
 
     def _products(self, starts: Starts) -> Base:
         acting, moved, steady = self._acting, self._posed, self.steady
         asked = (*(c for c in acting if c not in moved), *moved)
-        # what the rotors say of other axes than those that they drive stays as it was fitted
+        # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
         names = (*asked, *drives)
         root = np.linalg.cholesky(steady.covariance)
@@ -531,7 +512,7 @@ class Likelihood:
         state: Array | None = None,
         slopes: Array | None = None,
     ) -> Array:
-        """Return what a unit of columns changes in the predictions (n, 6, c) of a part of a piece.
+        """Return the change of the predictions (n, 6, c) of a part of a piece with each column.
 
         Args:
             track: the piece.
@@ -572,17 +553,17 @@ class Likelihood:
 
 
 def gyration(vehicle: Vehicle, rate: Array) -> Array:
-    """Return by how much the angular acceleration (n, 3, 3) grows with the angular velocity."""
+    """Return the derivative of the angular acceleration (n, 3, 3) by the angular velocity."""
     # -u x J v over the inertia J, of all pairs of axes u and v
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)
     return np.asarray(np.einsum("nk,kji->nij", rate, twist + twist.swapaxes(0, 1)))
 
 
 def read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
-    """Return the unbroken pieces of a log as they were measured, without what the vehicle's sensing
-    effects did to them; ``finer`` is added to the rotor speeds (n, 4) of each.
+    """Return the unbroken pieces of a log as measured, with the vehicle's sensing effects undone;
+    ``finer`` is added to the rotor speeds (n, 4) of each.
 
-    Where poses are late or early, rotor speeds are moved instead: poses would lose of their noise.
+    For late or early poses, rotor speeds are moved instead: moved poses would lose noise.
     """
     late = [e for e in sensing_of(vehicle) if is_delay(e.name)]
     offset = sum(sum(e.coefficients.values()) for e in late)
@@ -610,7 +591,7 @@ def read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list
 
 
 def _signals(piece: Poses, track: Track) -> Signals:
-    """Return the flight as the filter sees it between samples, as the effect models are asked."""
+    """Return the flight as the filter sees it between samples, for the effect models."""
     speeds = piece.rotor_speeds
     between = 0.5 * (speeds + np.vstack([speeds[1:], speeds[-1:]]))
     return Signals(

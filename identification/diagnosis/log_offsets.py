@@ -1,9 +1,8 @@
-"""By what the signals of a log may be off: apart in time, with rotor speeds less smooth or less
-even than what the rotors do, and with a bias of the accelerometer. All are fitted beside effects.
+"""Errors of a log's signals: time offsets, rotor speeds too rough or too even, and a bias of the
+accelerometer. All are fitted beside effects.
 
-A fusion takes out what it knows of an accelerometer's bias; what is left is three numbers a flight.
-So a steady force along the body is told from a bias only where attitude, thrust or the force itself
-changes.
+A fusion takes out most of an accelerometer's bias; three numbers a flight are left. So a steady
+force along the body differs from a bias only where attitude, thrust or the force itself changes.
 """
 
 import math
@@ -19,18 +18,19 @@ from ...dynamics.vehicle import Vehicle
 from ..motion.signals import Signals
 from ..motion.smoothing import lagged, resampled
 
-# time offsets (s) of a log: by which the rotor speeds act later than they are logged, by which the
-# attitude is ahead of the position, and by which the velocity that acts is behind the position's (a
-# simulator that holds its forces over a step has one)
+# time offsets (s) of a log: of the rotor speeds' action behind their log, of the attitude ahead of
+# the position, and of the acting velocity behind the position's (as in a simulator with forces held
+# over a step)
 ROTOR_TIME_OFFSET = ("", "rotor_time_offset")
 ATTITUDE_TIME_OFFSET = ("", "attitude_time_offset")
 VELOCITY_TIME_OFFSET = ("", "velocity_time_offset")
-# variance (s2) of the time over which rotor speeds are averaged, to both sides: an IMU hardly has
-# noise, so that of the rotor speeds, and their rounding, show; and it has a low-pass of its own.
-# Without it a lag is found that averages them, with an offset that brings them forward again
+# variance (s2) of the time over which rotor speeds are averaged, to both sides. An IMU hardly has
+# noise, so the rotor speeds' noise and rounding show; and the IMU has a low-pass of its own.
+# Without this average the fit finds an averaging lag, with an offset to bring the rotors forward
+# again
 ROTOR_SPREAD = ("", "rotor_spread")
-# s by which rotors behind a lag speed up sooner, and slow down later, than the lag says. Without it
-# their mean thrust, which is larger by as much, is a mass that is smaller
+# s by which lagging rotors speed up sooner and slow down later than the lag. Their mean thrust is
+# larger by as much, and without this offset looks like a smaller mass
 LAG_ASYMMETRY = ("", "lag_asymmetry")
 
 
@@ -50,8 +50,8 @@ TIMINGS = {
     ROTOR_SPREAD: Offset(2.5e-5, (0.0, 1.6e-3)),  # 5 ms, and at most 40
     LAG_ASYMMETRY: Offset(0.005, (-0.02, 0.02)),  # rotors are driven up, and drag slows them down
 }
-# where the pose was filtered before the log was written: a causal low-pass of 5 Hz is 45 ms late,
-# an estimator some more
+# for a pose filtered before the log was written: a causal low-pass of 5 Hz is 45 ms late, an
+# estimator some more
 BEHIND_A_FILTER = Offset(0.02, (-0.1, 0.1))
 
 
@@ -62,7 +62,7 @@ def bias_column(log: int, axis: int) -> tuple[str, str]:
 
 def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Signals:
     """Return the signals with rotors that speed up sooner, by ``asymmetry`` s, and slow down later
-    than a vehicle's lag says; as they are where it has none.
+    than a vehicle's lag; unchanged without a lag.
 
     To first order: behind a lag of ``tau -+ asymmetry``, rotor speeds follow ``u + asymmetry
     |dW/dt|`` with the lag ``tau``, where W follows u.

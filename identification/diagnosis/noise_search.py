@@ -1,32 +1,29 @@
 """The likeliest noise of a flight's pose, by Fisher's method of scoring.
 
-Searched are four numbers of each axis, and linear gains beside them: of what else than the pose
-says something of its states.
+The search is over four numbers of each axis, and over linear gains beside them: the gains on other
+signals of the axis' states than the pose.
 """
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..logs.table import Array
 from .evidence import bounded_mode
 from .steady_filter import PAIRS, PoseNoise, SteadyFilter, steady_filter
 
-Array = NDArray[np.float64]
-
-
-SETTLING_TIME = 1.0  # s, from the start of a piece to the first innovation that counts
-FIRST_TIME = 0.4  # s, correlation time at which a search begins
-# s, correlation times: gusts last 0.1 to 2 s; what lasts longer is no disturbance
+SETTLING_TIME = 1.0  # s, from the start of a piece to the first innovation in the likelihood
+FIRST_TIME = 0.4  # s, correlation time at the start of a search
+# s, correlation times: gusts last 0.1 to 2 s; a longer force is no disturbance
 TIMES = (0.03, 2.0)
 TOLERANCE = 0.1  # nats, by which the last step of the search changes the likelihood
 STEPS = 20  # of the search, at most
-# share of its diagonal by which the information grows for the first step. Of 15 flights the search
-# ended 9 and 17 nats short on two with a hundredth of it; ten times as much took a fifth more steps
+# growth of the information's diagonal for the first step. For 15 flights and a hundredth of this
+# share, the search ended 9 and 17 nats short on two; ten times the share took a fifth more steps
 DAMPING = 0.1
-STEP = 1e-4  # of what is searched, for derivatives
+STEP = 1e-4  # of the searched numbers, for derivatives
 LEAST_POSE = 1e-9  # m and rad: below the last digit of any log
 SEARCHED = 24  # numbers of the noise: four of each axis
 
@@ -36,12 +33,12 @@ class NoiseSearch:
     """A search.
 
     Attributes:
-        see: returns the innovations (n, 6) of a flight's parts, as a filter with gains (3, e) of
-            each pair sees them. With slopes (6, 7, m), by which a noise changes the filter's gains
-            and ``keep``, also what that does (n, 6, 3 e + m) to the predictions, behind what the
-            gains of each pair in turn do.
-        held: (e,) standard deviations of the gains' prior. Rotor speeds that are nearly predicted
-            would have gains without limit.
+        see: returns the innovations (n, 6) of a flight's parts through a filter with gains (3, e)
+            of each pair. With slopes (6, 7, m) of the filter's gains and ``keep`` by a noise, also
+            the changes (n, 6, 3 e + m) of the predictions, behind the changes by the gains of each
+            pair in turn.
+        held: (e,) standard deviations of the gains' prior. Without it nearly predicted rotor speeds
+            would have unlimited gains.
         period: s.
         gravity: m/s2.
     """
@@ -55,8 +52,8 @@ class NoiseSearch:
         """Return the noise and the gains (3, e) at maximum likelihood, by damped steps.
 
         Args:
-            near: the noise at which the search begins.
-            gains: (3, e) at which it begins.
+            near: the noise at the start of the search.
+            gains: (3, e) at its start.
         """
         x = _free(near)
         low, high = x - 16.0, x + 16.0
@@ -115,7 +112,7 @@ class NoiseSearch:
         held = np.tile(self.held, len(PAIRS))
         normal[range(len(held)), range(len(held))] += held**-2
         right[: len(held)] -= at[: len(held)] / held**2
-        # of the innovations' covariance
+        # by the innovations' covariance
         share = np.linalg.solve(steady.covariance, change)  # (m, 6, 6)
         left = np.linalg.solve(steady.covariance, own) - n * np.eye(6)
         normal[len(held) :, len(held) :] += 0.5 * n * np.einsum("mij,lji->ml", share, share)
@@ -123,13 +120,12 @@ class NoiseSearch:
         return self._deviance(own, steady.covariance, at, n), normal, right
 
     def _filter_slopes(self, at: Array, here: SteadyFilter) -> tuple[Array, Array]:
-        """Return what a unit of each number of the noise adds to the gains and to ``keep`` of the
-        axes (6, 7, m), and to the covariance of the innovations (m, 6, 6).
+        """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
+        covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
         """
         numbers = range(SEARCHED)
         noise = [self._noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in numbers]
-        fields = ("pose", "disturbance", "time", "white")
-        moved = PoseNoise(*(np.stack([getattr(x, f) for x in noise]) for f in fields))
+        moved = PoseNoise(*(np.stack(each) for each in zip(*map(astuple, noise), strict=True)))
         there = steady_filter(moved, self.period, self.gravity)
         gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
         slopes = np.concatenate([gain, (there.keep - here.keep)[..., None]], axis=2) / STEP
@@ -138,9 +134,9 @@ class NoiseSearch:
 
 
 def _free(noise: PoseNoise) -> Array:
-    """Return a noise as what is searched (6, 4): logarithms of the pose's standard deviation, the
-    disturbance's and its correlation time, and the white acceleration's variance over the
-    disturbance's.
+    """Return the searched numbers of a noise (6, 4): logarithms of the pose's standard deviation,
+    the disturbance's and its correlation time, and the ratio of the variances of the white
+    acceleration and the disturbance.
     """
     logs = [np.log(x) for x in (noise.pose, noise.disturbance, noise.time)]
     return np.stack([*logs, np.square(noise.white / noise.disturbance)], axis=-1)

@@ -1,5 +1,5 @@
-"""Priors and bounds of what a posterior's likelihood is a function of: a standard deviation for
-each column, and the ways in which an effect may act.
+"""Priors and bounds of a posterior's columns: a standard deviation for each, and the variants of an
+effect.
 """
 
 import math
@@ -8,60 +8,59 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
+from ..logs.table import Array
 from .evidence import Index, Marginal, SetEvidence, marginal
 from .log_offsets import TIMINGS
 from .regression import (
     CENTRAL,
     START_PREFIX,
     Column,
-    Flights,
+    RegressedFlights,
     coefficient,
     moves_time,
     typical_size,
     unit_of_change,
 )
 
-Array = NDArray[np.float64]
 Setting = dict[str, dict[str, float]]
 # columns of whole effects, with the coefficients of each
 Starts = Mapping[Column, Mapping[str, float]]
 
-WHOLE_PREFIX = "whole "  # a coefficient of an effect that acts at the centre, without a moment
-# columns without an effect: what any flight may have, and what an effect that is in no library does
+WHOLE_PREFIX = "whole "  # a coefficient of an effect acting at the centre, without a moment
+# columns without an effect: nuisances of any flight, and effects outside the library
 BETWEEN = "rotors between samples"
 MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown ", "nuisance "
 
 
 @dataclass(frozen=True)
 class PriorSettings:
-    """What is believed before a flight is seen."""
+    """Beliefs before a flight is seen."""
 
-    expected: float = 1.0  # effects that a vehicle lacks
-    # typical sizes: every effect acts a little, and one that is no larger is not worth a name. It
-    # is the standard deviation of what any coefficient may have without the effect being named
+    expected: float = 1.0  # number of effects missing in a model
+    # typical sizes: every effect acts a little, and none up to this size is worth a name. The
+    # standard deviation of any coefficient of an unnamed effect
     negligible: float = 0.03
-    any_size: float = 3.0  # typical sizes, of effects that may be of any size; of others one
-    most_missing_mass: float = 0.9  # share of the declared mass that a vehicle may lack
-    # times a lag or a delay at which a column was made, between which the column stands for it
+    any_size: float = 3.0  # typical sizes, of effects of any size; of others one
+    most_missing_mass: float = 0.9  # share of the declared mass a vehicle may lack
+    # times a column's own lag or delay: range in which the column stands for it
     near_start: tuple[float, float] = (0.5, 1.5)
-    # share of an axis' force or torque by which any model is wrong: of thrust along its axis and
-    # across it, and of the torques. Propellers and bearings are not stable to less
+    # error of any model as a share of an axis' force or torque: of thrust along its axis and across
+    # it, and of the torques. Propellers and bearings are not stable to less
     model_error: float = 0.003
-    # standard deviations of the gains on the rotors' innovations, by which pose, rate and
-    # disturbance answer them, in what one period of such an acceleration makes. They are to leave
-    # the gains free: a loop that shows the tilt that it sees has gains of some 3,000, 100 and 1
+    # standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
+    # units of one period of such an acceleration. They leave the gains free: a loop that shows the
+    # tilt it sees has gains of some 3,000, 100 and 1
     gains: tuple[float, float, float] = (1e4, 1e3, 1e2)
-    # second differences of the rotor speeds, the standard deviation of what they may do between
-    # samples beside a straight line
+    # second differences of the rotor speeds: standard deviation of their path between samples from
+    # a straight line
     between_samples: float = 0.5
 
 
 PRIORS = PriorSettings()
-# columns of one way in which an effect may act: all coefficients, or one of those starting points
+# columns of one variant of an effect: all coefficients, or one of its starting points
 Variant = tuple[Column, ...]
 
 
@@ -73,25 +72,25 @@ class Base:
     size: Array  # (c,) prior standard deviations
     low: Array
     high: Array
-    total: Array  # (c + 1, c + 1) sums of products, which are known to rounding
+    total: Array  # (c + 1, c + 1) sums of products, true to rounding
     blocks: Array  # (blocks, k + 1, k + 1), the same of each block, of the columns ``single``
-    single: Index  # (k,) columns outside the dictionary, which would take nine tenths of it
+    single: Index  # (k,) columns without the dictionary, nine tenths of all
     penalty: float
     effects: frozenset[str]  # of the setting
-    plain: Index  # columns that any flight may have
+    plain: Index  # nuisances of any flight
     typical: Array  # (c,) typical sizes in prior standard deviations
     dictionary: Index  # columns of the discrepancy
     starts: Starts
-    # the evidence of sets, by the likelihood's power and their columns; None of one that cannot be
+    # the evidence of sets, by the likelihood's power and their columns; None for an impossible set
     tried: dict[tuple[float, tuple[Variant, ...]], SetEvidence | None] = field(default_factory=dict)
 
     @cached_property
     def columns(self) -> dict[Column, int]:
-        """Where each column is."""
+        """The index of each column."""
         return {c: i for i, c in enumerate(self.names)}
 
     def at(self, columns: Iterable[Column]) -> Index:
-        """Return where some columns are."""
+        """Return the indices of some columns."""
         return np.array([self.columns[c] for c in columns], dtype=np.intp)
 
     @property
@@ -102,35 +101,35 @@ class Base:
     def marginal(
         self, asked: Index, others: Index, size: Array | None = None, power: float = 1.0
     ) -> Marginal:
-        """Return the likelihood, to a power, of columns that are asked about, with others
-        integrated out; ``size``: standard deviations of their prior, if it is not theirs.
+        """Return the likelihood, to a power, of the columns asked about, with others integrated
+        out; ``size``: standard deviations of their prior, if not their own.
         """
         products = power * self.total
         products[-1, -1] += power * self.penalty
         return marginal(products, asked, others, np.ones(len(others)) if size is None else size)
 
     def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, tuple[float, float]]:
-        """Return the coefficients of some columns at the mode where no other acts, and their
+        """Return the coefficients of some columns at the mode without all others, and their
         standard deviations.
         """
         total = power * self.total
         normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
         mode = np.linalg.solve(normal, total[chosen, -1]) * self.size[chosen]
         std = np.sqrt(np.diag(np.linalg.inv(normal))) * self.size[chosen]
-        found = zip(chosen, mode.tolist(), std.tolist(), strict=True)
-        return {self.names[i]: (x, s) for i, x, s in found}
+        modes = zip(chosen, mode.tolist(), std.tolist(), strict=True)
+        return {self.names[i]: (x, s) for i, x, s in modes}
 
 
 def bare(column: Column) -> Column:
-    """Return a column's coefficient, of an effect that may act as a whole."""
+    """Return a column's coefficient, without the mark of a whole effect."""
     return column[0], column[1].removeprefix(WHOLE_PREFIX)
 
 
 def variants_of(
-    flights: Flights, effect: str, setting: Collection[str], starts: Starts
+    flights: RegressedFlights, effect: str, setting: Collection[str], starts: Starts
 ) -> list[Variant]:
-    """Return the ways in which an effect may act beside the effects of a setting, without what the
-    vehicle's file fixes.
+    """Return the variants of an effect beside the effects of a setting, without coefficients fixed
+    by the vehicle's file.
     """
     own, wholes = tuple(flights.columns_of([effect])), [(c,) for c in starts if c[0] == effect]
     if moves_time(effect) and effect not in setting:
@@ -144,7 +143,7 @@ def variants_of(
     return [own, tuple((effect, WHOLE_PREFIX + name) for _, name in own)]
 
 
-def prior_size(column: Column, flights: Flights) -> float:
+def prior_size(column: Column, flights: RegressedFlights) -> float:
     """Return the standard deviation of a column's coefficient before a flight is seen."""
     effect, name = column
     if column in TIMINGS:
@@ -162,7 +161,7 @@ def prior_size(column: Column, flights: Flights) -> float:
     return math.hypot(size, flights.thrust_std) if get(effect).role == Role.THRUST else size
 
 
-def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
+def _bounds(column: Column, flights: RegressedFlights) -> tuple[float, float]:
     effect, name = column
     if not effect:
         return -math.inf, math.inf
@@ -176,36 +175,36 @@ def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
     return min(low - own, 0.0), max(high - own, 0.0)
 
 
-def declared(column: Column, flights: Flights) -> float:
-    """Return what the vehicle's file states of a column's coefficient, from which a coefficient of
-    the likelihood counts; 0 where it states nothing.
+def declared(column: Column, flights: RegressedFlights) -> float:
+    """Return a column's coefficient by the vehicle's file, the zero of the likelihood's
+    coefficient; 0 if not stated.
     """
     effect, name = bare(column)
     return flights.coefficients({}, effect).get(name, 0.0)
 
 
 def in_prior_units(
-    flights: Flights,
+    flights: RegressedFlights,
     names: Sequence[Column],
     blocks: Array,
     penalty: float,
     setting: Setting,
     starts: Starts,
 ) -> Base:
-    """Return a likelihood in standard deviations of the priors, about zero and not about the
-    setting beside which it was made.
+    """Return a likelihood in standard deviations of the priors, about zero instead of the setting
+    of its columns.
 
     Args:
-        flights: of the vehicle.
+        flights: the vehicle's flights.
         names: (c,) columns.
-        blocks: (blocks, c + 1, c + 1) sums of products, of columns and of what is left at the
-            setting (last), whitened; they are changed in place, since ten minutes take 0.2 GB.
+        blocks: (blocks, c + 1, c + 1) sums of products, of columns and of the residual at the
+            setting (last), whitened. They are changed in place: ten minutes take 0.2 GB.
         penalty: twice the sum over samples of the logarithm of the standard deviations.
-        setting: of effects.
+        setting: the setting of effects.
         starts: columns of whole effects.
     """
     size = np.array([prior_size(c, flights) for c in names])
-    # about zero, not about the setting: the residual with all its effects taken away
+    # about zero: the residual without all effects of the setting
     own = [*map(bare, names)]
     here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in own]
     back = np.append(np.subtract(here, [declared(c, flights) for c in own]), 1.0)

@@ -1,14 +1,13 @@
-"""Which effects act: the posterior over sets, and what they leave unexplained.
+"""The posterior over sets of effects, and the residual beside them.
 
-Every effect of the library is as likely as every other before the flight, and one is expected to be
-missing. Where poses and rotors were measured as they were, a set's evidence is that of the likelier
-noise of two: that beside no effect, and that beside the best set, because what is not explained
-counts as a disturbance.
+Before the flight every effect of the library is equally likely, and one is expected to be missing.
+With poses and rotors as measured, a set has the evidence of the likelier noise of two: beside no
+effect, and beside the best set. The reason: an unexplained force counts as a disturbance.
 
-Of other flights (rotors known by commands, a pose that was filtered, a motion read from an IMU)
-rows of forces and, where rotors are measured, of torques are explained, with one noise for all
-sets. The likeliest set is fitted without linearisation, and so is each that comes out likeliest
-after it, until none does that was not fitted.
+Other flights have rotors known by commands, a filtered pose, or a motion read from an IMU. There
+rows of forces and, with measured rotors, of torques are explained, with one noise for all sets. The
+likeliest set is fitted without linearisation, and so is each next likeliest, until the likeliest is
+a fitted one.
 """
 
 import math
@@ -17,58 +16,55 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ..findings import Disturbance, Ranking
+from ..logs.table import Array
 from .climbing import Height, linearised, mode
 from .evidence import set_evidence
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts, prior_size
-from .regression import START_PREFIX, Column, Flights, moves_time, typical_size, without
+from .regression import START_PREFIX, Column, RegressedFlights, moves_time, typical_size, without
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
 from .starting_points import starting_points
 
-Array = NDArray[np.float64]
-
-
-# typical sizes at which a lag or a delay is tried as a whole: their columns change with them
+# typical sizes of the trials of a lag or a delay as a whole: their columns change with them
 TIME_STARTS = (0.3, 0.6, 1.2)
-# share of the likeliest set's probability from which another effect in a place of it is one that
-# the flights do not tell from it: a likelihood of 20 to 1
+# share of the likeliest set's probability from which flights do not tell another effect from one of
+# its own: a likelihood of 20 to 1
 LEAST_RIVAL = 0.05
 ROUNDS = 6  # of fitting the noise beside the best set
-# standard deviations of its prior, by which a coefficient moves in the last of these rounds at most
+# standard deviations of its prior: largest step of a coefficient in the last of these rounds
 CLOSE = 0.1
-MOST_STARTS = 2  # of an effect with nonlinear coefficients, the likeliest, that are fitted by rows
+MOST_STARTS = 2  # likeliest starts of an effect with nonlinear coefficients, fitted by rows
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """The posterior of flights, and what the likeliest set is a fit of."""
+class FittedPosterior:
+    """The posterior of flights, and the fit of the likeliest set."""
 
     posterior: Posterior
     ranking: Ranking
     setting: Setting  # coefficients of the likeliest set
-    # of each channel, where the likelihood has a noise of the motion; none for a force balance
+    # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
     sensors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # of each effect of the set, those that the logs do not show and that do as well in its place
+    # for each effect of the set: effects hidden in these logs that do as well in its place
     behind: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def rank(
-    flights: Flights,
+    flights: RegressedFlights,
     library: Sequence[str],
     report: Callable[[str], None] = lambda text: None,
-) -> Found:
-    """Return the posterior over sets of effects of a library, of those that flights can show.
+) -> FittedPosterior:
+    """Return the posterior over sets of effects of a library.
 
     Args:
-        flights: whose poses are explained.
-        library: names of effects that may act.
+        flights: flights with poses to explain.
+        library: names of effects that these flights can show.
         report: called with a line of progress.
     """
 
@@ -98,69 +94,70 @@ def rank(
 
     def alone(best: Likelihood) -> float:
         base = best.base(best.setting, {})
-        found = Posterior(flights, [*best.setting], (base, base))
-        return found.scores.get(frozenset(best.setting), -math.inf)
+        scores = Posterior(flights, [*best.setting], (base, base)).scores
+        return scores.get(frozenset(best.setting), -math.inf)
 
     def first() -> tuple[Likelihood, Starts, Base]:
         nothing, starts = Likelihood(flights, {}), starts_of(flights, library, {})
         return nothing, starts, nothing.base(library, starts)
 
-    # made anew at the end where no set is likeliest: its columns of ten minutes take 0.5 GB
+    # made anew at the end if no set is likeliest: its columns of ten minutes take 0.5 GB
     best, starts, loud = first()
     everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
     quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
-    found = Posterior(flights, library, (loud, quiet))
-    # as it was asked for: where a fit ends, a little of other effects beside it moves what is asked
+    posterior = Posterior(flights, library, (loud, quiet))
+    # settings as asked for: beside the end of a fit, a little of other effects moves the request
     tried: dict[frozenset[str], Setting] = {frozenset(): {}}
-    # the best effect first, alone: another set's columns are those of the model that has it
-    if setting := found.best_setting(1):
+    # the best effect first, alone: another set's columns are of the model with that effect
+    if setting := posterior.best_setting(1):
         best = fitted(setting, best)
         score = alone(best)
-        starts, found = around(best)
-        # what is alike counts as a disturbance beside it: each is judged beside its own noise
-        rivals = [fitted(x, best) for x in found.rivals(setting)]
+        starts, posterior = around(best)
+        # a similar effect counts as a disturbance beside it: each is judged beside its own noise
+        rivals = [fitted(x, best) for x in posterior.rivals(setting)]
         scores = [score, *map(alone, rivals)]
         if max(scores) > score:
             best = [best, *rivals][scores.index(max(scores))]
-            starts, found = around(best)
-        del rivals  # each holds a tenth of what a diagnosis takes
+            starts, posterior = around(best)
+        del rivals  # each holds a tenth of a diagnosis' memory
     for _ in range(ROUNDS):
-        # the columns of the same set change with its coefficients, where these have moved far
-        setting = found.best_setting()
-        if not found.is_elsewhere(setting, tried):
+        # the columns of the same set change with its coefficients, if these have moved far
+        setting = posterior.best_setting()
+        if not posterior.is_elsewhere(setting, tried):
             break
         best = fitted(setting, best)
-        starts, found = around(best)
-    # once more, with the dictionary's columns, that are dear, beside the likeliest set
-    setting = found.best_setting()
+        starts, posterior = around(best)
+    # once more, with the dictionary's costly columns, beside the likeliest set
+    setting = posterior.best_setting()
     if setting.keys() != best.setting.keys():
         best = Likelihood(flights, setting, best) if setting else first()[0]
         starts = starts_of(flights, library, setting, *([{}] if setting else []))
     whole = best.base(library, starts, unknown=True)
-    found = Posterior(flights, library, (loud, whole), found.tempering())
-    column, size, gained = found.strangest()
-    # of so many columns one explains as much by chance, and no noise beside it would be likelier
+    posterior = Posterior(flights, library, (loud, whole), posterior.tempering())
+    column, size, gained = posterior.strangest()
+    # among so many columns one explains as much by chance, and no noise beside it is likelier
     by_chance = 2.0 * math.log(len(whole.dictionary))
-    ranking = found.ranking(best.quieter({column: size}, starts) if gained > by_chance else None)
-    late = {c[1]: x for c, x in found.nuisances().items() if c in flights.offsets}
-    return Found(found, ranking, found.best_setting(), best.gusts(), late)
+    quieter = best.quieter({column: size}, starts) if gained > by_chance else None
+    ranking = posterior.ranking(quieter)
+    late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
+    return FittedPosterior(posterior, ranking, posterior.best_setting(), best.gusts(), late)
 
 
 def rank_by_rows(
-    flights: Flights,
+    flights: RegressedFlights,
     library: Sequence[str],
     first: Setting,
     fixed: Setting,
     report: Callable[[str], None] = lambda text: None,
-) -> Found:
+) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
-        flights: of the vehicle.
-        library: effects that may act, those of ``first`` among them.
-        first: effects that any set has, with coefficients about which a fit begins; none where
-            rotors are measured.
-        fixed: effects that are known from elsewhere, with their coefficients.
+        flights: the vehicle's flights.
+        library: names of effects, with ``first``.
+        first: effects of every set, with coefficients for the start of a fit; none with measured
+            rotors.
+        fixed: effects known from elsewhere, with their coefficients.
         report: called with a line of progress.
     """
     likelihood = RowLikelihood(flights, library, first, fixed)
@@ -183,14 +180,14 @@ def rank_by_rows(
 
     def add(setting: Setting) -> None:
         key = frozenset(setting)
-        if any(map(flights.is_nonlinear, setting)):  # what was linearised elsewhere says little
+        if any(map(flights.is_nonlinear, setting)):  # a linearisation elsewhere says little
             near = fitted[max(fitted, key=lambda other: len(other & key))]
             begun = {e: near.get(e, x) for e, x in setting.items()}
             setting = min(setting, begun, key=likelihood.objective)
         fitted[key] = likelihood.fitted(setting)
-        found = set(fitted[key]) - given
-        if likelihood.idle(fitted[key], found) or not all(
-            is_possible(flights, fitted[key], {}, e, plausible=True) for e in found
+        own = set(fitted[key]) - given
+        if likelihood.idle(fitted[key], own) or not all(
+            is_possible(flights, fitted[key], {}, e, plausible=True) for e in own
         ):
             idle.add(key)
             return
@@ -210,8 +207,8 @@ def rank_by_rows(
         return Posterior(flights, library, [*bases.values()], likelihood.power, given, idle)
 
     def likeliest() -> Setting:
-        """Return the likeliest set's fit, once no set is likelier that was not fitted, nor, where
-        rotors are measured, one that lacks one of its effects.
+        """Return the likeliest set's fit, once no unfitted set is likelier. With measured rotors
+        the sets with one effect less are fitted as well.
         """
         while True:
             setting = posterior().best_setting(len(library))
@@ -229,16 +226,16 @@ def rank_by_rows(
     likeliest()
     likelihood.power = posterior().tempering()
     best = likeliest()
-    bases.pop(frozenset(best))  # the last is the one that has the dictionary
+    bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
-    found = posterior()
+    last = posterior()
     sensors, behind = likelihood.sensors(best), _behind(likelihood, best)
-    return Found(found, found.ranking(), best, sensors=sensors, behind=behind)
+    return FittedPosterior(last, last.ranking(), best, sensors=sensors, behind=behind)
 
 
 def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, tuple[str, ...]]:
-    """Return of each effect of a set those which logs do not show and which may act all the same,
-    that explain the flights as well in its place.
+    """Return, for each effect of a set, possible effects hidden in the logs with as much explained
+    in its place.
     """
     flights = likelihood.flights
     unseen = sorted(flights.needs_pose - flights.without_trace - set(best))
@@ -255,31 +252,31 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, tuple[str, ..
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
-    found = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
-    return {e: others for e, others in found.items() if others}
+    behind = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
+    return {e: others for e, others in behind.items() if others}
 
 
 def starts_of(
-    flights: Flights, library: Sequence[str], setting: Setting, *others: Setting
+    flights: RegressedFlights, library: Sequence[str], setting: Setting, *others: Setting
 ) -> Starts:
-    """Return columns of whole effects that are not in a setting, with the coefficients of each:
-    lags and delays, and effects whose coefficients do nothing one by one. These start from what the
-    setting leaves unexplained, and what ``others`` do: an effect may act in the place of another.
+    """Return columns of whole effects outside a setting, with the coefficients of each: lags and
+    delays, and effects whose coefficients do nothing one by one. The latter start from the residual
+    of the setting, and of ``others``: an effect may act in the place of another.
     """
     out: dict[Column, Mapping[str, float]] = {}
     residuals: list[Array] = []
     beside = [*setting, *(e.name for e in flights.vehicle.effects)]
     for effect in (e for e in library if e not in setting):
-        found: list[Mapping[str, float]] = []
+        own: list[Mapping[str, float]] = []
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
             typical = typical_size((effect, name), flights.vehicle)
-            found = [{name: share * typical} for share in TIME_STARTS]
+            own = [{name: share * typical} for share in TIME_STARTS]
         elif flights.is_nonlinear(effect):
             residuals = residuals or [flights.residual(x) for x in (setting, *others)]
             stated = flights.stated(effect)
             for y in residuals:
                 starts = starting_points(effect, flights, y, stated, beside)
-                found += [{**start, **stated} for start in starts]
-        out |= {(effect, f"{START_PREFIX}{i}"): start for i, start in enumerate(found)}
+                own += [{**start, **stated} for start in starts]
+        out |= {(effect, f"{START_PREFIX}{i}"): start for i, start in enumerate(own)}
     return out

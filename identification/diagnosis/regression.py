@@ -1,9 +1,9 @@
 """The residual of flights as a regression on the coefficients of effects.
 
-Rows are samples of all flights, low-passed with zero phase and thinned out; the six channels are
+Rows are samples of all flights, low-passed with zero phase and thinned out. The six channels are
 force in the world frame and torque in the body frame. A column is the change of the residual with
-one coefficient. Residual and columns come from the same effect models that plant and estimator run,
-through the same filter.
+one coefficient. Plant, estimator, residual and columns share the effect models; residual and
+columns share the low-pass.
 """
 
 import math
@@ -22,13 +22,14 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
+from ..logs.table import Array, Mask
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import LONGEST_GAP, Signals, log_signals
-from ..motion.smoothing import CUTOFFS, low_pass, resampled
+from ..motion.smoothing import CUTOFFS, low_pass, mean_square, resampled
 from .commanded_rotors import (
     UNSTATED_THRUST_STD,
     downsampled,
@@ -50,36 +51,33 @@ from .log_offsets import (
     with_uneven_lag,
 )
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
 K = TypeVar("K")
 V = TypeVar("V")
 
 
 ROWS_PER_CUTOFF = 5.0  # rows in a period of the residual's cut-off
-MARGIN = 0.6  # s at either end of a piece, where the filters lack half of what they need
-# share of sensor noise in the power of an effect's column, from which the effect is not
-# identifiable. One that scales a measurement could cancel the measurement's own noise: of its
-# column it is the share in the amplitude
+MARGIN = 0.6  # s at either end of a piece, where the filters lack half of their input
+# share of sensor noise in the power of an effect's column, beyond which the effect is not
+# identifiable. A scaled measurement could cancel its own noise: there the share is of the amplitude
 MOST_NOISE_SHARE = 0.1
-# rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
-# like an effect
+# rounding steps by which rotor speeds must vary: with less, the rounding is no noise but looks like
+# an effect
 LEAST_STEPS_OF_ROTOR_SPEED = 1.4
 BLOCK = 3.0  # s of flight held out, or left out in cross-validation, in one piece
 SHORT_BLOCK = 1.0  # s, the same of commanded flights of fewer than eight blocks
 BLOCKS_PER_HELD_OUT = 4  # one of so many blocks is held out
-MEMORY = 2**28  # bytes, of pieces that are kept
-# what logs lack whose rotor speeds are worked out from commands: torque is left out, the thrust
-# curve is a guess, and commands do not tell small differences between rotors
+MEMORY = 2**28  # bytes of cached pieces
+# not known where rotor speeds come from commands: torque is left out, the thrust curve is a guess,
+# and commands do not tell small differences between rotors
 NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 
-# typical sizes, over which derivatives by a coefficient are taken: where it is fitted, and, so that
-# a signal moves in time by a sample and not by a part of one, where the noise in them is looked at
+# typical sizes, the steps of derivatives by a coefficient: in a fit, and in a column examined for
+# its noise (there a signal moves in time by a sample, not by a part of one)
 STEP, LARGE_STEP = 0.1, 0.5
-# Coefficients by effect: what is added to the declared vehicle
+# coefficients by effect, beside the declared vehicle
 Setting = Mapping[str, Mapping[str, float]]
-# A column: an effect's coefficient
+# an effect's coefficient
 Column = tuple[str, str]
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
 # a whole effect at coefficients of its own; the column is a multiple of it
@@ -92,15 +90,15 @@ def without(setting: Mapping[str, V], effect: str) -> dict[str, V]:
 
 
 def is_delay(effect: str) -> bool:
-    """Return whether an effect moves rotor speeds against the pose in time: it contains the rotors'
-    time offset.
+    """Return whether an effect moves rotor speeds against the pose in time. Such an effect contains
+    the rotors' time offset.
     """
     return get(effect).role == Role.DELAY
 
 
 def delivered(signals: Signals, vehicle: Vehicle) -> Array:
     """Return the thrust (N) and the torque (Nm, body) of a vehicle's rotors (n, 4), behind its lag
-    and whatever else changes what they deliver.
+    and its other effects on the rotors.
     """
     own = tuple(e for e in vehicle.effects if get(e.name).kind == "rotor input")
     still = replace(signals, angular_velocity=np.zeros_like(signals.angular_velocity))
@@ -110,12 +108,12 @@ def delivered(signals: Signals, vehicle: Vehicle) -> Array:
 
 
 def moves_time(effect: str) -> bool:
-    """Return whether rotors act late by an effect: behind a delay, or behind a lag."""
+    """Return whether rotors act late by an effect: a delay or a lag."""
     return get(effect).role in (Role.DELAY, Role.LAG)
 
 
 def is_nonlinear(effect: str) -> bool:
-    """Return whether an effect's force is no sum over its coefficients."""
+    """Return whether an effect's force is not linear in its coefficients."""
     return get(effect).starting_points is not None
 
 
@@ -125,8 +123,8 @@ def coefficient(column: Column) -> Coefficient:
 
 
 def unit_of_change(column: Column, vehicle: Vehicle) -> float:
-    """Return how much of a coefficient changes what it changes by as much as is declared: the
-    vehicle's mass for one in kg, 1 for a relative one.
+    """Return the change of a coefficient by 100 % of the declared quantity: the vehicle's mass in
+    kg, 1 for a relative coefficient.
     """
     return vehicle.mass if coefficient(column).unit == "kg" else 1.0
 
@@ -142,39 +140,34 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     c = coefficient(column)
     large, small = (abs(x) for x in c.typical)
     if large == 0 or small == 0:
-        others = [
-            abs(o.typical[0])
-            for o in get(column[0]).coefficients
-            if o.unit == c.unit and o.typical[0]
-        ]
-        return max(others, default=1.0)
+        same_unit = (o for o in get(column[0]).coefficients if o.unit == c.unit)
+        return max((abs(o.typical[0]) for o in same_unit if o.typical[0]), default=1.0)
     share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
     return float(small * (large / small) ** share)
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """One unbroken piece of a flight, and what of it the fit may see."""
+class FlightPiece:
+    """One unbroken piece of a flight, with its rows."""
 
-    log: int  # which log
+    log: int  # index of the log
     signals: Signals
-    rows: Index  # the samples that are rows
-    needed: Array  # (rows, 6) what the motion needs, N and Nm, by the declared mass and inertia
-    felt: Array | None  # (rows, 3) as of ``Flights.felt``, where an accelerometer was read
+    rows: Index  # samples used as rows
+    needed: Array  # (rows, 6) wrench of the motion, N and Nm, by the declared mass and inertia
+    felt: Array | None  # (rows, 3) as of ``RegressedFlights.felt``, with an accelerometer
 
     def smooth(self, x: Array) -> Array:
         """Return samples (n, ...) at the rows, through the residual's low-pass."""
         return _smooth(x, self.signals)[self.rows]
 
 
-class Flights:
-    """Flights of one vehicle, ready to be regressed.
+class RegressedFlights:
+    """Flights of one vehicle as rows of a regression.
 
     Args:
-        logs: of the fit.
-        vehicle: as it is declared.
-        test: further logs, which the fit never sees; without any, one block of 3 s of each four is
-            held out.
+        logs: the logs to fit.
+        vehicle: as declared.
+        test: further logs outside the fit; without any, one block of 3 s of each four is held out.
     """
 
     def __init__(
@@ -183,7 +176,7 @@ class Flights:
         self.vehicle = vehicle
         self._declared: Setting = {e.name: e.coefficients for e in vehicle.effects}
         self.logs = (*logs, *test)
-        # the motion is that of an IMU: no pose, or one that is too slow to tell it
+        # without a pose, or with a slow one, the motion is read from an IMU
         self.inertial = any(map(reads_imu, self.logs))
         for flown in self.logs if self.inertial else ():
             if flown.gyro is None or flown.accelerometer is None:
@@ -193,39 +186,37 @@ class Flights:
                 )
         # torque is left out, and only the time in the air counts
         self.commanded = any(log.commanded for log in self.logs)
-        if self.inertial:  # a ground that carries is no effect, and no height shows it
+        if self.inertial:  # no log shows a height, and a ground that carries is no effect
             self.logs = tuple(in_flight_by_thrust(log, vehicle) for log in self.logs)
         elif self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
-        # relative standard deviation of the thrust that is assumed
+        # relative standard deviation of the assumed thrust
         self.thrust_std = UNSTATED_THRUST_STD if thrust_is_assumed(self.logs, vehicle) else 0.0
-        # the noise of a filtered pose cannot be read from its log, nor can what the filter's delay
-        # and bandwidth took away
+        # a filtered pose hides its own noise, and the filter's delay and bandwidth take more away
         self.filtered = not (self.commanded or self.inertial) and any(
             pose_was_filtered(log) for log in self.logs
         )
-        # poses and rotor speeds as they were measured, for one filter of all logs
+        # poses and rotor speeds as measured, for one filter of all logs
         self.has_raw_poses = not (self.commanded or self.inertial or self.filtered) and np.allclose(
             [log.period for log in self.logs], self.logs[0].period, rtol=0.01
         )
         self.logs = tuple(excerpt(self.logs))
         self._fit_logs = len(logs)
-        self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
+        self._drift: np.random.Generator | None = None  # of a copy with other errors of the fusion
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
         self._forget()
-        self._first: list[Piece] = []
+        self._first: list[FlightPiece] = []
         self._lay_rows()
-        # by what the accelerometers from which the motion is read may be off, and all signals
+        # errors of accelerometers from which the motion is read, and time offsets of all signals
         self.biases = self._biases()
         self.offsets = self._timings() | self.biases
-        # of a log that is read by its IMU: effects that leave no trace in it at all, and those that
-        # would show beside a pose
+        # in a log read by its IMU: effects without any trace, and effects a pose would show
         self.without_trace: frozenset[str] = frozenset()
         self.needs_pose: frozenset[str] = frozenset()
-        # the noise is added to the logs once more, and the change is what noise makes
+        # the noise is added to the logs once more; the change is the effect of noise
         noisy = self._noisier()
         self.visible_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
-        # what is identifiable depends on the noise that there is, not on what shows of it
+        # identifiability depends on all noise, visible or hidden
         noisy = self._noisier(hidden=True) if self.filtered else noisy
         self.sensor_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6)
         # effects whose columns are sensor noise to a large part
@@ -235,19 +226,19 @@ class Flights:
         self.rotor_noise = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
 
     def _forget(self) -> None:
-        """Keep nothing of what was computed."""
-        self._pieces: dict[tuple[object, ...], list[Piece]] = {}
+        """Clear all caches."""
+        self._pieces: dict[tuple[object, ...], list[FlightPiece]] = {}
         self._residuals: dict[tuple[object, ...], Array] = {}
 
-    def _noisier(self, hidden: bool = False) -> "Flights":
-        """Return the same rows of louder logs; ``hidden``: by what noise a filter hides."""
+    def _noisier(self, hidden: bool = False) -> "RegressedFlights":
+        """Return the same rows of louder logs; ``hidden``: with the noise hidden by a filter."""
         out = copy(self)
         out._forget()
         out.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden))
         return out
 
-    def of_the_fit(self) -> "Flights":
-        """Return the flights without the logs that the fit never sees."""
+    def of_the_fit(self) -> "RegressedFlights":
+        """Return the flights without the test logs."""
         out = copy(self)
         out._forget()
         out.logs = self.logs[: self._fit_logs]
@@ -258,12 +249,12 @@ class Flights:
         return out
 
     def _lay_rows(self) -> None:
-        """Cut the flights into pieces, and say of which of their samples rows are."""
+        """Cut the flights into pieces, and choose the samples for rows."""
         self._first = pieces = self.pieces({})
         times = [piece.signals.t[piece.rows] for piece in pieces]
         self.t: Array = np.concatenate(times)  # (rows,) s
         self.start: Mask = np.concatenate([t == t[0] for t in times])  # first row of a piece
-        # (rows,) which log
+        # (rows,) index of the log
         self.log: Index = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
         self.period = float(np.median(np.diff(self.t)))  # s, from row to row
         # s of unbroken flight
@@ -278,23 +269,23 @@ class Flights:
         if self.fit_rows.all() and self.block[-1] > 0:  # fewer than four blocks
             self.fit_rows = self.block < self.block[-1]
 
-    def _lost_in_noise(self, noisy: "Flights") -> frozenset[str]:
-        """Return the effects whose columns are noise to a large part.
+    def _lost_in_noise(self, noisy: "RegressedFlights") -> frozenset[str]:
+        """Return the effects whose columns are largely noise.
 
-        Fitted all the same, one would come out too small, or explain the noise of the residual by
-        removing it from the pose; of a causal filter, it would mend the filter's gains.
+        A fit of such an effect would come out too small, or remove noise of the pose to explain
+        noise of the residual. With a causal filter, the effect would mend the filter's gains.
         """
         linear = [e for e in names() if not is_nonlinear(e)]
         lost, _ = self._noisy_columns(noisy, linear)
         if self.inertial:
-            # a column also depends on what the IMU knows badly
-            quietly = lost  # of these, what the sensors' noise alone hides
+            # a column also depends on states the IMU hardly shows
+            quietly = lost  # lost in sensor noise alone
             noisy._forget()
             noisy._drift = np.random.default_rng(1)
             lost, self.without_trace = self._noisy_columns(
                 noisy, [*linear, *filter(is_nonlinear, names())]
             )
-            lacking: frozenset[str] = frozenset()  # what no pose would bring back
+            lacking: frozenset[str] = frozenset()  # effects a pose would not show either
             if all(log.voltage is None for log in self.logs):
                 lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
             if self.commanded:
@@ -309,20 +300,20 @@ class Flights:
         return lost
 
     def _noisy_columns(
-        self, noisy: "Flights", effects: Iterable[str]
+        self, noisy: "RegressedFlights", effects: Iterable[str]
     ) -> tuple[frozenset[str], frozenset[str]]:
-        """Return the effects of which too much of what they add is noise, and those that leave no
-        trace at all in an IMU.
+        """Return the effects whose columns hold too much noise, and the effects without any trace
+        in an IMU.
         """
-        weight = 1.0 / (np.mean(np.square(self.sensor_noise), axis=0) + 1e-30)
+        weight = 1.0 / (mean_square(self.sensor_noise) + 1e-30)
         lost, traceless = set(), set()
         for effect in effects:
             noise = whole = 0.0
             pairs = zip(self._typical_parts(effect), noisy._typical_parts(effect), strict=True)
             for quiet, loud in pairs:
                 turned = loud if noisy._drift is None else self._in_own_axes(loud, noisy)
-                noise += float(weight @ np.mean(np.square(turned - quiet), axis=0))
-                whole += float(weight @ np.mean(np.square(quiet), axis=0))
+                noise += float(weight @ mean_square(turned - quiet))
+                whole += float(weight @ mean_square(quiet))
             most = MOST_NOISE_SHARE ** (2 if get(effect).scales_noise else 1)
             if self.inertial and whole == 0.0:
                 traceless.add(effect)
@@ -331,8 +322,8 @@ class Flights:
         return frozenset(lost), frozenset(traceless)
 
     def _typical_parts(self, effect: str) -> list[Array]:
-        """Return what typical coefficients of an effect explain (rows, 6), one by one; all together
-        where its force is no sum over them.
+        """Return the columns of an effect (rows, 6) at typical coefficients, one by one, or as one
+        where the force is not linear in them.
         """
         own: list[Column] = [(effect, c.name) for c in get(effect).coefficients]
         if is_nonlinear(effect):
@@ -341,33 +332,36 @@ class Flights:
         columns = self.columns({}, [c for c in own if c[1] != CENTRAL], LARGE_STEP)
         return [typical_size(c, self.vehicle) * x for c, x in columns.items()]
 
-    def _in_own_axes(self, x: Array, noisy: "Flights") -> Array:
-        """Return a column (rows, 6) of a copy whose fusion errs otherwise, its force turned from
-        that copy's attitude to this one's.
+    def _in_own_axes(self, x: Array, noisy: "RegressedFlights") -> Array:
+        """Return a column (rows, 6) of a copy with other errors of the fusion, its force turned
+        from the copy's attitude to this one's.
 
-        An attitude that is wrong turns needed and modelled force alike: only what acts in other
-        axes than the body's changes with it.
+        A wrong attitude turns needed and modelled force alike: only forces outside the body's axes
+        change with the attitude.
         """
         own, other = (flights.at_rows("rotation") for flights in (self, noisy))
         return np.column_stack([np.einsum("nij,nkj,nk->ni", own, other, x[:, :3]), x[:, 3:]])
 
     def rotor_wrench(self, setting: Setting) -> Array:
-        """Return what the rotors deliver at the rows (rows, 4), behind a lag and the like that the
-        vehicle has: thrust (N) and torque (Nm, body), low-passed.
+        """Return thrust (N) and torque (Nm, body) of the rotors at the rows (rows, 4), behind the
+        vehicle's lag and its like, low-passed.
         """
         vehicle, pieces = self.amended(setting), self.pieces(setting)
         return np.concatenate([p.smooth(delivered(p.signals, vehicle)) for p in pieces])
 
     def at_rows(self, name: str, setting: Setting | None = None) -> Array:
         """Return a signal (rows, ...) of ``Signals``, by its name, at the rows."""
-        return np.concatenate(
-            [getattr(p.signals, name)[p.rows] for p in self.pieces(setting or {})]
-        )
+        parts = [getattr(p.signals, name)[p.rows] for p in self.pieces(setting or {})]
+        return np.concatenate(parts)
 
     @property
     def runs(self) -> list[NDArray[np.intp]]:
         """The rows of each piece."""
         return np.split(np.arange(len(self.t)), np.flatnonzero(self.start)[1:])
+
+    def low_passed(self, x: Array, cutoff_hz: float) -> Array:
+        """Return samples at the rows (rows, ...), low-passed piece by piece."""
+        return np.concatenate([low_pass(x[run], cutoff_hz, self.period) for run in self.runs])
 
     @cached_property
     def speed(self) -> float:
@@ -387,17 +381,17 @@ class Flights:
             > LEAST_STEPS_OF_ROTOR_SPEED * self.vehicle.omega_lsb
         )
 
-    def pieces(self, setting: Setting) -> list[Piece]:
-        """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
+    def pieces(self, setting: Setting) -> list[FlightPiece]:
+        """Return the pieces, with the vehicle's sensing effects undone in the logs."""
         vehicle = self.amended(setting)
         sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in sensing_of(vehicle))
         size = 400 * max(sum(len(p.signals.t) for p in self._first), 1)  # bytes
         most = min(max(MEMORY // size, 1), 40)
         return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
 
-    def _cut(self, vehicle: Vehicle) -> list[Piece]:
-        found: list[tuple[int, Signals]] = [
-            (i, s)
+    def _cut(self, vehicle: Vehicle) -> list[FlightPiece]:
+        cut: list[tuple[int, Signals]] = [
+            (i, downsampled(s) if self.commanded else s)
             for i, log in enumerate(self.logs)
             for s in (
                 self._inertial_signals(log)
@@ -405,24 +399,22 @@ class Flights:
                 else log_signals(undo_log_sensing(log, vehicle))
             )
         ]
-        if self.commanded:
-            found = [(i, downsampled(s)) for i, s in found]
         if not self._first:
-            return [self._piece(i, s, _rows(s)) for i, s in found]
-        # a clock offset moves the start of a piece: the rows stay where they are in time
+            return [self._piece(i, s, _rows(s)) for i, s in cut]
+        # a clock offset moves the start of a piece: the rows keep their times
         pieces = []
         for first in self._first:
             wanted = first.signals.t[first.rows]
             s = next(
                 s
-                for i, s in found
+                for i, s in cut
                 if i == first.log and s.t[0] <= wanted[0] and s.t[-1] >= wanted[-1]
             )
             rows = np.rint((wanted - s.t[0]) / s.period).astype(np.int64)
             pieces.append(self._piece(first.log, s, rows))
         return pieces
 
-    def _piece(self, log: int, signals: Signals, rows: Index) -> Piece:
+    def _piece(self, log: int, signals: Signals, rows: Index) -> FlightPiece:
         needed = needed_wrench(signals, self.vehicle)
         if self.commanded:
             needed[:, 3:] = 0.0
@@ -431,10 +423,10 @@ class Flights:
             at = resampled(signals.t, *read)
             force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, at)
             felt = _smooth(force, signals)[rows] - needed[:, :3]
-        return Piece(log, signals, rows, needed, felt)
+        return FlightPiece(log, signals, rows, needed, felt)
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
-        # no effect of the library changes what an IMU measured: each log is fused once
+        # no effect of the library changes an IMU's readings: each log is fused once
         if log not in self._fused:
             self._fused[log] = inertial_signals(log, self.vehicle.gravity)
         if self._drift is None:
@@ -442,7 +434,7 @@ class Flights:
         return [with_drift(s, self._drift, self.vehicle.gravity) for s in self._fused[log]]
 
     def _timings(self) -> dict[Column, Offset]:
-        """Return by what signals may be apart in time: none where commands stand for rotors."""
+        """Return the possible time offsets of the signals: none where commands stand for rotors."""
         if self.commanded:
             return {}
         others = (ROTOR_SPREAD,) if self.inertial else (ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
@@ -450,7 +442,7 @@ class Flights:
         return {ROTOR_TIME_OFFSET: rotors, **{c: TIMINGS[c] for c in others}}
 
     def _biases(self) -> dict[Column, Offset]:
-        """Return what is left of the biases of accelerometers from which the motion is read."""
+        """Return the possible biases of accelerometers from which the motion is read."""
         out: dict[Column, Offset] = {}
         for piece in self._first:
             if isinstance(s := piece.signals, InertialSignals) and piece.log < self._fit_logs:
@@ -460,32 +452,26 @@ class Flights:
         return out
 
     def amended(self, setting: Setting) -> Vehicle:
-        """Return the vehicle with these effects; one that it declares already is replaced."""
-        effects = tuple(
-            EffectSetting(name, dict(values)) for name, values in setting.items() if name
-        )
-        return replace(
-            self.vehicle,
-            effects=(*(e for e in self.vehicle.effects if e.name not in setting), *effects),
-        )
+        """Return the vehicle with these effects in place of its own of the same names."""
+        kept = [e for e in self.vehicle.effects if e.name not in setting]
+        new = (EffectSetting(name, dict(values)) for name, values in setting.items() if name)
+        return replace(self.vehicle, effects=(*kept, *new))
 
     def coefficients(self, setting: Setting, effect: str) -> Mapping[str, float]:
-        """Return an effect's coefficients at a setting; of one that it does not have, those that
-        the vehicle declares.
-        """
+        """Return an effect's coefficients at a setting; outside the setting, the vehicle's own."""
         return setting[effect] if effect in setting else self._declared.get(effect, {})
 
     def stated(self, effect: str) -> Mapping[str, float]:
-        """Return the coefficients of an effect that the vehicle's file fixes: where it states not
-        all of them. Of one that is stated whole, all may have changed.
+        """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
+        the file states some. All may have changed where it states all.
         """
         own = self._declared.get(effect, {})
         every = {c.name for c in get(effect).coefficients} - {CENTRAL}
         return own if every - set(own) else {}
 
     def columns_of(self, effects: Iterable[str]) -> list[Column]:
-        """Return the columns of effects: their coefficients, but those that the vehicle's file
-        fixes. Where an effect acts makes no force.
+        """Return the columns of effects: their coefficients except for the fixed ones, and for
+        ``central``, without a force of its own.
         """
         return [
             (e, c.name)
@@ -495,8 +481,8 @@ class Flights:
         ]
 
     def is_nonlinear(self, effect: str) -> bool:
-        """Return whether an effect's force is no sum over its coefficients, and no file states them
-        all, about which it would be one.
+        """Return whether an effect's force is not linear in its coefficients, with no values of all
+        of them in a file to linearise about.
         """
         whole = effect in self._declared and not self.stated(effect)
         return is_nonlinear(effect) and not whole
@@ -504,21 +490,21 @@ class Flights:
     def residual(self, setting: Setting) -> Array:
         """Return the residual (rows, 6) with these effects.
 
-        It is an acceleration by the *declared* mass and inertia. A force would vanish, noise and
-        all, with the mass; and no noise of differentiation is multiplied by a coefficient.
+        It is an acceleration by the *declared* mass and inertia. A force would vanish with the
+        mass, noise and all. Nor does a coefficient multiply the noise of differentiation.
         """
         key = tuple((name, *sorted(values.items())) for name, values in setting.items())
 
         def made() -> Array:
-            out, vehicle = [], self.amended(setting)
+            vehicle, left = self.amended(setting), []
             for piece in self.pieces(setting):
                 acting = self.acting(piece.signals, setting, piece.log, vehicle)
                 if self.commanded:
                     acting[:, 3:] = 0.0
-                out.append(piece.needed - piece.smooth(acting))
-            found = np.concatenate(out)
-            found.setflags(write=False)
-            return found
+                left.append(piece.needed - piece.smooth(acting))
+            out = np.concatenate(left)
+            out.setflags(write=False)
+            return out
 
         # a fit asks several times for the residual at its setting
         return _kept(self._residuals, key, made, 16)
@@ -526,11 +512,11 @@ class Flights:
     def acting(
         self, signals: Signals, setting: Setting, log: int = 0, vehicle: Vehicle | None = None
     ) -> Array:
-        """Return the force and the torque (n, 6) along signals of a log that these effects say act
-        on the vehicle; ``vehicle`` is the amended one, if it is at hand.
+        """Return these effects' force and torque (n, 6) on the vehicle along signals of a log;
+        ``vehicle`` is the amended one, if at hand.
 
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
-        as the residual is.
+        like the residual.
         """
         vehicle, offsets = vehicle or self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
         s = with_time_offsets(signals, offsets)
@@ -542,16 +528,15 @@ class Flights:
         return wrench
 
     def felt(self, setting: Setting) -> Array | None:
-        """Return the force (rows, 3) N, world, by which the accelerometers differ from what the
-        poses' motion needs, low-passed; None where a log has no accelerometer, or where the motion
-        is read from it.
+        """Return the accelerometers' force less the force of the poses' motion (rows, 3) N, world,
+        low-passed; None where a log has no accelerometer, or where the motion is read from it.
         """
-        found = [piece.felt for piece in self.pieces(setting) if piece.felt is not None]
-        return np.concatenate(found) if len(found) == len(self._first) else None
+        felt = [piece.felt for piece in self.pieces(setting) if piece.felt is not None]
+        return np.concatenate(felt) if len(felt) == len(self._first) else None
 
     def step(self, setting: Setting, column: Column, size: float = STEP) -> tuple[float, float]:
-        """Return a coefficient's value at a setting, and a step from there within its limits, of so
-        many typical sizes, over which a derivative is taken.
+        """Return a coefficient's value at a setting, and the step of a derivative from there: so
+        many typical sizes, within the coefficient's limits.
         """
         value = self.coefficients(setting, column[0]).get(column[1], 0.0)
         delta = size * typical_size(column, self.vehicle)
@@ -568,7 +553,7 @@ class Flights:
         step: float = STEP,
         residual: Callable[[Setting], Array] | None = None,
     ) -> dict[Column, Array]:
-        """Return what each unit of a coefficient adds to a residual, (rows, 6) of these flights.
+        """Return the columns of coefficients, for a residual (rows, 6) of these flights.
 
         So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
         typical sizes.
@@ -586,8 +571,8 @@ class Flights:
         def at(moved: float) -> Array:
             return residual({**setting, effect: {**own, name: moved}})
 
-        # moving signals in time moves their noise as well, and a step to one side would seem to
-        # reduce it: the difference is taken to both sides
+        # moving signals in time moves their noise too, and a one-sided step would seem to reduce
+        # the noise: the difference is two-sided
         if effect and moves_time(effect) and abs(value) > abs(delta):
             c, far = coefficient(column), abs(delta)
             if c.minimum <= value - far and value + far <= c.maximum:
@@ -596,8 +581,8 @@ class Flights:
 
 
 def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
-    """Return what is kept under a key, or make it; of more than so many, that which was not asked
-    for the longest goes.
+    """Return the cached value of a key, or make it; beyond ``most`` values the one unused for
+    longest goes.
     """
     memory[key] = memory.pop(key) if key in memory else make()
     if len(memory) > most:
@@ -607,8 +592,8 @@ def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
 
 @lru_cache(maxsize=16)  # of several pieces, and again at each setting of sensing effects
 def _accelerometer(log: FlightLog) -> tuple[Array, Array] | None:
-    """Return times (n,) s, evenly spaced, and what the accelerometer reads (n, 3) m/s2, with the
-    same low-pass as the pose; None where it was not read from the log's beginning to its end.
+    """Return times (n,) s, evenly spaced, and the accelerometer's readings (n, 3) m/s2 with the
+    pose's low-pass; None unless the readings span the log from beginning to end.
     """
     if log.accelerometer is None:
         return None
@@ -627,8 +612,8 @@ def _smooth(x: Array, signals: Signals) -> Array:
 
 
 def blocks(t: Array, begins: Mask, seconds: float) -> Index:
-    """Return the number of the block of so many seconds (n,) in which samples at ``t`` (n,) s lie,
-    which begin anew with each piece.
+    """Return the numbers of blocks of so many seconds (n,), for samples at ``t`` (n,) s. A new
+    block begins with each piece.
     """
     since = t - t[begins][np.cumsum(begins) - 1]
     new = begins | (np.diff(since // seconds, prepend=-1.0) != 0.0)
@@ -636,8 +621,8 @@ def blocks(t: Array, begins: Mask, seconds: float) -> Index:
 
 
 def held_out(number: Index) -> Index:
-    """Return which block of its four is held out, of each block: the last of the first, then as
-    evenly as can be: by the golden ratio, with which no flight keeps step.
+    """Return the held-out one of each block's four: the last of the first, then as evenly as can
+    be. The step is the golden ratio, in step with no flight.
     """
     golden = 0.5 * (5.0**0.5 - 1.0)
     turn = (0.75 + golden * (number // BLOCKS_PER_HELD_OUT)) % 1.0

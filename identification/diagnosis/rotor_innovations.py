@@ -1,56 +1,54 @@
-"""What the rotors do that the flight's past does not predict.
+"""The rotors' innovations: thrust and torques not predicted by the flight's past.
 
-A flight loop that reads a gyro answers a gust before the pose shows it, and a rotor speed is
-measured with noise and rounding. Both reach the likelihood through the rotors' own innovations: the
-part of thrust and torques that neither past rotor speeds nor the filter's state predict. What of it
-the pose confirms later, as a gust or as an error of measurement, is the gain of the joint filter of
-rotors and pose. That gain is unknown, as the loop is, so it is fitted beside the effects: an effect
-is known by what of the rotors was predictable alone. (Joint input-output identification: L. Ljung,
-System Identification, 2nd edition, 1999, section 13.5.)
+A flight loop with a gyro answers a gust before the pose shows it, and a measured rotor speed has
+noise and rounding. Both reach the likelihood through the rotors' own innovations: the part of
+thrust and torques predicted neither by past rotor speeds nor by the filter's state. The pose
+confirms a share of it later, as a gust or as an error of measurement. This share is the gain of the
+joint filter of rotors and pose. Like the loop it is unknown, so it is fitted beside the effects: an
+effect shows in the predictable part of the rotors alone. (Joint input-output identification: L.
+Ljung, System Identification, 2nd edition, 1999, section 13.5.)
 """
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from ..logs.table import Array
+from ..motion.signals import in_body
 from .causal_filter import Poses, Track, level
 
-Array = NDArray[np.float64]
-
-
-# samples of the rotors' past by which they answer it: a loop's own filter remembers what it saw. Of
-# 23 flights whose loops saw more than their logs, 7 got a wrong probable set with 4, and 4 with 20
+# past samples of the rotors in a prediction: a loop's own filter has a memory. Of 23 flights whose
+# loops saw more than their logs, 7 got a wrong probable set with 4 samples, and 4 with 20
 LAGS = 20
-# of a regression on rounded speeds. Of 34 hovers, half by a simulator that is not ours, the
-# likeliest set is the true one on 16 without, and on 19 with 5. More rounds are nearer to the true
-# speeds, but what is left of the error then follows the loop: with 12, fewer sets were right
+# of a regression on rounded speeds. Of 34 hovers, half by a foreign simulator, the likeliest set is
+# the true one on 16 without rounds, and on 19 with 5. More rounds come nearer to the true speeds,
+# but the rest of the error then follows the loop: with 12, fewer sets were right
 ROUNDS = 5
-# the axis of the pose that each of thrust and torques drives
+# the axis of the pose driven by each of thrust and torques
 DRIVEN = (2, 3, 4, 5)
 
 
 def rotor_innovations(pieces: list[tuple[Poses, Track]]) -> list[Array]:
     """Return the rotors' innovations (n, 4) of each piece, as accelerations: along body z (m/s2)
-    and about the body's axes (rad/s2). The first samples, of which too little is past, have none.
+    and about the body's axes (rad/s2). The first samples, with too short a past, have none.
 
     Args:
-        pieces: as they were measured, and as the filter sees them.
+        pieces: as measured, and as the filter sees them.
     """
     rotors = [_accelerations(poses, track) for poses, track in pieces]
     out = [np.zeros_like(now) for now in rotors]
-    for found, now, predicted in zip(out, rotors, _predicted(pieces, rotors), strict=True):
-        found[LAGS:] = now[LAGS:] - predicted
+    for innovations, now, predicted in zip(out, rotors, _predicted(pieces, rotors), strict=True):
+        innovations[LAGS:] = now[LAGS:] - predicted
     return out
 
 
 def unrounded(pieces: list[tuple[Poses, Track]], step: float) -> list[Array]:
-    """Return what is added to rotor speeds (n, 4) of each piece, rad/s, that a log rounds to
-    multiples of ``step``, to have those that are expected.
+    """Return the corrections of rotor speeds (n, 4) of each piece, rad/s, from the log's multiples
+    of ``step`` to the expected speeds.
 
     In hover a rotor speed moves by less than a step, and its rounding follows the flight loop like
-    a damping. What the past predicts of it, within the step that the log states, is most of it: a
+    a damping. The prediction from the past, within the logged step, is most of the speed: a
     regression on intervals, by expectation and maximisation (M. D. Burridge, Journal of the Royal
     Statistical Society B 43 (1981), 41-45).
     """
@@ -81,15 +79,15 @@ def _predicted(pieces: list[tuple[Poses, Track]], rotors: list[Array]) -> list[A
     mean, size = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
     z = np.column_stack([(x - mean) / size, np.ones(len(x))])
     normal = z.T @ z
-    # against columns that are alike, and those that do not vary: all others have a square of one
+    # against columns nearly alike, and constant ones: all others have a square of one
     normal += 1e-6 * len(z) * np.eye(len(normal))
     predicted = z @ np.linalg.solve(normal, z.T @ y)
     return np.split(predicted, np.cumsum([len(part) for part in later])[:-1])
 
 
 def _accelerations(poses: Poses, track: Track) -> Array:
-    """Return what the rotors do at the samples (n, 4), as accelerations."""
-    # the track has the rotors between samples; what they do is linear in the squares of the speeds
+    """Return the accelerations by the rotors at the samples (n, 4)."""
+    # the track has the rotors between samples; the accelerations are linear in squared speeds
     effectiveness = np.linalg.lstsq(
         np.square(0.5 * (poses.rotor_speeds[:-1] + poses.rotor_speeds[1:])),
         track.rotors[:-1],
@@ -99,13 +97,13 @@ def _accelerations(poses: Poses, track: Track) -> Array:
 
 
 def _known_before(track: Track, rotors: Array) -> Array:
-    """Return what is known before a sample's rotors (n - LAGS, c): their past, ``rotors`` (n, 4),
-    and the filter's state. Nothing is known in a piece that is shorter than the lags.
+    """Return everything known before a sample's rotors (n - LAGS, c): their past, ``rotors`` (n,
+    4), and the filter's state. A piece shorter than the lags has no row.
     """
     count = max(len(rotors) - LAGS, 0)
     known = [rotors[i : i + count] for i in reversed(range(LAGS))]
     before = slice(LAGS - 1, LAGS - 1 + count)
-    body = np.einsum("nij,ni->nj", track.rotation[before], track.velocity[before])
+    body = in_body(track.velocity[before], track.rotation[before])
     # along the heading and to its left, and about the body's axes
     back = track.heading * [1.0, -1.0]
     seen = np.hstack([level(back, x) for x in np.hsplit(track.innovations, 2)])

@@ -5,10 +5,10 @@ settings.
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Role, playing
-from .causal_filter import State
+from ..logs.table import Array
+from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import LAG_ASYMMETRY
@@ -21,28 +21,26 @@ from .priors import (
     in_prior_units,
     prior_size,
 )
-from .regression import Column, Flights, delivered, without
+from .regression import Column, RegressedFlights, delivered, without
 from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
-
-Array = NDArray[np.float64]
 
 
 class RowLikelihood:
     """The likelihood of flights.
 
-    ``library`` is what of the given one leaves a trace in them.
+    ``library`` is the part of the given one with a trace in them.
 
     Args:
-        flights: of the vehicle.
-        library: effects that may act, those that any set has among them.
-        first: the setting of those that any set has.
-        fixed: effects that are known from elsewhere, with their coefficients.
+        flights: the vehicle's flights.
+        library: effects, the given ones of every set among them.
+        first: the setting of these given effects.
+        fixed: effects known from elsewhere, with their coefficients.
     """
 
     def __init__(
-        self, flights: Flights, library: Sequence[str], first: Setting, fixed: Setting
+        self, flights: RegressedFlights, library: Sequence[str], first: Setting, fixed: Setting
     ) -> None:
         self.flights, self.library = flights, list(library)
         self.rows = Rows(flights, fixed)
@@ -55,12 +53,12 @@ class RowLikelihood:
         rows = self.rows
         y = rows.residual(first)
         linear = [e for e in self.library if not self.flights.is_nonlinear(e)]
-        found = rows.columns(first, self.flights.columns_of(linear))
-        traced = {c[0] for c, x in found.items() if x.any()}
+        columns = rows.columns(first, self.flights.columns_of(linear))
+        traced = {c[0] for c, x in columns.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
-        own = [x * prior_size(c, self.flights) for c, x in found.items() if c[0] in traced]
+        own = [x * prior_size(c, self.flights) for c, x in columns.items() if c[0] in traced]
         signals, explained = followers(rows), np.zeros_like(y)
-        # first as if all of a signal could be disturbances that it follows
+        # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
             noise, explained = self._noise_beside(y, own, answers)
@@ -70,14 +68,14 @@ class RowLikelihood:
     def _noise_beside(
         self, y: Array, own: Sequence[Array], answers: Mapping[Column, Array]
     ) -> tuple[RowNoise, Array]:
-        """Return the noise of the residual ``y`` (n, channels) and what effects explain of it.
+        """Return the noise of the residual ``y`` (n, channels) and the effects' part of it.
 
-        What follows disturbances explains them, and does not make them less: they are noise.
+        A signal that follows disturbances explains them without making them less: they stay noise.
 
         Args:
-            y: of what every set has.
+            y: with the given effects of every set.
             own: columns of effects, in standard deviations of their priors.
-            answers: columns of what follows disturbances.
+            answers: columns of signals that follow disturbances.
         """
         rows = self.rows
         X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
@@ -105,9 +103,9 @@ class RowLikelihood:
         """Return the likelihood about a setting.
 
         Args:
-            setting: of effects.
+            setting: the setting of effects.
             starts: columns of whole effects, with the coefficients of each.
-            effects: that are asked about; default: all of the library.
+            effects: effects to ask about; default: all of the library.
             unknown: whether the dictionary's columns are among them.
         """
         rows, flights, residual = self.rows, self.flights, self.rows.residual(setting)
@@ -115,7 +113,7 @@ class RowLikelihood:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
         columns = dict(self.nuisances)
         if not flights.commanded and playing(Role.LAG, among=list(setting)):
-            # rotors that speed up sooner than they slow down
+            # lagging rotors may speed up sooner than they slow down
             columns |= rows.columns(setting, [LAG_ASYMMETRY])
         columns |= rows.columns(setting, flights.columns_of(effects))
         for c, start in starts.items():
@@ -129,14 +127,14 @@ class RowLikelihood:
         return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
-        """Return the dictionary's columns, those of coefficients that change among them."""
+        """Return the dictionary's columns, changing coefficients among them."""
         rows, flights, vehicle = self.rows, self.flights, self.flights.vehicle
         pieces, states = flights.pieces({}), []
         for s in (p.signals for p in pieces):
             rotors = delivered(s, vehicle) / flights.inertias[2:]
-            # the acceleration is the rotors', which knows no disturbance
+            # the acceleration is the rotors' alone, without disturbances
             push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
-            states.append(State(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
+            states.append(FlightState(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
         whole, ends = joined(states)
         out: dict[Column, Array] = {}
         for column, made in discrepancy_columns(whole, ends, flights).items():
@@ -148,13 +146,13 @@ class RowLikelihood:
         here = rows.residual(setting)
         own = {e: rows.residual(without(setting, e)) - here for e in setting}
         at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
-        found = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
-        return out | {column: x[:] for column, x in changing_columns(own, found).items()}
+        followed = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
+        return out | {column: x[:] for column, x in changing_columns(own, followed).items()}
 
     # Fits
 
     def _height(self, setting: Setting) -> Height:
-        """Return how high the posterior is at a setting, up to a constant, with the nuisances
+        """Return the height of the posterior at a setting, up to a constant, with the nuisances
         integrated out.
         """
         base = self.base(setting, {}, ())
@@ -172,7 +170,7 @@ class RowLikelihood:
 
     def objective(self, setting: Setting) -> float:
         """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
-        infinite where no vehicle is like that.
+        infinite for an impossible vehicle.
         """
         return height(setting, self._height)[0]
 
@@ -182,7 +180,7 @@ class RowLikelihood:
 
     def sensors(self, setting: Setting) -> dict[str, tuple[float, float]]:
         """Return the likeliest biases of accelerometers from which the motion was read, and the
-        time offsets of logs, as ``Flights`` takes them out, with their standard deviations.
+        time offsets of logs, in the units of ``offsets``, with their standard deviations.
         """
         base = self.base(setting, {}, ())
         modes, out = base.mode(base.plain, self.power), {}
@@ -192,7 +190,7 @@ class RowLikelihood:
         return out
 
     def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
-        """Return which effects of a setting, among some, do nothing there."""
+        """Return the effects of a setting, among some, without any effect there."""
         here = self.rows.residual(setting)
         least = 1e-6 * float(np.abs(here).max())
         return {

@@ -1,35 +1,32 @@
-"""What any flight may have beside effects: columns in standard deviations of their priors, which
-are integrated out.
+"""Nuisances of any flight beside effects: columns in standard deviations of their priors, to be
+integrated out.
 """
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..logs.table import Array
 from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import MODEL_ERROR, PRIORS
 from .rows import Rows
 
-Array = NDArray[np.float64]
-
-
-# standard deviations of what differs from flight to flight
-THRUST_STD = 0.02  # relative, of a flight against what is usual: cells, propellers, air
+# standard deviations of the differences from flight to flight
+THRUST_STD = 0.02  # relative, of a flight to the usual thrust: cells, propellers, air
 DRIFT_STD = 0.003  # relative, of thrust over a flight, beside the fade and the battery's sag
 DELAY_STD = 0.02  # s, of commands
 TILT_STD = 0.01  # rad, of the motion capture's vertical, and of the rotors' mean axis
 BIAS_STD = 0.3  # m/s2, of a MEMS accelerometer between warm and cold
 SCALE_STD = 0.02  # relative, of an accelerometer
-STOPPED_WITHIN = 0.1  # s, in which a flight loop stops an angular velocity that it did not want
+STOPPED_WITHIN = 0.1  # s, in which a flight loop stops an unwanted angular velocity
 AXES = dict(zip("xyz", np.eye(3), strict=True))  # of the body
 
 
 def row_nuisances(rows: Rows) -> dict[str, Array]:
     """Return columns (n, channels) by name, each in standard deviations of its prior.
 
-    Of thrust at a command they are the differences between flights: what all flights share is the
-    thrust's own coefficient, and a column nearly like its own would with it be a lag or a drag.
+    For thrust at a command they are the differences between flights. The common part is the
+    thrust's own coefficient; beside it, a nearly equal column would become a lag or a drag.
     """
     flights = rows.flights
     out: dict[str, Array] = {}
@@ -47,15 +44,15 @@ def row_nuisances(rows: Rows) -> dict[str, Array]:
     if flights.commanded:
         shared = np.mean([out[f"thrust {i}"] for i in numbers], axis=0)
         out |= {f"thrust {i}": out[f"thrust {i}"] - shared for i in numbers}
-    found = rows.columns({}, flights.offsets)
-    return out | {c[1]: flights.offsets[c].size * x for c, x in found.items()}
+    offsets = rows.columns({}, flights.offsets)
+    return out | {c[1]: flights.offsets[c].size * x for c, x in offsets.items()}
 
 
 def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> dict[str, Array]:
-    """Return what sensors may have in one flight.
+    """Return the possible errors of sensors in one flight.
 
     Args:
-        rows: of the flights.
+        rows: the flights' rows.
         here: (samples, 1) 1 in this flight, 0 in others.
         thrust: (samples, 1) specific, m/s2, by the declared vehicle; 0 in other flights.
     """
@@ -66,11 +63,11 @@ def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> dict[str, Arra
 
 
 def _of_commands(rows: Rows, here: Array, thrust: Array) -> dict[str, Array]:
-    """Return what differs between flights whose rotors are known by commands.
+    """Return the differences between flights with rotors known by commands.
 
-    From one sample to the next rotors may be held or not, and lag: half a period is not known.
-    Where the delay of commands is known from how the vehicle turns, that of its thrust may still
-    differ: the flight loop answers vertical motion.
+    From one sample to the next rotors may be held or not, and lag: half a period is not known. The
+    turns may show the delay of commands. Even then the delay of thrust may differ: the flight loop
+    answers vertical motion.
     """
     flights, up = rows.flights, thrust * AXES["z"]
     t = flights.t[here[:, 0] > 0.0]
@@ -92,11 +89,11 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> dict[str, Array]:
 
 
 def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> dict[str, Array]:
-    """Return by how much the model of measured rotors is wrong; ``turning`` (samples, 3): angular
+    """Return the errors of the model of measured rotors; ``turning`` (samples, 3): angular
     acceleration by the rotors, rad/s2.
 
-    A torque's gain is biased low by the share of its column that is noise of the rotor speeds
-    (errors in variables).
+    Noise of the rotor speeds biases a torque's gain low, by its share of the column (errors in
+    variables).
     """
     noise = rows.flights.rotor_noise
     varying = noise[0] * (thrust - here * thrust[here > 0.0].mean())
@@ -110,16 +107,16 @@ def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> dict[s
 
 
 def followers(rows: Rows) -> dict[str, tuple[Array, Sequence[int]]]:
-    """Return the signals of rotors and of the motion that follow disturbances, because the flight
-    loop answers them, or because they are the motion that these make: each (n,) in m/s2 or rad/s2,
-    and the channels in which the disturbances act.
+    """Return the signals of rotors and of the motion that follow disturbances, as an answer of the
+    flight loop or as the disturbed motion itself: each (n,) in m/s2 or rad/s2, and the channels of
+    the disturbances.
 
     A flight loop answers a sideways disturbance by tilting, and the noise of a measured tilt looks
-    like one that it answers: in hover, tilt is hardly anything else. It answers the velocity that a
-    vertical disturbance makes by thrust, and its acceleration by a change of thrust. The change is
-    in the size of thrust's own variation, and an angular velocity is what makes it within the time
-    in which the loop stops it. Of commands tilt alone is one: with thrust beside it, flights of
-    NanoBench were predicted worse than by constant thrust (.28 for .14 m/s2).
+    like such an answer: in hover, tilt is hardly anything else. The loop answers the velocity of a
+    vertical disturbance by thrust, and its acceleration by a change of thrust. The change has the
+    size of thrust's own variation. An angular velocity is taken as the acceleration to make it
+    within the loop's stopping time. With commands only tilt is a follower: with thrust beside it,
+    NanoBench flights were predicted worse than by constant thrust (.28 for .14 m/s2).
     """
     flights = rows.flights
     torque = rows.channels - 3 * rows.with_torques
@@ -144,16 +141,15 @@ def followers(rows: Rows) -> dict[str, tuple[Array, Sequence[int]]]:
 def answered(
     rows: Rows, signals: Mapping[str, tuple[Array, Sequence[int]]], disturbance: Array
 ) -> dict[str, Array]:
-    """Return what disturbances are where a signal follows them: a share of it.
+    """Return the disturbances in signals that follow them: a share of each signal.
 
     A signal that follows a disturbance ``d`` explains the share ``var(d) / var(signal)`` of itself
-    as one, whatever the loop. In hover that is all of it, and next to nothing where the flight is
-    far from one.
+    as one, whatever the loop: all of it in hover, and next to nothing far from a hover.
 
     Args:
-        rows: of the flights.
+        rows: the flights' rows.
         signals: ``followers``.
-        disturbance: (n, channels) what is one, as far as it is known.
+        disturbance: (n, channels) the known disturbance.
     """
     out = {}
     for name, (signal, channels) in signals.items():

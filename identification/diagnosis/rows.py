@@ -1,10 +1,9 @@
-"""The balance of forces and torques of flights as rows of a regression: the accelerations in body
-axes that the model leaves, by the pose and by the accelerometer, at all frequencies from zero to a
-few hertz.
+"""The balance of forces and torques of flights as rows of a regression: accelerations in body axes
+missing in the model, by the pose and by the accelerometer, from zero to a few hertz.
 
-A steady wind has no power between 1 and 2 Hz, and a tilted frame none above them: what tells one
-from the other is the whole band down to zero. Above 3.5 Hz motors, filters and the flight loop
-decide what commands do, and they say nothing of torques.
+A steady wind has no power between 1 and 2 Hz, and a tilted frame none above: the whole band down to
+zero tells one from the other. Above 3.5 Hz motors, filters and the flight loop decide the effect of
+commands, and commands say nothing of torques.
 """
 
 from collections.abc import Iterable
@@ -12,49 +11,48 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..logs.table import Array, Mask
+from ..motion.signals import in_body
+from ..motion.smoothing import CUTOFFS
 from .discrepancy import weight_and_torque
-from .regression import Column, Flights, Setting, blocks
+from .regression import Column, RegressedFlights, Setting, blocks
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
 
-COMMANDED_CUTOFF_HZ = 3.5  # where rotors are known by commands
-FILTERED_CUTOFF_HZ = 2.0  # where the pose was filtered: well below any filter
+COMMANDED_CUTOFF_HZ = 3.5  # for rotors known by commands
+FILTERED_CUTOFF_HZ = 2.0  # for a filtered pose: well below any filter
 ROWS_PER_CUTOFF = 25.0 / 10.5  # rows in a period of the cut-off
-# of the weight, and of it at a quarter of the arm: how well a log shows motion at best, for one of
-# a simulator may have no noise
+# of the weight, and of the weight at a quarter of the arm: best accuracy of a log's motion, since a
+# simulator's log may have no noise
 LEAST = 1e-4
-BLOCK = 4.0  # s, of the sums by which the likelihood's scatter is judged
+BLOCK = 4.0  # s, of the sums for the likelihood's scatter
 
 
 class Rows:
-    """Rows (n, channels) of flights: specific force along body x, y and z, m/s2, by the pose; where
-    each log has an accelerometer beside it, the same by the accelerometer; and, where rotors are
-    measured, angular acceleration about the same axes, rad/s2.
+    """Rows (n, channels) of flights: specific force along body x, y and z, m/s2, by the pose; the
+    same by the accelerometer, if each log has one beside the pose; and, with measured rotors,
+    angular acceleration about the same axes, rad/s2.
 
-    Of logs whose motion is read from an IMU the accelerometer is the motion, and force is in three
+    In logs with a motion read from an IMU the accelerometer is the motion, and force is in three
     channels.
 
     Args:
-        flights: of the vehicle.
-        fixed: effects that are known from elsewhere, with their coefficients; they are in every
-            setting.
+        flights: the vehicle's flights.
+        fixed: effects known from elsewhere, with their coefficients; they are in every setting.
 
     Attributes:
-        fit: (n,) rows that the fit may see.
+        fit: (n,) rows in the fit.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
         t: (n,) s.
         channels: 3, 6 or 9.
-        least: (channels,) to which a motion is known at best.
+        least: (channels,) best accuracy of a motion.
         with_torques: whether torques are among them.
         rotation: (samples, 3, 3) body to world, at the samples of ``flights``.
     """
 
-    def __init__(self, flights: Flights, fixed: Setting) -> None:
+    def __init__(self, flights: RegressedFlights, fixed: Setting) -> None:
         self.with_torques, cutoff = not flights.commanded, CUTOFFS.residual_hz
         self._cutoff = np.inf
         if flights.commanded or flights.filtered:
@@ -90,8 +88,8 @@ class Rows:
         of ``flights``.
 
         Args:
-            pose: that the pose shows.
-            accelerometer: that the accelerometer shows, where there is one; default: the same.
+            pose: by the pose.
+            accelerometer: by the accelerometer, if there is one; default: as ``pose``.
             torque: the angular acceleration (samples, 3) rad/s2, body axes; default: none.
         """
         channels = [pose]
@@ -102,16 +100,14 @@ class Rows:
         return self.at_rows(np.concatenate(channels, axis=1))
 
     def at_rows(self, x: Array) -> Array:
-        """Return at the rows (n, ...) what is known at the samples of ``flights``, low-passed."""
-        period, runs = self.flights.period, self.flights.runs
-        smooth = [low_pass(x[rows], self._cutoff, period) for rows in runs]
-        return np.asarray(np.concatenate(smooth)[self._at])
+        """Return samples of ``flights`` at the rows (n, ...), low-passed."""
+        return np.asarray(self.flights.low_passed(x, self._cutoff)[self._at])
 
     def residual(self, setting: Setting) -> Array:
-        """Return what a model with these effects leaves (n, channels).
+        """Return the residual (n, channels) with these effects.
 
         Raises:
-            InputError: no vehicle is like that.
+            InputError: no vehicle is possible.
         """
         setting = {**self.fixed, **setting}
         left, felt = self.flights.residual(setting) / self._inertias, self.flights.felt(setting)
@@ -121,15 +117,10 @@ class Rows:
         return self.from_body(shown, read, left[:, 3:])
 
     def noise(self) -> Array:
-        """Return rows of the sensors' noise, as far as the logs show it."""
+        """Return rows of the sensors' noise, as far as visible in the logs."""
         noise = self.flights.visible_noise / self._inertias
         return self.from_world(noise[:, :3], np.zeros_like(noise[:, :3]), noise[:, 3:])
 
     def columns(self, setting: Setting, wanted: Iterable[Column]) -> dict[Column, Array]:
-        """Return what a unit of each coefficient explains (n, channels), by differences."""
+        """Return the columns of coefficients (n, channels), by differences."""
         return self.flights.columns({**self.fixed, **setting}, wanted, residual=self.residual)
-
-
-def in_body(x: Array, rotation: Array) -> Array:
-    """Return world vectors (n, 3) in body axes."""
-    return np.asarray(np.einsum("nji,nj->ni", rotation, x))

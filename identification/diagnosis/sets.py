@@ -1,4 +1,4 @@
-"""The posterior over sets of effects, from sums of products beside some settings of them."""
+"""The posterior over sets of effects, from sums of products beside some of the sets."""
 
 import math
 from collections import Counter
@@ -7,12 +7,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
+from ..logs.table import Array
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
     Index,
@@ -36,26 +36,23 @@ from .regression import (
     CENTRAL,
     START_PREFIX,
     Column,
-    Flights,
+    RegressedFlights,
     coefficient,
     moves_time,
     typical_size,
 )
 
-Array = NDArray[np.float64]
-
-
-MOST_EFFECTS = 5  # of a set, beside those that any set has
-KEPT_SETS = 8  # of each size, to which a further effect is added
-KEPT_ASKED = 24  # sets, the best, that are asked for beside the noise of no effect too
-MOST_RIVALS = 2  # effects, alike to the likeliest one, that are tried in its place
-LEAST_PROBABILITY = 1e-6  # of a set that is kept
-# shares of the weight, and of the weight at a quarter of the arm: standard deviations of what a
-# column of the dictionary adds
+MOST_EFFECTS = 5  # in a set, beside the given ones
+KEPT_SETS = 8  # of each size, extended by a further effect
+KEPT_ASKED = 24  # best sets also judged beside the noise of no effect
+MOST_RIVALS = 2  # effects like the likeliest one, tried in its place
+LEAST_PROBABILITY = 1e-6  # of a set in the ranking
+# shares of the weight, and of the weight at a quarter of the arm: standard deviations of a column
+# of the dictionary
 UNKNOWN_SIZES = (0.001, 0.003, 0.01, 0.03)
-EFFECT_ERROR = 0.01  # share of its own wrench by which the model of an effect is wrong
-# power of the likelihood where rotor speeds hardly leave their rounding steps: their rounding is
-# then no noise, and follows the flight
+EFFECT_ERROR = 0.01  # error of an effect's model, as a share of the effect's own wrench
+# power of the likelihood where rotor speeds hardly leave their rounding steps: there the rounding
+# follows the flight and is no noise
 ROUNDED = 0.25
 
 
@@ -71,12 +68,16 @@ class _Candidate:
 
 
 def is_possible(
-    flights: Flights, setting: Setting, std: Mapping[str, float], effect: str, plausible: bool
+    flights: RegressedFlights,
+    setting: Setting,
+    std: Mapping[str, float],
+    effect: str,
+    plausible: bool,
 ) -> bool:
     """Return whether a vehicle can have an effect's coefficients, with their standard deviations,
     at a setting; ``plausible``: and whether they are physics of this effect.
 
-    An effect that stands for another one is often fitted at a bound: a dry friction, named a drag,
+    A fit of an effect in the place of another often ends at a bound: a dry friction, named a drag,
     needs a quadratic part below zero. A true coefficient of zero is at a bound too, but its best
     fit is not far outside.
     """
@@ -101,19 +102,19 @@ class Posterior:
     """The evidence of sets, of all bases together.
 
     Args:
-        flights: whose motion is explained.
-        library: names of effects that may act.
-        bases: the likelihood beside some settings. The first has the noise of nothing explained.
+        flights: the explained flights.
+        library: names of effects.
+        bases: the likelihood beside some sets. The first has the noise of nothing explained.
         power: of the likelihood.
-        given: effects that any set has; then the noise is one, and each set is judged beside the
-            base that has most of its effects; a single one has them all. Without them each has a
-            noise of its own, and of a set the likeliest counts.
-        idle: sets that are none: where they fit best an effect of them does nothing.
+        given: effects in every set. Then all sets share one noise, and the base with most of a
+            set's effects judges it; a single base has them all. Without given effects each base has
+            a noise of its own, and a set's likeliest counts.
+        idle: sets to leave out: their best fit has an effect that does nothing.
     """
 
     def __init__(
         self,
-        flights: Flights,
+        flights: RegressedFlights,
         library: Sequence[str],
         bases: Sequence[Base],
         power: float = 1.0,
@@ -126,34 +127,34 @@ class Posterior:
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[frozenset[str], _Candidate] = {}
         self.scores: dict[frozenset[str], float] = {}
-        # beside the noise of nothing explained no effect shows: what others found is asked there
+        # beside the noise of nothing explained no effect shows: only sets found elsewhere go there
         for i in range(1 if given is None else 0, len(bases)):
             self._search(i)
         if given is None:
-            found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-            self._search(0, [self.known[k].variants for k in found[:KEPT_ASKED]])
+            likeliest = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
+            self._search(0, [self.known[k].variants for k in likeliest[:KEPT_ASKED]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
         best = self.known[max(self.scores, key=self.scores.__getitem__)]
         return best.base, best
 
     def tempering(self) -> float:
-        """Return the power of the likelihood that the scatter beside the likeliest set allows."""
+        """Return the power of the likelihood by the scatter beside the likeliest set."""
         base, best = self._likeliest()
         fitted = np.sort(np.append(base.plain, base.at(best.columns)))
         return tempering(base.blocks, np.searchsorted(base.single, fitted))
 
     def _negligible(self, base: Base, asked: Index) -> Array:
-        """Return how much (len(asked),) of each column any flight may have."""
+        """Return the share (len(asked),) of each column in any flight."""
         little = PRIORS.negligible * base.typical[asked]
-        # bases have the starts of other effects: of none a little acts
+        # a start of another base is no small effect
         if self.given is not None:
             little[[base.names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
         return little
 
     def _counts(self, number: int, key: frozenset[str]) -> bool:
         """Return whether a set is judged beside a base."""
-        if self.given is None:  # of a set in another base the columns are that base's
+        if self.given is None:  # another base has the columns of this set
             return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
         most = max(len(x.effects) for x in self.bases if x.effects <= key)
         return key not in self.idle and len(self.bases[number].effects) == most
@@ -162,7 +163,7 @@ class Posterior:
         out = []
         for effect in self.library:
             for columns in variants_of(self.flights, effect, base.effects, base.starts):
-                if self.given is not None:  # a balance does not see where an effect acts
+                if self.given is not None:  # a balance does not see the point of action
                     columns = tuple(c for c in columns if c in base.columns)
                 if columns and all(c in base.columns for c in columns):
                     out.append(columns)
@@ -172,7 +173,7 @@ class Posterior:
         base = self.bases[number]
         asked = base.at(base.asked)
         at = {c: i for i, c in enumerate(base.asked)}
-        # integrated out: what any flight may have, and a little of every effect
+        # integrated out: everything any flight may have, and a little of every effect
         little = np.concatenate([np.ones(len(base.plain)), self._negligible(base, asked)])
         m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
         low, high = base.low[asked], base.high[asked]
@@ -188,9 +189,9 @@ class Posterior:
                 index = [at[c] for v in some for c in v]
                 base.tried[self.power, some] = None
                 with suppress(np.linalg.LinAlgError):
-                    found = set_evidence(m, index, low, high)
-                    if self._possible(_Candidate(base, some, found)):
-                        base.tried[self.power, some] = found
+                    first_evidence = set_evidence(m, index, low, high)
+                    if self._possible(_Candidate(base, some, first_evidence)):
+                        base.tried[self.power, some] = first_evidence
             if (evidence := base.tried[self.power, some]) is None:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)
@@ -232,11 +233,12 @@ class Posterior:
     def structure(self, quieter: Base | None = None) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
 
-        Each group of the dictionary is as likely as each other to have it, and in it each column.
+        Each group of the dictionary is equally likely to have the column, and so is each column of
+        a group.
 
         Args:
-            quieter: the last base with the noise that is likeliest beside the strangest column. The
-                set, and the set with one more column, have the likelier noise of both.
+            quieter: the last base with the likeliest noise beside the strangest column. The set,
+                and the set with one more column, have the likelier noise of both.
         """
         none, more = [], []
         for base in (self.bases[-1], *((quieter,) if quieter else ())):
@@ -244,14 +246,14 @@ class Posterior:
             groups: dict[str, list[int]] = {}
             for i, at in enumerate(base.dictionary.tolist()):
                 groups.setdefault(base.names[at][1].split(": ")[0], []).append(i)
-            found = [evidence_of_one_more(m, i, UNKNOWN_SIZES) for i in groups.values()]
+            factors = [evidence_of_one_more(m, i, UNKNOWN_SIZES) for i in groups.values()]
             none.append(m.constant)
-            more.append(m.constant + float(logsumexp(found)) - math.log(len(found)))
+            more.append(m.constant + float(logsumexp(factors)) - math.log(len(factors)))
         return max(more) - max(none)
 
     def strangest(self) -> tuple[Column, float, float]:
-        """Return the column of the dictionary that explains most beside the likeliest set, its
-        coefficient, and the deviance that it explains.
+        """Return the dictionary's best column beside the likeliest set, its coefficient, and its
+        deviance.
         """
         base = self.bases[-1]
         m = self._dictionary_beside_best(base)
@@ -261,8 +263,8 @@ class Posterior:
         return base.names[base.dictionary[best]], float(coefficients[best]), float(gains[best])
 
     def log_bayes_factor(self, effect: str) -> float:
-        """Return by how much the likeliest set with an effect is likelier than the likeliest
-        without it, whatever was believed before.
+        """Return the log-likelihood ratio of the likeliest set with an effect to the likeliest
+        without it, less the prior odds.
         """
         each = math.log(self.inclusion / (1.0 - self.inclusion))
         value = {key: x - each * len(key) for key, x in self.scores.items()}
@@ -271,15 +273,15 @@ class Posterior:
         return have - lack
 
     def left(self) -> float:
-        """Return the deviance that the likeliest set leaves, with the nuisances integrated out."""
+        """Return the deviance left by the likeliest set, with the nuisances integrated out."""
         base, best = self._likeliest()
         m = base.marginal(base.at(best.columns), base.plain, power=self.power)
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
     def alone(self) -> dict[str, float]:
-        """Return the deviance that each effect of the library explains alone, beside what every set
-        has, over that which all of them together explain.
+        """Return the deviance of each effect of the library alone, beside the given effects, over
+        the deviance of all effects together.
         """
         given = self.given or frozenset()
         base = next(x for x in self.bases if x.effects == given)
@@ -298,16 +300,16 @@ class Posterior:
         return out
 
     def nuisances(self) -> dict[Column, tuple[float, float]]:
-        """Return what any flight may have beside effects, at the mode beside the likeliest set:
-        values and standard deviations.
+        """Return the nuisances of any flight at the mode beside the likeliest set: values and
+        standard deviations.
         """
         base, best = self._likeliest()
-        found = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
-        return {c: x for c, x in found.items() if not c[0]}
+        fitted = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
+        return {c: x for c, x in fitted.items() if not c[0]}
 
     def shown(self, known: Sequence[Column] = ()) -> dict[str, float]:
-        """Return for each effect outside the likeliest set by how much a typical size of it changes
-        the deviance; ``known``: nuisances of which nothing is left to find out.
+        """Return the change of the deviance by a typical size of each effect outside the likeliest
+        set; ``known``: nuisances taken as fully known.
         """
         base, best = self._likeliest()
         others = np.append(np.setdiff1d(base.plain, base.at(known)), base.at(best.columns))
@@ -324,12 +326,12 @@ class Posterior:
         return out
 
     def _dictionary_beside_best(self, base: Base) -> Marginal:
-        """Return the likelihood of the dictionary's columns of a base beside what the likeliest set
-        has there.
+        """Return the likelihood of a base's dictionary beside the base's columns of the likeliest
+        set.
         """
         own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
         asked = base.at(base.asked)
-        # an effect of the set is true to some per cent, whatever it changes with
+        # an effect of the set is true to some per cent, whatever makes it change
         changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
         wrong = np.full(len(changing), EFFECT_ERROR / SHARE_OF_EFFECT)
         little, ones = self._negligible(base, asked), np.ones(len(base.plain) + len(own))
@@ -339,22 +341,22 @@ class Posterior:
         return base.marginal(base.dictionary, chosen, np.concatenate([ones, little, wrong]), power)
 
     def best_setting(self, most: int = MOST_EFFECTS) -> Setting:
-        """Return the coefficients of the likeliest set of at most so many effects."""
+        """Return the coefficients of the likeliest set of at most ``most`` effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._at_mode(self.known[key])[0]
 
     def rivals(self, setting: Setting) -> list[Setting]:
-        """Return the coefficients of the likeliest other effects that, alone, gain at least half of
-        what a setting does.
+        """Return the coefficients of the likeliest other effects with, each alone, at least half of
+        a setting's gain.
         """
         least = 0.5 * (self.scores.get(frozenset(setting), -math.inf) + self.scores[frozenset()])
-        found = [k for k, x in self.scores.items() if len(k) == 1 and x > least and k - {*setting}]
-        found.sort(key=self.scores.__getitem__, reverse=True)
-        return [self._at_mode(self.known[k])[0] for k in found[:MOST_RIVALS]]
+        keys = [k for k, x in self.scores.items() if len(k) == 1 and x > least and k - {*setting}]
+        keys.sort(key=self.scores.__getitem__, reverse=True)
+        return [self._at_mode(self.known[k])[0] for k in keys[:MOST_RIVALS]]
 
     def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
-        """Return whether a set was not tried yet, or with coefficients that are more than a
-        standard deviation away.
+        """Return whether a set is untried, or was tried only with coefficients more than a standard
+        deviation away.
         """
         if (old := tried.get(frozenset(new))) is None:
             return True
@@ -370,12 +372,12 @@ class Posterior:
         base, evidence = candidate.base, candidate.evidence
         setting: Setting = {}
         std: Setting = {}
-        found = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
+        modes = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
         for columns in candidate.variants:
             effect = columns[0][0]
             own: dict[str, float] = dict(self.flights.coefficients({}, effect))
             off: dict[str, float] = {}
-            for c, (mode, deviation) in zip(columns, found, strict=False):
+            for c, (mode, deviation) in zip(columns, modes, strict=False):
                 if c[1].startswith(START_PREFIX):
                     own |= base.starts[c]
                     if moves_time(effect):

@@ -1,8 +1,8 @@
 """Starting points of effects whose coefficients do nothing one by one; each is tried as a column of
 fixed shape.
 
-The effects themselves say where to start. Of many starts, those are tried whose wrench, along the
-flights, resembles the residual most.
+The effects themselves say where to start. Among many starts, the tried ones have the wrench most
+like the residual along the flights.
 """
 
 import math
@@ -10,23 +10,21 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Coefficients, Unexplained
-from .regression import Flights, Setting, typical_size
+from ..logs.table import Array
+from ..motion.smoothing import mean_square
+from .regression import RegressedFlights, Setting, typical_size
 
-Array = NDArray[np.float64]
-
-
-MOST_TRIED = 12  # all of them, if there are no more
-KEPT_OF_MORE = 4  # of more, those that resemble the residual most
-SAMPLE_STEP = 20  # every so many samples are enough to see the resemblance
+MOST_TRIED = 12  # starts; no more are tried all
+KEPT_OF_MORE = 4  # starts of more, the most like the residual
+SAMPLE_STEP = 20  # one of so many samples is enough to compare
 
 
 def starting_points(
     effect: str,
-    flights: Flights,
+    flights: RegressedFlights,
     residual: Array,
     stated: Coefficients,
     beside: Iterable[str] = (),
@@ -34,16 +32,16 @@ def starting_points(
     """Return the coefficients from which a fit of an effect starts.
 
     Args:
-        effect: that declares starting points.
-        flights: where it is looked for.
-        residual: that they leave (rows, 6).
-        stated: coefficients that the vehicle's file fixes.
-        beside: other effects that act.
+        effect: its name. It declares starting points.
+        flights: the searched flights.
+        residual: the unexplained residual (rows, 6).
+        stated: coefficients fixed by the vehicle's file.
+        beside: other effects in action.
     """
     declared = get(effect).starting_points
     assert declared is not None, f"{effect} declares no starting points"
     position, seen, vehicle = flights.at_rows("position"), flights.fit_rows, flights.vehicle
-    found = declared(
+    starts = declared(
         Unexplained(
             vehicle,
             {c.name: typical_size((effect, c.name), vehicle) for c in get(effect).coefficients},
@@ -56,13 +54,12 @@ def starting_points(
             residual[seen, 3:],
         )
     )
-    if len(found) <= MOST_TRIED:
-        return found
-    # an effect that has no state of its own and goes by no clock does the same as long as nothing
-    # else changes, so not every sample need be looked at: one sample, repeated for a minute, in
-    # step with no whole Hz
+    if len(starts) <= MOST_TRIED:
+        return starts
+    # an effect without a state or clock of its own does the same in the same sample, so a few
+    # samples are enough. To find out, one sample is repeated for a minute, in step with no whole Hz
     one = flights.pieces({})[0].signals.at(np.zeros(200, dtype=np.int64))
-    acts = flights.acting(replace(one, period=0.317), {effect: found[0]})
+    acts = flights.acting(replace(one, period=0.317), {effect: starts[0]})
     steady, sampled, every = bool(np.all(acts == acts[0])), [], []
     for p in flights.pieces({}):
         chosen = np.arange(len(p.rows)) % max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) == 0
@@ -71,18 +68,18 @@ def starting_points(
         every.append(chosen)
     chosen = np.concatenate(every)
     target = residual[chosen & seen]
-    scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
+    scale = 1.0 / np.maximum(np.sqrt(mean_square(target)), 1e-12)
 
     def acting(setting: Setting) -> Array:
         parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
         return np.asarray(np.concatenate(parts)[seen[chosen]] * scale)
 
-    # how much of the residual goes like each start's wrench; of those that are alike the later one,
-    # and none that does nothing
+    # share of the residual along each start's wrench; the later one of equals, and none without a
+    # wrench
     base, likeness = acting({}), []
-    for i, start in enumerate(found):
+    for i, start in enumerate(starts):
         shape = acting({effect: start}) - base
         size = float(np.sum(shape * shape))
         if size > 0.0:
             likeness.append((float(np.sum(shape * target * scale)) / math.sqrt(size), i))
-    return [found[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]
+    return [starts[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]

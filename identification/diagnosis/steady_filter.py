@@ -2,19 +2,18 @@
 
 The axes are the world's: position along them, and turns about them. The states of an axis are its
 pose, the pose's rate, and a disturbance: an Ornstein-Uhlenbeck acceleration. A white acceleration
-beside it stands for the rotors' rounding, and for whatever else changes from sample to sample. A
-pitch pulls the vehicle along x and a roll against y: x and pitch are one filter, y and roll
-another, whatever way the vehicle yaws. Up and yaw are a pair that nothing joins.
+beside it stands for the rotors' rounding, and for any other change from sample to sample. A pitch
+pulls the vehicle along x and a roll against y: x and pitch are one filter, y and roll another,
+whatever the yaw. Up and yaw are a pair without a link.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..logs.table import Array
 
-PAIRS = np.array([[0, 4], [1, 3], [2, 5]])  # a position, and the turn that pulls it
+PAIRS = np.array([[0, 4], [1, 3], [2, 5]])  # a position, and the turn pulling it
 # (6, 3) whether an axis is of a pair
 OWN = np.equal(np.arange(6)[:, None, None], PAIRS).any(axis=2)
 PARTNER = np.array([4, 3, 5, 1, 0, 2])
@@ -28,7 +27,7 @@ class PoseNoise:
     pose: Array  # standard deviation of one sample
     disturbance: Array  # standard deviation, an acceleration
     time: Array  # s, correlation time
-    white: Array  # standard deviation of an acceleration that lasts one period
+    white: Array  # standard deviation of an acceleration over one period
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +37,7 @@ class SteadyFilter:
     Attributes:
         gain: (..., 6, 3, 2) of pose, rate and disturbance of each axis, per unit of its own
             innovation and of its partner's.
-        keep: (..., 6) what is left of a disturbance after a period.
+        keep: (..., 6) share of a disturbance left after a period.
         covariance: (..., 6, 6) of the innovations.
     """
 
@@ -54,16 +53,16 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     pose, decay = noise.pose[..., PAIRS], keep[..., PAIRS]
     unit = period * period / pose
     half = np.array([0.5, 1.0, 0.0])
+    white = np.square(noise.white[..., PAIRS] * unit)
+    drift = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
     shape = (*pose.shape[:-1], 6, 6)
     F, Q, H = np.zeros(shape), np.zeros(shape), np.zeros((2, 6))
     for i in range(2):
         at = slice(3 * i, 3 * i + 3)
         F[..., at, at] = [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]]
         F[..., 3 * i + 2, 3 * i + 2] = decay[..., i]
-        white = np.square(noise.white[..., PAIRS][..., i] * unit[..., i])
-        Q[..., at, at] = white[..., None, None] * np.outer(half, half)
-        size = noise.disturbance[..., PAIRS][..., i] * unit[..., i]
-        Q[..., 3 * i + 2, 3 * i + 2] = np.square(size) * (1.0 - decay[..., i] ** 2)
+        Q[..., at, at] = white[..., i, None, None] * np.outer(half, half)
+        Q[..., 3 * i + 2, 3 * i + 2] = drift[..., i]
         H[i, 3 * i] = 1.0
     pull = gravity * PULL * unit[..., 0] * pose[..., 1]
     F[..., :3, 3:6] = pull[..., None, None] * np.outer(half, [1.0, 0.5, 0.0])
@@ -83,8 +82,8 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
 
 
 def _riccati(F: Array, Q: Array, H: Array) -> Array:
-    """Return the steady covariance of the prediction, where the measurement's noise is one, by
-    doubling (B. D. O. Anderson, International Journal of Control 28 (1978), 295-306).
+    """Return the steady covariance of the prediction, for measurements with unit noise, by doubling
+    (B. D. O. Anderson, International Journal of Control 28 (1978), 295-306).
     """
     A, X = np.swapaxes(F, -1, -2), Q
     G = np.broadcast_to(H.T @ H, F.shape)

@@ -1,8 +1,8 @@
-"""Where a finding shows: the quantity that it follows most closely, the channels of the logs in
-which it leaves its trace, and those that its effect model reads.
+"""The evidence of a finding in the logs: the quantity it follows most closely, the channels with
+its trace, and the channels its effect model reads.
 
-All are computed. The trace is the share of the effect's deviance in the balance of forces and in
-that of torques; what the model reads shows where its wrench changes with an input.
+All are computed. The trace is the share of the effect's deviance in the balances of forces and of
+torques. A model reads an input if its wrench changes with it.
 """
 
 from collections.abc import Iterator
@@ -10,19 +10,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import get
 from ..findings import CHANNELS, Signature
-from ..motion.signals import Signals
-from .regression import Flights, Setting, without
-from .rows import in_body
+from ..logs.table import Array
+from ..motion.signals import Signals, in_body
+from ..motion.smoothing import mean_square
+from .regression import RegressedFlights, Setting, without
 
-Array = NDArray[np.float64]
-
-# shares from which a channel carries an effect: of its deviance, in the forces or in the torques,
-# and of its wrench, as an input changes
+# least shares for a channel to carry an effect: of its deviance, in the forces or in the torques,
+# and of its wrench, with a changed input
 LEAST_SHARE, LEAST_CHANGE = 0.05, 0.01
 ORDER = (
     "position",
@@ -36,12 +34,12 @@ ORDER = (
 
 
 def signature(
-    flights: Flights, setting: Setting, effect: str, share: Array, after: Array
+    flights: RegressedFlights, setting: Setting, effect: str, share: Array, after: Array
 ) -> Signature:
-    """Return the channel in which an effect is largest, against what it follows most closely.
+    """Return the channel of an effect's largest part, against the quantity it follows most closely.
 
     Args:
-        flights: of the vehicle.
+        flights: the vehicle's flights.
         setting: coefficients of all effects.
         effect: its name.
         share: of the effect in the residual (rows, 6).
@@ -58,8 +56,8 @@ def signature(
     return Signature(effect, CHANNELS[channel], name, x, y + after[:, channel], y)
 
 
-def explanatory_variables(flights: Flights, setting: Setting) -> list[tuple[str, Array]]:
-    """Return the explanatory variables at the rows: what a force may depend on, with its unit."""
+def explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[tuple[str, Array]]:
+    """Return the explanatory variables of a force at the rows, named with their units."""
     names = ("t", "position", "rotation", "velocity")
     t, position, rotation, velocity = (flights.at_rows(name, setting) for name in names)
     pieces = flights.pieces(setting)
@@ -67,7 +65,7 @@ def explanatory_variables(flights: Flights, setting: Setting) -> list[tuple[str,
     body = in_body(velocity, rotation)
     speed = np.linalg.norm(body, axis=1)
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    found = [
+    named = [
         *((f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")),
         ("speed (m/s)", speed),
         ("squared speed (m2/s2)", speed**2),
@@ -77,31 +75,31 @@ def explanatory_variables(flights: Flights, setting: Setting) -> list[tuple[str,
         ("time (s)", t),
     ]
     if flights.rotor_speeds_vary:
-        found.append(("thrust (N)", flights.rotor_wrench(setting)[:, 0]))
-    found += [(f"angular velocity {a} (rad/s)", rate[:, i]) for i, a in enumerate("xyz")]
-    found += [(f"world position {a} (m)", position[:, i]) for i, a in enumerate("xy")]
+        named.append(("thrust (N)", flights.rotor_wrench(setting)[:, 0]))
+    named += [(f"angular velocity {a} (rad/s)", rate[:, i]) for i, a in enumerate("xyz")]
+    named += [(f"world position {a} (m)", position[:, i]) for i, a in enumerate("xy")]
     if all(p.signals.voltage is not None for p in pieces):
-        found.append(("battery voltage (V)", flights.at_rows("voltage", setting)))
-    return [(name, x) for name, x in found if x.std() > 1e-9]
+        named.append(("battery voltage (V)", flights.at_rows("voltage", setting)))
+    return [(name, x) for name, x in named if x.std() > 1e-9]
 
 
-def carrying_channels(flights: Flights, setting: Setting, effect: str) -> tuple[str, ...]:
-    """Return the channels that carry a named effect at a setting, in the order of ``ORDER``: those
-    in which it leaves its trace, and those that its model reads.
+def carrying_channels(flights: RegressedFlights, setting: Setting, effect: str) -> tuple[str, ...]:
+    """Return the channels that carry a named effect at a setting, in the order of ``ORDER``: the
+    channels with its trace, and the channels read by its model.
     """
     part = flights.residual(without(setting, effect)) - flights.residual(setting)
-    noise = np.mean(np.square(flights.sensor_noise), axis=0) + 1e-30
-    force, torque = (np.mean(np.square(part), axis=0) / noise).reshape(2, 3).sum(axis=1)
-    least, found = LEAST_SHARE * max(force + torque, 1e-30), {*_read(flights, setting, effect)}
+    noise = mean_square(flights.sensor_noise) + 1e-30
+    force, torque = (mean_square(part) / noise).reshape(2, 3).sum(axis=1)
+    least, carrying = LEAST_SHARE * max(force + torque, 1e-30), {*_read(flights, setting, effect)}
     if force > least:
-        found.add("accelerometer" if flights.inertial else "position")
+        carrying.add("accelerometer" if flights.inertial else "position")
     if torque > least and not flights.commanded:
-        found.add("gyro" if flights.inertial else "attitude")
-    return tuple(channel for channel in ORDER if channel in found)
+        carrying.add("gyro" if flights.inertial else "attitude")
+    return tuple(channel for channel in ORDER if channel in carrying)
 
 
-def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
-    """Yield the channels that an effect's model reads."""
+def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[str]:
+    """Yield the channels read by an effect's model."""
     if get(effect).kind == "sensing":
         yield from ("position", "attitude")
         return
@@ -109,7 +107,7 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     unit = vehicle.weight * np.repeat([1.0, vehicle.arm_l], 3)
 
     def added(s: Signals) -> Array:
-        """Return what the effect adds (n, 6) in body axes, over the weight and the weight times the
+        """Return the effect's wrench (n, 6) in body axes, over the weight and the weight times the
         arm.
         """
         off = flights.acting(s, setting) - flights.acting(s, less)
@@ -122,7 +120,7 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
     turn = "gyro" if flights.inertial else "attitude"
     rotors = "motor commands" if flights.commanded else "rotor speeds"
     turned = s.rotation @ Rotation.from_rotvec([0.1, -0.1, 0.1]).as_matrix()
-    # inputs, changed by some per cent, or by as much as they vary in a calm flight (SI units)
+    # inputs, changed by some per cent, or by their variation in a calm flight (SI units)
     changed: list[tuple[str, dict[str, Any]]] = [
         (rotors, {"rotor_speeds": 1.05 * s.rotor_speeds}),
         (place, {"position": s.position + 0.1}),
@@ -139,4 +137,4 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
 
 def _size(wrench: Array) -> float:
     """Return the sum of a wrench's RMS (n, 6) over its axes."""
-    return float(np.sqrt(np.mean(np.square(wrench), axis=0)).sum())
+    return float(np.sqrt(mean_square(wrench)).sum())

@@ -1,15 +1,15 @@
-"""The delay between commands and what the rotors do, from how the vehicle turns.
+"""The delay of the rotors behind their commands, from the vehicle's turns.
 
-In closed loop thrust and vertical acceleration cause each other, and the delay that fits them best
-is as much the loop's as the motors'. Roll and pitch are driven far harder: between 1 and 8 Hz the
-commanded moments show in the angular acceleration of the pose, and by how much they come late there
-is the delay. How much of them shows (inertia, the thrust curve) is left free for each axis of each
-flight; it may not be negative. What else moves the vehicle, and the pose's noise, may have any
-spectrum: the likelihood is Whittle's with an unknown noise at each frequency.
+In closed loop thrust and vertical acceleration cause each other, and the delay of their best fit is
+as much the loop's as the motors'. Roll and pitch are driven far harder: between 1 and 8 Hz the
+commanded moments show in the angular acceleration of the pose, later by the delay. Their gain
+(inertia, the thrust curve) is free for each axis of each flight; it may not be negative. Other
+forces, and the pose's noise, may have any spectrum: the likelihood is Whittle's with an unknown
+noise at each frequency.
 
-It is a pure delay that is fitted. A lag also takes gain away at high frequencies, but so does a
-loop that is closed over a noisy pose: a lag of that delay is always as good. What the vehicle
-declares of either is no part of the delay.
+The fit is of a pure delay. A lag also takes gain away at high frequencies, but so does a loop
+closed over a noisy pose: a lag of equal delay is always as good. A declared lag or delay is no part
+of the fitted one.
 """
 
 import math
@@ -23,15 +23,13 @@ from scipy.signal import csd, welch
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
+from ..logs.table import Array
 from ..motion.signals import Signals
 from .regression import moves_time
 
-Array = NDArray[np.float64]
-
-
-# Hz, where the commanded moments show in the angular acceleration
+# Hz, of the commanded moments in the angular acceleration
 BAND_HZ = (1.0, 8.0)
-# log-likelihood ratio over moments that do not show, which have one number less an axis
+# log-likelihood ratio over no visible moments, with one number less an axis
 LEAST_LOG_LIKELIHOOD_RATIO = 40.0
 SEGMENT = 2.0  # s, of a spectrum
 LONGEST_DELAY = 0.12  # s
@@ -39,9 +37,7 @@ LONGEST_DELAY = 0.12  # s
 
 @dataclass(frozen=True, eq=False)
 class _Spectra:
-    """Spectra (frequencies in the band,) of a moment and of what turns with it, from so many
-    segments.
-    """
+    """Spectra (frequencies in the band,) of a moment and of its turn, from ``count`` segments."""
 
     omega: Array  # rad/s
     moment: Array
@@ -50,12 +46,10 @@ class _Spectra:
     count: float  # independent segments
 
     def deviance(self, response: NDArray[np.complex128]) -> float:
-        """Return minus twice the log likelihood, up to a constant, at the gain that fits best."""
-        along, power = (
-            np.real(np.conj(response) * self.cross),
-            np.square(np.abs(response)) * self.moment,
-        )
-        # the gain changes the noise by which it is weighted
+        """Return minus twice the log likelihood, up to a constant, at the best gain."""
+        along = np.real(np.conj(response) * self.cross)
+        power = np.square(np.abs(response)) * self.moment
+        # the gain changes its own weights, the noise
         noise = self.turning
         for _ in range(6):
             gain = max(float(np.sum(along / noise) / np.sum(power / noise)), 0.0)
@@ -67,14 +61,14 @@ def turning_delay(
     pieces: Sequence[Signals], vehicle: Vehicle, held: float = 0.0
 ) -> tuple[float, float, float] | None:
     """Return the delay of the rotors' moments behind the commands, s, its standard deviation, and
-    its log-likelihood ratio over moments that do not show; None where turning does not show one.
+    its log-likelihood ratio over no visible moments; None if turning does not show one.
 
     Args:
-        pieces: unbroken flight, with rotor speeds worked out from commands.
-        vehicle: as it is declared.
-        held: s, from one logged command to the next. Between them rotor speeds move linearly here;
-            rotors that are held at each are late by half as long, and those of a log that has left
-            commands out by less.
+        pieces: unbroken flight, with rotor speeds from commands.
+        vehicle: as declared.
+        held: s, from one logged command to the next. Between them rotor speeds move linearly here.
+            Rotors held at each command are late by half as long; with commands left out of the log,
+            by less.
     """
     declared = [
         (get(e.name).role, x)
@@ -101,7 +95,7 @@ def turning_delay(
     seconds, least, near = float(best.x), float(best.fun), 0.1 * step
     bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
     std = float(np.sqrt(2.0 / max(bend, 1e-6)))
-    # a lag delays each frequency otherwise, and which of them the loop lets show is not known
+    # a lag delays each frequency differently, and the frequencies shown by the loop are not known
     omega = spectra[0].omega
     spread = float(np.std(behind(omega, 0.0) / omega))
     std = math.hypot(std, spread, 0.5 * held / math.sqrt(12.0))

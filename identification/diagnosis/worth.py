@@ -1,44 +1,41 @@
-"""How much an effect does, beside what a model with it leaves unexplained."""
+"""The size of an effect, beside the residual of a model with it."""
 
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ...dynamics.effects import get
+from ..motion.smoothing import mean_square
 from .priors import prior_size
-from .regression import Flights, Setting, without
+from .regression import RegressedFlights, Setting, without
 from .row_nuisances import row_nuisances
 from .rows import Rows
 
-Array = NDArray[np.float64]
-
-
-NOISE_KNOWN = 0.2  # share of the sensors' noise, to which it is known
-# standard deviations that chance makes: of a prior, by which others may differ in an effect's
-# place, and of a nuisance that is worth a note
+NOISE_KNOWN = 0.2  # relative accuracy of the sensors' noise
+# standard deviations made by chance: of other priors in an effect's place, and of a nuisance worth
+# a note
 BY_CHANCE = 3.0
 
 
 def worth(
-    flights: Flights, fixed: Setting, first: Collection[str], setting: Setting
+    flights: RegressedFlights, fixed: Setting, first: Collection[str], setting: Setting
 ) -> dict[str, float]:
-    """Return of each effect the RMS of what nuisances, effects that any set has and effects of
-    other families cannot do in its place, within three standard deviations of their priors, over
-    the RMS of what is left beyond the sensors' noise: in the channel where that is most.
+    """Return the size of each effect over the residual beyond the sensors' noise, in the channel
+    with most. The size is the RMS of its irreplaceable part: nuisances, effects of every set and
+    effects of other families take the rest, within three standard deviations of their priors.
 
     Args:
-        flights: of the vehicle.
-        fixed: effects that are known from elsewhere.
-        first: effects that any set has.
-        setting: coefficients of the effects that are asked about.
+        flights: the vehicle's flights.
+        fixed: effects known from elsewhere.
+        first: effects of every set.
+        setting: coefficients of the effects asked about.
     """
     if not setting:
         return {}
     rows = Rows(flights, fixed)
     fit, left = rows.fit, rows.residual(setting)
-    power, noise = (np.mean(np.square(x[fit]), axis=0) for x in (left, rows.noise()))
+    power, noise = (mean_square(x[fit]) for x in (left, rows.noise()))
     size = np.sqrt(np.maximum(power - noise, NOISE_KNOWN**2 * noise)) + 1e-12
     nuisances = list(row_nuisances(rows).values())
     columns = rows.columns(setting, flights.columns_of(setting))
@@ -46,10 +43,10 @@ def worth(
     for effect in setting:
         less = without(setting, effect)
         part = rows.residual(less) - left
-        # in still air a drag cannot do what it does in a wind
+        # a drag acts otherwise in still air than in a wind
         still = get(effect).sets_wind
         others = rows.columns(less, flights.columns_of(less)) if still else columns
-        # what any set has, and what is of another family
+        # of every set, or of another family
         own = [
             x * prior_size(c, flights)
             for c, x in others.items()
@@ -58,5 +55,5 @@ def worth(
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
         done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-BY_CHANCE, BY_CHANCE)).x
-        out[effect] = float(np.sqrt(np.mean(np.square(y - X @ done), axis=0)).max())
+        out[effect] = float(np.sqrt(mean_square(y - X @ done)).max())
     return out

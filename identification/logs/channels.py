@@ -1,12 +1,10 @@
-"""Columns that were sampled together: their clock, and what they hold in the kit's units, axes and
-order of rotors.
+"""Groups of columns with one clock each, in the kit's units, axes and order of rotors.
 
 With W from the log's world and B from its body axes to this kit's, positions become W p, attitudes
-W R B' and what a sensor measures B v.
+W R B' and a sensor's vectors B v.
 
 The clock of a recording may not be one clock: a stamp is wrong, rows were written late, a counter
-rolls over, or a vehicle was switched on twice. Each group of columns has its stamps in the order in
-which they were written.
+rolls over, or a vehicle was switched on twice. Each group keeps its stamps in the order of writing.
 """
 
 import math
@@ -31,13 +29,13 @@ BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN, "y_up": _Y_
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
-    """Columns that were sampled together: rows in the order of time."""
+class ChannelGroup:
+    """Columns with one clock; rows in the order of time."""
 
     t: Array  # (N,) s
-    columns: Mapping[str, Array]  # by name (N,); NaN where there is no value
-    topic: str = ""  # of the message in which they stood, where a log has several
-    table: Table | None = None  # in which they stand
+    columns: Mapping[str, Array]  # by name (N,); NaN: no value
+    topic: str = ""  # of the columns' message, in a log of several
+    table: Table | None = None  # of the columns
     rows: Rows | None = None  # (N,) of it
 
     def values(self, part: Columns) -> Array:
@@ -51,14 +49,14 @@ class Samples:
         return scaled(part, values)
 
     def there(self, part: Columns) -> Mask:
-        """Return in which rows (N,) a section has all of its values."""
+        """Return the rows (N,) with all values of a section."""
         return finite_rows(self.values(part))
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""
         return part.topic in ("", self.topic) and set(part.named) <= set(self.columns)
 
-    def cut(self, keep: slice | Mask | Rows) -> "Samples":
+    def cut(self, keep: slice | Mask | Rows) -> "ChannelGroup":
         """Return some of the rows; itself where a mask keeps all, since an hour takes 120 MB."""
         if isinstance(keep, np.ndarray) and keep.dtype == np.bool_ and keep.all():
             return self
@@ -74,7 +72,7 @@ class Samples:
 
 
 def scaled(part: Columns, values: Array) -> Array:
-    """Return what columns (N, k) hold, with the section's signs and scale."""
+    """Return columns (N, k), with the section's signs and scale."""
     signs = np.array(part.signs, dtype=np.float64) if part.signs else 1.0
     return values * signs * part.scale
 
@@ -84,12 +82,14 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
     axes and order of rotors; commands as 0 to 1.
     """
     unit = UNITS.get(section, {}).get(part.unit, 1.0)
+    if isinstance(part, Rotors | Commands):
+        values = values[:, np.subtract(part.order, 1)]
     if isinstance(part, Rotors):
-        return values[:, [m - 1 for m in part.order]] * (unit / part.pole_pairs)
+        return values * (unit / part.pole_pairs)
     if isinstance(part, Commands):
         assert part.range is not None
         low, high = part.range
-        return (values[:, [m - 1 for m in part.order]] - low) / (high - low)
+        return (values - low) / (high - low)
     if isinstance(part, Battery):
         return values * unit * part.cells
     if isinstance(part, Sensor):
@@ -98,8 +98,8 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
 
 
 def quaternions(part: Attitude, values: Array) -> Array:
-    """Return the quaternions (N, 4), scalar first, that an attitude's columns (N, k) stand for, in
-    their own axes and of the length that they have.
+    """Return an attitude's columns (N, k) as quaternions (N, 4), scalar first, in the columns' axes
+    and of the columns' length.
     """
     if not part.euler:
         return values[:, [part.order.index(name) for name in "wxyz"]]
@@ -114,48 +114,41 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
         attitude = attitude * np.array([1.0, -1.0, -1.0, -1.0])
     if log_map.world == "enu" and log_map.body == "flu":
         return attitude
-    if log_map.world == "ned" and log_map.body == "frd":  # of any length, NaN included
+    if log_map.world == "ned" and log_map.body == "frd":  # quaternions of any length, NaN included
         return np.asarray(attitude * np.array([1.0, 1.0, -1.0, -1.0]))
     matrix = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
     turn = Rotation.from_matrix(WORLD_TURNS[log_map.world] @ matrix @ BODY_TURNS[log_map.body].T)
     return np.asarray(turn.as_quat(scalar_first=True))
 
 
-@dataclass(frozen=True)
-class ClockSettings:
-    """What tells a clock from another."""
-
-    rollover: float = 2.0**32 * 1e-6  # s, after which a counter of 32 bits of microseconds is zero
-    jitter: float = 1.0  # s, by which the stamps at both ends of a rollover may be off it
-    reset: float = 1.0  # s, by which a clock goes back that starts anew; late rows are late by less
-    window: int = 5  # stamps, of which the median is compared before and after: one is no clock
-    hole: float = 1.5  # median steps: a row that was written late fills a hole at least that wide
-    alone: float = 100.0  # median steps, and the seconds of ``jitter``, off all others: a first or
-    # a last stamp that no other one confirms
-
-
-CLOCK = ClockSettings()
+# When a clock is rolled over, reset or late.
+ROLLOVER = 2.0**32 * 1e-6  # s, of a counter of 32 bits of microseconds
+_JITTER = 1.0  # s, of the stamps at both ends of a rollover
+_RESET = 1.0  # s, the least step back of a restart; late rows are late by less
+_WINDOW = 5  # stamps, whose median is compared; one decides nothing
+_HOLE = 1.5  # median steps: the least hole that a late row fills
+_ALONE = 100.0  # median steps, and at least ``jitter``: a lone first or last stamp
+# this far off all others is wrong
 
 
 def on_one_clock(
-    path: Path, recorded: Sequence[Samples], piece: int | None = None
-) -> tuple[list[Samples], list[str]]:
+    path: Path, recorded: Sequence[ChannelGroup], piece: int | None = None
+) -> tuple[list[ChannelGroup], list[str]]:
     """Return groups of columns with times that increase strictly, and notes.
 
     Args:
         path: the file, for errors.
         recorded: the groups, in the order of their writing.
-        piece: which part of the file is read, from 1, where its clock started anew; default: the
-            longest.
+        piece: part of the file to read, from 1, after restarts of the clock; default: the longest.
 
     Raises:
         InputError: there is no such piece.
     """
-    groups: list[Samples] = []
+    groups: list[ChannelGroup] = []
     notes: list[str] = []
     for samples in recorded:
-        over = np.cumsum(np.abs(np.diff(samples.t, prepend=np.nan) + CLOCK.rollover) < CLOCK.jitter)
-        groups.append(replace(samples, t=samples.t + CLOCK.rollover * over))
+        over = np.cumsum(np.abs(np.diff(samples.t, prepend=np.nan) + ROLLOVER) < _JITTER)
+        groups.append(replace(samples, t=samples.t + ROLLOVER * over))
         if over.any():
             notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
     groups, said = _of_piece(path, groups, piece)
@@ -176,12 +169,12 @@ def on_one_clock(
 
 
 def _of_piece(
-    path: Path, groups: list[Samples], piece: int | None
-) -> tuple[list[Samples], list[str]]:
-    """Return the part of each group that belongs to one piece, and a note on how many there are.
+    path: Path, groups: list[ChannelGroup], piece: int | None
+) -> tuple[list[ChannelGroup], list[str]]:
+    """Return each group's rows of one piece, and a note on the number of pieces.
 
-    A group that has other pieces than most, since it was not written in each of them, is left whole
-    but for what goes back in time.
+    A group with another number of pieces was not written in each of them. Such a group stays whole,
+    without rows of earlier times.
     """
     cuts = [_resets(samples.t) for samples in groups]
     counts = Counter(len(cut) + 1 for cut in cuts if len(cut))
@@ -195,10 +188,10 @@ def _of_piece(
     ]
     both = list(zip(groups, parts, strict=True))
     seconds = [
-        max(float(np.ptp(samples.t[part[i]])) for samples, part in both if part is not None)
+        max(np.ptp(samples.t[part[i]]) for samples, part in both if part is not None)
         for i in range(many)
     ]
-    chosen = int(np.argmax(seconds)) if piece is None else piece - 1
+    chosen = np.argmax(seconds) if piece is None else piece - 1
     lengths = ", ".join(f"{x:.3g}" for x in seconds)
     why, how = ("the longest, ", "; --piece reads another") if piece is None else ("", "")
     note = (
@@ -209,10 +202,10 @@ def _of_piece(
 
 
 def check_piece(path: Path, piece: int | None, many: int) -> None:
-    """Check that a file has a piece.
+    """Check the number of a piece.
 
     Raises:
-        InputError: it does not.
+        InputError: the file has no such piece.
     """
     if piece is not None and not 1 <= piece <= many:
         raise InputError(f"{path}: piece {piece}: it has {many}; expected 1 to {many}")
@@ -222,27 +215,26 @@ def _resets(t: Array) -> Rows:
     """Return the first sample of each piece but the first: where the clock goes back, and stays
     back.
     """
-    found: list[int] = []
-    for i in np.flatnonzero(np.diff(t) < -CLOCK.reset) + 1:
-        before, after = t[max(i - CLOCK.window, 0) : i], t[i : i + CLOCK.window]
-        enough = min(len(before), len(after)) >= min(CLOCK.window, 3)
-        if enough and float(np.median(after)) < float(np.median(before)) - CLOCK.reset:
-            found.append(int(i))
-    return np.array(found, dtype=np.intp)
+    resets: list[int] = []
+    for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
+        before, after = t[max(i - _WINDOW, 0) : i], t[i : i + _WINDOW]
+        enough = min(len(before), len(after)) >= min(_WINDOW, 3)
+        if enough and np.median(after) < np.median(before) - _RESET:
+            resets.append(int(i))
+    return np.array(resets, dtype=np.intp)
 
 
 def in_order(t: Array) -> tuple[Rows, int]:
-    """Return the rows that make times (N,) increase strictly, and how many of them were written
-    late.
+    """Return the rows of strictly increasing times (N,), and the number of rows written late.
 
-    Most rows are right: the longest sequence that increases is kept. A row outside it is put where
-    its time is, if a row is missing there. All others have a wrong time, or one that was there.
+    Most rows are right: the longest increasing sequence is kept. A row outside the sequence is put
+    at its time, if a row is missing there. The others have a wrong or a repeated time.
     """
     increases = len(t) < 2 or bool(np.all(np.diff(t) > 0.0))
     rows: Rows = np.arange(len(t)) if increases else _longest_increase(t)
     if len(rows) > 3:  # a first or a last one far off all others is left out
         steps = np.diff(t[rows])
-        far = max(CLOCK.alone * float(np.median(steps)), CLOCK.jitter)
+        far = max(_ALONE * np.median(steps), _JITTER)
         rows = rows[int(steps[0] > far) : len(rows) - int(steps[-1] > far)]
     if increases:
         return rows, 0
@@ -251,7 +243,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     steps = np.diff(t[rows])
     if not len(steps):
         return rows, 0
-    hole = CLOCK.hole * float(np.median(steps))
+    hole = _HOLE * np.median(steps)
     late = np.flatnonzero(others & (t > t[rows[0]]) & (t < t[rows[-1]]))
     late = late[np.unique(t[late], return_index=True)[1]]
     after = np.searchsorted(t[rows], t[late])
@@ -261,15 +253,15 @@ def in_order(t: Array) -> tuple[Rows, int]:
 
 
 def _longest_increase(t: Array) -> Rows:
-    """Return the rows of the longest sequence of times (N,) that increases strictly (patience
-    sorting; NaN is in none).
+    """Return the rows of the longest strictly increasing sequence of times (N,), by patience
+    sorting; NaN is in none.
     """
     ends: list[float] = []  # the least last time of a sequence of each length
     at: list[int] = []  # and its row
     before: dict[int, int] = {}
     for i, x in enumerate(t.tolist()):
         k = bisect_left(ends, x)
-        if math.isfinite(x) and ends[k : k + 1] != [x]:  # of two samples at one time the first
+        if math.isfinite(x) and ends[k : k + 1] != [x]:  # the first of two samples at one time
             before[i] = at[k - 1] if k else -1
             ends[k : k + 1], at[k : k + 1] = [x], [i]
     rows = at[-1:] or [-1]

@@ -1,5 +1,4 @@
-"""What the names of a table's columns say: which belong together, what they are of, and their
-unit.
+"""Groups, parts and units of a table's columns, by their names.
 
 Names are read as people write them: ``pos_x``, ``Position.X [mm]``, ``qw``, ``q[0]``,
 ``gyroADC[1]``, ``roll_deg``, ``motor[3]``, ``rpm_front_left``.
@@ -14,7 +13,7 @@ from typing import Any
 from ...runtime.yaml_file import read_yaml
 
 WORDS: dict[str, Any] = read_yaml(Path(__file__).with_name("column_words.yaml"), "words")
-# by their spellings; nothing for one that no map uses
+# by spelling; nothing for a unit without use in maps
 _UNITS: dict[str, str] = {
     word: unit for unit, spellings in WORDS["units"].items() for word in spellings
 }
@@ -35,18 +34,18 @@ class Name:
 
 
 def unit_spelled(text: str) -> str:
-    """Return the unit that a text is a spelling of, or nothing."""
+    """Return the unit of a spelling, or nothing."""
     return _UNITS.get(text, "") or str(WORDS["unit_words"].get(text, ""))
 
 
 @dataclass(frozen=True)
 class Group:
-    """Columns that belong together."""
+    """Columns of one vector or of one set of motors."""
 
     columns: tuple[str, ...]
-    key: str  # what their names share
+    key: str  # the common part of the names
     unit: str = ""
-    endings: tuple[str, ...] = ()  # of the names: axes or numbers, where these are known
+    endings: tuple[str, ...] = ()  # axes or numbers in the names, where known
 
     @property
     def numbered(self) -> bool:
@@ -55,14 +54,14 @@ class Group:
 
 
 def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
-    """Return the columns' names, taken apart; ``units`` are those of a line behind the header."""
+    """Return the columns' names, taken apart; ``units`` stand in a line behind the header."""
     out = []
     for i, column in enumerate(header):
         text, unit = column.strip(), ""
-        found = _BRACKETS.search(text) or _ENDING.search(text)
-        if found and found.start() > 0:
-            unit = _UNITS.get(found[1].lower(), "")
-            text = text[: found.start()]
+        ending = _BRACKETS.search(text) or _ENDING.search(text)
+        if ending and ending.start() > 0:
+            unit = _UNITS.get(ending[1].lower(), "")
+            text = text[: ending.start()]
         if not unit and i < len(units):
             unit = _UNITS.get(_bare(units[i]), "")
         base = re.sub(r"[^0-9a-zA-Z]+", "_", text).strip("_").lower()
@@ -81,10 +80,10 @@ def _bare(text: str) -> str:
 
 
 def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
-    """Return the groups of columns whose names differ in one of ``endings`` alone, at the end, at
-    the beginning, or as a word or a word's number between others, in the order of the endings.
+    """Return the groups of columns whose names differ in one of ``endings`` alone, in the order of
+    the endings. An ending stands at the end, at the beginning, or between other words.
     """
-    found: dict[tuple[str, bool], dict[str, Name]] = {}
+    families: dict[tuple[str, bool], dict[str, Name]] = {}
     names = list(names)
     bases = {name.base for name in names}
     before = "(?<!\\d)" if endings[0].isdigit() else "_"
@@ -99,9 +98,9 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
                     continue
                 if key[-1:].isdigit() and behind and endings[0].isdigit():
                     continue
-                found.setdefault((key.strip("_"), behind), {}).setdefault(ending, name)
+                families.setdefault((key.strip("_"), behind), {}).setdefault(ending, name)
     out = []
-    for (key, _), members in found.items():
+    for (key, _), members in families.items():
         more = "3" if endings[-1] == "2" else "0" if endings[0] == "1" else ""
         if more and {key + more, f"{key}_{more}"} & bases:
             continue  # three of four, or four of five
@@ -118,7 +117,7 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
 
 
 def named_alone(names: Sequence[Name], part: str) -> list[Name]:
-    """Return the names that speak for a part of one column, the likeliest first: the time, or the
+    """Return the likely names of a part of one column, the likeliest first: the time, or the
     battery's voltage.
     """
     known = WORDS[part]

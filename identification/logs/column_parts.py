@@ -1,10 +1,10 @@
-"""Which columns of a table are which part of a flight: what their numbers obey counts for more than
-their names, which may be anyone's.
+"""The parts of a flight among a table's columns: numbers that obey physics count for more than
+names.
 
 A quaternion has length 1. An accelerometer reads gravity, 9.81 m/s2 or 1 g. The horizontal
 acceleration of a position follows the tilt, in whatever frames, and a gyro the turns of the pose.
-Rotors or commands are four columns of one size that move together with the specific force. Columns
-whose names say nothing are looked at by threes and fours that stand side by side.
+Rotors or commands are four columns of one size, correlated with the specific force. Columns without
+telling names are tried by adjacent threes and fours.
 """
 
 import re
@@ -19,28 +19,22 @@ from .magnitudes import likely_unit
 from .table import Array, finite_rows
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
-_TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # of which no column is another group's
+_TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # their columns are no other group's
 
 
-@dataclass(frozen=True)
-class PartSettings:
-    """When numbers speak for a part, and what that counts beside a name (4 for the likeliest)."""
-
-    numbers: float = 4.0  # what numbers that obey the part's physics count
-    certain: float = 2.0  # lead over the next candidate
-    length: tuple[float, float] = (2e-3, 0.02)  # error of a quaternion's: median, and of 98 %
-    window: float = 0.2  # s, over which rates are taken
-    rows: int = 20_000  # in the middle of the flight that are looked at, at most
-    samples: int = 4000  # of them that are compared, at most
-    levels: int = 10  # that a switch may take
-    fewest: int = 30  # that decide something
-    follows: float = 0.7  # correlation from which on one follows the other
-    alike: float = 1.6  # ratio of medians of four rotors
-    felt: float = 0.5  # correlation of rotors with the specific force
-    shown: int = 4  # candidates that a map lists
-
-
-PARTS = PartSettings()
+# When numbers speak for a part, and their score beside a name's (4 for the likeliest).
+_NUMBERS = 4.0  # score of numbers by the part's physics
+CERTAIN_LEAD = 2.0  # lead over the next candidate
+_LENGTH_ERROR = (2e-3, 0.02)  # of a quaternion: median error, and of 98 %
+_WINDOW = 0.2  # s, of the window for rates
+_MOST_ROWS = 20_000  # at most, from the middle of the flight
+_MOST_SAMPLES = 4000  # at most, of the rows compared
+_LEVELS = 10  # of a switch, at most
+_FEWEST = 30  # for a decision
+_FOLLOWS = 0.7  # correlation of a signal with its driver
+_ALIKE = 1.6  # ratio of medians of four rotors
+_FELT = 0.5  # correlation of rotors with the specific force
+SHOWN = 4  # candidates in a map
 
 
 def correlation(x: Array, y: Array) -> float:
@@ -49,29 +43,27 @@ def correlation(x: Array, y: Array) -> float:
 
 
 class Numbers:
-    """What the numbers of columns obey.
+    """Tests of columns' numbers against physics.
 
     Args:
-        t: (N,) s; NaN in rows that are not looked at.
+        t: (N,) s; NaN in rows left out.
         data: columns (N,) by name.
     """
 
     def __init__(self, t: Array, data: Mapping[str, Array]) -> None:
         order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
-        self.order = order[max(0, (len(order) - PARTS.rows) // 2) :][: PARTS.rows]
+        self.order = order[max(0, (len(order) - _MOST_ROWS) // 2) :][:_MOST_ROWS]
         self.t = t[self.order]
-        count = min(PARTS.samples, len(self.t))
-        # times (n,) in s at which motors are compared
+        count = min(_MOST_SAMPLES, len(self.t))
+        # times (n,) in s of comparisons of motors
         self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
         self._rows: dict[tuple[str, ...], tuple[Array, Array]] = {}
-        self.attitude: Sequence[
-            str
-        ] = ()  # a quaternion, whose tilt a position's acceleration follows
-        self.felt: list[Array] = []  # what may be the specific force, at ``self.clock``
+        self.attitude: Sequence[str] = ()  # a quaternion, whose tilt drives the position
+        self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
 
     def rows(self, columns: Sequence[str]) -> tuple[Array, Array]:
-        """Return the times (n,) and values (n, k) of the rows in which columns are all there."""
+        """Return the times (n,) and values (n, k) of the rows with all columns."""
         if (key := tuple(columns)) not in self._rows:
             values = np.column_stack([self.data[name][self.order] for name in columns])
             there = finite_rows(values)
@@ -81,7 +73,7 @@ class Numbers:
     def some(self, columns: Sequence[str]) -> Array:
         """Return values (n, k) of some rows, spread over all."""
         values = self.rows(columns)[1]
-        return values[:: max(1, len(values) // PARTS.samples)]
+        return values[:: max(1, len(values) // _MOST_SAMPLES)]
 
     def between(self, t: Array, columns: Sequence[str]) -> Array:
         """Return values (n, k) at times (n,), of lines between the rows."""
@@ -92,7 +84,7 @@ class Numbers:
 
     def varies(self, column: str) -> bool:
         """Return whether a column takes more than a few values: no counter's and no switch's."""
-        return column in self.data and len(np.unique(self.some([column]))) > PARTS.levels
+        return column in self.data and len(np.unique(self.some([column]))) > _LEVELS
 
     def quaternion(self, columns: Sequence[str]) -> tuple[float, str]:
         """Return 1 where columns may be an attitude: three angles are 0, for nothing shows them;
@@ -102,65 +94,63 @@ class Numbers:
             return 0.0, ""
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
-        there = length > 0.5  # zeros stand for one that is not there
+        there = length > 0.5  # zeros stand for a missing quaternion
         off = np.abs(length[there] - 1.0)
-        if len(off) < max(2, 0.5 * len(x)) or np.median(off) >= PARTS.length[0]:
+        if len(off) < max(2, 0.5 * len(x)) or np.median(off) >= _LENGTH_ERROR[0]:
             return -np.inf, ""
-        is_one = np.quantile(off, 0.98) < PARTS.length[1]
+        is_one = np.quantile(off, 0.98) < _LENGTH_ERROR[1]
         return (1.0 if is_one else -np.inf), "their length is 1"
 
     def gravity(self, columns: Sequence[str]) -> tuple[float, str]:
-        """Return 1 where three columns have the size of gravity, or less where it does not lie
-        along the third.
-        """
+        """Return 1 where gravity lies along the third of three columns, 0.8 along another."""
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
         size, middle = float(np.median(length)), np.abs(np.median(x, axis=0))
         unit, is_gravity = likely_unit("accelerometer", size)
         if not is_gravity or np.std(length) < 1e-6 * size or middle.max() < 0.8 * size:
-            return 0.0, ""  # another size, a direction, or all that turns
+            return 0.0, ""  # another size, a direction, or a turning vector
         return (1.0 if middle.argmax() == 2 else 0.8), f"their size is gravity's, in {unit}"
 
     def follows_tilt(self, columns: Sequence[str]) -> tuple[float, str]:
-        """Return how the second difference of two of three columns follows the tilt, at most 1; 0
-        where it does not.
+        """Return the correlation of two of three columns' second differences with the tilt; 0 where
+        there is little.
         """
         if not self.attitude:
             return 0.0, ""
-        every = slice(None, None, max(1, len(self.rows(self.attitude)[0]) // PARTS.samples))
+        every = slice(None, None, max(1, len(self.rows(self.attitude)[0]) // _MOST_SAMPLES))
         times, attitude = (x[every] for x in self.rows(self.attitude))
-        if min(len(times), len(self.rows(columns)[0])) < PARTS.fewest:
+        if min(len(times), len(self.rows(columns)[0])) < _FEWEST:
             return 0.0, ""
-        force, best = second_difference(times, PARTS.window, *self.rows(columns)).T, 0.0
+        force, best = second_difference(times, _WINDOW, *self.rows(columns)).T, 0.0
         for w, x, y, z in (attitude.T, attitude[:, [3, 0, 1, 2]].T):
             for sign in (1.0, -1.0):
                 tilt = x * z + sign * w * y, y * z - sign * w * x
-                found = [abs(correlation(f, d)) for f, d in zip(force, tilt, strict=False)]
-                best = max(best, min(found))
-        return (best if best > PARTS.follows else 0.0), "their acceleration follows the tilt"
+                correlations = [abs(correlation(f, d)) for f, d in zip(force, tilt, strict=False)]
+                best = max(best, min(correlations))
+        return (best if best > _FOLLOWS else 0.0), "their acceleration follows the tilt"
 
     def moves_together(self, columns: Sequence[str]) -> tuple[float, str]:
         """Return 1 where four columns are of one size and move with the specific force."""
         x = self.some(columns)
         x = x[np.any(x != 0.0, axis=1)]
-        if len(x) < PARTS.fewest or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
+        if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
             return 0.0, ""
         middle, total = np.median(x, axis=0), self.between(self.clock, columns).sum(axis=1)
-        together = middle.min() * PARTS.alike >= middle.max() > 0.0
-        together &= any(correlation(total, felt) > PARTS.felt for felt in self.felt)
+        together = middle.min() * _ALIKE >= middle.max() > 0.0
+        together &= any(correlation(total, felt) > _FELT for felt in self.felt)
         return float(together), "they move together with the specific force"
 
     def feel(self, accelerometer: Sequence[str], position: Sequence[str]) -> None:
-        """Keep what may be the specific force: an accelerometer's size, else accelerations."""
+        """Keep likely specific forces: an accelerometer's size, else accelerations."""
         if accelerometer:
             self.felt = [np.linalg.norm(self.between(self.clock, accelerometer), axis=1)]
         elif position:
-            force = second_difference(self.clock, PARTS.window, *self.rows(position)).T
+            force = second_difference(self.clock, _WINDOW, *self.rows(position)).T
             self.felt = [*force, *-force]
 
     def elasticity(self, values: Array) -> float:
-        """Return by which power of four motors' mean (N, 4) the specific force grows: 2 of rotor
-        speeds, more of pulses that stand on an offset. NaN where the flight does not show it.
+        """Return the power of four motors' mean (N, 4) by which the specific force grows: 2 of
+        rotor speeds, more of pulses on an offset. NaN: the flight does not show the power.
         """
         if len(self.felt) != 1:
             return np.nan
@@ -169,14 +159,14 @@ class Numbers:
         mean = np.interp(self.clock, self.t[good], total[good])
         there = (mean > 0.5 * np.median(mean)) & (self.felt[0] > 0.3 * np.median(self.felt[0]))
         x, y = np.log(mean[there]), np.log(self.felt[0][there])
-        if len(x) < PARTS.fewest or correlation(x, y) < 0.85:
+        if len(x) < _FEWEST or correlation(x, y) < 0.85:
             return np.nan
         return float(np.std(y) / np.std(x))
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """Columns that may be a part of a flight."""
+class ColumnCandidate:
+    """Columns of a possible part of a flight."""
 
     group: Group
     score: float
@@ -198,7 +188,7 @@ def _named(group: Group, part: str = "") -> bool:
 
 
 def named_columns(names: Sequence[Name]) -> set[str]:
-    """Return the columns whose names speak for a part."""
+    """Return the columns with a part's name."""
     endings = [e for ways in WORDS["parts"].values() for way in ways for e in way["endings"]]
     groups = [group for ending in endings for group in groups_of(names, ending) if _named(group)]
     alone = [name.column for part in ("time", "battery") for name in named_alone(names, part)]
@@ -210,15 +200,15 @@ def candidates(
     names: Sequence[Name],
     numbers: Numbers,
     judge: Callable[[Sequence[str]], tuple[float, str]],
-) -> list[Candidate]:
+) -> list[ColumnCandidate]:
     """Return the candidates of a part by their names and numbers, the likeliest first.
 
     Args:
-        part: of a flight.
-        names: of columns that are free; those without numbers are no part's.
+        part: a section of a log map, or ``motors``.
+        names: free columns; a column without numbers is no part's.
         numbers: of columns.
-        judge: returns how well columns obey the part's physics, from 0 to 1, and in words; minus
-            infinite where they contradict it.
+        judge: returns how well columns obey the part's physics, from 0 to 1 (minus infinite: they
+            contradict the part), and in words.
     """
     names = [name for name in names if name.column in numbers.data]
     named = {column for way in _TRIPLES for g in groups_of(names, way) for column in g.columns}
@@ -229,7 +219,7 @@ def candidates(
         for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
             places = (i for i, word in enumerate(way["words"]) if re.fullmatch(word, group.key))
             if (i := next(places, None)) is not None:
-                by_name = PARTS.numbers - 0.3 * i - 0.5 * number
+                by_name = _NUMBERS - 0.3 * i - 0.5 * number
                 ways.append((group, by_name, "by the columns' names"))
             elif commanded or _named(group, part):
                 continue
@@ -240,18 +230,18 @@ def candidates(
         wanted, width = WORDS["not_measured"], 4 if part in ("attitude", "motors") else 3
         loose = [n for n in names if n.column not in named and numbers.varies(n.column)]
         measured = tuple(name.column for name in loose if not re.search(wanted, name.base))
-        for i in range(len(measured) - width + 1):  # those that stand beside one another
+        for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
-    found: dict[tuple[str, ...], Candidate] = {}
+    likeliest: dict[tuple[str, ...], ColumnCandidate] = {}
     for group, score, why in ways:
         there = len(numbers.rows(group.columns)[0]) > 0
         strength, told = judge(group.columns) if there else (0.0, "")
-        whole = Candidate(
+        whole = ColumnCandidate(
             group,
-            score + PARTS.numbers * strength,
+            score + _NUMBERS * strength,
             "; ".join(filter(None, (why, told if strength else ""))),
         )
-        before = found.get(group.columns)
+        before = likeliest.get(group.columns)
         if whole.why and strength >= 0.0 and (before is None or before.score < whole.score):
-            found[group.columns] = whole
-    return sorted(found.values(), key=lambda candidate: -candidate.score)
+            likeliest[group.columns] = whole
+    return sorted(likeliest.values(), key=lambda candidate: -candidate.score)

@@ -1,12 +1,12 @@
-"""Rotor speeds of a log that has motor commands alone: by the vehicle's motor curve, or by an
-assumption that the log then states.
+"""Rotor speeds of a log with motor commands alone, by the vehicle's motor curve or by an
+assumption, with a note.
 
 Without a curve only the ratio of thrusts is assumed, ``f a^2 + (1 - f) a`` of a command a from 0 to
-1. The scale follows from flying. Where an accelerometer says what acts along the rotors' axis,
-thrust is the mass times its reading, on the median over the flight: a fault or a crash at the end
-does not move the median. Without one, over a flight that begins and ends at rest, the mean vertical
-thrust is the weight, so the thrust along each time's own rotor axis is counted by its vertical
-part; a tilted flight needs more than its weight.
+1. The scale follows from flying. With an accelerometer, thrust is the mass times the reading along
+   the rotors' axis, on the median over the flight: a fault or a crash at the end does not move the
+   median. Without one, the mean vertical thrust is the weight, over a flight from rest to rest. The
+   thrust along each time's own rotor axis is counted by its vertical part: a tilted flight needs
+   more than its weight.
 """
 
 from collections.abc import Sequence
@@ -23,47 +23,46 @@ from .log_map import Commands
 from .magnitudes import within
 from .table import Array
 
-# s, up to which less is a dip in flight: without thrust a vehicle falls 5 m meanwhile. Without the
-# dips high thrusts alone would remain, whose mean is above the weight
+# s, the longest dip of thrust in flight: a vehicle falls 5 m meanwhile. Without dips, high thrusts
+# alone would remain, with a mean above the weight
 _DIP = 1.0
-_SATURATED = 0.9995  # of the full command
+_SATURATED = 0.9995  # share of the full command
 _FELT = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be another
 
 
 def flown_vehicle(vehicle: Vehicle | None, name: str) -> Vehicle | None:
-    """Return the vehicle, or else the one of a name that a log gives, where it comes with the
-    kit.
-    """
+    """Return the vehicle, or else the preset of a log's vehicle name; None: there is none."""
     return _preset(name) if vehicle is None and name in preset_names() else vehicle
 
 
-_preset = cache(load_vehicle)  # a log asks for it three times
+_preset = cache(load_vehicle)  # asked three times a log
 
 
 def with_commanded_speeds(
     log: FlightLog, vehicle: Vehicle | None, model: Commands | None = None
 ) -> FlightLog:
-    """Return a log whose rotor speeds are worked out from its commands, where it has no others.
+    """Return a log with rotor speeds from its commands, unless speeds were measured. Speeds that
+    another vehicle's thrust model gave are replaced by those of ``vehicle``'s motor curve.
 
     Args:
         log: the flight.
-        vehicle: that flew; None: nothing is worked out.
-        model: what a command is assumed to give where the vehicle states no motor curve; None: a
-            thrust that grows with its square.
+        vehicle: of the flight; None: no speeds.
+        model: thrust of a command for a vehicle without a motor curve; None: grows with the
+            command's square.
     """
-    if log.command is None or log.has_rotor_speeds:
+    of_another = log.commanded and vehicle is not None and vehicle.motor_curve is not None
+    if log.command is None or (log.has_rotor_speeds and not of_another):
         return log
     speeds, notes = _speeds(log, log.command, vehicle, model or Commands(()))
-    if speeds is None:
-        return replace(log, notes=(*log.notes, *notes))
-    return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, *notes))
+    log = replace(log, notes=(*log.notes, *notes))
+    return log if speeds is None else replace(log, rotor_speeds=speeds, commanded=True)
 
 
 def _speeds(
     log: FlightLog, command: Array, vehicle: Vehicle | None, model: Commands
 ) -> tuple[Array | None, list[str]]:
-    """Return the rotor speeds (N, 4) in rad/s of commands (N, 4), None where nothing says what
-    these give, and notes.
+    """Return the rotor speeds (N, 4) in rad/s of commands (N, 4), None without a thrust model, and
+    notes.
     """
     unknown = "no rotor speeds: the log has motor commands"
     if vehicle is None:
@@ -90,7 +89,7 @@ def _speeds(
             "battery's voltage. A constant factor on thrust and the mass cannot be found from this "
             "log"
         ]
-        saturated = float(np.mean(command.max(axis=1) >= _SATURATED))
+        saturated = np.mean(command.max(axis=1) >= _SATURATED)
         if saturated > 0.0:
             notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
         return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
@@ -99,7 +98,7 @@ def _speeds(
     relative = model.thrust_factor * np.square(share) + (1.0 - model.thrust_factor) * share
     total = relative.sum(axis=1)
     x, felt = log.accelerometer, None
-    if x is not None:  # beside a pose, one whose size is not usual in flight tells nothing
+    if x is not None:  # beside a pose, an unusual size counts as unknown
         usual = within(float(np.nanmedian(np.linalg.norm(x, axis=1))), _FELT)
         felt = x[:, 2] if usual or not log.has_pose else None
     where = "a pose" if felt is None else "an accelerometer"
@@ -143,7 +142,7 @@ def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]
         "What the firmware's thrust curve, the battery and the motors made of the command is not "
         "in the log; a constant factor on thrust remains unknown"
     ]
-    clipped = int(np.sum(np.any((square < 0.0) | (square > limit), axis=1)))
+    clipped = np.count_nonzero(np.any((square < 0.0) | (square > limit), axis=1))
     if clipped:
         notes.append(
             f"the commands of {clipped} sample(s) were out of the rotors' reach and were clipped"
@@ -158,9 +157,9 @@ def _polynomial(coefficients: Sequence[float]) -> str:
 
 
 def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -> float | None:
-    """Return N of a motor at full command, or None where no motor runs in flight: by what is felt
-    (N,) along the rotors' axis in m/s2, else by the weight. In flight are samples of high thrust,
-    and of low for a moment between high ones.
+    """Return N of a motor at full command, or None where no motor runs in flight: from ``felt``
+    (N,), the specific force along the rotors' axis in m/s2, else from the weight. In flight are
+    samples of high thrust, and of low for a moment between high ones.
     """
     rows = log.valid if felt is None else np.isfinite(felt)
     t, total = log.t[rows], total[rows]

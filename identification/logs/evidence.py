@@ -4,15 +4,15 @@ rule.
 Three balances hold in any flight, whatever small effects a vehicle's model lacks:
 
 * the specific force points along the thrust axis: ``f_h = f_z d_h / d_z`` with ``f = a + g e3`` and
-  the body's z axis ``d``;
-* its vertical part follows the rotors' thrust: ``f_z = T d_z / m``;
+  the body's z axis ``d``.
+* its vertical part follows the rotors' thrust: ``f_z = T d_z / m``.
 * the rotors turn the body: ``J alpha + omega x J omega = tau``; without a vehicle, rotors on one
-  side turn it over to the other.
+  side turn the body to the other.
 
 Each balance leaves a share of the motion's variance unexplained, and shares make a likelihood: with
 Gaussian residuals of unknown size, ``log L = -n/2 sum(log share)``. Undeclared effects last, so a
 flight counts for few independent samples ``n``. A hover tells nothing: all shares are near 1. The
-likeliest reading is taken, less what it must make up for being less usual.
+likeliest reading is taken, after a penalty on unusual ones.
 """
 
 import math
@@ -38,50 +38,43 @@ from ..motion.smoothing import (
 from .flight_log import FlightLog
 from .flight_phases import carrying
 from .log_map import UNITS
-from .readings import DECLARED, OFFSET, Reading, as_written, log_readings
+from .readings import DECLARED, OFFSET, ColumnReading, as_written, log_readings
 from .table import Array, Rows, finite_rows, median_step
 
+# Filters, and when a reading is certain.
+# Hz, of the angular acceleration: from, to, and to of yaw, where rotors do least. Below, steady
+# moments of the air are larger than the torques of turning; above, the pose's noise is
+_TURN_HZ = (1.0, 4.0, 3.0)
+_RATE_HZ = 20.0  # rate of the samples compared
+_MOST = 2000  # samples; of longer flights every second one, or third ...
+_PERIOD = 0.005  # s, the shortest of the filters' clock
+_EDGE = 0.3  # s at either end of a piece, for the filters' start
+_GAP = 0.1  # s (or 3.5 periods) without a sample end a piece
+_SHORTEST = 3.0  # s of a piece
+_FEWEST = 60  # samples in flight for a decision
 
-@dataclass(frozen=True)
-class EvidenceSettings:
-    """Filters, and when a reading is certain."""
+# gains and delays (s) by undeclared effects
+_FORCE_GAIN = (0.6, 1.6)
+_TORQUE_GAIN = (0.4, 2.5)  # and of thrust in commands
+_MOST_THRUST = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
+_DELAYS = tuple(0.02 * k for k in range(-5, 13))
+# s, delays of rotors against the motion on one clock: motors, radio and filters make rotors up
+# to 0.22 s early on measured flights. Then the longest delay searched, and the search's step
+_NEAR = (-0.25, 0.1)
+_FAR = 5.0
+_STEP = 0.02
 
-    # Hz, of the angular acceleration: from, to, and to of yaw, where rotors do least. Below, steady
-    # moments of the air are larger than what turns the body; above, noise of the pose is
-    turn_hz: tuple[float, float, float] = (1.0, 4.0, 3.0)
-    rate_hz: float = 20.0  # of the samples compared
-    most: int = 2000  # of them; of longer flights every second one, or third ...
-    period: float = 0.005  # s, the shortest of the clock of the filters
-    edge: float = 0.3  # s at either end of a piece, where filters start
-    gap: float = 0.1  # s (or 3.5 periods) without a sample, which end a piece
-    shortest: float = 3.0  # s of a piece
-    fewest: int = 60  # samples in flight that decide something
-
-    # what undeclared effects may make of a gain and of a delay (s)
-    force_gain: tuple[float, float] = (0.6, 1.6)
-    torque_gain: tuple[float, float] = (0.4, 2.5)  # and of thrust in commands
-    most_thrust: float = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
-    delays: tuple[float, ...] = tuple(0.02 * k for k in range(-5, 13))
-    # s by which rotors may come late against the motion on one clock: motors, radio and filters
-    # make them up to 0.22 s early on measured flights; the most that is looked for, and its steps
-    near: tuple[float, float] = (-0.25, 0.1)
-    far: float = 5.0
-    step: float = 0.02
-
-    samples: float = 20.0  # independent samples of one component that a flight counts for, at most
-    least_share: float = 0.01  # a smaller share says no more: no model is better
-    most_share: float = 2.0  # a larger share says no more
-    fallen: float = 60.0  # log-likelihood ratio that a flight must make up for lying on its side
-    below: float = 3.0  # the same for a flight below its origin
-    good: float = 0.5  # share up to which a reading is believed, and from which on it is not
-    good_torque: float = 0.65  # the same of torques without a vehicle
-    certain: float = 3.4  # log-likelihood ratio over the next best: 30 to 1
-    # rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
-    # answer disturbances more than they turn the body, and the mirrored order may explain more
-    turning: float = 0.06
-
-
-EVIDENCE = EvidenceSettings()
+_SAMPLES = 20.0  # independent samples of one component in a flight, at most
+_LEAST_SHARE = 0.01  # smaller shares count the same: no model is better
+_MOST_SHARE = 2.0  # larger shares count the same
+_FALLEN = 60.0  # log-likelihood ratio against a flight on its side
+_BELOW = 3.0  # the same against a flight below its origin
+GOOD = 0.5  # share: a reading below is believed
+GOOD_TORQUE = 0.65  # the same of torques without a vehicle
+_CERTAIN_LEAD = 3.4  # log-likelihood ratio over the next best: 30 to 1
+# rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
+# answer disturbances more than they turn the body, and the mirrored order may explain more
+TURNING_RATE = 0.06
 _G = 9.81
 # roll and pitch of rotors 1 to 4, whatever the vehicle
 _SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
@@ -89,30 +82,28 @@ _SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 def likelihood(left: Sequence[float]) -> float:
     """Return the log-likelihood, up to a constant, of shares of one component each."""
-    bounded = (min(max(x, EVIDENCE.least_share), EVIDENCE.most_share) for x in left)
-    return -0.5 * EVIDENCE.samples * sum(map(math.log, bounded))
+    bounded = (min(max(x, _LEAST_SHARE), _MOST_SHARE) for x in left)
+    return -0.5 * _SAMPLES * sum(map(math.log, bounded))
 
 
 def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
-    """Return the shares of variances ``total`` (...) that signals of variance ``power`` and
-    covariance ``cross`` leave, times a gain in range: ``gain`` (2, ...).
+    """Return the shares of variances ``total`` (...) left by signals of variance ``power`` and
+    covariance ``cross``, times a gain in range: ``gain`` (2, ...).
     """
-    with np.errstate(divide="ignore", invalid="ignore"):  # of a variance of zero all is left
+    with np.errstate(divide="ignore", invalid="ignore"):  # all of a zero variance is left
         factor = np.clip(cross / power, *np.asarray(gain))
-        left = np.minimum(
-            1.0 - factor * (2.0 * cross - factor * power) / total, EVIDENCE.most_share
-        )
+        left = np.minimum(1.0 - factor * (2.0 * cross - factor * power) / total, _MOST_SHARE)
     return np.where((total > 0.0) & (power > 0.0), left, 1.0)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Shares of variance that a reading leaves unexplained, and its score."""
+    """Unexplained shares of variance by a reading, and its score."""
 
-    reading: Any  # a Reading, or a SensorReading
-    horizontal: float  # of the horizontal specific force, or of what the sensor measures
-    torques: tuple[float, ...]  # about x, y and, with a vehicle, z
-    score: float  # log-likelihood less what the reading must make up for being less usual
+    reading: Any  # a ColumnReading, or a SensorReading
+    horizontal: float  # share of the horizontal specific force, or of the sensor's vector
+    torques: tuple[float, ...]  # shares about x, y and, with a vehicle, z
+    score: float  # log-likelihood less the penalty on an unusual reading
 
     @property
     def torque(self) -> float:
@@ -130,8 +121,8 @@ class _Piece:
     compared: Rows
 
     def even(self, t: Array, values: Array) -> Array:
-        """Return columns (m, k) on the piece's clock, also of rows between those of the piece; NaN
-        where there are none.
+        """Return columns (m, k) on the piece's clock, also from rows between the piece's own; NaN:
+        there are none.
         """
         inside = slice(self.rows[0], self.rows[-1] + 1)
         x, at = values[inside], t[inside]
@@ -146,7 +137,7 @@ class _Piece:
 
     def band(self, x: Array, rows: Rows | slice = slice(None)) -> Array:
         """Return rows of columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
-        low, high, yaw = (low_pass(x, hz, self.period)[rows] for hz in EVIDENCE.turn_hz)
+        low, high, yaw = (low_pass(x, hz, self.period)[rows] for hz in _TURN_HZ)
         return np.stack([high - low, yaw - low], axis=1)
 
 
@@ -155,11 +146,11 @@ class Evidence:
 
     Args:
         t: (N,) s.
-        thrusts: (N, 4) of the rotors' columns, in any unit that grows with thrust.
+        thrusts: (N, 4) of the rotors' columns, in any unit growing with thrust.
         position: (N, 3) in the columns' unit; None: unknown.
         attitude: (N, 4) or (N, 3) as in the columns; None: unknown.
-        gyro: (N, 3) rad/s, in the kit's body axes, where no attitude tells turns.
-        along: (N,) m/s2, specific force along the body's z axis, where no pose tells it.
+        gyro: (N, 3) rad/s, in the kit's body axes, without an attitude.
+        along: (N,) m/s2, specific force along the body's z axis, without a pose.
         vehicle: as declared; ``thrusts`` are squared rotor speeds then. None: unknown.
     """
 
@@ -176,26 +167,26 @@ class Evidence:
         self._t, self._position, self._attitude = t, position, attitude
         self._gyro, self._along = gyro, along
         self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), _SIDES
-        self._gains = EVIDENCE.torque_gain, (0.0, np.inf)  # of thrust and of torques
+        self._gains = _TORQUE_GAIN, (0.0, np.inf)  # gains of thrust and of torques
         if vehicle is not None:
             self._k, self._inertia, self._mixing = vehicle.k, vehicle.inertia, vehicle.mixing[1:]
-            self._gains = EVIDENCE.force_gain, EVIDENCE.torque_gain
+            self._gains = _FORCE_GAIN, _TORQUE_GAIN
         self._thrusts = thrusts
         if np.isfinite(thrusts).any():
-            most = EVIDENCE.most_thrust * float(np.nanquantile(thrusts, 0.99))
+            most = _MOST_THRUST * np.nanquantile(thrusts, 0.99)
             self._thrusts = np.minimum(thrusts, most)
         moving = [x for x in (position, attitude, gyro) if x is not None]
         there = np.isfinite(t) & np.all([finite_rows(x) for x in moving], axis=0)
         self._pieces = self._cut(np.flatnonzero(there))
         self.has_pose = attitude is not None
-        # whether the flight is long enough to decide something
-        self.enough = sum(len(p.compared) for p in self._pieces) >= EVIDENCE.fewest
+        # whether the flight is long enough for a decision
+        self.enough = sum(len(p.compared) for p in self._pieces) >= _FEWEST
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
 
     @classmethod
     def of_log(cls, log: FlightLog, vehicle: Vehicle, by_imu: bool = False) -> "Evidence":
-        """Return the evidence of a log: of its pose, or of its IMU."""
+        """Return the evidence of a log: by its pose, or by its IMU."""
         squares = np.square(log.rotor_speeds)
         if by_imu:
             assert log.accelerometer is not None
@@ -207,18 +198,18 @@ class Evidence:
         return cls(log.t, squares, position, quaternion, vehicle=vehicle)
 
     def _cut(self, rows: Rows) -> list[_Piece]:
-        """Return the pieces in which the motion is known, and of each which samples fly."""
+        """Return the pieces of known motion, each with its samples in flight."""
         if len(rows) < 2:
             return []
         step = median_step(self._t[rows])
-        period = max(step, EVIDENCE.period)
-        count = len(rows) * step * EVIDENCE.rate_hz
-        every = np.ceil(count / EVIDENCE.most) / (EVIDENCE.rate_hz * period)
+        period = max(step, _PERIOD)
+        count = len(rows) * step * _RATE_HZ
+        every = np.ceil(count / _MOST) / (_RATE_HZ * period)
         pieces, totals = [], []
-        gap = max(EVIDENCE.gap, 3.5 * step)
-        for part in unbroken(self._t, rows, gap, 8, EVIDENCE.shortest):
+        gap = max(_GAP, 3.5 * step)
+        for part in unbroken(self._t, rows, gap, 8, _SHORTEST):
             t = np.arange(self._t[part[0]], self._t[part[-1]], period)
-            edge = round(EVIDENCE.edge / period)
+            edge = round(_EDGE / period)
             compared = np.arange(edge, len(t) - edge, max(1, round(every)))
             piece = _Piece(part, t, period, compared)
             total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
@@ -250,7 +241,7 @@ class Evidence:
 
     @cached_property
     def _middle(self) -> Array:
-        """Median position (3,) in the columns' world and unit; zero where it is unknown."""
+        """Median position (3,) in the columns' world and unit; zero: unknown."""
         if self._position is None:
             return np.zeros(3)
         rows = np.concatenate([p.rows for p in self._pieces])
@@ -258,14 +249,14 @@ class Evidence:
 
     @cached_property
     def _driving(self) -> list[Array]:
-        """Thrusts of each piece (m, 10): of four rotors in the band of roll and pitch, in that of
-        yaw, and of all together, low-passed and as they are, in m/s2; their median in flight is
-        gravity.
+        """Thrusts of each piece (m, 10): four in the band of roll and pitch, four in the band of
+        yaw, and the total, low-passed and raw. The total is in m/s2, with gravity as its median in
+        flight.
         """
         thrusts = [p.even(self._t, self._thrusts) for p in self._pieces]
         each = list(zip(thrusts, self._pieces, strict=True))
         totals = np.concatenate([(x @ self._k)[p.compared] for x, p in each])
-        scale = _G / max(float(np.median(totals)), 1e-300)
+        scale = _G / max(np.median(totals), 1e-300)
         out = []
         for x, p in each:
             total = scale * (x @ self._k)
@@ -273,8 +264,9 @@ class Evidence:
         return out
 
     def _pushes(self, *delays: float) -> tuple[Array, Array]:
-        """Return which samples compared less each delay (d, n) lie within their piece (1, or 0),
-        and the first thrusts (d, 9, n) of ``_driving`` there less their means; zero elsewhere.
+        """Return whether the samples compared, less each delay (d, n), lie within their piece (1,
+        or 0), and thrusts. The thrusts (d, 9, n) are the first nine of ``_driving``, less their
+        means; zero elsewhere.
         """
         there, out = [], []
         for x, p in zip(self._driving, self._pieces, strict=True):
@@ -287,9 +279,9 @@ class Evidence:
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
-    def _turned(self, reading: Reading) -> Iterator[tuple[Array, Array]]:
-        """Yield the rotations (m, 3, 3), zero where no attitude is known, and the angular velocity
-        (m, 3) of each piece by the way in which a reading turns columns into rotations.
+    def _turned(self, reading: ColumnReading) -> Iterator[tuple[Array, Array]]:
+        """Yield each piece's rotations (m, 3, 3), zero without an attitude, and angular velocity
+        (m, 3), by a reading.
         """
         quaternion = None
         if self._attitude is not None:
@@ -306,12 +298,12 @@ class Evidence:
                 yield turning(q, p.period)
 
     def _moving(self, *attitude: Any) -> tuple[Array, Array]:
-        """Return what moves the body by one way to turn columns into rotations: specific thrust
-        times the body's axes (n, 3, 3) in m/s2, in the world; and, in two bands, angular
-        velocity, angular acceleration and products of the angular velocity (n, 2, 15).
+        """Return thrust and turns by one reading of the attitude. Thrust is specific, times the
+        body's axes (n, 3, 3), in m/s2, in the world. Turns in two bands (n, 2, 15) are angular
+        velocity, angular acceleration and products of the angular velocity.
         """
         axes, turns = [], []
-        turned = self._turned(Reading(*attitude))
+        turned = self._turned(ColumnReading(*attitude))
         for p, thrusts, (matrices, w) in zip(self._pieces, self._driving, turned, strict=True):
             axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
             products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
@@ -319,10 +311,10 @@ class Evidence:
             turns.append(p.band(columns, p.compared))
         return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turns)
 
-    def _needed(self, along: Array, reading: Reading) -> Array:
-        """Return the force ``along`` the thrust axis (n,) above the torques in Nm that the motion
-        needs, in the band of turning (4, n), less their means; without a vehicle, the angular
-        acceleration in place of torques.
+    def _needed(self, along: Array, reading: ColumnReading) -> Array:
+        """Return the force ``along`` the thrust axis (n,) above the torques in Nm of the motion, in
+        the band of turning (4, n), less their means. Without a vehicle, angular accelerations stand
+        for torques.
         """
         # a pseudovector: a mirrored body frame turns its sign as well
         body = reading.frames.body
@@ -335,11 +327,10 @@ class Evidence:
         return needed
 
     def _balances(self, *moves: Any) -> tuple[float, float, Array]:
-        """Return what a reading's motion says whatever the rotors: the share of the horizontal
-        force that is left, the log-likelihood ratio that a flight must make up for its place, and
-        the force along the thrust axis in m/s2 above the torques (``_needed``).
+        """Return the terms of a reading without rotors. They are the unexplained share of the
+        horizontal force, the penalty on the flight's place (log-likelihood ratio), and ``_needed``.
         """
-        reading = Reading(*moves)
+        reading = ColumnReading(*moves)
         if self._attitude is None:
             force = np.zeros(len(self._t)) if self._along is None else self._along
             felt = self._compared(lambda p: p.slow(p.even(self._t, force[:, None])))
@@ -351,12 +342,12 @@ class Evidence:
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
         mean, size = push.mean(axis=0), np.linalg.norm(push, axis=1)
         along = np.sum(force * push, axis=1) / np.maximum(size, 1e-9)
-        cost = EVIDENCE.fallen * (mean[2] <= EVIDENCE.good * np.linalg.norm(mean))
-        cost += EVIDENCE.below * ((frames.position @ self._middle)[2] < 0.0)
-        left = shares(needed @ needed, given @ given, needed @ given, EVIDENCE.force_gain)
+        cost = _FALLEN * (mean[2] <= GOOD * np.linalg.norm(mean))
+        cost += _BELOW * ((frames.position @ self._middle)[2] < 0.0)
+        left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
         return float(left), float(cost), self._needed(along, reading)
 
-    def fit(self, reading: Reading, torques: bool = True) -> Fit:
+    def fit(self, reading: ColumnReading, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
         mixing = self._mixing if torques else self._mixing[:0]
         mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
@@ -367,7 +358,7 @@ class Evidence:
         gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
         horizontal, cost, motion = self._moved(*reading.moves)
         needed = motion[: len(rows)]
-        delays = EVIDENCE.delays if torques else (0.0,)
+        delays = _DELAYS if torques else (0.0,)
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
         left = shares(
@@ -376,18 +367,18 @@ class Evidence:
             np.sum(given * needed, axis=2),
             np.transpose(gains),
         )
-        left[there.sum(axis=1) < EVIDENCE.fewest] = EVIDENCE.most_share
+        left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
         vertical, *others = max(left.tolist(), key=likelihood)
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
         return Fit(reading, horizontal, tuple(others), score)
 
     def late(self) -> float:
-        """Return by how many s the rotors' columns come late against the motion, as declared; 0
-        where they do not, or where the flight does not tell.
+        """Return the delay in s of the rotors' columns against the motion, as declared; 0: none, or
+        unknown.
 
-        In the band of turning the force along the thrust axis follows the thrust, and what turns
-        the body the torques. Their signs are correlated over all lags: one landing outweighs a
-        flight otherwise. By chance a correlation has the variance of Bartlett's formula.
+        In the band of turning the force along the thrust axis follows the thrust, and angular
+        acceleration the torques. Their signs are correlated over all lags: one landing outweighs a
+        flight otherwise. The variance of a chance correlation is by Bartlett's formula.
         """
         mixing = np.vstack([self._k, self._mixing])
         sums, chance = np.zeros(1), np.full(4, 1e-300)
@@ -399,8 +390,8 @@ class Evidence:
                 along = p.even(self._t, self._along[:, None])[:, 0]
             turn = derivative(w, p.period) @ self._inertia + np.cross(w, w @ self._inertia)
             both = p.even(self._t, self._thrusts) @ mixing.T, np.column_stack([along, turn])
-            thin = max(1, round(EVIDENCE.step / p.period))
-            most = round(EVIDENCE.far / (thin * p.period))
+            thin = max(1, round(_STEP / p.period))
+            most = round(_FAR / (thin * p.period))
             signs = [np.sign(p.band(x, slice(None, None, thin))[:, 0]) for x in both]
             length = next_fast_len(len(signs[0]) + most, real=True)
             given, needed = (np.fft.rfft(x, length, axis=0) for x in signs)
@@ -410,26 +401,28 @@ class Evidence:
             lags = thin * p.period * np.arange(-most, most + 1)
         squares = 0.5 * np.square(sums) / chance
         follows = np.sum(squares * (sums > 0.0), axis=1)
-        is_near = (lags >= EVIDENCE.near[0]) & (lags <= EVIDENCE.near[1])
-        best = int(np.argmax(np.where(is_near, 0.0, follows)))
+        is_near = (lags >= _NEAR[0]) & (lags <= _NEAR[1])
+        best = np.argmax(np.where(is_near, 0.0, follows))
         lead = follows[best] - np.max(np.sum(squares, axis=1)[is_near])
         return float(lags[best]) if lead > OFFSET else 0.0
 
-    def turns(self, reading: Reading) -> float:
+    def turns(self, reading: ColumnReading) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
         rates = self._motion(*reading.attitude)[1][:, 0, :2]
         return float(np.sqrt(np.mean(np.square(rates))))
 
 
 @dataclass(frozen=True, eq=False)
-class Ranking:
+class RankedFits:
     """Fits of readings, the likeliest first."""
 
     ranked: Sequence[Fit]
-    left: str = "horizontal acceleration is left by the tilt"  # of what a reading leaves a share
+    left: str = "horizontal acceleration is left by the tilt"  # words for the unexplained share
 
     @classmethod
-    def of(cls, evidence: Evidence, readings: Sequence[Reading], torques: bool = True) -> "Ranking":
+    def of(
+        cls, evidence: Evidence, readings: Sequence[ColumnReading], torques: bool = True
+    ) -> "RankedFits":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
         fits = (
             evidence.fit(r, torques) if evidence.enough else Fit(r, 1.0, (), -r.unlikely)
@@ -439,7 +432,7 @@ class Ranking:
 
     @property
     def best(self) -> Any:
-        """The reading that is taken."""
+        """The likeliest reading."""
         return self.ranked[0].reading
 
     @property
@@ -449,9 +442,9 @@ class Ranking:
 
     def other(self, name: str) -> tuple[object, float]:
         """Return the next best value of a property, and the log-likelihood ratio of the best over
-        that value (0 where the flight tells nothing, infinite where there is no other value).
+        the next. The ratio is 0 where the flight tells nothing, infinite without another value.
         """
-        tells = self.fit.horizontal <= EVIDENCE.good
+        tells = self.fit.horizontal <= GOOD
         for fit in self.ranked:
             if (value := getattr(fit.reading, name)) != getattr(self.best, name):
                 return value, self.fit.score - fit.score if tells else 0.0
@@ -459,7 +452,7 @@ class Ranking:
 
     def certain(self, *names: str) -> bool:
         """Return whether every other value of properties explains the flight clearly less."""
-        return all(self.other(name)[1] >= EVIDENCE.certain for name in names)
+        return all(self.other(name)[1] >= _CERTAIN_LEAD for name in names)
 
     def says(self, name: str) -> tuple[Any, bool, str]:
         """Return the best value of a property, whether it is certain, and why."""
@@ -470,18 +463,18 @@ class Ranking:
         return getattr(self.best, name), self.certain(name), why
 
 
-def departures(evidence: Evidence) -> list[Reading]:
-    """Return the readings that explain a log where the log as declared does not: none, one, or
-    several that fit alike.
+def departures(evidence: Evidence) -> list[ColumnReading]:
+    """Return the readings that explain a log better than its declaration: none, one, or several
+    equally good.
     """
     if evidence.enough and (late := evidence.late()):
-        return [Reading(late=late)]
-    ranking = Ranking.of(evidence, log_readings(evidence.has_pose))
-    best, left, most = ranking.best, ranking.fit.torque, EVIDENCE.good_torque
+        return [ColumnReading(late=late)]
+    ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
+    best, left, most = ranking.best, ranking.fit.torque, GOOD_TORQUE
     if evidence.has_pose and best.moves != DECLARED.moves:  # forces tell, not torques
-        left, most = ranking.fit.horizontal, EVIDENCE.good
+        left, most = ranking.fit.horizontal, GOOD
     if best is DECLARED or left > most:
         return []
-    least = ranking.fit.score - EVIDENCE.certain
+    least = ranking.fit.score - _CERTAIN_LEAD
     readings = [fit.reading for fit in ranking.ranked if fit.score >= least]
     return [reading for reading in readings if reading is not DECLARED]

@@ -9,15 +9,15 @@ import numpy as np
 
 from .flight_log import FlightLog, with_rows
 
-LONGEST = 480.0  # s of flight, all logs together, that are looked at whole
-_WINDOW = 60.0  # s, of what is looked at of longer ones
+LONGEST = 480.0  # s of flight, all logs together, used whole
+_WINDOW = 60.0  # s, a window of longer flights
 
 
 def excerpt(logs: Sequence[FlightLog]) -> list[FlightLog]:
     """Return the logs, or windows of a minute spread evenly over each where they last more than
     ``LONGEST`` together.
 
-    What is left out is a gap in the log, and a note of the log says so.
+    The rest becomes a gap in the log, with a note.
     """
     seconds = [float(log.t[-1] - log.t[0]) for log in logs]
     share = LONGEST / max(sum(seconds), LONGEST)

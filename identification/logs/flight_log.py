@@ -1,27 +1,24 @@
-"""A flight log: what was measured on a flight, in SI units and this kit's conventions.
+"""A flight log: the measurements of a flight, in SI units and this kit's conventions.
 
 One row a sample, time strictly increasing. Columns of the file:
 
-| column                       | unit  | meaning                                                                   |
-| ---------------------------- | ----- | ------------------------------------------------------------------------- |
-| ``t``                        | s     | time                                                                      |
-| ``px, py, pz``               | m     | position of the geometric centre, world, z up                             |
-| ``qw, qx, qy, qz``           | 1     | attitude, body to world, scalar first; its sign means nothing             |
-| ``omega1 ... omega4``        | rad/s | rotor speeds: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right      |
-| ``vbat`` (optional)          | V     | battery voltage                                                           |
-| ``fx, fy, fz`` (optional)    | N     | true external force, world                                                |
-| ``tx, ty, tz`` (optional)    | Nm    | true external torque, world; force and torque come together or not at all |
-| ``ax, ay, az`` (optional)    | m/s2  | accelerometer at the centre: specific force, body; +g along z in a hover  |
-| ``gx, gy, gz`` (optional)    | rad/s | gyro: angular velocity, body                                              |
-| ``cmd1 ... cmd4`` (optional) | 1     | motor commands, 0 to 1, in the rotors' order                              |
-| ``vehicle=NAME`` (optional)  | 1     | 1 in every row: the vehicle that flew, named by the column's own name     |
+| column                       | unit  | meaning                                                                   | |
+---------------------------- | ----- | ------------------------------------------------------------------------- | | ``t``
+| s     | time                                                                      | | ``px, py, pz``               | m     |
+position of the geometric centre, world, z up                             | | ``qw, qx, qy, qz``           | 1     | attitude,
+body to world, scalar first; its sign means nothing             | | ``omega1 ... omega4``        | rad/s | rotor speeds: 1
+front-left, 2 rear-left, 3 rear-right, 4 front-right      | | ``vbat`` (optional)          | V     | battery voltage
+| | ``fx, fy, fz`` (optional)    | N     | true external force, world                                                | | ``tx, ty,
+tz`` (optional)    | Nm    | true external torque, world; force and torque come together or not at all | | ``ax, ay, az``
+(optional)    | m/s2  | accelerometer at the centre: specific force, body; +g along z in a hover  | | ``gx, gy, gz`` (optional)
+| rad/s | gyro: angular velocity, body                                              | | ``cmd1 ... cmd4`` (optional) | 1     |
+motor commands, 0 to 1, in the rotors' order                              | | ``vehicle=NAME`` (optional)  | 1     | 1 in every
+row: vehicle's name, in the column's own name     |
 
-A row whose seven pose fields are all empty is one in which motion capture lost the vehicle, or one between two poses.
-The pose's columns may be left out altogether where accelerometer and gyro are there, or the quaternion's alone, and the
-rotor speeds' where motor commands are.
-A row whose three fields of an inertial sensor are all empty is one in which it was not read, so a sensor faster than the
-pose has rows of its own. Other columns are ignored. The name of the vehicle stands in a header, so that whatever reads a table of
-numbers still reads one.
+A row with all seven pose fields empty lies between two poses, or motion capture lost the vehicle in that row. With accelerometer
+and gyro, the pose's columns may be left out, or the quaternion's alone. With motor commands, the rotor speeds may be left out. In
+a row with an inertial sensor's three fields empty, the sensor was not read: a sensor faster than the pose has rows of its own.
+Other columns are ignored. The vehicle's name stands in a header, so the table holds numbers alone.
 """  # noqa: E501
 
 from __future__ import annotations
@@ -48,7 +45,7 @@ REQUIRED = ("t", *POSE, *ROTORS)
 
 VEHICLE = re.compile(r"vehicle=([A-Za-z0-9][A-Za-z0-9_.+ -]{0,63})")  # a column's name
 
-NORM_TOLERANCE = 0.02  # of a quaternion's length
+NORM_TOLERANCE = 0.02  # tolerance of a quaternion's length
 _GAP = 3.0  # median time steps
 
 
@@ -56,33 +53,33 @@ _GAP = 3.0  # median time steps
 class FlightLog:
     """One flight, checked: times increase, numbers are finite, quaternions have length 1.
 
-    A row in which an inertial sensor was read along some of its axes alone counts as not read.
+    An inertial sensor's row with some axes missing counts as not read.
 
     Attributes:
         t: (N,) s.
         position: (N, 3) m, world; NaN where the pose is missing.
         quaternion: (N, 4) body to world, scalar first; NaN where the pose is missing.
-        rotor_speeds: (N, 4) rad/s; NaN in every row where the log has commands that nothing turned
-            into speeds.
+        rotor_speeds: (N, 4) rad/s; NaN in every row of a log with commands and without a thrust
+            model.
         voltage: (N,) V.
         force: (N, 3) N, world, truth.
         torque: (N, 3) Nm, world, truth.
         accelerometer: (N, 3) m/s2, body: specific force, +g along z in a hover; NaN rows: not
             measured.
         gyro: (N, 3) rad/s, body; NaN rows: not measured.
-        name: by which messages call it.
+        name: the log's name in messages.
         source: the file and the reader.
         notes: gaps, doubts about units, and the thrust model where rotor speeds were not measured.
         valid: (N,) the pose is there.
-        extra: (N,) or (N, ...) SI; what a reader found besides.
+        extra: (N,) or (N, ...) SI; further channels of a reader.
         commanded: rotor speeds are computed from commands: scale of thrust unknown, moments not to
             be trusted.
         command: (N, 4) motor commands, 0 to 1, in the rotors' order.
-        vehicle: name of the vehicle that flew, where the log or its reader knows it.
-        rates: Hz, how often each channel was measured (``streams``), by its section of a log
-            map: position, rotors, commands, wrench, battery, accelerometer, gyro. A channel that
-            is not named was measured in every row.
-        flown: what the log states of its vehicle.
+        vehicle: the vehicle's name, where the log or its reader knows one.
+        rates: Hz, the rate of measurement of each channel (``streams``), by its section of a log
+            map: position, rotors, commands, wrench, battery, accelerometer, gyro. Channels without
+            a rate were measured in every row.
+        flown: the log's statements on its vehicle.
     """
 
     t: Array
@@ -107,8 +104,7 @@ class FlightLog:
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
-            pose = np.column_stack([self.position, self.quaternion])
-            there = finite_rows(pose)
+            there = finite_rows(self.position) & finite_rows(self.quaternion)
             object.__setattr__(self, "valid", there)
         for name in ("accelerometer", "gyro"):
             x = getattr(self, name)
@@ -123,7 +119,7 @@ class FlightLog:
 
     @property
     def has_pose(self) -> bool:
-        """Is there any pose in it?"""
+        """Has the log any pose?"""
         return bool(self.valid.any())
 
     @property
@@ -133,7 +129,7 @@ class FlightLog:
 
     @property
     def motor_rate(self) -> float:
-        """How often what tells the rotors was measured, Hz: speeds, else what was commanded."""
+        """Rate of measured rotor speeds, else of commands, Hz."""
         names = ("commands", "wrench") if self.commanded else ("rotors", "commands", "wrench")
         return next((self.rates[name] for name in names if name in self.rates), np.inf)
 
@@ -158,9 +154,7 @@ def time_notes(t: Array) -> tuple[str, ...]:
 
 
 def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
-    """Return a log with the rows (N,) that are to be kept alone; the log itself where that is all
-    of them.
-    """
+    """Return a log with the rows ``keep`` (N,); the log itself where all are kept."""
     if keep.all():
         return log
     parts: dict[str, Any] = {
@@ -170,7 +164,7 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
 
 
 def parts_of(log: FlightLog) -> list[tuple[tuple[str, ...], Array]]:
-    """Return what a log holds (N, k), beside the names of the columns that it has in a file."""
+    """Return a log's channels (N, k), with their columns' names in a file."""
     pose = np.where(log.valid[:, None], np.column_stack([log.position, log.quaternion]), np.nan)
     parts: list[tuple[tuple[str, ...], Array | None]] = [(("t",), log.t)]
     if log.has_pose or log.accelerometer is None or log.gyro is None:

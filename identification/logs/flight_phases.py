@@ -12,43 +12,42 @@ from .table import Array, Mask, finite_rows
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
 
-_TURNING = 0.1  # of the weight: less thrust is a rotor at rest
+_TURNING = 0.1  # share of the weight: less thrust is a rotor at rest
 _CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
 _WELL_ABOVE = 0.2  # of the typical height
 _CLIMB = 0.1  # m/s: slower is not climbing or sinking
-_CLIMB_WINDOW = 0.25  # s, either side, over which the mean climb rate is taken
+_CLIMB_WINDOW = 0.25  # s, either side, of the mean climb rate
 _MOVES = 0.1  # m of way: a vehicle at rest moves by less, whatever the noise of its pose
-_DROVE = 2.0, 0.003  # m of way, over which the height of what flies changes by more than this
+_DROVE = 2.0, 0.003  # m of way, and m of height: a flight over this way changes its height by more
 _TURNS = 0.03  # rad/s, of means over _MEAN: a vehicle at rest turns by less, whatever its vibration
 _MEAN = 0.2  # s
 
 
 def flying(total: Array) -> Mask:
-    """Return at which samples (N,) the rotors carry a vehicle, by their thrust (N,) in any unit:
-    above half of the level that a tenth of the samples exceed.
+    """Return the samples (N,) with enough thrust (N,), in any unit, to carry a vehicle: more than
+    half of the 90th percentile.
     """
     return total > 0.5 * np.quantile(total, 0.9)
 
 
 def usual_thrust(total: Array) -> float:
-    """Return the median thrust of rotors that turn, by their thrust (N,) in any unit; infinite
-    where none does.
+    """Return the median thrust of turning rotors, by their thrust (N,) in any unit; infinite: none
+    turns.
     """
     turning = total[total > 0.3 * np.quantile(total, 0.95)]
     return float(np.median(turning)) if turning.size else np.inf
 
 
 def carrying(total: Array) -> Mask:
-    """Return at which samples (N,) the rotors carry a vehicle that hovers most of the time, by
-    their thrust (N,) in any unit: above half of the usual one.
+    """Return the samples (N,) with enough thrust (N,), in any unit, to carry a mostly hovering
+    vehicle: more than half of the usual thrust.
     """
     return total > 0.5 * usual_thrust(total)
 
 
 def flew(log: FlightLog) -> tuple[str, str]:
-    """Return whether a log shows that its vehicle flew, and by what: "no" where the motors never
-    turn, "not shown" where what was measured is that of a vehicle on the ground, "unknown" where
-    nothing was measured that tells.
+    """Return whether a log's vehicle flew, and why: "no" where the motors never turn, "not shown"
+    where the vehicle may stand or drive on the ground, "unknown" without measured motion.
     """
     if log.has_rotor_speeds:
         total = np.square(log.rotor_speeds).sum(axis=1)
@@ -59,19 +58,19 @@ def flew(log: FlightLog) -> tuple[str, str]:
     if not np.any(total > 0.0):
         return "no", "the motors never turn"
     aloft = carrying(total)
-    told = f"yes, {float(aloft.sum()) * log.period:.3g} s"
+    told = f"yes, {aloft.sum() * log.period:.3g} s"
     place = log.position[aloft & finite_rows(log.position)]
     if len(place) > 1:
         way = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
-        far = float(np.linalg.norm(way))
+        far = np.linalg.norm(way)
         said = f"the motors turn, and the position spans {far:.3g} m, {way[2]:.3g} m of height"
-        drove = float(np.hypot(*way[:2])) > _DROVE[0] and way[2] < _DROVE[1]
+        drove = np.hypot(*way[:2]) > _DROVE[0] and way[2] < _DROVE[1]
         return "not shown" if far < _MOVES or drove else told, said
     if log.gyro is not None:
         rates = log.gyro[aloft & finite_rows(log.gyro)]
         count = max(1, round(_MEAN / log.period))
         means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
-        turns = float(np.std(means, axis=0).max(initial=0.0)) if len(means) else 0.0
+        turns = np.std(means, axis=0).max(initial=0.0) if len(means) else 0.0
         said = f"the motors turn, and the body by {turns:.2g} rad/s"
         return "unknown" if turns < _TURNS else told, said
     return "unknown", "the motors turn, and no motion was logged"
@@ -86,46 +85,42 @@ class Phase(NamedTuple):
 
 
 def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle) -> list[Phase]:
-    """Return the phases of a flight in order of time; together they cover it.
+    """Return the phases of a flight in order of time; without gaps.
 
-    A log that begins (or ends) with its rotors turning begins (or ends) in flight. Take-off lasts
-    from leaving the ground until the first climb ends, landing from the start of the last descent
-    until touching the ground.
+    A log beginning (or ending) with turning rotors begins (or ends) in flight. Take-off lasts from
+    leaving the ground until the first climb ends, landing from the start of the last descent until
+    touching the ground.
 
     Args:
         t: (N,) s.
         height: (N,) m.
         rotor_speeds: (N, 4) rad/s.
-        vehicle: the vehicle that flew.
+        vehicle: the vehicle.
     """
     at_rest = np.square(rotor_speeds) @ vehicle.k < _TURNING * vehicle.weight
+    grounded = [Phase(GROUND, float(t[0]), float(t[-1]))]
     if at_rest.all():
-        return [Phase(GROUND, float(t[0]), float(t[-1]))]
+        return grounded
     turning = np.flatnonzero(~at_rest)
     on, off, last = int(turning[0]), int(turning[-1]), len(t) - 1
-    starts, lands = on > 0, off < last  # whether the log shows it
+    starts, lands = on > 0, off < last  # whether the log shows take-off and landing
     before = float(np.median(height[:on])) if starts else -np.inf
     after = float(np.median(height[off + 1 :])) if lands else -np.inf
     clear = height > max(before, after) + _CLEARANCE
     clear[:on] = clear[off + 1 :] = False
     if not clear.any():  # the rotors turned, but the vehicle never left the ground
-        return [Phase(GROUND, float(t[0]), float(t[-1]))]
+        return grounded
 
-    # well above the ground, so that a bounce on landing is no flight
+    # well above the ground: a bounce on landing is no flight
     typical = float(np.median(height[clear]))
     window = _CLIMB_WINDOW
     climb = (np.interp(t + window, t, height) - np.interp(t - window, t, height)) / (2 * window)
     lift_off, cruise, descent, touch_down = 0, 0, last, last
     if starts:
-        up = int(np.argmax(clear & (height >= before + _WELL_ABOVE * (typical - before))))
-        lift_off = up - _run(clear[up::-1]) + 1
-        cruise = up + _run(climb[up:] > _CLIMB)
-    if lands:
-        down = last - int(
-            np.argmax((clear & (height >= after + _WELL_ABOVE * (typical - after)))[::-1])
-        )
-        touch_down = down + _run(clear[down:]) - 1
-        descent = down - _run(climb[down::-1] < -_CLIMB)
+        lift_off, cruise = _first_climb(clear, height, before, typical, climb)
+    if lands:  # a take-off, backwards in time
+        up, end = _first_climb(clear[::-1], height[::-1], after, typical, -climb[::-1])
+        touch_down, descent = last - up, last - end
     cruise, descent = min(cruise, touch_down), max(descent, lift_off)
     if cruise > descent:  # a hop: up and down again at once
         cruise = descent = (cruise + descent) // 2
@@ -136,6 +131,14 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         for name, a, b in zip(names, edges, edges[1:], strict=False)
         if b > a
     ]
+
+
+def _first_climb(
+    clear: Mask, height: Array, ground: float, typical: float, climb: Array
+) -> tuple[int, int]:
+    """Return the first sample off the ground, and the first behind the climb (N,) from there."""
+    up = int(np.argmax(clear & (height >= ground + _WELL_ABOVE * (typical - ground))))
+    return up - _run(clear[up::-1]) + 1, up + _run(climb[up:] > _CLIMB)
 
 
 def _run(true: Mask) -> int:

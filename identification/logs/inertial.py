@@ -1,16 +1,15 @@
-"""Are a log's gyro and accelerometer what their columns claim: rad/s and m/s2, body axes forward,
-left, up?
+"""Checks of a log's gyro and accelerometer: rad/s and m/s2, body axes forward, left, up.
 
-The pose knows. Over a short window the mean of the gyro is the turn of the
-attitude, ``log(q(t)^-1 q(t + T)) / T``, but for a bias; and the accelerometer turned into the
-world, averaged twice over ``T``, is the second difference of the position, plus gravity:
-``(p(t + T) - 2 p(t) + p(t - T)) / T^2 + g e3``. Both hold whatever the vehicle's model lacks, on
-logs of any length. A sensor that contradicts them is left out, with a note: the pose and the rotors
-are enough for everything. Without a pose, gravity alone is left to show the accelerometer.
+The pose knows. Over a short window the mean of the gyro is the turn of the attitude, ``log(q(t)^-1
+q(t + T)) / T``, but for a bias. The accelerometer in world axes, averaged twice over ``T``, is the
+second difference of the position, plus gravity: ``(p(t + T) - 2 p(t) + p(t - T)) / T^2 + g e3``.
+Both hold whatever the vehicle's model lacks, on logs of any length. A contradicting sensor is left
+out, with a note: the pose and the rotors are enough for everything. Without a pose, gravity alone
+is left to show the accelerometer.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,36 +17,29 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
 from ..motion.smoothing import resampled, second_difference
-from .evidence import EVIDENCE, likelihood
+from .evidence import GOOD, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
 from .table import Array, finite_rows
 
-
-@dataclass(frozen=True)
-class InertialSettings:
-    """How inertial sensors are compared."""
-
-    window: float = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
-    step: float = 0.05  # s between two comparisons
-    gap: float = 0.1  # s without a sample, across which nothing is compared
-    fewest: int = 10  # comparisons that decide something
-    samples: int = 20  # of pose and of sensor that do
-    still: float = 0.1  # rad/s: what pose noise makes of the rate of a vehicle that stands still
-    moving: float = 0.5  # m/s2 of horizontal acceleration, far above what pose noise makes of it
-
-
-INERTIAL = InertialSettings()
+# How inertial sensors are compared.
+_WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
+_STEP = 0.05  # s between two comparisons
+_GAP = 0.1  # s without a sample; no comparison across
+_FEWEST = 10  # comparisons for a decision
+LEAST_SAMPLES = 20  # of pose and of sensor, at least
+_STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
+_MOVING = 0.5  # m/s2 of horizontal acceleration, far above pose noise
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
 def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tuple[str, ...]]:
-    """Return a log without inertial sensors that contradict its pose, and a note on each.
+    """Return a log without the inertial sensors contradicting its pose, and a note on each.
 
     Args:
         log: the flight.
-        gravity: m/s2, of the vehicle that flew.
+        gravity: m/s2, of the vehicle's flight.
     """
     notes = []
     seen = np.flatnonzero(log.valid)
@@ -83,32 +75,31 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
             notes.append(f"{columns} {doubt}. They were left out")
             left_out: dict[str, Any] = {field: None}
             log = replace(log, **left_out)
-        elif shares is None and alone:  # no pose shows how wrong it is
+        elif shares is None and alone:  # no pose shows the error
             notes.append(f"{columns} {alone}")
     return log, tuple(notes)
 
 
 def is_stuck(measured: Array) -> bool:
     """Return whether the readings (N, 3) of a sensor are all the same."""
-    return len(measured) >= INERTIAL.samples and bool(np.all(np.ptp(measured, axis=0) == 0.0))
+    return len(measured) >= LEAST_SAMPLES and bool(np.all(np.ptp(measured, axis=0) == 0.0))
 
 
 def sensor_doubt(
     shares: Sequence[float] | None, readings: Sequence[SensorReading], otherwise: str
 ) -> str:
-    """Return what is wrong with a sensor, or nothing.
+    """Return the words on a wrong sensor, or nothing.
 
     Args:
-        shares: of the variance that the sensor leaves: as declared, then by each reading; None:
-            unknown.
+        shares: unexplained shares of variance: as declared, then by each reading; None: unknown.
         readings: the other ones.
-        otherwise: what to say where no reading explains the sensor.
+        otherwise: words for a sensor without an explanation.
     """
-    if shares is None or shares[0] <= EVIDENCE.good:
+    if shares is None or shares[0] <= GOOD:
         return ""
     declared, *others = (likelihood([share] * 3) for share in shares)
     best = max(others)
-    if min(shares[1:]) > EVIDENCE.good or best - declared < OTHER:
+    if min(shares[1:]) > GOOD or best - declared < OTHER:
         return otherwise
     alike = [r.says for score, r in zip(others, readings, strict=True) if score > best - 1.0]
     return "; or ".join(alike[:3])
@@ -117,27 +108,27 @@ def sensor_doubt(
 def gyro_shares(
     t: Array, gyro: Array, pose_times: Array, attitude: Rotation, turns: Sequence[Array]
 ) -> list[float] | None:
-    """Return which share of the attitude's rate a gyro leaves, by each of several readings; None
-    where too little is measured.
+    """Return the share of the attitude's rate left by a gyro, by each of several readings; None:
+    too little is measured.
 
     Args:
         t: (N,) s, of the gyro.
-        gyro: (N, 3) as it stands.
+        gyro: (N, 3) as in the columns.
         pose_times: (M,) s.
         attitude: (M) body to world.
-        turns: (3, 3) each, by which a reading multiplies the gyro.
+        turns: (3, 3) each, a reading's factor on the gyro.
     """
     read = np.isfinite(t) & finite_rows(gyro)
     t, gyro = t[read], gyro[read]
     begins = _windows(pose_times, t, before=0.0)
-    if len(begins) < INERTIAL.fewest:
+    if len(begins) < _FEWEST:
         return None
-    at, ends = Slerp(pose_times, attitude), begins + INERTIAL.window
-    turned = (at(begins).inv() * at(ends)).as_rotvec() / INERTIAL.window
+    at, ends = Slerp(pose_times, attitude), begins + _WINDOW
+    turned = (at(begins).inv() * at(ends)).as_rotvec() / _WINDOW
     sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
-    mean = (resampled(ends, t, sum_of) - resampled(begins, t, sum_of)) / INERTIAL.window
+    mean = (resampled(ends, t, sum_of) - resampled(begins, t, sum_of)) / _WINDOW
     motion, seen = turned - np.median(turned, axis=0), mean - np.median(mean, axis=0)  # a bias
-    size = _middle(motion) + INERTIAL.still**2
+    size = _middle(motion) + _STILL**2
     return [_middle(motion - seen @ turn.T) / size for turn in turns]
 
 
@@ -149,36 +140,36 @@ def _force_shares(
     position: Array,
     gravity: float,
 ) -> tuple[list[float] | None, Array | None]:
-    """Return which share of acceleration and gravity an accelerometer leaves, as declared and by
-    each reading, None where too little is measured; and the specific force in body axes (N, 3)
-    where its columns hold an acceleration in world axes, else None.
+    """Return the shares of acceleration and gravity left by an accelerometer, as declared and by
+    each reading; None: too little is measured. For an acceleration in world axes return the
+    specific force in body axes (N, 3), too, else None.
 
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
     """
-    middles = _windows(pose_times, t, before=INERTIAL.window)
-    if len(middles) < INERTIAL.fewest:
+    middles = _windows(pose_times, t, before=_WINDOW)
+    if len(middles) < _FEWEST:
         return None, None
     inside = (t >= pose_times[0]) & (t <= pose_times[-1])
     body = Slerp(pose_times, attitude)(np.clip(t, pose_times[0], pose_times[-1]))
 
     def mean(force: Array) -> Array:
-        """Return a force's (N, 3) mean over two windows, as a second difference weighs it."""
+        """Return a force's (N, 3) mean over two windows, weighted as by a second difference."""
         sums, times = force[inside], t[inside]
         for _ in range(2):
             sums = cumulative_trapezoid(sums, times, axis=0, initial=0.0)
-        return second_difference(middles, INERTIAL.window, times, sums) / INERTIAL.window**2
+        return second_difference(middles, _WINDOW, times, sums) / _WINDOW**2
 
     up, turned = np.zeros(3), None
-    needed = second_difference(middles, INERTIAL.window, pose_times, position) / INERTIAL.window**2
-    moves = np.linalg.norm(needed[:, :2], axis=1) > INERTIAL.moving
-    if np.count_nonzero(moves) >= INERTIAL.fewest:
+    needed = second_difference(middles, _WINDOW, pose_times, position) / _WINDOW**2
+    moves = np.linalg.norm(needed[:, :2], axis=1) > _MOVING
+    if np.count_nonzero(moves) >= _FEWEST:
         in_body, in_world = (
             _middle((needed - mean(x))[moves, :2]) / _middle(needed[moves, :2])
             for x in (body.apply(measured), measured)
         )
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
-        if in_world <= EVIDENCE.good and lead >= OTHER:
+        if in_world <= GOOD and lead >= OTHER:
             up[2] = gravity if np.median(measured[inside, 2]) < 0.5 * gravity else 0.0
             turned = measured = body.inv().apply(measured + up)
     up[2] = gravity
@@ -191,9 +182,9 @@ def _force_shares(
 
 
 def gravity_doubt(force: Array, gravity: float) -> str:
-    """Return what gravity says against the specific force (n, 3) of a flight, or nothing."""
+    """Return gravity's objection to the specific force (n, 3) of a flight, or nothing."""
     middle = np.median(force, axis=0)
-    size = float(np.linalg.norm(middle))
+    size = np.linalg.norm(middle)
     otherwise = (
         f"are {size:.3g} m/s2 in the median of a flight, along a{'xyz'[np.argmax(np.abs(middle))]}"
         f"; expected the specific force, which gravity makes about {gravity:.3g} along az: axes "
@@ -205,8 +196,8 @@ def gravity_doubt(force: Array, gravity: float) -> str:
 
 
 def _gravity_shares(force: Array, gravity: float) -> list[float]:
-    """Return which share of gravity the median of a specific force (n, 3) leaves, as declared and
-    by each reading of ``_BY_GRAVITY``.
+    """Return the share of gravity left by the median of a specific force (n, 3), as declared and by
+    each reading of ``_BY_GRAVITY``.
     """
     middle, up = np.median(force, axis=0), np.array([0.0, 0.0, gravity])
     readings = (AS_DECLARED, *_BY_GRAVITY)
@@ -214,24 +205,24 @@ def _gravity_shares(force: Array, gravity: float) -> list[float]:
 
 
 def _middle(vectors: Array) -> float:
-    """Return the median squared length of vectors (n, 3): single leaps of a pose do not move it."""
+    """Return the median squared length of vectors (n, 3): robust to single leaps of a pose."""
     return float(np.median(np.sum(np.square(vectors), axis=1)))
 
 
 def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
-    """Return times (n,) in s around which, from ``before`` before to a window after, neither pose
-    nor sensor has a gap.
+    """Return times (n,) in s without a gap of pose or sensor, from ``before`` earlier to a window
+    later.
     """
-    if min(len(pose_times), len(sensor_times)) < INERTIAL.samples:
+    if min(len(pose_times), len(sensor_times)) < LEAST_SAMPLES:
         return np.empty(0)
     first = max(pose_times[0], sensor_times[0]) + before
-    last = min(pose_times[-1], sensor_times[-1]) - INERTIAL.window
+    last = min(pose_times[-1], sensor_times[-1]) - _WINDOW
     if last <= first:
         return np.empty(0)
-    count = min(int((last - first) / INERTIAL.step), 100_000)
+    count = min(int((last - first) / _STEP), 100_000)
     times: Array = np.linspace(first, last, count + 1)
     for clock in (pose_times, sensor_times):
-        gaps = np.flatnonzero(np.diff(clock) > INERTIAL.gap)
-        begun = np.searchsorted(clock[gaps], times + INERTIAL.window)
+        gaps = np.flatnonzero(np.diff(clock) > _GAP)
+        begun = np.searchsorted(clock[gaps], times + _WINDOW)
         times = times[begun == np.searchsorted(clock[gaps + 1], times - before, "right")]
     return times

@@ -1,48 +1,46 @@
-"""What the columns of a log mean: a map from them to a flight log, in a YAML file.
+"""Log maps: the meaning of a log's columns, in a YAML file.
 
 Every section but ``time`` may be left out; the log must come to have a pose or an IMU, and rotor
-speeds or motor commands. ``optional: true`` in a section skips it where none of its columns is
-there. ``signs: [1, -1, 1]`` in a section of several columns turns single ones over; ``scale``
-multiplies what the column holds before its unit is applied; ``note`` is said of a log in which the
-section is used. A list of sections in place of one states alternatives: the first is taken whose
-columns the log has, with numbers in them.
+speeds or motor commands. ``optional: true`` skips a section without any of its columns. ``signs:
+[1, -1, 1]`` in a section of several columns turns single ones over. ``scale`` multiplies a column's
+numbers, before its unit. ``note`` is a note of each log with the section. A list of sections in
+place of one states alternatives: the first is taken with columns in the log, and numbers in them.
 
-* ``about``: what kind of table it is, for people
-* ``vehicle``: name of the vehicle that flew
-* ``recognise``: columns by which a table of this kind is known without being told
-* ``notes``: said of every log
+* ``about``: the kind of table, for people
+* ``vehicle``: name of the vehicle
+* ``recognise``: columns of every table of this kind, by which the map is chosen
+* ``notes``: notes of every log
 * ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
 * ``body``: flu (forward, left, up), frd (forward, right, down) or y_up (forward, up, right)
 * ``rows``, of a table: mixed (default: fields may be empty where a channel has no sample) or whole
   (every field of a pose is filled, or all are empty; times strictly increase; every row is one of
-  the log's); messages, of a recording, as mixed, and a position that stands still is one
+  the log's); messages, of a recording: as mixed, and a position may stand still
 * ``stray_rows``: how many rows at the start are dropped, at most, where a gap follows them
 * ``time``: column (numbers, dates or times of day), unit (s, ms, us, ns, min), nanoseconds (column
   beside one of whole seconds), offset (s; default: the flight begins at 0); or rate_hz alone, where
   the table has no time
-* ``topic`` of any section: the kind of message in which its columns stand, in a log of several
-* ``position``: columns (x, y, z), unit (m, mm, cm, ft), held (true: a position that repeats the one
-  before is no measurement)
+* ``topic`` of any section: the kind of message with its columns, in a log of several
+* ``position``: columns (x, y, z), unit (m, mm, cm, ft), held (true: a repeated position is no
+  measurement)
 * ``attitude``: columns, and order (wxyz or xyzw); or columns (roll, pitch, yaw: about x, y, z),
-  euler (order of the turns, each about the axis that the last has moved: zyx is yaw, pitch, roll)
-  and unit (deg, rad). A column ``=0`` stands for an angle that is not in the table. sense:
-  body_to_world or world_to_body. of: topics of the positions that it goes with (default: all)
-* ``rotors``: measured speeds: columns, order (a name of ``rotor_orders`` or four motors' numbers:
-  those at front-left, rear-left, rear-right, front-right), unit (rad/s, rpm, Hz, eRPM with
-  pole_pairs)
-* ``commands``: columns, order, unit (us, normalised, duty, percent, dshot, counts), range (what
-  stands for 0 and for full command), clip (true: a command beyond the range is set to its end);
-  what a vehicle without a motor curve is assumed to make of them: thrust_factor (f of the relative
-  thrust f u^2 + (1 - f) u) or thrust (N a motor, the coefficients of the count's powers 0, 1, 2, at
-  full_voltage, and thrust_source, who found them)
+  euler (order of the turns, each about the axis moved by the turn before: zyx is yaw, pitch, roll)
+  and unit (deg, rad). A column ``=0`` stands for an angle outside the table. sense: body_to_world
+  or world_to_body. of: topics of its positions (default: all)
+* ``rotors``: measured speeds: columns, order (a name of ``what_flew`` or four motors' numbers:
+  at front-left, rear-left, rear-right, front-right), unit (rad/s, rpm, Hz, eRPM with pole_pairs)
+* ``commands``: columns, order, unit (us, normalised, duty, percent, dshot, counts), range (counts
+  of no and of full command), clip (true: a command beyond the range is set to its end); assumed of
+  a vehicle without a motor curve: thrust_factor (f of the relative thrust f u^2 + (1 - f) u) or
+  thrust (N a motor, the coefficients of the count's powers 0, 1, 2, at full_voltage, from
+  thrust_source)
 * ``wrench``: commanded collective thrust (N) and torque about x, y, z (Nm): columns
-* ``battery``: column, unit (V, mV, cV), cells (where the voltage is that of one cell), late (s, by
-  which the voltage is logged late)
+* ``battery``: column, unit (V, mV, cV), cells (of a voltage of one cell), late (s, delay of the
+  logged voltage)
 * ``accelerometer``: columns, unit (m/s2, g, raw with scale in m/s2), body (where another than
   above)
 * ``gyro``: columns, unit (rad/s, deg/s, raw with scale in rad/s), body
 * ``force, torque``: true external wrench in the world, N and Nm
-* ``extra``: what else is kept, by name: columns and scale
+* ``extra``: further channels, by name: columns and scale
 """
 
 import re
@@ -66,12 +64,12 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .rotor_orders import ORDERS, Order, rotor_order
 from .table import Array
+from .what_flew import ORDERS, Order, rotor_order
 
-MAPS = Path(__file__).parent / "maps"  # those that ship with the kit
+MAPS = Path(__file__).parent / "maps"  # the kit's own maps
 OWN_MAP = "windwrench"  # of this kit's own columns
-UNKNOWN = "?"  # what a guessed map leaves to a person to choose
+UNKNOWN = "?"  # a field that a person must choose
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
 BODIES = ("flu", "frd", "y_up")
@@ -85,17 +83,17 @@ EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 
 def _known(value: Any, known: Collection[str], what: str) -> str:
-    """Return which of some words a value is, whatever its case, or in another spelling."""
+    """Return a value as one of the known words, in any case or spelling."""
     lower = {name.lower(): name for name in known}
     text = str(value).lower()
-    found = lower.get(text) or lower.get(unit_spelled(text).lower())
-    if found is None:
+    word = lower.get(text) or lower.get(unit_spelled(text).lower())
+    if word is None:
         raise unknown_name(what, str(value), known)
-    return found
+    return word
 
 
 def one_of(known: Collection[str]) -> BeforeValidator:
-    """Return a validator that takes one of some words, as ``_known``."""
+    """Return a validator for one of some words, as ``_known``."""
     return BeforeValidator(lambda value, info: _known(value, known, info.field_name))
 
 
@@ -130,7 +128,7 @@ _Order = Annotated[Order, BeforeValidator(rotor_order)]
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of one kind, and what they are in."""
+    """Columns of one kind, with unit, scale and signs."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
@@ -140,17 +138,17 @@ class Columns:
     signs: tuple[_Sign, ...] = ()  # one a column; empty: all as they stand
     optional: _Truth = False
     note: str = ""
-    topic: str = ""  # of the messages in which the columns stand; empty: any
+    topic: str = ""  # of the columns' messages; empty: any
 
     @property
     def label(self) -> str:
-        """What the columns are called together: their topic, else the first of them."""
+        """The columns' common name: their topic, else the first of them."""
         several = " ..." if len(self.columns) > 1 else ""
         return self.topic or f"{self.columns[0]}{several}"
 
     @property
     def named(self) -> list[str]:
-        """The columns that stand in the table: those that are no constant such as ``=0``."""
+        """The columns of the table, without constants such as ``=0``."""
         return [name for name in self.columns if constant(name) is None]
 
 
@@ -162,15 +160,15 @@ class TimeColumn:
 
     column: _Name = ""
     unit: Annotated[str, one_of(UNITS["time"])] = "s"
-    nanoseconds: str = ""  # column, of what is beyond the whole seconds of the other
-    offset: Number | None = None  # s, added; None: so that the flight begins at 0
-    rate_hz: Positive = 0.0  # of rows, where there is no column
+    nanoseconds: str = ""  # column of nanoseconds beyond whole seconds
+    offset: Number | None = None  # s, added; None: the flight begins at 0
+    rate_hz: Positive = 0.0  # of rows, without a column
     note: str = ""
     optional: ClassVar[bool] = False
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The columns that stand in the table."""
+        """The columns of the table."""
         return tuple(filter(None, (self.column, self.nanoseconds)))
 
     def raw(self, columns: Mapping[str, Array]) -> Array:
@@ -185,14 +183,14 @@ class TimeColumn:
 class Position(Columns):
     """A position."""
 
-    held: _Truth = False  # a value that repeats the one before is no measurement
+    held: _Truth = False  # a repeated value is no measurement
 
 
 @dataclass(frozen=True)
 class Attitude(Columns):
     """A quaternion, or Euler angles about x, y and z."""
 
-    order: Annotated[str, one_of(QUATERNIONS)] = "wxyz"  # of the columns of a quaternion
+    order: Annotated[str, one_of(QUATERNIONS)] = "wxyz"  # order of a quaternion's columns
     euler: Annotated[str, one_of(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
     sense: Annotated[str, one_of(SENSES)] = "body_to_world"
     of: tuple[str, ...] = ()  # topics of positions; empty: of all
@@ -211,13 +209,13 @@ class Commands(Columns):
     """Motor commands."""
 
     order: _Order = ORDERS["windwrench"]
-    range: _Range | None = None  # None: the vehicle's motor curve states it
+    range: _Range | None = None  # None: as of the vehicle's motor curve
     thrust_factor: Annotated[Number, Field(ge=0.0, le=1.0)] = 1.0
     thrust_span: tuple[Number, Number] = (0.0, 1.0)  # commands at which u is 0 and 1
     clip: _Truth = False
     thrust: tuple[Number, ...] = ()  # N a motor, of the count's powers 0, 1, 2
     full_voltage: Positive = 1.0  # V, at which ``thrust`` holds
-    thrust_source: str = ""  # who found ``thrust``
+    thrust_source: str = ""  # source of ``thrust``
 
 
 @dataclass(frozen=True)
@@ -225,7 +223,7 @@ class Battery(Columns):
     """The battery's voltage."""
 
     cells: _Count = 1
-    late: Number = 0.0  # s, by which the voltage is logged late
+    late: Number = 0.0  # s, delay of the logged voltage
 
 
 @dataclass(frozen=True)
@@ -236,11 +234,11 @@ class Sensor(Columns):
 
 
 def _section(count: int, units: Collection[str] = ()) -> WrapValidator:
-    """Return a validator of a section: as many columns as it needs, their unit and signs.
+    """Return a validator of a section: the number of columns, their unit and signs.
 
     Args:
         count: columns; 0: any but none.
-        units: that the columns may have; nothing: they have none.
+        units: units of the columns; nothing: they have none.
     """
 
     def check(given: Any, inner: Callable[[Any], Any]) -> Any:
@@ -283,7 +281,7 @@ def _clock(time: TimeColumn) -> TimeColumn:
 
 @dataclass(frozen=True)
 class LogMap:
-    """What the columns of a table mean."""
+    """The meaning of a table's columns."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
@@ -303,7 +301,7 @@ class LogMap:
     about: str = ""
     vehicle: str = ""
     recognise: tuple[str, ...] = ()
-    name: str = ""  # where it comes from: a shipped map's name or a file
+    name: str = ""  # source: a shipped map's name or a file
     notes: tuple[str, ...] = ()
     rows: Literal["mixed", "whole", "messages"] = "mixed"
     stray_rows: Annotated[int, Field(ge=0)] = 0
@@ -313,9 +311,9 @@ class LogMap:
 
     @property
     def sections(self) -> dict[str, Columns]:
-        """The sections that the map has, but the time."""
-        found = {name: getattr(self, name) for name in SECTIONS}
-        return {name: part for name, part in found.items() if part is not None}
+        """The sections of the map, without the time."""
+        parts = {name: getattr(self, name) for name in SECTIONS}
+        return {name: part for name, part in parts.items() if part is not None}
 
     @property
     def is_own(self) -> bool:
@@ -328,9 +326,11 @@ class LogMap:
         return () if first is None else (first, *self.alternatives.get(section, ()))
 
     def with_ways(self, ways: Mapping[str, Sequence[Any]]) -> "LogMap":
-        """Return the map with these ways to fill its sections; without those that have none."""
-        first: dict[str, Any] = {name: found[0] if found else None for name, found in ways.items()}
-        others = {name: tuple(found[1:]) for name, found in ways.items()}
+        """Return the map with these ways to fill its sections, without empty ones."""
+        first: dict[str, Any] = {
+            name: listed[0] if listed else None for name, listed in ways.items()
+        }
+        others = {name: tuple(listed[1:]) for name, listed in ways.items()}
         return replace(self, **first, alternatives={**self.alternatives, **others})
 
     def with_order(self, order: Order) -> "LogMap":
@@ -340,26 +340,34 @@ class LogMap:
 
     @property
     def wanted(self) -> list[str]:
-        """The columns that the map asks for, each once."""
+        """The map's columns, each once."""
         parts = [way for section in self.sections for way in self.ways(section)]
         names = [name for part in (*parts, *self.extra.values()) for name in part.named]
         return [name for name in dict.fromkeys([*names, *self.time.named]) if name]
 
     @property
     def topics(self) -> set[str]:
-        """The kinds of messages in which the columns stand."""
+        """The kinds of messages of the columns."""
         return {way.topic for section in self.sections for way in self.ways(section)}
 
 
 SECTIONS = (
-    *("position", "attitude", "rotors", "commands", "wrench", "battery"),
-    *("accelerometer", "gyro", "force", "torque"),
+    "position",
+    "attitude",
+    "rotors",
+    "commands",
+    "wrench",
+    "battery",
+    "accelerometer",
+    "gyro",
+    "force",
+    "torque",
 )
 _FIELDS = [field.name for field in fields(LogMap) if field.name not in ("name", "alternatives")]
 
 
 def constant(name: str) -> float | None:
-    """Return the constant that a column's name stands for, such as ``=0``."""
+    """Return the constant of a column's name such as ``=0``."""
     if not name.startswith("="):
         return None
     try:
@@ -369,58 +377,56 @@ def constant(name: str) -> float | None:
 
 
 def map_names() -> list[str]:
-    """Return the names of the maps that ship with the kit."""
+    """Return the names of the kit's own maps."""
     return sorted(path.stem for path in MAPS.glob("*.yaml"))
 
 
 def load_map(name: str | Path) -> LogMap:
-    """Return a map: one that ships with the kit, by its name, or that of a YAML file.
+    """Return a map of the kit, by its name, or of a YAML file.
 
     Raises:
-        InputError: there is none of that name, it is no map, or leaves a field open; the message
-            says where and what was expected.
+        InputError: the name is unknown, the file is no map, or leaves a field open; the message
+            says where, and the expected value.
     """
     path = Path(name)
     if str(name) in map_names():
         return shipped_map(str(name))
     if path.suffix.lower() not in (".yaml", ".yml") and not path.exists():
         raise unknown_name("map", str(name), [*map_names(), "the path of a YAML file"])
-    found = read_yaml(path, "a map file")
-    for section, part in found.items() if isinstance(found, Mapping) else ():
+    content = read_yaml(path, "a map file")
+    for section, part in content.items() if isinstance(content, Mapping) else ():
         for field_name, value in part.items() if isinstance(part, Mapping) else ():
             if UNKNOWN in (value if isinstance(value, list) else [value]):
-                # the candidates stand in a comment beside it
+                # a comment beside the field holds the candidates
                 text = path.read_text(encoding="utf-8-sig")
                 noted = re.search(rf"^# choose {section}\.{field_name}: (.*)$", text, re.MULTILINE)
                 raise InputError(
                     f"{path}: {section}.{field_name} is still {UNKNOWN}; expected "
                     f"{noted[1] if noted else 'columns of the table'}"
                 )
-    return parse_map(found, str(path), str(path))
+    return parse_map(content, str(path), str(path))
 
 
 @cache
 def shipped_map(name: str) -> LogMap:
-    """Return a map that ships with the kit: of tables, or in ``recordings`` of an autopilot's
-    messages, which its reader decodes.
-    """
+    """Return a map of the kit: of tables, or in ``recordings`` of an autopilot's messages."""
     return parse_map(read_yaml(MAPS / f"{name}.yaml", "a map"), f"map {name}", name)
 
 
 @cache
 def stated(name: str) -> dict[str, Any]:
-    """Return what a file in ``maps/recordings`` states that is no map."""
-    found: dict[str, Any] = read_yaml(MAPS / "recordings" / f"{name}.yaml", name)
-    return found
+    """Return a file of ``maps/recordings`` other than a map."""
+    content: dict[str, Any] = read_yaml(MAPS / "recordings" / f"{name}.yaml", name)
+    return content
 
 
 def parse_map(value: object, where: str, name: str = "") -> LogMap:
-    """Return the map that a YAML file's value states.
+    """Return the map stated by a YAML file's value.
 
     Args:
-        value: of the file.
-        where: it comes from, for errors.
-        name: of the map.
+        value: content of the file.
+        where: its source, for errors.
+        name: name of the map.
 
     Raises:
         InputError: a field is unknown, missing, or of another kind.
@@ -435,30 +441,32 @@ def parse_map(value: object, where: str, name: str = "") -> LogMap:
             raise unknown_name("key", key, _FIELDS, where)
     ways = {key: given[key] for key in ("time", *SECTIONS) if isinstance(given.get(key), list)}
     first = given | {key: listed[0] for key, listed in ways.items() if listed}
-    found = checked(LogMap, first, where)
+    log_map = checked(LogMap, first, where)
     others = {
         key: [getattr(checked(LogMap, first | {key: way}, where), key) for way in listed]
         for key, listed in ways.items()
     }
-    check_whole(found, where)
-    return replace(found, name=name or where).with_ways(others)
+    check_whole(log_map, where)
+    return replace(log_map, name=name or where).with_ways(others)
 
 
-def check_whole(found: LogMap, where: str) -> None:
+def check_whole(log_map: LogMap, where: str) -> None:
     """Raise InputError where a map's sections are not enough for a flight log."""
-    has_imu = found.accelerometer is not None and found.gyro is not None
-    if (found.position is None) != (found.attitude is None) and not (found.is_own and has_imu):
-        missing = "attitude" if found.attitude is None else "position"
+    has_imu = log_map.accelerometer is not None and log_map.gyro is not None
+    if (log_map.position is None) != (log_map.attitude is None) and not (
+        log_map.is_own and has_imu
+    ):
+        missing = "attitude" if log_map.attitude is None else "position"
         raise InputError(
             f"{where}: no section {missing}; expected position and attitude, or neither where "
             "accelerometer and gyro are there"
         )
-    if found.position is None and not has_imu and not found.extra:
+    if log_map.position is None and not has_imu and not log_map.extra:
         raise InputError(
             f"{where}: no pose and no IMU; expected the sections position and attitude, or "
             "accelerometer and gyro"
         )
-    if found.rotors is None and found.commands is None and found.wrench is None:
+    if log_map.rotors is None and log_map.commands is None and log_map.wrench is None:
         raise InputError(f"{where}: no motors; expected a section rotors or commands")
-    if (found.force is None) != (found.torque is None):
+    if (log_map.force is None) != (log_map.torque is None):
         raise InputError(f"{where}: force and torque come together; expected both or neither")

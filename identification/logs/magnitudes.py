@@ -1,7 +1,6 @@
-"""Sizes of a flight's numbers: the unit that they tell, and beyond which there is no flight.
+"""Sizes of a flight's numbers: likely units, and limits of any flight.
 
-The guess of a map, the reading of a log and its screening ask here, so that all three decide alike
-and say the same sentence.
+The guess of a map, the reading of a log and its screening decide here, with the same sentences.
 """
 
 import re
@@ -23,31 +22,30 @@ class Magnitudes:
     """How large and how small the numbers of a log may be."""
 
     shortest_period: float = 1e-5  # s, of the median step: 100 kHz, far above any pose's rate
-    # s, of any step; a log in nanoseconds has steps of 1e7, and more than a year between two rows
-    # is no flight
+    # s, of any step. A log in nanoseconds has steps of 1e7; a step of a year is no flight
     longest_step: float = 1e12
-    largest: float = 1e9  # of all other numbers, in SI units; millimetres or rpm stay far below
-    rates: tuple[float, float] = (5.0, 5000.0)  # Hz of rows, in which a unit of time is likely
-    sure_rates: tuple[float, float] = (15.0, 2500.0)  # the same, in which the unit is certain
+    largest: float = 1e9  # SI units, all other numbers; millimetres or rpm stay far below
+    rates: tuple[float, float] = (5.0, 5000.0)  # Hz of rows: a unit of time is likely
+    sure_rates: tuple[float, float] = (15.0, 2500.0)  # the same: the unit is certain
     voltages: tuple[float, float] = (2.7, 100.0)  # V of a battery: the unit is likely
     sure_voltages: tuple[float, float] = (2.7, 60.0)  # the same: the unit is certain
-    widest: float = 300.0  # m, over which the positions of one flight spread
+    widest: float = 300.0  # m, spread of one flight's positions
     # thrust by weight of rotors in their right unit; mass and thrust curve may be off
     carries: tuple[float, float] = (0.55, 1.8)
-    flies: tuple[float, float] = (0.2, 5.0)  # its median, beyond which a log is of another vehicle
-    doubtful: tuple[float, float] = (0.5, 2.0)  # the same, beyond which it may be
+    flies: tuple[float, float] = (0.2, 5.0)  # its median; beyond, another vehicle flew
+    doubtful: tuple[float, float] = (0.5, 2.0)  # the same; beyond, another may have flown
     gravity: tuple[float, float] = (0.85, 1.15)  # specific force by 1 g: the unit is certain
     fastest_gyro: float = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
-    slow_gyro: float = 6.0  # below which 99.5 % of a flight's angular velocities lie in rad/s
-    named_rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows, beyond which no name counts
-    # of four motors' columns: the median above which no unit but rpm is left, since no propeller
-    # turns at that rate in rad/s; above which rpm is likelier (in rad/s a palm-sized vehicle alone
-    # hovers at that); and above which rpm may also be a command of 16 bits
+    slow_gyro: float = 6.0  # rad/s: 99.5 % of a flight's angular velocities are less
+    named_rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows; beyond, no name counts
+    # limits of four motors' median. Above the first, only rpm is left: no propeller turns as fast
+    # in rad/s. Above the second, rpm is likelier: in rad/s only palm-sized vehicles hover as fast.
+    # Above the third, rpm may also be a command of 16 bits
     rpm: float = 4500.0
     fast: float = 2600.0
     counts: float = 20_000.0
-    # power by which the specific force grows: of rotor speeds, and from which on of pulses
+    # power of the specific force's growth: with rotor speeds, and with pulses at least
     squares: tuple[float, float] = (1.5, 2.5)
     offset: float = 2.8
 
@@ -67,9 +65,9 @@ def within(value: float, limits: tuple[float, float]) -> bool:
 
 
 def likely_unit(section: str, size: float) -> tuple[str, bool]:
-    """Return the first unit of a section's columns in which a size is likely, or the first of all,
-    and whether that is certain: of a battery, a median voltage; of the time, a median step; of an
-    accelerometer, a median length.
+    """Return the first unit of a section with a likely size, or the first of all, and whether the
+    unit is certain. The size is a battery's median voltage, the time's median step, or an
+    accelerometer's median length.
     """
     units = {unit: one for unit, one in UNITS[section].items() if unit not in ("min", "raw")}
     sizes = {unit: size * one for unit, one in units.items()}
@@ -85,7 +83,7 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
 
 
 def time_doubt(step: float) -> str:
-    """Return what a median step (s) says against its unit, or nothing."""
+    """Return a doubt on the time's unit by a median step (s), or nothing."""
     unit, is_sure = likely_unit("time", step)
     if unit == "s" or not is_sure:
         return ""
@@ -107,15 +105,15 @@ def thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
 
 
 def carrying_units(thrust: float) -> list[str]:
-    """Return the units in which rotors carry the vehicle, whose numbers as rad/s make a median
-    thrust by weight.
+    """Return the units of rotor speeds able to carry the vehicle, by the median thrust by weight of
+    the numbers as rad/s.
     """
     factors = {"rad/s": 1.0} | {unit: factor for unit, (_, factor) in _SPEEDS.items()}
     return [u for u, factor in factors.items() if within(thrust * factor**2, MAGNITUDES.carries)]
 
 
 def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
-    """Return what a median thrust by weight says against rotor speeds in rad/s, or nothing."""
+    """Return a doubt on rotor speeds in rad/s by a median thrust by weight, or nothing."""
     if within(thrust, MAGNITUDES.flies):
         return ""
     for unit in carrying_units(thrust):
@@ -134,11 +132,11 @@ def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
 def motor_unit(
     group: Group, values: Array, vehicle: Vehicle | None, power: float = np.nan
 ) -> tuple[str, str, bool, str]:
-    """Return whether columns are rotors or commands, their unit, if that is certain, and why: by
-    the first rule that holds. ``power`` is that by which the specific force grows with them; NaN:
-    unknown.
+    """Return whether columns are rotors or commands, their unit, whether the unit is certain, and
+    why. The first matching rule decides. The specific force grows with ``power`` of the columns;
+    NaN: unknown.
     """
-    # of a path such as /fmu/out/esc_status/rotor_speed.00 the last word
+    # the last word of a path such as /fmu/out/esc_status/rotor_speed.00
     names = " ".join(re.sub(r"^.*/(?=.*[a-z])", "", name.lower()) for name in group.columns)
     turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
     if not turning.size:
@@ -164,7 +162,7 @@ def motor_unit(
     up_to = f"values up to {high:.6g}"
     carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
     carries += f", though they may be {doubt}" if doubt else ""
-    # by the vehicle's weight a name may be wrong, but poles of eRPM are unknown
+    # the vehicle's weight may contradict a name, but poles of eRPM are unknown
     lifts = len(carrying) == 1 and named in UNITS["rotors"] and named not in ("eRPM", *carrying)
     rules = (
         (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
@@ -178,18 +176,24 @@ def motor_unit(
         (len(carrying) == 1, "rotors", "".join(carrying), not doubt, carries),
         (
             not commanded and middle > MAGNITUDES.counts and high <= 65535.5,
-            *("commands", "counts", False),
+            "commands",
+            "counts",
+            False,
             f"{up_to}, which may be 16 bits of a command, or rpm",
         ),
         (
             not commanded and middle > MAGNITUDES.rpm,
-            *("rotors", "rpm", True),
+            "rotors",
+            "rpm",
+            True,
             f"the median is {middle:.5g}, too fast for rad/s",
         ),
         (pulses and not speeds, "commands", "us", False, between),
         (
             middle > MAGNITUDES.fast,
-            *("rotors", "rpm", False),
+            "rotors",
+            "rpm",
+            False,
             f"the median is {middle:.4g}: few rotors turn as fast in rad/s",
         ),
     )
@@ -198,13 +202,13 @@ def motor_unit(
 
 
 def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
-    """Return what the sizes of a log's numbers say against its units.
+    """Return doubts on a log's units by the sizes of its numbers.
 
     Raises:
-        InputError: a number is none that a flight has; the message says which.
+        InputError: a number is beyond any flight's; the message names the number.
     """
     step = np.diff(log.t)
-    where, longest = f"{log.source}: column", int(np.argmax(step))
+    where, longest = f"{log.source}: column", np.argmax(step)
     if not log.period >= MAGNITUDES.shortest_period:
         raise InputError(
             f"{where} t: the median time step is {log.period:.3g} s; expected at least "
@@ -224,7 +228,7 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             )
     doubts = [time_doubt(log.period)]
     if log.valid.any():
-        spread = float(np.max(np.ptp(log.position[log.valid], axis=0)))
+        spread = np.max(np.ptp(log.position[log.valid], axis=0))
         if spread > MAGNITUDES.widest:
             doubts.append(
                 f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "

@@ -1,12 +1,12 @@
-"""A map for a table that brings none: guessed from the physics that every flight obeys, the size
-of the numbers, and the columns' names. Each field says whether it is certain, and why; what cannot
-be guessed is ``?``, beside its candidates.
+"""A guessed map for a table without one, from every flight's physics, the size of the numbers, and
+the columns' names. Each field is certain or a guess, with the reason; an unknown field is ``?``,
+beside its candidates.
 
-``column_parts`` says which columns are which part. The specific force points along the thrust axis,
-so a horizontal acceleration is gravity times the tilt, which tells the quaternion's order and
-sense, frames, degrees and millimetres; rotors turn the body towards the side that they push up,
-which tells their order. A flight that hardly moves tells neither, and then the field is a guess. A
-unit in a name is taken unless the numbers contradict it.
+``column_parts`` finds each part's columns. The specific force points along the thrust axis, so a
+horizontal acceleration is gravity times the tilt: this shows the quaternion's order and sense,
+frames, degrees and millimetres. Rotors on one side turn the body to the other: this shows their
+order. A flight with little motion shows neither; the field is then a guess. A name's unit is taken
+unless the numbers contradict the name.
 """
 
 import re
@@ -23,8 +23,8 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import WORDS, Group, Name, named_alone, take_apart
-from .column_parts import PARTS, Candidate, Numbers, candidates, named_columns
-from .evidence import EVIDENCE, Evidence, Fit, Ranking, likelihood
+from .column_parts import CERTAIN_LEAD, SHOWN, ColumnCandidate, Numbers, candidates, named_columns
+from .evidence import GOOD, GOOD_TORQUE, TURNING_RATE, Evidence, Fit, RankedFits, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
@@ -42,13 +42,12 @@ from .log_map import (
 )
 from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Array, Table
-from .what_flew import more_rotors
+from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
-_Choice = tuple[str, bool, str]  # what is taken, whether it is certain, and why
+_Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
-_TURNS = ("world", "body", "sense", "order", "pitch_sign", "unit")  # what shows how a body turns
+_TURNS = ("world", "body", "sense", "order", "pitch_sign", "unit")  # readings of a body's turns
 _MOTORS = ("motors", "commands")
 _GYROS = [
     SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
@@ -64,32 +63,32 @@ _EXAMPLES = {
 
 @dataclass(frozen=True)
 class Reason:
-    """Why a field is what it is."""
+    """The reason for a field's value."""
 
     section: str
     field: str
     certain: bool
     why: str
-    candidates: tuple[str, ...] = ()  # columns, the likeliest first, of which a person must choose
+    candidates: tuple[str, ...] = ()  # columns for a person's choice, the likeliest first
 
 
 @dataclass(frozen=True)
 class Guess:
-    """A map that was guessed."""
+    """A guessed map."""
 
     log_map: LogMap
     reasons: tuple[Reason, ...]
     unused: tuple[str, ...] = ()  # columns
-    missing: tuple[Reason, ...] = ()  # fields that are ``?``, without which the log is not read
+    missing: tuple[Reason, ...] = ()  # fields ``?``; the log is not read without them
 
     @property
     def lacks(self) -> str:
-        """What is missing, in one line; nothing where the map is whole."""
+        """The missing fields, in one line; empty for a whole map."""
         return "; ".join(f"{m.section}.{m.field}: {m.why}" for m in self.missing)
 
     @property
     def doubts(self) -> tuple[Reason, ...]:
-        """The fields that are not certain."""
+        """The uncertain fields."""
         return tuple(reason for reason in self.reasons if not reason.certain)
 
 
@@ -97,28 +96,30 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
     """Return a guessed map of a table.
 
     Args:
-        table: of any columns, with a line of units where it has one.
-        vehicle: that flew, whose weight and rotors tell the rotors' unit; None: not known.
+        table: a table of any columns, with its line of units.
+        vehicle: the vehicle, for the rotors' unit by weight; None: unknown.
 
     Raises:
         InputError: the table cannot be read.
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # columns that hold nothing, or the absurd
-        found = _Guessing(table, vehicle)
-        missing = tuple(found.missing())
-    parts = [part for part in found.sections.values() if isinstance(part, Columns)]
-    used = {*found.time_columns, *(c for part in parts for c in part.columns)}
+        warnings.simplefilter("ignore", RuntimeWarning)  # empty or absurd columns
+        guessing = _Guessing(table, vehicle)
+        missing = tuple(guessing.missing())
+    parts = [part for part in guessing.sections.values() if isinstance(part, Columns)]
+    used = {*guessing.time_columns, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
-    found.sections.setdefault("time", TimeColumn(UNKNOWN))
-    return Guess(LogMap(**found.sections, name="guess"), tuple(found.reasons), unused, missing)
+    guessing.sections.setdefault("time", TimeColumn(UNKNOWN))
+    return Guess(
+        LogMap(**guessing.sections, name="guess"), tuple(guessing.reasons), unused, missing
+    )
 
 
 def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
-    """Return the columns (rows,) that hold numbers, but for those in which text turns up later."""
+    """Return the columns (rows,) of numbers, without columns of later text."""
     once = [n.column for n in names if table.header.count(n.column) == 1]
     wanted = [column for column in once if not table.numeric or column in table.numeric]
-    if len(wanted) * table.rows > LIMITS.table_numbers // 2:  # those whose names say something
+    if len(wanted) * table.rows > LIMITS.table_numbers // 2:  # columns with telling names
         named = named_columns(names)
         wanted = [column for column in wanted if column in named]
     while wanted:
@@ -133,7 +134,7 @@ def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
 
 
 def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | None:
-    """Return the column of the time: by its name, else the first that increases throughout."""
+    """Return the column of the time: by name, else the first increasing column."""
     there = [name for name in names if name.column in data]
     for name in named_alone(there, "time"):
         values = data[name.column]
@@ -145,18 +146,18 @@ def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | Non
 
 
 class _Guessing:
-    """What was found so far: the columns of each part, the sections of the map, and reasons."""
+    """The state of a guess: the columns of each part, the sections of the map, and reasons."""
 
     def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
         self.sections: dict[str, Any] = {}
         self.time_columns: tuple[str, ...] = ()
         self.reasons: list[Reason] = []
-        self.ranked: dict[str, list[Candidate]] = {}  # of each part
-        self.parts: dict[str, Group] = {}  # the first of them, where one is likely
-        self.unnamed: set[str] = set()  # sections whose columns' names do not speak for them
-        self.further: dict[str, str] = {}  # what more than four motors say, by part
-        self.ranking: Ranking | None = None  # of the pose
+        self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
+        self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
+        self.unnamed: set[str] = set()  # sections without telling names
+        self.further: dict[str, str] = {}  # words on more than four motors, by part
+        self.ranking: RankedFits | None = None  # of the pose
         names = take_apart(table.header, table.units)
         self.data = _numbers_of(table, names)
         self.clock = _time_column(names, self.data)
@@ -189,8 +190,8 @@ class _Guessing:
     def choose(
         self, part: str, judge: Callable[[Sequence[str]], tuple[float, str]]
     ) -> Group | None:
-        """Return the likeliest columns of a part, which are no later part's; None: there are none.
-        Other columns that may be it are a reason for doubt.
+        """Return the likeliest columns of a part, and take them from later parts; None: there are
+        none. Other likely columns are a reason for doubt.
         """
         ranked = self.ranked[part] = candidates(part, self.free, self.numbers, judge)
         if not ranked or ranked[0].score <= 0.0:
@@ -199,10 +200,10 @@ class _Guessing:
         self.free = [name for name in self.free if name.column not in group.columns]
         if part != "commands" and not ranked[0].why.startswith("by"):
             self.unnamed.add(part)
-        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - PARTS.certain)]
+        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - CERTAIN_LEAD)]
         if part in _EXAMPLES and (len(likely) > 1 or part in self.unnamed):
             field = "order" if len(group.columns) == 4 else "columns"
-            self.say(part, field, False, "; or ".join(map(str, likely[: PARTS.shown])))
+            self.say(part, field, False, "; or ".join(map(str, likely[:SHOWN])))
         return group
 
     def values(self, part: str) -> Array:
@@ -210,12 +211,12 @@ class _Guessing:
         return np.column_stack([self.data[name] for name in self.parts[part].columns])
 
     def missing(self) -> list[Reason]:
-        """Return what the map lacks for a flight log."""
+        """Return the fields missing for a flight log."""
         out = []
 
         def lack(part: str, section: str, why: str, field: str = "columns") -> None:
-            found = self.ranked.get(part, [])[: PARTS.shown]
-            out.append(Reason(section, field, False, why, tuple(map(str, found))))
+            ranked = self.ranked.get(part, [])[:SHOWN]
+            out.append(Reason(section, field, False, why, tuple(map(str, ranked))))
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
@@ -223,14 +224,14 @@ class _Guessing:
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
             half = [part for part in pose if part in self.parts]
-            # what is nearest to be whole: half a pose, half an IMU, else a pose
+            # the nearest to a whole: half a pose, half an IMU, else a pose
             for part in pose if half or not has.intersection(imu) else imu:
                 if part not in has and part not in half:
                     why = f"no columns look like one (such as {_EXAMPLES[part]})"
                     lack(part, part, why)
             for part in half:  # for a person to complete
                 columns, unit = self.parts[part].columns, self.parts[part].unit
-                most = float(np.max(np.abs(self.numbers.some(columns)), initial=0.0))
+                most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
                 made: Columns = Columns(columns, unit or "m")
                 if part == "attitude":
                     euler = "zyx" if len(columns) == 3 else ""
@@ -248,19 +249,19 @@ class _Guessing:
         return out
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
-        """Keep why a field is what it is."""
+        """Keep the reason for a field's value."""
         certain = certain and section not in self.unnamed
         self.reasons.append(Reason(section, name, certain, why))
 
     def take(self, section: str, name: str, choice: _Choice) -> str:
-        """Return what is taken for a field, and keep why."""
+        """Return the choice for a field, and keep the reason."""
         value, sure, why = choice
         self.say(section, name, sure, f"{value}: {why}")
         return value
 
     def unit(self, section: str, named: str, choice: _Choice) -> str:
-        """Return a section's unit: as its columns' names say unless their numbers are certain to be
-        in another, else as guessed.
+        """Return a section's unit: by its columns' names unless the numbers are certain of another,
+        else as guessed.
         """
         if named in UNITS[section] and (choice[0] == named or not choice[1]):
             choice = named, True, "by the columns' names"
@@ -284,8 +285,8 @@ class _Guessing:
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
-        self.sections["time"] = found = TimeColumn(clock.column, unit, nanoseconds)
-        self.time_columns = found.named
+        self.sections["time"] = column = TimeColumn(clock.column, unit, nanoseconds)
+        self.time_columns = column.named
         return t
 
     def pose(self, place: Group, group: Group) -> None:
@@ -306,7 +307,7 @@ class _Guessing:
         motors = [self.values(part) for part in _MOTORS if part in self.parts]
         thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
         evidence = Evidence(self.t, thrusts, self.values("position"), attitude)
-        self.ranking = ranking = Ranking.of(evidence, readings, torques=False)
+        self.ranking = ranking = RankedFits.of(evidence, readings, torques=False)
         best = ranking.best
         length = self.unit("position", place.unit, ranking.says("length"))
         fields = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
@@ -329,7 +330,7 @@ class _Guessing:
         values = self.values("accelerometer")
         size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
         z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
-        # without a pose, turned over may also be gravity in place of the specific force
+        # without a pose, a negative z may also be gravity in place of the specific force
         sure = abs(z) > 0.8 and (z > 0.0 or self.ranking is not None)
         why = f"along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size"
         axes = self.take("accelerometer", "body", ("flu" if z > 0.0 else "frd", sure, why))
@@ -348,9 +349,9 @@ class _Guessing:
         if self.ranking is None:
             self.sections["body"] = axes
 
-    def gyro_fits(self, columns: Sequence[str], unit: str = "") -> Ranking | None:
-        """Return how well columns turn as the pose does, by each unit and body axes; None where
-        there is no pose, or too little of it. Another unit than a named one must make up for it.
+    def gyro_fits(self, columns: Sequence[str], unit: str = "") -> RankedFits | None:
+        """Return fits of columns to the pose's turns, by each unit and body axes; None: no pose, or
+        too short a pose. Another unit than a named one has a penalty.
         """
         if self.ranking is None:
             return None
@@ -365,16 +366,18 @@ class _Guessing:
             for way, left in zip(_GYROS, shares, strict=False)
         ]
         ranked = sorted(fits, key=lambda fit: -fit.score)
-        return Ranking(ranked, "attitude's rate is left unexplained") if fits else None
+        return RankedFits(ranked, "attitude's rate is left unexplained") if fits else None
 
     def turns_alike(self, columns: Sequence[str]) -> tuple[float, str]:
-        """Return how well three columns turn as the pose does, at most 1; 0 where they do not."""
+        """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
+        otherwise.
+        """
         ranking = self.gyro_fits(columns)
         left = 1.0 if ranking is None else ranking.fit.horizontal
-        return (1.0 - left if left <= EVIDENCE.good else 0.0), "they turn as the attitude does"
+        return (1.0 - left if left <= GOOD else 0.0), "they turn as the attitude does"
 
     def gyro(self, group: Group) -> None:
-        """Find unit and axes of the gyro: by the pose's turns, or by size and accelerometer."""
+        """Find unit and axes of the gyro: from the pose's turns, or from size and accelerometer."""
         named = group.unit if group.unit in UNITS["gyro"] else ""
         ranking = self.gyro_fits(group.columns, named)
         if ranking is not None:
@@ -395,7 +398,7 @@ class _Guessing:
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
 
     def motors(self, part: str, group: Group) -> None:
-        """Find unit and order of rotor speeds or commands, where the map has none of the kind."""
+        """Find unit and order of rotor speeds or commands, unless the map has such a section."""
         values = self.values(part)
         power = self.numbers.elasticity(values)
         kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
@@ -415,7 +418,7 @@ class _Guessing:
             pairs = 7 if unit == "eRPM" else 1
             self.sections[kind] = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
             return
-        high = float(np.nanmax(values, initial=0.0))
+        high = np.nanmax(values, initial=0.0)
         counts = next((float(2**bits - 1) for bits in (8, 10, 11, 12) if high < 2**bits), 65535.0)
         limits = COMMAND_UNITS[unit] or (0.0, counts)
         if unit in ("us", "counts", "dshot"):
@@ -423,7 +426,7 @@ class _Guessing:
         self.sections[kind] = Commands(group.columns, unit, order=order, range=limits)
 
     def order(self, group: Group, values: Array) -> tuple[Order, bool, str]:
-        """Return the order of the rotors, whether it is certain, and why."""
+        """Return the order of the rotors, whether the order is certain, and why."""
         if not group.numbered:
             return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
         text = " ".join(group.columns).lower()
@@ -440,7 +443,7 @@ class _Guessing:
         if evidence is None or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
-        ranking = Ranking.of(evidence, ways)
+        ranking = RankedFits.of(evidence, ways)
         left, lead = ranking.fit.torque, ranking.other("rotors")[1]
         order = ranking.best.motors
         names = order_names(order)
@@ -448,8 +451,8 @@ class _Guessing:
             f"{names[0] if names else order_words(order)}: {left:.0%} of the angular acceleration "
             f"is left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
         )
-        turns = evidence.turns(best) >= EVIDENCE.turning
-        if left <= EVIDENCE.good_torque and ranking.certain("rotors") and turns:
+        turns = evidence.turns(best) >= TURNING_RATE
+        if left <= GOOD_TORQUE and ranking.certain("rotors") and turns:
             return order, True, why
         if names and left <= 0.9 and lead >= 1.0:
             return order, False, why

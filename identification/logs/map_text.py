@@ -1,6 +1,4 @@
-"""A guessed map as a YAML file, with comments on what is certain, what is a guess, and what to
-choose.
-"""
+"""A guessed map as a YAML file, with comments on certain fields, guesses and choices."""
 
 from typing import Any
 
@@ -8,12 +6,12 @@ import yaml
 
 from .log_map import UNKNOWN, Battery, Columns, Commands, Rotors
 from .map_guess import Guess
-from .rotor_orders import order_names
+from .what_flew import order_names
 
 
 def map_yaml(guess: Guess) -> str:
-    """Return a guessed map as a YAML file; comments say what is certain, what is a guess, and among
-    which columns to choose where it says ``?``.
+    """Return a guessed map as a YAML file; comments mark certain fields and guesses, and list the
+    columns to choose from for each ``?``.
     """
     m = guess.log_map
     sections: dict[str, Any] = {"vehicle": m.vehicle} if m.vehicle else {}
@@ -47,7 +45,7 @@ def map_yaml(guess: Guess) -> str:
 
 
 def _fields(part: Columns) -> dict[str, Any]:
-    """Return a section as its fields stand in the file: those that are not as usual."""
+    """Return a section's fields for the file, without defaults."""
     fields = {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in vars(part).items()
@@ -58,5 +56,5 @@ def _fields(part: Columns) -> dict[str, Any]:
     if isinstance(part, Rotors | Commands):
         fields["order"] = [*order_names(part.order), list(part.order)][0]
     if fields.get("euler"):
-        del fields["order"]  # of a quaternion
+        del fields["order"]  # a quaternion's
     return fields

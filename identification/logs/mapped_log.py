@@ -1,12 +1,11 @@
-"""From columns of any names and a map of what they mean to a flight log: of a table, whose channels
-share its rows, and of a recording, whose groups of channels have a clock each.
+"""From columns of any names, by a map, to a flight log: of a table with channels in shared rows, or
+of a recording with groups of channels on separate clocks.
 
-Of several ways to fill a section the first is taken whose columns are there and hold measurements.
-Each section of the map becomes a stream (``streams``). Where channels stand in rows of their own,
-the pose's rows are the log's, and the others are interpolated to them. Else rows of a table that
-hold neither a pose nor an inertial sensor's sample are left out, unless most rows have a pose,
-which the others then lost; a map of whole rows keeps them all. An attitude that is logged in other
-rows than the position is interpolated to the position's.
+A section is filled in the first way with columns and measurements in the log. Each section of the
+map becomes a stream (``streams``). For channels in rows of their own, the log has the pose's rows,
+and the others are interpolated to the pose. Else a table's rows without a pose and an inertial
+sensor's sample are left out. Such rows stay where most rows have a pose (the pose was lost), and in
+a map of whole rows. An attitude in other rows is interpolated to the position's rows.
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .channels import Samples, in_kit_axes, in_kit_units, on_one_clock, quaternions
+from .channels import ChannelGroup, in_kit_axes, in_kit_units, on_one_clock, quaternions
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, VEHICLE, FlightLog
 from .log_map import (
@@ -33,17 +32,16 @@ from .log_map import (
     check_whole,
     constant,
 )
-from .rotor_orders import order_names, order_words
 from .streams import Recording, Stream, readable, slerp
 from .table import Mask, Table, finite_rows
 from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
-from .what_flew import UNSTATED, WhatFlew, more_rotors
+from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
 
-_SHOWN = 30  # columns that an error lists
-NO_QUATERNION = 0.5  # length; shorter stands for one that is not there
+_SHOWN = 30  # columns in an error
+NO_QUATERNION = 0.5  # length; shorter stands for a missing quaternion
 _IMU = ("accelerometer", "gyro")
-_ATTITUDE_GAP = 0.1  # s, across which an attitude is not interpolated
-_OUTSIDE = 0.5  # share of commands beyond their range from which on the range is wrong
+_ATTITUDE_GAP = 0.1  # s, the longest gap for interpolating an attitude
+_OUTSIDE = 0.5  # share of commands beyond a wrong range
 
 
 def map_table(
@@ -53,19 +51,18 @@ def map_table(
     reader: str = "",
     piece: int | None = None,
 ) -> FlightLog:
-    """Return the flight log that a map makes of a table.
+    """Return the flight log of a table by a map.
 
     Args:
-        table: of any columns and any layout.
-        log_map: what its columns mean.
-        vehicle: that flew, to turn commands into rotor speeds; None: the map's, where that comes
-            with the kit.
-        reader: name of the reader that the map serves.
+        table: a table of any columns and any layout.
+        log_map: the meaning of its columns.
+        vehicle: the vehicle, to turn commands into rotor speeds; None: the map's, if a preset.
+        reader: name of the map's reader.
         piece: as of ``recording_of``.
 
     Raises:
-        InputError: the map does not fit the table, or a number is none that a flight has; the
-            message says which column and row.
+        InputError: the map does not fit the table, or a number is beyond any flight's; the message
+            names column and row.
     """
     if log_map.is_own:
         named = [match[1] for name in table.header if (match := VEHICLE.fullmatch(name))]
@@ -77,7 +74,7 @@ def map_table(
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     log_map = fitted(table.header, table.path, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
-    if log_map.is_own and rows_apart(Samples(np.arange(float(table.rows)), columns), log_map):
+    if log_map.is_own and rows_apart(ChannelGroup(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
     notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
     if not log_map.is_own or log_map.rows == "mixed":
@@ -92,27 +89,27 @@ def map_table(
 
 def recording_of(
     path: Path,
-    recorded: Sequence[Samples],
+    recorded: Sequence[ChannelGroup],
     log_map: LogMap,
     reader: str,
     notes: Sequence[str],
     piece: int | None = None,
     flown: WhatFlew = UNSTATED,
 ) -> Recording:
-    """Return the channels that a map makes of columns whose groups have a clock each.
+    """Return the channels of groups of columns by a map; each group has a clock.
 
     Args:
         path: the file, for errors and the log's name.
         recorded: its groups of columns.
-        log_map: what the columns mean; sections without measurements are left out.
+        log_map: the columns' meaning; sections without measurements are left out.
         reader: the reader's name.
-        notes: what the reader assumed.
-        piece: which part is read where the clock starts anew, from 1; default: the longest.
-        flown: what the log states of its vehicle.
+        notes: the reader's assumptions.
+        piece: part to read where the clock starts anew, from 1; default: the longest.
+        flown: the log's statements on its vehicle.
 
     Raises:
         InputError: more than four rotors, no such piece, no motors, neither a pose nor gyro and
-            accelerometer, or numbers that no flight has.
+            accelerometer, or numbers beyond any flight's.
     """
     recorded, of_clock = on_one_clock(path, recorded, piece)
     motors = (*log_map.ways("rotors"), *log_map.ways("commands"))
@@ -176,7 +173,7 @@ def recording_of(
 
 
 def _pose(
-    path: Path, log_map: LogMap, samples: Samples, turned: Samples | None
+    path: Path, log_map: LogMap, samples: ChannelGroup, turned: ChannelGroup | None
 ) -> tuple[Stream, list[str]]:
     """Return positions in m and attitudes (N, 7) in the kit's frames, NaN where there is none, and
     notes.
@@ -184,8 +181,8 @@ def _pose(
     Args:
         path: the file, for errors.
         log_map: with a position.
-        samples: of the position.
-        turned: of the attitude; None: there is none.
+        samples: the position's group.
+        turned: the attitude's group; None: there is none.
 
     Raises:
         InputError: a quaternion's length is not 1, or no position has an attitude.
@@ -207,7 +204,7 @@ def _pose(
         new = np.append(True, np.any(np.diff(position, axis=0) != 0.0, axis=1))
         placed &= new
         notes.append(
-            f"position: sampled and held; {int(np.sum(~new))} of {len(t)} rows repeat the one "
+            f"position: sampled and held; {np.count_nonzero(~new)} of {len(t)} rows repeat the one "
             "before and are not valid"
         )
     pose = np.full((len(t), 7), np.nan)
@@ -230,17 +227,17 @@ def _pose(
         turns = in_kit_axes(log_map, turn, turns[there])
     attitude = Stream(turn.label, measured.t[there], turns)
     steps = np.diff(attitude.t)
-    longest = max(_ATTITUDE_GAP, LONGEST_STEPS * float(np.median(steps))) if len(steps) else 0.0
+    longest = max(_ATTITUDE_GAP, LONGEST_STEPS * np.median(steps)) if len(steps) else 0.0
     pose[placed] = np.column_stack([position[placed], slerp(t[placed], attitude, longest)])
     if placed.any() and not finite_rows(pose).any():
         raise InputError(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
         )
-    alone = int(np.sum(~np.isin(t[placed], attitude.t)))
+    alone = np.count_nonzero(~np.isin(t[placed], attitude.t))
     if turned is samples and alone:
         notes.append(
-            f"{alone} of {int(placed.sum())} positions stand in rows without an attitude, which "
+            f"{alone} of {placed.sum()} positions stand in rows without an attitude, which "
             "was interpolated to their times where it has samples close by"
         )
     for name in turn.columns:
@@ -252,10 +249,10 @@ def _pose(
     return Stream(place.label, t, pose), notes
 
 
-def _kept_rows(samples: Samples, log_map: LogMap, part: Columns) -> Mask:
-    """Return which rows (N,) of a group are those of a section's stream: all messages. Of a table
-    its own, where channels stand in rows of their own; else those with a position or an inertial
-    sensor's sample; all, where most have a position, which the others lost.
+def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
+    """Return the rows (N,) of a group for a section's stream: all messages. In a table with
+    channels in rows of their own, the section's rows; else the rows with a position or an inertial
+    sensor's sample. All rows stay where most have a position: the others lost the position.
     """
     everything: Mask = np.ones(len(samples.t), bool)
     if log_map.rows == "whole" or samples.table is None:
@@ -274,14 +271,14 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
     """Return notes on commands (N, 4).
 
     Raises:
-        InputError: most of them are beyond the range that stands for 0 to 1.
+        InputError: most commands are beyond the range of 0 to 1.
     """
     low, high = part.range or (0.0, 1.0)
     u = commands.values[np.isfinite(commands.values)]
     if np.mean((u < -0.01) | (u > 1.01)) > _OUTSIDE if u.size else False:
         raw = low + (high - low) * u
         what, hint = ("", ": state the range in the map")
-        if u.max() < 0.0 and part.topic:  # an autopilot's, which knows its range
+        if u.max() < 0.0 and part.topic:  # an autopilot knows its range
             what, hint = "no motors that turn: ", ""
         raise InputError(
             f"{path}: {what}columns {', '.join(part.columns)}: values from {raw.min():.6g} to "
@@ -292,7 +289,7 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
         is_said = bool(part.note) or (low, high) == (0.0, 1.0)
         taken = "" if is_said else f"{low:g} to {high:g} taken as 0 to 1, "
         notes.append(f"commands: {commands.name}, {part.unit}, {taken}{_order_note(part.order)}")
-    if outside := int(np.sum((u < -1e-9) | (u > 1.0 + 1e-9))):
+    if outside := np.count_nonzero((u < -1e-9) | (u > 1.0 + 1e-9)):
         notes.append(f"{outside} motor command(s) beyond that range were set to its end")
     return notes
 
@@ -305,11 +302,11 @@ def _order_note(order: tuple[int, int, int, int]) -> str:
 def fitted(
     names: Sequence[str], source: object, log_map: LogMap, vehicle: Vehicle | None, reader: str
 ) -> LogMap:
-    """Return a map with the ways to fill a section for which a table has the columns, without the
-    optional sections that the table lacks, and with the range of its commands.
+    """Return a map with the ways to fill a section from a table's columns, and with the range of
+    its commands. Optional sections without columns are left out.
 
     Raises:
-        InputError: it does not fit the table.
+        InputError: the map does not fit the table.
     """
     header = set(names)
     where = f"{source}: map {log_map.name}"
@@ -332,8 +329,10 @@ def fitted(
             hint = f" (like {' or '.join(lower[x] for x in near)})" if near else ""
             words.append(f"{name!r} of {section}{hint}")
         more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
-        found = ", ".join(names[:_SHOWN]) + (", ..." if names[_SHOWN:] else "")
-        raise InputError(f"{where} does not fit: no column {', '.join(words)}{more}; found {found}")
+        listed = ", ".join(names[:_SHOWN]) + (", ..." if names[_SHOWN:] else "")
+        raise InputError(
+            f"{where} does not fit: no column {', '.join(words)}{more}; found {listed}"
+        )
     log_map = log_map.with_ways(fitting)
     check_whole(log_map, f"{where} does not fit")
     extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
@@ -342,7 +341,7 @@ def fitted(
 
 
 def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
-    """Return a map that states the range of its commands: its own, or that of the vehicle.
+    """Return a map with the range of its commands: its own, or the vehicle's.
 
     Raises:
         InputError: neither states one.
@@ -360,15 +359,17 @@ def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
     return replace(log_map, commands=replace(commands, range=curve.command))
 
 
-def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[str, Samples]]:
-    """Return a map with one way to fill each section, and the samples in which its columns stand:
-    the first way whose columns are there, and hold measurements; a position with an attitude that
-    goes with it. Optional sections of which there are none are left out.
+def chosen(
+    recorded: Sequence[ChannelGroup], log_map: LogMap
+) -> tuple[LogMap, dict[str, ChannelGroup]]:
+    """Return a map with one way to fill each section, and the columns' groups. The first way with
+    columns and measurements is taken; a position together with its attitude. Optional sections
+    without columns are left out.
     """
     stated, usable = log_map.rows == "whole" or log_map.is_own, {}
     for section in log_map.sections:
         ways = [(way, s) for way in log_map.ways(section) for s in recorded if s.has(way)]
-        # the only way that is there fills a section that must be filled
+        # the only way fills a required section
         if len(ways) != 1 or not (stated or not ways[0][0].optional):
             ways = [one for one in ways if _is_measured(section, *one, log_map.rows)]
         usable[section] = ways
@@ -387,9 +388,9 @@ def chosen(recorded: Sequence[Samples], log_map: LogMap) -> tuple[LogMap, dict[s
     ), samples
 
 
-def _is_measured(section: str, way: Columns, samples: Samples, rows: str) -> bool:
-    """Return whether a section's columns hold measurements: rotors that turn, a voltage, but of
-    ``messages`` a position that changes, and two samples of others.
+def _is_measured(section: str, way: Columns, samples: ChannelGroup, rows: str) -> bool:
+    """Return whether a section's columns hold measurements: turning rotors, a voltage, a changing
+    position (of any but ``messages``), or two samples of others.
     """
     values = samples.values(way)
     values = values[finite_rows(values)]

@@ -1,11 +1,11 @@
-"""A program that reads a MATLAB file from its input and writes the arrays of numbers in it as a
-NumPy archive (.npz): a field of a struct is ``struct.field``. scipy's reader, and HDF5's, may end
-the process at a spoiled file, so ``tables`` gives them one of their own.
+"""A program to turn a MATLAB file on its input into a NumPy archive (.npz) of the numeric arrays: a
+field of a struct is ``struct.field``. scipy's reader, and HDF5's, may end the process at a spoiled
+file, so ``tables`` gives them one of their own.
 
     python matlab_arrays.py MOST_BYTES MEMORY < flight.mat > flight.npz
 
-Files that unpack to more than ``MOST_BYTES`` are refused before an array is made; what else a
-spoiled file asks for, the limit on the process's memory refuses.
+Files of more than ``MOST_BYTES`` unpacked are refused before an array is made. The limit on the
+process's memory refuses other demands of a spoiled file.
 """
 
 import sys
@@ -20,7 +20,7 @@ from scipy.io import loadmat
 
 _HEADER = 128  # bytes of a file of version 5 to 7
 _BIG, _LITTLE = b"MI", b"IM"  # its last two
-_PACKED = 15  # type of an element that is packed
+_PACKED = 15  # type of a packed element
 _PIECE = 2**16  # bytes packed or unpacked at a time
 
 
@@ -70,7 +70,7 @@ def main() -> None:
     else:
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     data = sys.stdin.buffer
-    data.seek(0)  # whoever opened the file has looked into it
+    data.seek(0)  # the caller has read the file's start
     is_hdf5 = data.read(10) == b"MATLAB 7.3"
     data.seek(0)
     if is_hdf5:  # with its axes turned
@@ -78,11 +78,11 @@ def main() -> None:
             sets = dict(named("", file))
             if sum(value.nbytes for value in sets.values()) > most:
                 raise ValueError(f"it unpacks to more than {most} bytes; expected one flight")
-            found = {name: value[()].T for name, value in sets.items()}
+            arrays = {name: value[()].T for name, value in sets.items()}
     else:
         check_unpacked(data, most)
-        found = dict(named("", loadmat(data, simplify_cells=True)))
-    np.savez(sys.stdout.buffer, **{f"_{name}": value for name, value in found.items()})
+        arrays = dict(named("", loadmat(data, simplify_cells=True)))
+    np.savez(sys.stdout.buffer, **{f"_{name}": value for name, value in arrays.items()})
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Reading a flight log from a file: by its reader, or as a table by a map of its columns."""
+"""Reading a flight log from a file, by a reader or by a map of a table's columns."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .mapped_log import map_table
 from .table import Table
 from .tables import is_table, open_table
 
-_SHOWN = 20  # columns that an error lists
+_SHOWN = 20  # columns in an error
 
 
 def read_log(
@@ -34,20 +34,20 @@ def read_log(
     """Read a flight log.
 
     Args:
-        path: the log, of the kit's own form (``.csv``, ``.csv.gz`` or ``.parquet``) or of any that
-            a reader in ``identification/logs/readers/`` knows.
-        reader: name of a reader, with that reader's option behind a colon where it takes one
-            (``rosbag:topics.yaml``); None: chosen by what is in the file.
-        vehicle: the vehicle that flew, for checking units and for converting commands into rotor
-            speeds; None: the one that the log or its map names, where it is a preset.
-        map: for a table of other columns or another layout: the name of a map that ships with the
-            kit, or the path of a map file (``log_map``).
-        piece: which part of the file is read, from 1, where its clock started anew or it holds
-            several logs (``channels``); None: the longest.
+        path: the log, in the kit's own form (``.csv``, ``.csv.gz`` or ``.parquet``) or in the form
+            of a reader in ``identification/logs/readers/``.
+        reader: name of a reader, with an option behind a colon (``rosbag:topics.yaml``); None:
+            chosen by the file's content.
+        vehicle: the vehicle, for checking units and for converting commands into rotor speeds;
+            None: the log's or the map's, if a preset.
+        map: for a table of other columns or another layout: the name of one of the kit's maps, or
+            the path of a map file (``log_map``).
+        piece: part to read, from 1, of a file with several logs or with restarts of the clock
+            (``channels``); None: the longest.
 
     Raises:
-        InputError: the file cannot be read or breaks a rule of the form; the message says where and
-            what was expected.
+        InputError: the file cannot be read or breaks a rule of the form; the message says where,
+            and the expected value.
 
     Warns:
         UserWarning: numbers look as if they were in other units. The same text is in the log's
@@ -60,11 +60,11 @@ def read_log(
 
 
 def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
-    """Return a log as ``read_log`` gives it, of what a reader made of its file: with doubts about
-    its units, and without inertial sensors that contradict its pose.
+    """Return a reader's log as from ``read_log``: with doubts about its units, and without the
+    inertial sensors contradicting its pose.
 
     Raises:
-        InputError: a number is none that a flight has.
+        InputError: a number is beyond any flight's.
     """
     vehicle = flown_vehicle(vehicle, log.vehicle)
     of_units = unit_doubts(log, vehicle)
@@ -77,7 +77,7 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
 
 def is_own(header: Sequence[str]) -> bool:
     """Return whether a table has this kit's own columns: a time; a pose, or an inertial sensor; and
-    rotor speeds or motor commands. The map says what else must come together.
+    rotor speeds or motor commands. Further rules are in the map.
     """
     there = set(header)
     moves = set(POSE) <= there or {*ACCELEROMETER, *GYRO} <= there
@@ -85,11 +85,11 @@ def is_own(header: Sequence[str]) -> bool:
 
 
 def unknown_table(path: Path) -> Table | None:
-    """Return the table in a file whose columns are neither the kit's own nor those of a reader;
-    None for any other file.
+    """Return a file's table of unknown columns, neither the kit's nor a reader's; None: any other
+    file.
 
     Raises:
-        InputError: it is a table by its name, and none that can be read.
+        InputError: the file is a table by its name, but unreadable.
     """
     if not is_table(path) or readers.reader_by_content(path) is not None:
         return None
@@ -105,7 +105,7 @@ def _read(
     map: str | Path | None,
     piece: int | None,
 ) -> FlightLog:
-    """Read a log by the map or the reader that is given, else as what is in it says."""
+    """Read a log by the given map or reader, else by its content."""
     if map is not None:
         if reader is not None:
             raise InputError(f"{path}: both a reader and a map; expected one of them")
@@ -127,7 +127,7 @@ def _read(
                 f"{path}: missing column(s) {', '.join(missing)}; expected those of {chosen.what}"
             )
         return chosen.read(table, vehicle=vehicle, piece=piece)
-    from .map_guess import guess_map  # the guess is dear, and few logs need it
+    from .map_guess import guess_map  # the guess is slow to import, and few logs need a guess
 
     guess = guess_map(table, vehicle)
     if not guess.missing and not guess.doubts:

@@ -1,7 +1,7 @@
-"""What the columns of a flight may mean, enumerated: each reading writes its own sentence.
+"""Possible meanings of a flight's columns: each reading writes its own sentence.
 
 A reading assigns frames, the order and sense of the attitude, a unit of length, rotors and a clock
-to columns. ``evidence`` says how well a flight agrees with each.
+to columns. ``evidence`` compares a flight with each.
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 from ...runtime.yaml_file import read_yaml
 from .channels import quaternions, scaled
 from .log_map import SENSES, UNITS, Attitude
-from .rotor_orders import ORDERS, Order, order_names
 from .table import Array, Mask, finite_rows
+from .what_flew import ORDERS, Order, order_names
 
 _I = np.eye(3)
 _STATED: dict[str, Any] = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
@@ -34,12 +34,12 @@ class Frames:
     position: Array = field(default_factory=lambda: _I)
     world: Array = field(default_factory=lambda: _I)
     body: Array = field(default_factory=lambda: _I)
-    names: tuple[str, str] = ("", "")  # of world and body in a map; empty where a map has none
-    unusual: bool = False  # its axes do not belong together in any usual convention
+    names: tuple[str, str] = ("", "")  # names of world and body in a map; empty: a map has none
+    unusual: bool = False  # axes of no usual convention
 
 
 def _axes(text: str) -> Array:
-    """Return the matrix (3, 3) that makes of x, y and z what a text such as ``x -y -z`` says."""
+    """Return the matrix (3, 3) of a text such as ``x -y -z``, from x, y and z to these axes."""
     rows = [_I["xyz".index(axis[-1])] * (-1.0 if "-" in axis else 1.0) for axis in text.split()]
     return np.array(rows) + 0.0  # no negative zeros
 
@@ -52,12 +52,12 @@ def _frames(
 
 
 _USUAL_FRAMES = tuple(_frames(**stated) for stated in _STATED["frames"])
-MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.names[0])  # that a map can say
+MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.names[0])  # with names in a map
 PLAIN = MAP_FRAMES[0]
 
 
 _FACTS: dict[str, str] = _STATED["positions"]
-_ALONG = [  # the 47 other ways in which px, py, pz may lie along axes of the attitude's world
+_ALONG = [  # the 47 other directions of px, py, pz along axes of the attitude's world
     " ".join(map("".join, zip(signs, axes, strict=True)))
     for axes, signs in product(permutations("xyz"), product(("", "-"), repeat=3))
 ][1:]
@@ -76,9 +76,9 @@ ROTORS: Order = ORDERS["windwrench"]
 class SensorReading:
     """One way to read an inertial sensor."""
 
-    says: str = ""  # what the columns look like, what was expected, and what to do
+    says: str = ""  # the columns' look, the expected columns, and the remedy
     turn: Array = field(default_factory=lambda: _I)  # (3, 3), multiplies the columns
-    lacks_gravity: bool = False  # they hold an acceleration in place of the specific force
+    lacks_gravity: bool = False  # an acceleration in place of the specific force
     unit: str = ""  # of the columns, in a map
     body: str = ""  # axes of the columns, in a map
 
@@ -95,10 +95,10 @@ ACCELEROMETER_READINGS = tuple(_sensor(**stated) for stated in _STATED["accelero
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class ColumnReading:
     """One way to read a flight's columns."""
 
-    order: str = "wxyz"  # which of w, x, y, z the columns of a quaternion hold
+    order: str = "wxyz"  # of a quaternion's columns
     euler: str = ""  # order of turns of angles about x, y, z; empty: a quaternion
     unit: str = "rad"  # of the angles
     pitch_sign: int = 1  # of the angle about y
@@ -108,24 +108,25 @@ class Reading:
     gyro: SensorReading = AS_DECLARED
     rotors: Order = ROTORS  # the kit's rotor, from 1, in each column
     mirrored: bool = False  # rotors turn against the declared spin
-    late: float = 0.0  # s, by which the rotors' columns come late against the motion
-    unlikely: float = 0.0  # log-likelihood ratio to make up for being less usual
+    late: float = 0.0  # s, delay of the rotors' columns against the motion
+    unlikely: float = 0.0  # log-likelihood ratio against an unusual reading
 
     @property
     def attitude(self) -> tuple[Any, ...]:
-        """What turns columns into rotations: the first five fields."""
+        """The fields for rotations: the first five."""
         return self.order, self.euler, self.unit, self.pitch_sign, self.sense
 
     def part(self, columns: tuple[str, ...] = ()) -> Attitude:
-        """Return the section of a map by which columns hold the attitude."""
+        """Return the map's section for an attitude in some columns."""
         signs = (1, self.pitch_sign, 1) if self.pitch_sign < 0 else ()
         unit = self.unit if self.euler else ""
-        order, euler, sense = self.order, self.euler, self.sense
-        return Attitude(columns, unit, signs=signs, order=order, euler=euler, sense=sense)
+        return Attitude(
+            columns, unit, signs=signs, order=self.order, euler=self.euler, sense=self.sense
+        )
 
     @property
     def moves(self) -> tuple[Any, ...]:
-        """What turns columns into motion: the first eight fields."""
+        """The fields for motion: the first eight."""
         return *self.attitude, self.frames, self.length, self.gyro
 
     @property
@@ -146,7 +147,7 @@ class Reading:
 
     @property
     def says(self) -> str:
-        """What the columns look like, what was expected, and what to do."""
+        """The columns' look, the expected columns, and the remedy, in words."""
         if self.gyro.says:
             return f"gx, gy, gz {self.gyro.says}"
         if self.late:
@@ -204,7 +205,7 @@ class Reading:
 
 
 def _combined(matrix: Array, columns: Sequence[str]) -> str:
-    """Return in words what the rows of a matrix make of columns, up to one positive factor."""
+    """Return the products of a matrix's rows and columns in words, up to one positive factor."""
     rows = []
     for row in np.round(matrix, 6):
         terms = "".join(
@@ -214,10 +215,10 @@ def _combined(matrix: Array, columns: Sequence[str]) -> str:
     return f"({', '.join(rows)})"
 
 
-def _quaternion(reading: Reading) -> str:
+def _quaternion(reading: ColumnReading) -> str:
     """Return in words the kit's quaternion of the columns qw, qx, qy, qz."""
     frames = reading.frames
-    mirror = np.linalg.det(frames.world)  # of the body as well: a mirrored rotation is one again
+    mirror = np.linalg.det(frames.world)  # the body's too: a mirrored rotation is one again
     world, body = (Rotation.from_matrix(mirror * turn) for turn in (frames.world, frames.body))
     columns = as_written(np.eye(4), reading)[1]
     made = (world * columns * body).as_quat(scalar_first=True).T
@@ -226,22 +227,27 @@ def _quaternion(reading: Reading) -> str:
     return text if abs(first) > 0.9 else f"0.7071 {text}"
 
 
-DECLARED = Reading()
-# log-likelihood ratios that readings must make up: one as declared is right far more often, and of
-# time offsets that differ there are some 60
+DECLARED = ColumnReading()
+# penalties in log-likelihood ratios: the declared reading is right far more often, and there are
+# some 60 different time offsets
 OTHER, OFFSET = 8.0, 12.0
 
 
-def _each(**aspects: Sequence[Any]) -> list[Reading]:
+def _each(**aspects: Sequence[Any]) -> list[ColumnReading]:
     """Return the readings of all combinations of aspects."""
-    return [Reading(**dict(zip(aspects, each, strict=True))) for each in product(*aspects.values())]
+    return [
+        ColumnReading(**dict(zip(aspects, each, strict=True)))
+        for each in product(*aspects.values())
+    ]
 
 
-def _weighed(found: Sequence[Reading], least: float, world: str = "enu") -> list[Reading]:
-    """Return readings that must make up ``least``, and 1 for each convention that is less usual.
+def _weighed(
+    readings: Sequence[ColumnReading], least: float, world: str = "enu"
+) -> list[ColumnReading]:
+    """Return readings with a penalty of ``least``, and 1 for each less usual convention.
 
     Args:
-        found: the readings.
+        readings: the readings.
         least: log-likelihood ratio.
         world: the usual one.
     """
@@ -256,20 +262,20 @@ def _weighed(found: Sequence[Reading], least: float, world: str = "enu") -> list
             + (r.world != world)
             + r.frames.unusual,
         )
-        for r in found
+        for r in readings
     ]
 
 
-def log_readings(has_pose: bool) -> list[Reading]:
+def log_readings(has_pose: bool) -> list[ColumnReading]:
     """Return the readings of the kit's own columns, the one as declared first.
 
     Args:
-        has_pose: whether the motion is that of a pose; else it is that of a gyro.
+        has_pose: whether the motion is a pose's, else a gyro's.
     """
     others = _each(gyro=GYRO_READINGS)
     if has_pose:
         others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
-        others.append(Reading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
+        others.append(ColumnReading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
     others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
     return [DECLARED, *_weighed(others, OTHER)]
@@ -277,36 +283,36 @@ def log_readings(has_pose: bool) -> list[Reading]:
 
 def table_readings(
     orders: Sequence[str], units: Sequence[str], length: str, hint: str
-) -> list[Reading]:
-    """Return the readings of a table's pose that a map can express.
+) -> list[ColumnReading]:
+    """Return the readings of a table's pose within a map's words.
 
     Args:
-        orders: of a quaternion's columns, the usual first; nothing where they hold angles.
+        orders: orders of a quaternion's columns, the usual first; empty: angles.
         units: of angles.
-        length: unit of the position by the columns' names, for which another must make up.
-        hint: the world that names speak for; empty: none.
+        length: unit of the position by the columns' names; others have a penalty.
+        hint: the world by the columns' names; empty: none.
     """
     attitudes: dict[str, Sequence[Any]] = {"order": orders}
     if not orders:
         attitudes = {"euler": ("zyx", "xyz"), "unit": units, "pitch_sign": (1, -1)}
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    found = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
+    readings = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
     return [
         replace(r, unlikely=r.unlikely + OTHER * (length in lengths and r.length != length))
-        for r in _weighed(found, 0.0, hint or "enu")
+        for r in _weighed(readings, 0.0, hint or "enu")
     ]
 
 
-def rotations(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
-    """Return in which rows (N,) of an attitude's columns there is one, and the rotations of these
-    rows by a reading, body to world in the kit's frames.
+def rotations(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:
+    """Return the rows (N,) with an attitude, and their rotations by a reading, body to world in the
+    kit's frames.
     """
     good, rotation = as_written(columns, reading)
     frames = reading.frames
     return good, Rotation.from_matrix(frames.world @ rotation.as_matrix() @ frames.body)
 
 
-def as_written(columns: Array, reading: Reading) -> tuple[Mask, Rotation]:
+def as_written(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     part = reading.part()
     good = finite_rows(columns)

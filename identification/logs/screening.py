@@ -1,15 +1,15 @@
-"""Is a flight log what it claims to be? Asked before it is diagnosed, estimated or drawn, so that
-no effect and no force is found where a column is wrong.
+"""Screening of a flight log before a diagnosis, an estimate or a drawing: a wrong column must not
+appear as an effect or a force.
 
-A log that is too short, too slow, torn, from a clock that jumps, or in other units or conventions
-is refused with a message that says what it looks like and what to do. Whatever a quadrotor may do
-under effects that its model lacks passes.
+A log is refused if too short, too slow, torn, on a jumping clock, or in other units or conventions.
+The message states the log's look and the remedy. Every motion of a quadrotor under effects outside
+its model passes.
 
-What is a fault depends on the use. Other units, frames and orders, and a vehicle that did not fly,
-spoil every number of any answer: refused in every use. A leap of the pose, a clock that jumps, a
-pose that is held, a rotor that was not read for a while spoil an estimate of the wrench for a time
-that can be stated, so there they are notes; a diagnosis fits the whole log at once, and refuses
-them. Length, rate and even steps are what a diagnosis needs to have evidence; an estimate does not.
+Faults depend on the use. Other units, frames and orders, and a log without a flight, spoil every
+number of any answer: refused in every use. A leap or a hold of the pose, a jump of the clock, a
+rotor without readings spoil an estimate of the wrench for a known time, so they are notes of an
+estimate. A diagnosis fits the whole log at once, and refuses them. A diagnosis also needs length,
+rate and even steps as evidence; an estimate does not.
 """
 
 from collections.abc import Iterable
@@ -27,13 +27,13 @@ from .evidence import Evidence, departures
 from .excerpt import excerpt
 from .flight_log import FlightLog
 from .flight_phases import carrying, flying
-from .inertial import INERTIAL, gravity_doubt, is_stuck
+from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
-from .readings import Reading
+from .readings import ColumnReading
 from .streams import MOTOR_RATES
 from .table import Array, Mask, median_step
 
-LEAST_SECONDS = 10.0  # of unbroken pose in flight
+LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
 _SLACK = 1.1  # of a period: jitter
 _AT_REST = 0.003  # of the weight: thrust below is no turning rotor, in whatever unit
@@ -42,37 +42,37 @@ _UNEVEN = 0.4, 2.5  # of the median step: a step outside is uneven
 _UNEVEN_SHARE, _UNEVEN_NOTE = 0.25, 0.05
 _LEAP = 0.3, 20.0  # m, and m/s over the step: the farthest between two poses
 _TURN = 0.8, 60.0  # rad, and rad/s over the step
-_JUMP = 0.3  # s: a step so long over which the vehicle did not move is a jump of the clock
+_JUMP = 0.3  # s: a step so long without a move is a jump of the clock
 _MOVING = 0.3  # m/s
-_SAME = 0.25  # of the way that the speed would have taken it in half the step
+_SAME = 0.25  # of the way at the vehicle's speed in half the step
 _LOST_SHARE = 0.1  # of the rows in flight: losing more is a note
-_MOST_LEAPS = 0.25  # of the poses: with more, the rest says nothing either
-_HELD = 0.2  # s in flight that a pose may repeat itself: four of the slowest period
-_NEVER = 1.0  # s of log in which some pose must differ from another
-_STOPPED = 0.3  # s that one rotor may read 0 while the others carry the vehicle
-_ABOVE_MOST = 1.5  # of the vehicle's fastest rotor speed: no rotor turns that fast
-_STILL = 0.5  # s that a channel stands still; a busy link repeats a few samples
-# changes of each sister meanwhile: of channels that change equally often, the chance that one does
-# not at all is at most exp(-20)
+_MOST_LEAPS = 0.25  # of the poses: with more, the rest counts for nothing
+_HELD = 0.2  # s in flight of a repeated pose, at most: four of the slowest period
+_NEVER = 1.0  # s of log with at least two poses
+_STOPPED = 0.3  # s of one rotor at 0 while the others carry the vehicle
+_ABOVE_MOST = 1.5  # times the vehicle's fastest rotor speed: no rotor turns as fast
+_STILL = 0.5  # s of a still channel; a busy link repeats a few samples
+# changes of each sister meanwhile: among channels with equally frequent changes, the chance of none
+# in one is at most exp(-20)
 _SISTERS_CHANGE = 20
-_AT_LIMIT = 0.99  # of the fastest rotor speed: a rotor at its limit stands still rightly
+_AT_LIMIT = 0.99  # share of the fastest rotor speed: a rotor at its limit stands still rightly
 _BEYOND = 20.0  # of the median rotor speed: the same where the vehicle states no fastest
 
 
 class Refused(str):
-    """What refuses the log."""
+    """A reason against any use of the log."""
 
 
 class Needed(str):
-    """What refuses the log for a diagnosis, and is nothing to an estimate."""
+    """A reason against a diagnosis, without meaning for an estimate."""
 
 
 class Fault(str):
-    """What refuses the log for a diagnosis, and is a warning for an estimate."""
+    """A reason against a diagnosis, and a warning for an estimate."""
 
 
 class Note(str):
-    """What is said."""
+    """A note."""
 
 
 Findings = Iterable[str]
@@ -81,27 +81,27 @@ Findings = Iterable[str]
 def screen_log(
     log: FlightLog, vehicle: Vehicle, least_seconds: float | None = LEAST_SECONDS
 ) -> tuple[FlightLog, tuple[str, ...]]:
-    """Return a log as a filter is to see it, and doubts about it, or refuse it.
+    """Return a log for a filter, and doubts, or refuse the log.
 
-    Of a pose that repeats the one before to the last digit only the first is valid in the log that
-    comes back: the others are no measurements. A log too short to tell its conventions (3 s of
-    unbroken pose) is taken at its word.
+    Of equal poses to the last digit only the first is valid in the returned log: the others are no
+    measurements. A log too short to tell its conventions (3 s of unbroken pose) is taken at its
+    word.
 
     Args:
-        log: the flight as it was read.
+        log: the flight as read.
         vehicle: as declared.
-        least_seconds: of unbroken pose in flight that the log must have for a diagnosis; several
-            short logs of one vehicle may make up for one another. None: for an estimate.
+        least_seconds: unbroken pose in flight needed for a diagnosis; several short logs of one
+            vehicle may add up. None: for an estimate.
 
     Returns:
-        The log, and notes: what is doubtful, but does not spoil a diagnosis; for an estimate what
-        spoils a part of it, and which part.
+        The log, and notes: doubts without harm to a diagnosis; for an estimate, the spoiled parts
+            and their causes.
 
     Raises:
         InputError: the log is too short, sampled too slowly, its pose lost too often, its clock
-            jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
-            for an estimate, where every number of it would be wrong. The message names the file,
-            what was found and what to do.
+            jumps, its pose leaps, or nothing flew. The log follows another convention than
+            declared. For an estimate: every number would be wrong. The message names the file, the
+            fault and the remedy.
     """
     source, by_imu = log.source or log.name or "log", reads_imu(log)
     notes: list[str] = []
@@ -132,7 +132,7 @@ def screen_log(
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
-    others: list[Reading] = []
+    others: list[ColumnReading] = []
     if by_imu or pose_pieces(log):
         evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu)
         others = departures(evidence)[:3]
@@ -149,8 +149,8 @@ def screen_log(
 
 
 def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
-    """Check that there are a motion and the declared vehicle, and that all four rotors turned, at
-    speeds (rad/s) that carry it.
+    """Check for a motion, the declared vehicle, and four turning rotors at speeds (rad/s) for its
+    weight.
     """
     if not by_imu and not log.valid.any():
         yield Refused(
@@ -178,7 +178,7 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     if not np.isfinite(most):
         yield Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
     for i, column in enumerate(speeds[thrust > 0.3 * most].T):
-        if float(np.max(column)) <= 0.0:
+        if np.max(column) <= 0.0:
             yield Refused(f"omega{i + 1} {zero}; {all_four}")
     ratio = thrust_by_weight(speeds, vehicle)
     if doubt := rotor_doubt(ratio, vehicle):
@@ -205,19 +205,19 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
     most = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > most)).size:
         row, rotor = above[0]
-        found = (
+        racing = (
             f"omega{rotor + 1} reads {speeds[row, rotor]:.4g} rad/s at t = {log.t[row]:.6g} s "
             f"({len(above)} such value(s)), faster than {vehicle.name} turns its rotors; expected "
             f"at most {most:.4g} rad/s"
         )
         if (speeds > most).all(axis=0).any():
-            yield Refused(found)
-        yield Needed(found)
-        yield Fault(f"{found}. They were interpolated")
+            yield Refused(racing)
+        yield Needed(racing)
+        yield Fault(f"{racing}. They were interpolated")
 
 
 def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
-    """Return a rotor speed in rad/s that no rotor reaches."""
+    """Return a rotor speed in rad/s beyond all rotors."""
     middle = float(np.median(log.rotor_speeds[log.rotor_speeds.max(axis=1) > 0.0]))
     return min(_ABOVE_MOST * vehicle.omega_max, _BEYOND * max(middle, vehicle.hover_rate))
 
@@ -225,13 +225,13 @@ def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
 def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     """Check rate, length, unit and axes of an IMU.
 
-    Gravity shows the accelerometer's unit and axes, and the rotors the gyro's. What neither shows
-    (an accelerometer turned about z) stays the log's word.
+    Gravity shows the accelerometer's unit and axes, and the rotors the gyro's. An accelerometer
+    turned about z shows in neither.
     """
     assert log.gyro is not None
     assert log.accelerometer is not None
     rows = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
-    if len(rows) < INERTIAL.samples:
+    if len(rows) < LEAST_SAMPLES:
         yield Refused(
             f"ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected them in "
             "the same rows, and a whole flight"
@@ -246,7 +246,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
             f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "
             f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
         )
-    there = sum(float(log.t[piece[-1]] - log.t[piece[0]]) for piece in inertial_pieces(log))
+    there = sum(log.t[piece[-1]] - log.t[piece[0]] for piece in inertial_pieces(log))
     if there < least - 1e-9:
         yield Needed(
             f"{there:.3g} s of unbroken gyro and accelerometer; expected at least {least:g} s of "
@@ -258,9 +258,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
 
 
 def _new_poses(log: FlightLog, same: Mask) -> Findings:
-    """Check that the pose changes, and how often; ``same`` (N,): the pose is the one before, to the
-    last digit.
-    """
+    """Check the rate of new poses; ``same`` (N,): the pose is the one before, to the last digit."""
     seen = np.flatnonzero(log.valid)
     if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(same[seen[1:]]):
         yield Refused("the pose never changes, to the last digit; expected the poses of a flight")
@@ -281,10 +279,10 @@ def _new_poses(log: FlightLog, same: Mask) -> Findings:
 
 
 def _uneven_steps(log: FlightLog) -> Findings:
-    """Check that the steps of the clock are even."""
+    """Check for even steps of the clock."""
     step = np.diff(log.t)
-    median = float(np.median(step))
-    uneven = float(np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median)))
+    median = np.median(step)
+    uneven = np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median))
     words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
     if uneven > _UNEVEN_SHARE:
         yield Refused(
@@ -297,9 +295,7 @@ def _uneven_steps(log: FlightLog) -> Findings:
 
 
 def _steps(log: FlightLog) -> Findings:
-    """Check that no pose is farther from the one before than a quadrotor gets, and that the clock
-    does not jump.
-    """
+    """Check for leaps of the pose beyond a quadrotor's speed, and for jumps of the clock."""
     seen = np.flatnonzero(log.valid)
     t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
     step = np.diff(t)
@@ -308,16 +304,16 @@ def _steps(log: FlightLog) -> Findings:
     far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
     leaps = far | turned
     if leaps.any():
-        first = int(np.argmax(leaps))
+        first = np.argmax(leaps)
         what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
         units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
         kind = Refused if leaps.mean() > _MOST_LEAPS else Fault
         yield kind(
             f"the pose leaps by {what} within {step[first]:.3g} s at t = {t[first + 1]:.6g} s, "
-            f"which no quadrotor flies ({int(leaps.sum())} such step(s)){units}; expected poses of "
+            f"which no quadrotor flies ({leaps.sum()} such step(s)){units}; expected poses of "
             "one vehicle on one clock: leave the bad rows' pose empty, or cut the log there"
         )
-    # two poses that follow one another as if no time had passed, by velocities over 10 on each side
+    # two poses as if no time had passed, by velocities over 10 poses on each side
     span = 10
     for i in np.flatnonzero(step > _JUMP):
         a, b = i - span, i + 1 + span
@@ -325,9 +321,9 @@ def _steps(log: FlightLog) -> Findings:
             continue
         before = (position[i] - position[a]) / (t[i] - t[a])
         after = (position[b] - position[i + 1]) / (t[b] - t[i + 1])
-        speed = min(float(np.linalg.norm(before)), float(np.linalg.norm(after)))
-        is_alike = float(np.linalg.norm(after - before)) < 0.15 * speed + 0.05 and angle[i] < 0.05
-        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * float(step[i]):
+        speed = min(np.linalg.norm(before), np.linalg.norm(after))
+        is_alike = np.linalg.norm(after - before) < 0.15 * speed + 0.05 and angle[i] < 0.05
+        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * step[i]:
             yield Fault(
                 f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
                 f"where it was ({1e3 * way[i]:.0f} mm on at {speed:.2g} m/s); expected one clock "
@@ -337,15 +333,17 @@ def _steps(log: FlightLog) -> Findings:
 
 
 def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
-    """Check that enough is left in unbroken runs in flight, and note where much is not."""
+    """Check for enough flight in unbroken runs, and note large losses."""
     thrust = np.square(log.rotor_speeds) @ vehicle.k
     thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
     step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
     step = np.where(carrying(thrust), step, 0.0)
     pieces = pose_pieces(log)
     left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
-    whole, runs = float(step.sum()), len(runs_of(~log.valid))
-    lost = f"the pose is lost in {runs} run(s), {int(np.sum(~log.valid))} of {len(log.t)} rows; "
+    whole, runs = step.sum(), len(runs_of(~log.valid))
+    lost = (
+        f"the pose is lost in {runs} run(s), {np.count_nonzero(~log.valid)} of {len(log.t)} rows; "
+    )
     words = f"{lost if runs else ''}{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of "
     words += f"poses of more than {SHORTEST_PIECE:g} s"
     if not pieces or left < least - 1e-9:
@@ -355,9 +353,9 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
 
 
 def stuck_channels(log: FlightLog, vehicle: Vehicle) -> Findings:
-    """Note each channel that repeats to the last digit, for half a second or more in flight, while
-    the other channels of its kind change, as a hung sensor leaves it, and rotor speeds that stand
-    there twice, as a wrong column does.
+    """Note hung sensors and repeated columns of rotor speeds. A hung sensor's channel stands still
+    to the last digit for half a second or more in flight, while the other channels of its kind
+    change.
     """
     rotors, seen = log.rotor_speeds, np.flatnonzero(log.valid)
     aloft = np.square(rotors) @ vehicle.k > 0.3 * vehicle.weight
@@ -385,8 +383,8 @@ def stuck_channels(log: FlightLog, vehicle: Vehicle) -> Findings:
 
 
 def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, names: str) -> Findings:
-    """Note the stretches of rows (N,) in which a channel (N, k) stands still and its sisters
-    (N, m), called ``names``, do not.
+    """Note the stretches of rows (N,) with a still channel (N, k) and moving sisters (N, m), called
+    ``names``.
     """
     still = np.append(False, np.all(np.diff(channel, axis=0) == 0.0, axis=1)) & rows
     changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
@@ -394,18 +392,18 @@ def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, name
         lasts = t[end - 1] - t[first] >= _STILL
         if lasts and np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
             still[first:end] = False
-    if found := _stretches(still, t, _STILL):
+    if stretches := _stretches(still, t, _STILL):
         wrong = "what depends on it there is wrong if its sensor hung"
-        yield Note(f"warning: {name} stands still for {found} while {names} change: {wrong}")
+        yield Note(f"warning: {name} stands still for {stretches} while {names} change: {wrong}")
 
 
 def _stretches(rows: Mask, t: Array, least: float) -> str:
-    """Return the longest run of rows (N,) that lasts at least ``least`` s, and how many do, in
-    words; nothing where none does.
+    """Return the longest run of rows (N,) of at least ``least`` s, and the number of such runs, in
+    words, or nothing.
     """
     runs = [(float(t[end - 1] - t[first]), float(t[first])) for first, end in runs_of(rows)]
-    found = [run for run in runs if run[0] >= least]
-    if not found:
+    long_runs = [run for run in runs if run[0] >= least]
+    if not long_runs:
         return ""
-    seconds, begin = max(found, key=lambda run: run[0])
-    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(found)} such stretch(es))"
+    seconds, begin = max(long_runs, key=lambda run: run[0])
+    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(long_runs)} such stretch(es))"

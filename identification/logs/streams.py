@@ -1,10 +1,10 @@
-"""Streams with clocks of their own, and the one flight log that is made of them.
+"""Streams with clocks of their own, and one flight log from them.
 
-Rows are the pose's samples. Where an inertial sensor is much faster than the pose, or where there
-is no pose, rows are the sensor's: the kit's form has room for rows without a pose.
+Rows are the pose's samples. For an inertial sensor much faster than the pose, or without a pose,
+rows are the sensor's: the kit's form has room for rows without a pose.
 
-A log that holds its slow channels between their samples, or that was resampled along straight
-lines, has rows that no sensor measured: ``source_rate`` says how often a channel was.
+A log with held slow channels, or resampled along straight lines, has unmeasured rows:
+``source_rate`` returns a channel's rate of measurement.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,13 +23,13 @@ from .log_map import LogMap
 from .table import Array, Rows, finite_rows, median_step
 from .what_flew import UNSTATED, WhatFlew
 
-_SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
+_SENSOR_GAP = 3.5  # median steps, the longest gap for interpolating an inertial sensor
 # V: below, a lithium cell is empty, and above no multirotor's pack of 14 cells of 4.35 V
 LEAST_VOLTS, MOST_VOLTS = 2.5, 61.0
-_ROTOR_GAP = 0.5  # s without rotor speeds that deserves a note
+_ROTOR_GAP = 0.5  # s without rotor speeds; longer gaps get a note
 _MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commanded wrenches"}
-# times faster than the pose from which an inertial sensor has rows of its own: a pose is put to the
-# nearest of them, so it moves by a tenth of the pose's step at most, and its noise stays its own
+# times faster than the pose: an inertial sensor has rows of its own. A pose is put to the nearest
+# row, so the pose moves by a tenth of its step at most, with its own noise
 _OWN_ROWS = 5.0
 
 
@@ -37,12 +37,12 @@ _OWN_ROWS = 5.0
 class Stream:
     """Samples of one quantity."""
 
-    name: str  # of the topic or the column
+    name: str  # topic's or column's name
     t: Array  # (N,) s, all streams of a log on one clock
     values: Array  # (N, K); NaN: not measured
 
     def whole(self) -> "Stream":
-        """Return the samples whose values are all finite."""
+        """Return the samples of finite values."""
         good = finite_rows(self.values)
         return self if good.all() else Stream(self.name, self.t[good], self.values[good])
 
@@ -64,22 +64,22 @@ class Stream:
         out = resampled(t, self.t, self.values)
         step = np.diff(self.t)
         after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
-        there = step[after - 1] <= _SENSOR_GAP * float(np.median(step))
+        there = step[after - 1] <= _SENSOR_GAP * np.median(step)
         there |= (self.t[after] == t) | (self.t[after - 1] == t)
         out[~there | (t < self.t[0]) | (t > self.t[-1])] = np.nan
         return out
 
 
 def readable(stream: Stream | None) -> Stream | None:
-    """Return the samples (N, K) that are finite; None where they are fewer than two."""
-    found = None if stream is None else stream.whole()
-    return None if found is None or len(found.t) < 2 else found
+    """Return the finite samples (N, K); None: fewer than two."""
+    finite = None if stream is None else stream.whole()
+    return None if finite is None or len(finite.t) < 2 else finite
 
 
 def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
-    """Return attitudes (M, 4), scalar first, at times (M,) in s; NaN before the first sample, after
-    the last, and within a gap of more than ``longest`` s. Samples at all of the times are returned
-    as they are, whatever their length.
+    """Return attitudes (M, 4), scalar first, at times (M,) in s; NaN outside the samples, and
+    within a gap of more than ``longest`` s. Samples at all of the times are returned as they are,
+    whatever their length.
     """
     out = np.full((len(t), 4), np.nan)
     good = np.linalg.norm(attitude.values, axis=1) > 0.5  # False where NaN
@@ -109,25 +109,25 @@ class Recording:
     # (N, 4) 0 to 1, or wrench (N, 4) N and Nm, commanded; battery (N, 1) V; accelerometer (N, 3)
     # m/s2 and gyro (N, 3) rad/s; force and torque (N, 3), truth
     streams: dict[str, Stream]
-    notes: list[str]  # what the reader assumed
-    extra: dict[str, Stream]  # what else is kept, by name
+    notes: list[str]  # the reader's assumptions
+    extra: dict[str, Stream]  # further channels, by name
     flown: WhatFlew = UNSTATED
 
     def log(self, vehicle: Vehicle | None) -> FlightLog:
         """Return the flight log.
 
-        Rows are the pose's samples within the span of the motors' stream. Of a sensor 5 times
-        faster than the pose, or of a log without a pose, they are the sensor's; a pose then stands
-        in the nearest row, moved there along the line to its neighbour. Everything else is
-        interpolated to the rows. A pose with a number that is not finite is not valid.
+        Rows are the pose's samples within the span of the motors' stream. For a sensor 5 times
+        faster than the pose, or without a pose, rows are the sensor's. A pose then stands in the
+        nearest row, moved there along the line to its neighbour. Everything else is interpolated to
+        the rows. A pose with NaN or an infinite number is not valid.
 
         Args:
-            vehicle: that flew, to turn commands into rotor speeds by its motor curve or by an
-                assumption that the notes state; None: the map's, where that comes with the kit.
+            vehicle: the vehicle, to turn commands into rotor speeds by its motor curve or by an
+                assumption in the notes; None: the map's, if a preset.
 
         Raises:
-            InputError: too few samples, an infinite rotor speed, neither
-                a pose nor gyro and accelerometer, no motors, or streams that do not overlap.
+            InputError: too few samples, an infinite rotor speed, neither a pose nor gyro and
+                accelerometer, no motors, or streams without overlap.
         """
         path, reader, log_map = self.path, self.reader, self.log_map
         vehicle = flown_vehicle(vehicle, log_map.vehicle)
@@ -140,7 +140,7 @@ class Recording:
         notes += words
         after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
         steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
-        if (longest := float(steps.max(initial=0.0))) > _ROTOR_GAP:
+        if (longest := steps.max(initial=0.0)) > _ROTOR_GAP:
             notes += (
                 f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
                 "are interpolated",
@@ -160,7 +160,7 @@ class Recording:
         kept = {name: stream.between(t) for name, stream in self.extra.items()}
         times = t - t[0] if log_map.time.offset is None else t
         notes += time_notes(times)
-        without = int(np.sum(~valid)) if valid.any() else 0
+        without = np.count_nonzero(~valid) if valid.any() else 0
         if without and measured:  # the sensor may be faster than the pose
             notes += tuple(f"of the pose: {text}" for text in time_notes(times[valid]))
         elif without:
@@ -191,7 +191,7 @@ class Recording:
 def _cleaned(
     path: Path, streams: Mapping[str, Stream]
 ) -> tuple[dict[str, Stream], tuple[str, ...]]:
-    """Return the streams that hold something, within what a flight has, and notes.
+    """Return the streams with values, within a flight's limits, and notes.
 
     Raises:
         InputError: too few samples, or an infinite rotor speed.
@@ -290,49 +290,44 @@ def _rows(
 class MotorRates:
     """How often rotor speeds or commands must be measured.
 
-    Between samples they are taken along a straight line, which passes 0.9 of an oscillation's
-    amplitude up to 0.18 of their rate. Forces are judged up to 3.5 Hz. Torques turn a vehicle
-    within a tenth of a second: they need what a pose and a gyro need.
+    Between samples they are taken along a straight line: 0.9 of an oscillation's amplitude passes
+    up to 0.18 of their rate. Forces are judged up to 3.5 Hz. Torques turn a vehicle within a tenth
+    of a second: they need the rate of a pose and a gyro.
     """
 
     force_hz: float = 20.0
     torque_hz: float = 45.0
-    jitter: float = 1.1  # times too slow that a rate may be
+    jitter: float = 1.1  # tolerance of a rate, as a factor
 
     def serves(self, rate: float, least: float) -> bool:
-        """Return whether a rate is as high as it must be, Hz."""
+        """Return whether a rate is high enough, Hz."""
         return rate * self.jitter >= least
 
 
 MOTOR_RATES = MotorRates()
 
 
-@dataclass(frozen=True)
-class SourceRateSettings:
-    """When values repeat because nothing was measured, and not because they were rounded."""
-
-    # of the median spacing of changes: rounded values change at any spacing, held ones at their own
-    least_spacing: float = 0.6
-    least_rows: float = 2.0  # of the median spacing; below, each row is a sample
-    early: float = 0.05  # quantile of spacings that is compared with the median
-    # of the RMS distance from the line between both neighbours: on the line
-    on_line: float = 1e-3
-    most_corners: float = 2 / 3  # of the rows; with more no two corners can be told apart
-    least_changes: int = 8  # that tell a spacing
-
-
-SOURCE_RATE = SourceRateSettings()
+# When values repeat because nothing was measured, and not because they were rounded.
+# share of the median spacing of changes: rounded values change at any spacing, held ones at
+# their own
+_LEAST_SPACING = 0.6
+_LEAST_ROWS = 2.0  # median spacing in rows; below, each row is a sample
+_EARLY = 0.05  # quantile of spacings compared with the median
+# share of the RMS distance from the line between both neighbours: on the line
+_ON_LINE = 1e-3
+_MOST_CORNERS = 2 / 3  # of the rows; with more no two corners can be told apart
+_LEAST_CHANGES = 8  # for a spacing
 
 
 def source_rate(t: Array, values: Array) -> float:
-    """Return how often a channel was measured, Hz; 0 where it holds less than two samples.
+    """Return a channel's rate of measurement, Hz; 0: less than two samples.
 
     Args:
         t: (N,) s, increasing.
         values: (N, K); a row with NaN is no sample.
     """
-    found = Stream("", t, values).whole()
-    t, values = found.t, found.values
+    finite = Stream("", t, values).whole()
+    t, values = finite.t, finite.values
     if len(t) < 2:
         return 0.0
     changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1))
@@ -346,8 +341,8 @@ def between_samples(t: Array, values: Array, rate: float) -> Array:
 
     Args:
         t: (N,) s, increasing.
-        values: (N, K), finite, of a channel that was measured less often.
-        rate: at which it was, Hz.
+        values: (N, K), finite, of a channel measured less often.
+        rate: of the measurement, Hz.
     """
     beats = np.arange(t[0], t[-1], 1.0 / rate)
     off = 0.5 * np.diff(resampled(beats, t, values), n=2, axis=0)
@@ -355,8 +350,8 @@ def between_samples(t: Array, values: Array, rate: float) -> Array:
 
 
 def _corners(t: Array, values: Array) -> Rows:
-    """Return where values (N, K) leave the straight line between their neighbours: of two or more
-    rows in a row the first, since a sample between rows bends the line in both.
+    """Return where values (N, K) leave the straight line between their neighbours: the first of
+    consecutive rows, since a sample between rows bends the line in both.
     """
     if len(t) < 3:
         return np.empty(0, dtype=np.intp)
@@ -366,18 +361,18 @@ def _corners(t: Array, values: Array) -> Rows:
     off += values[:-2]
     np.abs(np.subtract(values[1:-1], off, out=off), out=off)
     rms = np.sqrt(np.mean(np.square(off), axis=0))
-    is_corner = (off > SOURCE_RATE.on_line * rms).any(axis=1)
-    if np.mean(is_corner) > SOURCE_RATE.most_corners:
+    is_corner = (off > _ON_LINE * rms).any(axis=1)
+    if np.mean(is_corner) > _MOST_CORNERS:
         return np.empty(0, dtype=np.intp)
     return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))
 
 
 def _spacing(events: Rows) -> float:
-    """Return the usual number of rows between events that come in a beat of their own; else 1."""
-    use, spacing = SOURCE_RATE, np.diff(events)
-    if len(spacing) < use.least_changes:
+    """Return the usual number of rows between regular events; else 1."""
+    spacing = np.diff(events)
+    if len(spacing) < _LEAST_CHANGES:
         return 1.0
-    median = float(np.median(spacing))
-    beat = float(np.quantile(spacing, use.early)) >= use.least_spacing * median
-    usual = spacing[spacing < median / use.least_spacing]  # no gap
-    return float(np.mean(usual)) if beat and median >= use.least_rows else 1.0
+    median = np.median(spacing)
+    beat = np.quantile(spacing, _EARLY) >= _LEAST_SPACING * median
+    usual = spacing[spacing < median / _LEAST_SPACING]  # no gap
+    return float(np.mean(usual)) if beat and median >= _LEAST_ROWS else 1.0

@@ -17,29 +17,29 @@ Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 
 WHAT = "a flight log"  # for errors
-SUFFIXES = (".csv", ".csv.gz", ".parquet")  # of tables that the kit writes
+SUFFIXES = (".csv", ".csv.gz", ".parquet")  # of the kit's own tables
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".log")  # of text tables, packed or not
 ARRAY_SUFFIXES = (".mat", ".npz")
 
 
 @dataclass(frozen=True)
 class Table:
-    """A file of named columns, of which those asked for are turned into numbers, once.
+    """A file of named columns, turned into numbers on demand, once.
 
     Raises:
-        InputError: it has no rows, or more than ``FileLimits.table_rows``.
+        InputError: the file has no rows, or more than ``FileLimits.table_rows``.
     """
 
     path: Path
     header: tuple[str, ...]
     rows: int
     load: Callable[["Table", Sequence[str]], Iterable[Array]]  # gives columns (rows,) by names
-    first_line: int = 0  # line of a text in which the first row stands; 0: rows have no lines
+    first_line: int = 0  # line of the first row in a text; 0: rows have no lines
     blank_before: tuple[int, ...] = ()  # a row for each blank line before it, in their order
     units: tuple[str, ...] = ()  # of a line of units behind the header
-    notes: tuple[str, ...] = ()  # how it is laid out, and what was left out
-    numeric: tuple[str, ...] = ()  # columns that hold numbers, as far as was looked; empty: all
-    _columns: dict[str, Array] = field(default_factory=dict, repr=False)  # those turned so far
+    notes: tuple[str, ...] = ()  # on layout and omissions
+    numeric: tuple[str, ...] = ()  # columns of numbers in the first rows; empty: all
+    _columns: dict[str, Array] = field(default_factory=dict, repr=False)  # read so far
 
     def __post_init__(self) -> None:
         check_count(self.path, self.rows, LIMITS.table_rows, "rows")
@@ -69,7 +69,7 @@ class Table:
         return {name: self._columns[name] for name in names}
 
     def forget(self) -> None:
-        """Let go of the columns that were read; they are read anew where they are asked for."""
+        """Forget the columns read so far; they are read anew on demand."""
         self._columns.clear()
 
     def row(self, index: int) -> str:
@@ -81,7 +81,7 @@ class Table:
 
 
 def finite_rows(values: Array) -> Mask:
-    """Return which rows (N,) of values (N, k) are finite throughout."""
+    """Return the rows (N,) of values (N, k) with finite numbers alone."""
     return np.asarray(np.isfinite(values).all(axis=1))
 
 
@@ -92,7 +92,7 @@ def median_step(t: Array) -> float:
 
 @contextmanager
 def one_line(what: str, expected: str = "") -> Iterator[None]:
-    """Make an InputError of one line of whatever a parser raises of bytes that are none of its own.
+    """Turn a parser's exception at foreign bytes into an InputError of one line.
 
     Args:
         what: cannot be read, for the error.
@@ -108,7 +108,7 @@ def one_line(what: str, expected: str = "") -> Iterator[None]:
 
 
 def file_kind(path: Path) -> str:
-    """Return which of ``SUFFIXES`` a file to be written has.
+    """Return the suffix, of ``SUFFIXES``, of a file to be written.
 
     Raises:
         InputError: none of them.

@@ -1,7 +1,7 @@
-"""The rows of a table by a map: their times, what of a row may be empty, and gaps of the motors.
+"""The rows of a table by a map: their times, empty fields, and gaps of the motors.
 
-A channel that is slower than its table, or that was lost, is interpolated over short gaps; nobody
-knows what happened in a long one.
+A lost channel, or one slower than its table, is interpolated over short gaps; a long gap hides too
+much.
 """
 
 from collections import Counter
@@ -11,29 +11,29 @@ from dataclasses import replace
 import numpy as np
 
 from ...runtime.errors import InputError
-from .channels import Samples
+from .channels import ChannelGroup
 from .log_map import UNITS, Columns, LogMap
 from .table import Array, Mask, Rows, Table
 
 _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
-# s that are interpolated over: the lag of a small vehicle's motors, over which their speed hardly
-# changes; and steps of the channel's own, since a slow one has longer gaps by nature
+# s to interpolate: the lag of a small vehicle's motors, with hardly a change of speed. And steps of
+# the channel's own: a slow channel has longer gaps by nature
 _LONGEST_GAP = 0.06
 LONGEST_STEPS = 3.5
 _FINITE = "a finite number"
-_BACK = 0.2  # share of the steps that go back, above which times are none
-_DENSE = 0.5  # share of the rows from which on a channel counts as one of every row
-_FEWEST = 10  # samples of a channel that tell in which rows it stands
+_BACK = 0.2  # share of steps back; more are no times
+_DENSE = 0.5  # share of the rows; a channel with more counts as one of every row
+_FEWEST = 10  # samples of a channel to decide on its rows
 
 
 def rows_of(
     table: Table, columns: Mapping[str, Array], log_map: LogMap
-) -> tuple[Samples, list[str]]:
-    """Return what the map's columns hold, as they were written, and notes.
+) -> tuple[ChannelGroup, list[str]]:
+    """Return the map's columns, as written, and notes.
 
     Raises:
-        InputError: many times go back, they cannot be told apart, or are fewer than two; of whole
-            rows, one goes back, or a row lacks a number.
+        InputError: many times go back, times cannot be told apart, or are fewer than two. Of whole
+            rows: one time goes back, or a row lacks a number.
     """
     clock, is_whole = log_map.time, log_map.rows == "whole"
     notes = []
@@ -44,8 +44,8 @@ def rows_of(
     if not clock.column:
         t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
-        return Samples(t, columns, table=table, rows=rows), notes
-    samples = Samples(clock.raw(columns), columns, table=table, rows=rows)
+        return ChannelGroup(t, columns, table=table, rows=rows), notes
+    samples = ChannelGroup(clock.raw(columns), columns, table=table, rows=rows)
     if is_whole:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
     samples = samples.cut(np.isfinite(samples.t))
@@ -88,7 +88,7 @@ def rows_of(
     if len(begins) < len(t):
         notes.append(f"{len(t) - len(begins)} row(s) repeat a time and were joined to the one row")
         joined = {}
-        for name, column in samples.columns.items():  # of each the last value that is there
+        for name, column in samples.columns.items():  # the last value of each
             there = np.where(np.isnan(column), -1, np.arange(len(t)))
             last = np.maximum.reduceat(there, begins)
             joined[name] = np.where(last >= 0, column[last], np.nan)
@@ -96,20 +96,22 @@ def rows_of(
     return samples, notes
 
 
-def _refuse(samples: Samples, name: str, column: Array, bad: Mask, expected: str = _FINITE) -> None:
-    """Raise InputError at the first of a column's values (N,) that is ``bad`` (N,)."""
+def _refuse(
+    samples: ChannelGroup, name: str, column: Array, bad: Mask, expected: str = _FINITE
+) -> None:
+    """Raise InputError at the first ``bad`` (N,) value of a column (N,)."""
     if bad.any():
         i = int(np.argmax(bad))
         value = f"{column[i]:g}"
-        found = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
+        words = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
         assert samples.table is not None
         where = f"{samples.table.path}: column {name}, {samples.place(i)}"
-        raise InputError(f"{where} is {found}; expected {expected}")
+        raise InputError(f"{where} is {words}; expected {expected}")
 
 
-def _check_whole(samples: Samples, log_map: LogMap) -> None:
-    """Raise InputError where a row has a part of a pose, or of a sensor's three values, or lacks
-    another number; ``check_rows`` looks at gaps of motors and of the voltage.
+def _check_whole(samples: ChannelGroup, log_map: LogMap) -> None:
+    """Raise InputError at a row with a part of a pose, or of a sensor's three values, or without
+    another number. ``check_rows`` checks gaps of motors and of the voltage.
     """
 
     def names_of(*parts: Columns | None) -> list[str]:
@@ -128,10 +130,10 @@ def _check_whole(samples: Samples, log_map: LogMap) -> None:
     check([name for name in others if name not in pose], True, _FINITE)
 
 
-def rows_apart(samples: Samples, log_map: LogMap) -> bool:
-    """Return whether channels stand in rows of their own: another one is in rows without a position
-    (or without a gyro's sample, in a log of no pose) far more often than rows lack one. Where a
-    pose is lost, the others are in all rows alike.
+def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
+    """Return whether channels stand in rows of their own: another channel prefers the rows without
+    a position (without a gyro's sample, in a log of no pose). After the loss of a pose, the others
+    are in all rows alike.
     """
     there = {n: samples.there(part) for n, part in log_map.sections.items() if samples.has(part)}
     base = next((name for name in ("position", "gyro") if name in there), "")
@@ -148,15 +150,15 @@ def rows_apart(samples: Samples, log_map: LogMap) -> bool:
     )
 
 
-def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
+def check_rows(samples: ChannelGroup, log_map: LogMap) -> list[str]:
     """Return notes on the gaps of motors, of a true wrench, and of whole rows' voltage.
 
     Args:
-        samples: of a table.
+        samples: a table's columns.
         log_map: with one way to fill each section.
 
     Raises:
-        InputError: a number is none that a flight has, or a gap is long; the message names the row.
+        InputError: a number is beyond any flight's, or a gap is long; the message names the row.
     """
     is_whole, rotors, commands = log_map.rows == "whole", log_map.rotors, log_map.commands
     battery = log_map.battery if is_whole else None
@@ -166,7 +168,7 @@ def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
         inside = samples.cut(slice(read[0], read[-1] + 1)) if len(read) else samples
         for name, column in zip(part.columns, inside.values(part).T, strict=True):
             gap = _longest_gap(inside, name, column)
-            count = int(np.sum(~np.isnan(column)))
+            count = np.count_nonzero(~np.isnan(column))
             if count < _DENSE * len(column):
                 slow.append(f"{name} {count} of {len(column)}")
             elif count < len(column):
@@ -191,7 +193,7 @@ def check_rows(samples: Samples, log_map: LogMap) -> list[str]:
     return notes
 
 
-def _longest_gap(samples: Samples, name: str, column: Array) -> float:
+def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
     """Return the longest time step of a column's (N,) values, in s.
 
     Raises:
@@ -204,9 +206,9 @@ def _longest_gap(samples: Samples, name: str, column: Array) -> float:
         return 0.0
     t = samples.t
     steps = np.diff(t[read])
-    limit = max(_LONGEST_GAP, LONGEST_STEPS * float(np.median(steps)) if len(steps) else 0.0)
+    limit = max(_LONGEST_GAP, LONGEST_STEPS * np.median(steps) if len(steps) else 0.0)
     edges = np.concatenate([[t[0]], t[read], [t[-1]]])
-    at = int(np.argmax(np.diff(edges)))
+    at = np.argmax(np.diff(edges))
     gap = float(edges[at + 1] - edges[at])
     is_long = not len(read) or gap > limit * (1.0 + 1e-9)
     first = int(read[at - 1]) + 1 if at and len(read) else 0

@@ -1,10 +1,10 @@
-"""Tables of numbers in text, Parquet, MATLAB and NumPy files: read with errors that say where,
+"""Tables of numbers in text, Parquet, MATLAB and NumPy files: read with the places of errors,
 written whole or not at all.
 
-Of Parquet a field of a struct is the column ``struct.field``, an item of a list ``name[0]``,
-``name[1]`` ...; arrays of MATLAB (.mat) and NumPy (.npz) files make the columns of one table in the
-same way. What a Parquet file says of its columns' sizes is looked at before they are unpacked. A
-dictionary of one text may stand for any number of its copies, so its columns must be numbers.
+In Parquet a field of a struct is the column ``struct.field``, an item of a list ``name[0]``,
+``name[1]`` ... Arrays of MATLAB (.mat) and NumPy (.npz) files make columns in the same way. A
+Parquet file's sizes of columns are checked before unpacking. A dictionary of one text may stand for
+any number of its copies, so its columns must be numbers.
 """
 
 import gzip
@@ -40,13 +40,13 @@ from .table import (
 )
 from .text_table import open_text
 
-_MEMORY = 7 * 2**27  # bytes of the process that reads MATLAB's files
-_SHOWN = 10  # arrays that a note lists
-_BUFFER = 2**20  # bytes of a column of Parquet that are read at a time
+_MEMORY = 7 * 2**27  # bytes of the process for MATLAB's files
+_SHOWN = 10  # arrays in a note
+_BUFFER = 2**20  # bytes of a column of Parquet, read at a time
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a file's name is that of a table: of arrays, or a text, packed or not."""
+    """Return whether a file has a table's name: arrays, or a text, packed or not."""
     name = path.name.lower()
     return name.endswith((".parquet", *ARRAY_SUFFIXES)) or name.removesuffix(".gz").endswith(
         TEXT_SUFFIXES
@@ -156,12 +156,12 @@ def _open_arrays(path: Path) -> Table:
 def _write_matlab(path: Path, data: BinaryIO, made: BinaryIO) -> None:
     """Write the arrays of numbers in a MATLAB file into a file, as a NumPy archive.
 
-    scipy reads it in a process of its own: of 8 x 400 files with spoiled bytes, one in each 8 ended
-    the process by a segmentation fault before the 214th.
+    scipy reads the file in a process of its own: in each of 8 runs over 400 files with spoiled
+    bytes, a segmentation fault ended the process before the 214th.
 
     Raises:
-        InputError: it is of version 7.3 and h5py is not installed.
-        ValueError: it is no such file, is spoiled, or unpacks to too much.
+        InputError: the file is of version 7.3 and h5py is not installed.
+        ValueError: the file is no MATLAB file, is spoiled, or unpacks to too much.
     """
     if data.read(10) == b"MATLAB 7.3" and find_spec("h5py") is None:
         raise InputError(
@@ -170,7 +170,7 @@ def _write_matlab(path: Path, data: BinaryIO, made: BinaryIO) -> None:
         )
     program = str(Path(__file__).with_name("matlab_arrays.py"))
     command = [sys.executable, "-P", program, str(LIMITS.arrays), str(_MEMORY)]
-    # threads of linear algebra would take memory of what the file may
+    # threads of linear algebra would take the file's share of memory
     alone = {**os.environ, **SINGLE_THREADED}
     ran = subprocess.run(command, stdin=data, stdout=made, stderr=PIPE, check=False, env=alone)
     if ran.returncode:
@@ -235,7 +235,7 @@ def _open_parquet(path: Path) -> Table:
 def _check_claims(
     path: Path, file: Any, names: Sequence[str], size: int, count: int, what: str
 ) -> None:
-    """Raise InputError where a file says of columns that they unpack to more bytes or numbers."""
+    """Raise InputError where columns unpack to more bytes or numbers, by the file's metadata."""
     groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
     chunks = [chunk for group in groups for chunk in map(group.column, range(group.num_columns))]
     chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] in names]
@@ -248,7 +248,7 @@ def _column(path: Path, file: Any, name: str) -> Any:
     """Return a whole column, in one piece.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: the column is unreadable.
     """
     import pyarrow
 
@@ -261,7 +261,7 @@ def _column(path: Path, file: Any, name: str) -> Any:
 
 
 def _within(path: Path, name: str, array: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the columns that fields of structs and items of lists of numbers make, by their names.
+    """Yield the columns of structs' fields and of lists' numbers, by their names.
 
     Raises:
         InputError: the lists of a column have several lengths; empty ones may stand between.
@@ -287,7 +287,7 @@ def _within(path: Path, name: str, array: Any) -> Iterator[tuple[str, Any]]:
         if count:
             flat = array.flatten().cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
             values[:, lengths > 0] = flat.reshape(-1, count).T
-        for i, column in enumerate(values):  # of which Arrow takes no copy
+        for i, column in enumerate(values):  # without a copy
             yield f"{name}[{i}]", pyarrow.array(column)
     else:
         yield name, array

@@ -2,8 +2,8 @@
 the header, a line of units behind it, lists in fields, whose items are columns ``name[0]`` ...
 
 The layout is found in the first lines. Each separator and each way to write decimals is tried. The
-right one makes the most numbers of a line, in the longest run of lines that have as many fields as
-one another. That run is the table, and the line of names before it is its header. The rows are then
+right layout makes the most numbers of a line, in the longest run of lines with equally many fields.
+This run is the table, and the line of names before the run is its header. The rows are then
 counted, and the columns asked for are turned into numbers a block of lines at a time.
 """
 
@@ -31,17 +31,17 @@ from ...runtime.regular_files import open_regular
 from .column_names import is_unit
 from .table import WHAT, Array, Table
 
-# what people write for a value that is not there
+# people's words for a missing value
 MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**18  # bytes unpacked at a time
-_UNUSED = 2**21  # packed bytes, of which a line may come yet
+_UNUSED = 2**21  # packed bytes without a line yet
 _DAY_0 = date(1970, 1, 1).toordinal()
 _BLOCK = 200  # lines turned into numbers at a time; their texts stay in the cache of the processor
-_LOOKED_AT = 2**18  # characters in which the layout is found
-_LINES = 600  # of them; what Betaflight's decoder writes before the header has 150
+_LOOKED_AT = 2**18  # characters for finding the layout
+_LINES = 600  # lines, at most; Betaflight's decoder writes 150 before the header
 _BETWEEN = 5  # lines between header and first row, at most
 _FEWEST = 2  # columns of a table
 _LIST = re.compile(  # between separators: numbers in brackets, or nothing
@@ -63,7 +63,7 @@ _DECIMAL_COMMA = (
 
 
 def _items(field: str) -> list[str]:
-    """Return the items of a list as people write it, between commas, semicolons or spaces."""
+    """Return the items of a list, between commas, semicolons or spaces."""
     return re.sub(r"[\[\](),;]", " ", field).split()
 
 
@@ -71,15 +71,17 @@ def _seconds(field: str) -> float | None:
     """Return the seconds since 1970 of a date, or since midnight of a time of day; None where a
     field is neither.
     """
-    found = _MOMENT.fullmatch(field)
-    if found is None:
+    moment = _MOMENT.fullmatch(field)
+    if moment is None:
         return None
-    day = found["date"]
+    day = moment["date"]
     try:
         days = 0 if day is None else date.fromisoformat(day.replace("/", "-")).toordinal() - _DAY_0
     except ValueError:  # the 31st of February
         return None
-    return 86_400.0 * days + 3600.0 * int(found["h"]) + 60.0 * int(found["m"]) + float(found["s"])
+    return (
+        86_400.0 * days + 3600.0 * int(moment["h"]) + 60.0 * int(moment["m"]) + float(moment["s"])
+    )
 
 
 @dataclass(frozen=True)
@@ -88,32 +90,32 @@ class TextLayout:
 
     separator: str = ","  # " ": any white space
     decimal: str = "."  # or ","
-    lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) that hold lists, and their lengths
+    lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) of lists, and their lengths
 
     def fields(self, line: str) -> list[str]:
         """Return the fields of a line without the space around them, as ``split``."""
         return list(map(str.strip, self.split(line)))
 
     def split(self, line: str) -> list[str]:
-        """Return the fields of a line, an item of a list each; none where its quotation marks are
-        not those of CSV.
+        """Return the fields of a line, an item of a list each; empty for quotation marks against
+        CSV.
         """
         if self.separator == " ":
             return line.split()
         if self.lists:
             line = _LIST.sub(r'"\1"', line)
         if '"' not in line:
-            found = line.split(self.separator)
+            fields = line.split(self.separator)
         else:
             rows = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
             try:
-                found = next(rows)
+                fields = next(rows)
             except csv.Error:
                 return []
         for i, count in reversed(self.lists):  # as many empty fields as an empty list has items
-            if i < len(found):
-                found[i : i + 1] = _items(found[i]) or [""] * count
-        return found
+            if i < len(fields):
+                fields[i : i + 1] = _items(fields[i]) or [""] * count
+        return fields
 
     def names(self, line: str) -> list[str]:
         """Return the columns' names of a header; a separator behind the last name, and the mark of
@@ -126,8 +128,8 @@ class TextLayout:
         return names
 
     def number(self, field: str) -> float | None:
-        """Return the number in a field, the seconds of a date or a time of day, NaN where it is
-        empty, None where it holds something else.
+        """Return the number in a field, or the seconds of a date or a time of day; NaN: empty,
+        None: something else.
         """
         if not field or field.lower() in MISSING_WORDS:
             return math.nan
@@ -139,7 +141,7 @@ class TextLayout:
             return _seconds(field) if ":" in field else None
 
     def is_blank(self, line: str) -> bool:
-        """Return whether a line has no field that holds anything."""
+        """Return whether all fields of a line are empty."""
         return not line.strip().strip(f'{self.separator} "')
 
 
@@ -211,17 +213,17 @@ def open_text(path: Path) -> Table:
 
 
 def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
-    """Return which fields (from 0) of rows hold lists, and how long the first that has items is."""
-    found: dict[int, int] = {}
+    """Return the fields (from 0) of lists, and the length of each field's first list with items."""
+    lengths: dict[int, int] = {}
     for line in lines if layout.separator != " " else ():
         for i, field in enumerate(layout.fields(_LIST.sub(r'"\1"', line))):
             if field[:1] in ("[", "("):
-                found[i] = found.get(i) or len(_items(field))
-    return tuple(sorted((i, count) for i, count in found.items() if count))
+                lengths[i] = lengths.get(i) or len(_items(field))
+    return tuple(sorted((i, count) for i, count in lengths.items() if count))
 
 
 def _latin(error: UnicodeError) -> tuple[str, int]:
-    """Return bytes that are not UTF-8 as the Latin-1 of old programs."""
+    """Return bytes outside UTF-8 as the Latin-1 of old programs."""
     assert isinstance(error, UnicodeDecodeError)
     return error.object[error.start : error.end].decode("latin-1"), error.end
 
@@ -230,13 +232,13 @@ codecs.register_error(_LATIN, _latin)
 
 
 class _Packed:
-    """The bytes of a gzip file, of which no more are read than characters came of them: a million
-    empty parts would take as long as a table.
+    """The bytes of a gzip file; no more are read than characters were unpacked: a million empty
+    parts would take as long as a table.
     """
 
     def __init__(self, file: BinaryIO, path: Path) -> None:
         self._file, self._path, self._size = file, path, 0
-        self.unpacked = 0  # characters that came
+        self.unpacked = 0  # characters so far
 
     def read(self, size: int) -> bytes:
         """Return the next bytes.
@@ -274,7 +276,7 @@ def _lines(path: Path) -> Iterator[str]:
                 packed.unpacked = size
                 if "\0" in line:
                     raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
-                # asked before it is said: a table may have millions of lines
+                # checked first: a table may have millions of lines
                 if len(line) > LIMITS.table_line or size > LIMITS.table_text or number > most:
                     check_count(path, len(line), LIMITS.table_line, f"in line {number}")
                     check_count(path, size, LIMITS.table_text, "characters of text")
@@ -287,8 +289,8 @@ def _lines(path: Path) -> Iterator[str]:
 
 
 def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
-    """Return the layout that makes the most numbers of the first lines, and the line (from 0) of
-    the first row that is full of them.
+    """Return the layout with the most numbers in the first lines, and the line (from 0) of the
+    first row full of numbers.
 
     Raises:
         InputError: none makes a table of them.
@@ -301,7 +303,7 @@ def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
         if separator in there and (decimal == "." or (separator != "," and "," in there))
     ]
     scores = [_score(head, layout) for layout in layouts]
-    best = int(np.argmax([round(score, 9) for score, _ in scores]))
+    best = np.argmax([round(score, 9) for score, _ in scores])
     if scores[best][0]:
         return layouts[best], scores[best][1]
     if not any(head):
@@ -326,9 +328,9 @@ def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
     if width < _FEWEST:
         return 0.0, 0
     whole = sum(1 for line in head[tail[0][0] :] if line.strip())
-    most = max(k for _, n, k in tail if n == width)
-    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * most)
-    return sum(k for _, n, k in tail if n == width) / whole, start
+    counts = [k for _, n, k in tail if n == width]
+    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * max(counts))
+    return sum(counts) / whole, start
 
 
 def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:
@@ -338,10 +340,10 @@ def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:
 
 
 def _header(path: Path, head: list[str], layout: TextLayout, full: int) -> tuple[int | None, int]:
-    """Return the line (from 0) of the header, None where there is none, and that of the first row.
+    """Return the lines (from 0) of the header, if any, and of the first row.
 
-    The header is the nearest line before the first row that has a name for nearly every column.
-    Rows before the first one that is ``full`` of numbers have empty fields.
+    The header is the nearest line before the first row with a name for nearly every column. Rows
+    before the first ``full`` one have empty fields.
 
     Raises:
         InputError: the rows have twice as many fields as a line of names before them.
@@ -400,7 +402,7 @@ def _fill(
         if layout.decimal == ",":
             texts = "\n".join(texts).translate(_POINTS).split("\n")
         with suppress(ValueError):
-            if is_plain:  # as Python reads numbers, which is quick
+            if is_plain:  # Python's own numbers are quick
                 values[:] = [float(text or "nan") for text in texts]
                 continue
         texts = [text.strip() for text in columns[column]]

@@ -1,7 +1,10 @@
-"""What a log says of the vehicle that flew: its airframe, its outputs, and what moved.
+"""A log's statements on its vehicle (airframe, outputs, turning rotors), and orders of motors.
 
-A quadrotor is what this kit knows. Every reader fills the same form from what its log states, and
-one gate refuses what is none, before four of six motors are taken for a quadrotor's.
+This kit knows quadrotors alone. Every reader fills the same form from its log, and one gate refuses
+other vehicles, before four of six motors are taken for a quadrotor's.
+
+An order gives the motor of each of the kit's rotors: 1 front-left, 2 rear-left, 3 rear-right,
+4 front-right. ``column_words.yaml`` states the vehicles' orders by name, and their sources.
 """
 
 import re
@@ -12,10 +15,17 @@ from itertools import takewhile
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
-from ...runtime.errors import InputError
+from ...runtime.errors import InputError, unknown_name
 from .column_names import WORDS
-from .rotor_orders import Order
 from .table import Array, Table, finite_rows
+
+Order = tuple[int, int, int, int]
+
+PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of rotors 1 to 4
+
+ORDERS: dict[str, Order] = {
+    name: (a, b, c, d) for name, (a, b, c, d) in WORDS["rotor_orders"].items()
+}
 
 QUADROTOR = "a quadrotor"
 _ROTORS = {QUADROTOR: 4, "a tricopter": 3, "a hexarotor": 6, "an octorotor": 8}
@@ -23,26 +33,59 @@ _ROTORS |= {"a decarotor": 10, "a dodecarotor": 12}
 # motors 1 to 4 of PX4's and ArduPilot's plus: right, left, front, rear; x forward, y left
 PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
 _QUADRANTS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))  # x forward, y left
-_APART = np.radians(30.0)  # by which a motor may stand off the rotor that it is
-# of a further rotor's column: share of its variance that the four leave, and its median by theirs
+_APART = np.radians(30.0)  # between a motor and its rotor, at most
+# of a further rotor's column: share of variance unexplained by the four, and its median by theirs
 _LEFT, _SIZES = 0.5, (0.5, 2.0)
-_FEWEST = 30  # rows that decide
+_FEWEST = 30  # rows for a decision
+
+
+def rotor_order(value: object) -> Order:
+    """Return the motor, from 1, of each of the kit's rotors.
+
+    Args:
+        value: a name of ``ORDERS``, or the four motors' numbers, front-left first.
+
+    Raises:
+        InputError: neither.
+    """
+    if isinstance(value, str):
+        if value not in ORDERS:
+            raise unknown_name("rotor order", value, ORDERS)
+        return ORDERS[value]
+    if isinstance(value, list | tuple) and sorted(map(str, value)) == ["1", "2", "3", "4"]:
+        a, b, c, d = (int(str(x)) for x in value)
+        return a, b, c, d
+    raise InputError(
+        f"{value!r}; expected one of {', '.join(ORDERS)}, or the numbers of the motors "
+        f"at the {', '.join(PLACES)}, such as [3, 2, 4, 1]"
+    )
+
+
+def order_words(order: Order) -> str:
+    """Return an order in words."""
+    places = sorted(zip(order, PLACES, strict=True))
+    return f"motors {', '.join(f'{motor} {place}' for motor, place in places)}"
+
+
+def order_names(order: tuple[int, ...]) -> list[str]:
+    """Return the names of an order, if any."""
+    return [name for name, known in ORDERS.items() if known == order]
 
 
 @dataclass(frozen=True)
 class WhatFlew:
-    """What a log states of its vehicle; empty and None: nothing."""
+    """A log's statements on its vehicle; empty and None: nothing."""
 
     airframe: str = ""  # in words, such as "a hexarotor"
-    by: str = ""  # the parameter, message or header that says so
+    by: str = ""  # the parameter, message or header stating the airframe
     rotors: int | None = None  # how many it has
     outputs: str = ""  # protocol and range of the motors' outputs, in words
 
     def check(self, path: object) -> None:
-        """Check that a log is a quadrotor's.
+        """Check a log for a quadrotor.
 
         Raises:
-            InputError: it states another vehicle.
+            InputError: the log states another vehicle.
         """
         count = self.rotors if self.rotors is not None else _ROTORS.get(self.airframe)
         with_rotors = "" if count in (None, 4) else f" with {count} rotors"
@@ -51,7 +94,7 @@ class WhatFlew:
             raise InputError(f"{path}: {self.by} says {what}; expected a quadrotor")
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Return what is known, as rows of a table: what, its value, and what says it."""
+        """Return the statements as rows of a table: name, value, and source."""
         told = [
             ("airframe", self.airframe.partition(" ")[2], self.by),
             ("rotors", "" if self.rotors is None else str(self.rotors), self.by),
@@ -66,15 +109,14 @@ UNSTATED = WhatFlew()
 def more_rotors(
     columns: Sequence[str], source: Table | Mapping[str, Array], are_speeds: bool = False
 ) -> str:
-    """Return in words that a vehicle has more than four rotors; nothing where it has not: columns
-    go on with the numbers of four motors', and turn as they do. An output that is not a motor's by
-    name may be a servo's, and counts where it is a sum of the four: all are mixed of thrust, roll,
-    pitch and yaw.
+    """Return words on more than four rotors, or nothing: columns go on with the numbers of four
+    motors', and turn as they do. Without a motor's name an output may be a servo's, and counts if a
+    sum of the four: all are mixed of thrust, roll, pitch and yaw.
 
     Args:
         columns: the four.
-        source: all columns (N,) that are there, by their names.
-        are_speeds: the four are measured speeds, which no servo has.
+        source: all columns (N,), by their names.
+        are_speeds: the four are measured speeds; a servo has none.
 
     Raises:
         InputError: a table cannot be read.
@@ -82,12 +124,12 @@ def more_rotors(
     turning = [*columns]
     others = source.numeric or source.header if isinstance(source, Table) else [*source]
     for name in _numbered_on(columns, others):
-        found = source.read([*columns, name]) if isinstance(source, Table) else source
-        rows = np.column_stack([found[column] for column in (*columns, name)])
+        data = source.read([*columns, name]) if isinstance(source, Table) else source
+        rows = np.column_stack([data[column] for column in (*columns, name)])
         rows = rows[finite_rows(rows)]
         if len(rows) < _FEWEST or np.ptp(rows[:, 4]) == 0.0:
             continue
-        size = abs(float(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12)))
+        size = abs(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12))
         moves = rows - rows.mean(axis=0)
         left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
         share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
@@ -100,10 +142,10 @@ def more_rotors(
 
 
 def _numbered_on(columns: Sequence[str], others: Sequence[str]) -> list[str]:
-    """Return which other columns differ from four in a number alone, the next ones up."""
-    for found in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
-        if len({match[0] for match in found}) == len(columns):
-            first, last = found[0], max(int(match[0]) for match in found)
+    """Return the other columns with the next numbers up in the four columns' names."""
+    for numbers in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
+        if len({match[0] for match in numbers}) == len(columns):
+            first, last = numbers[0], max(int(match[0]) for match in numbers)
             before, behind = first.string[: first.start()], first.string[first.end() :]
             following = (f"{before}{n:0{len(first[0])}d}{behind}" for n in range(last + 1, 16))
             return list(takewhile(others.__contains__, following))
@@ -111,8 +153,8 @@ def _numbered_on(columns: Sequence[str], others: Sequence[str]) -> list[str]:
 
 
 def slots_of_motors(functions: Sequence[int], first: int) -> list[int]:
-    """Return the slots of motors 1 to 4, by the numbers of what each slot does, of which motor 1's
-    is ``first``; none: not all are there.
+    """Return the slots of motors 1 to 4, by each slot's function number, with ``first`` for motor
+    1; none: not all are there.
     """
     motors = range(first, first + 4)
     return [functions.index(motor) for motor in motors] if {*motors} <= {*functions} else []
@@ -121,8 +163,8 @@ def slots_of_motors(functions: Sequence[int], first: int) -> list[int]:
 def order_by_places(
     places: Sequence[tuple[float, float]], vehicle: Vehicle | None = None
 ) -> Order | None:
-    """Return which motor, from 1, each of the vehicle's rotors is, by their directions from the
-    centre; None where they do not match.
+    """Return the motor, from 1, of each of the vehicle's rotors, by directions from the centre;
+    None: no match.
 
     Args:
         places: (x forward, y left) of motors 1 to 4, in any unit.
@@ -132,8 +174,8 @@ def order_by_places(
     motors = np.arctan2(*np.array(places, dtype=np.float64).T[::-1])
     wanted = np.arctan2(*np.array(rotors, dtype=np.float64).T[::-1])
     off = np.abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
-    found = [int(i) for i in np.argmin(off, axis=1)]
-    if sorted(found) != [0, 1, 2, 3] or off.min(axis=1).max() > _APART:
+    nearest = [int(i) for i in np.argmin(off, axis=1)]
+    if sorted(nearest) != [0, 1, 2, 3] or off.min(axis=1).max() > _APART:
         return None
-    first, second, third, fourth = (i + 1 for i in found)
+    first, second, third, fourth = (i + 1 for i in nearest)
     return first, second, third, fourth

@@ -1,3 +1,1 @@
-"""The motion that a log shows: smoothed and differentiated once, its residual wrench, its sensors'
-noise.
-"""
+"""The motion in a log: smoothed and differentiated, its residual wrench, its sensors' noise."""

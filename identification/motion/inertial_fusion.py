@@ -1,13 +1,12 @@
-"""Attitude, velocity, position and sensor biases from an IMU, with whatever positions and attitudes
-were measured beside it: none, a few a second, or many.
+"""Attitude, velocity, position and sensor biases from an IMU, with any positions and attitudes
+measured beside it: none, a few a second, or many.
 
 A fixed-interval smoother of the error state (attitude, velocity, position, gyro bias, accelerometer
 bias), linearised about its own result and repeated (Gauss-Newton; H. E. Rauch, F. Tung, C. T.
 Striebel, AIAA Journal 3 (1965), 1445-1450; B. M. Bell, SIAM Journal on Optimization 4 (1994),
-626-636). Without any position one thing is still known: a vehicle's velocity is bounded, so over
-tens of seconds the specific force in the world is gravity. That holds the tilt to some mrad; what
-it does not hold (heading, velocity, position) has large standard deviations, which come with the
-result.
+626-636). One fact is known without any position: a vehicle's velocity is bounded. So over tens of
+seconds the specific force in the world is gravity, and the tilt is known to some mrad. Heading,
+velocity and position are not: the result states their large standard deviations.
 """
 
 import math
@@ -19,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...runtime.compiled import compiled
+from ..logs.table import Array
 from .smoothing import resampled, second_difference
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 # knot, first of three states, s behind the knot, distance (3,) from the nominal motion and variance
 # of each, sorted by knot
@@ -32,25 +31,25 @@ Nominal = tuple[float, float, Array, Array, Array, Array, Array]
 
 
 KNOT = 0.02  # s from state to state; between them the IMU is integrated
-# m/s, by which a velocity that nothing measured varies, and s between two that are
-# independent. A steady velocity besides changes nothing that an IMU feels
+# m/s, standard deviation of an unmeasured velocity, and s between two independent ones. A steady
+# velocity besides does not change an IMU's readings
 VELOCITY_STD = 2.0
 VELOCITY_EVERY = 3.0
-STEADY_VELOCITY_STD = 5.0  # m/s, of that one, which stays unknown
-POSITION_STD = 10.0  # m, where the flight begins, if nothing measured it
+STEADY_VELOCITY_STD = 5.0  # m/s, of the steady one, which stays unknown
+POSITION_STD = 10.0  # m, at the start, if not measured
 TILT_STD = 0.3  # rad, at the start, from the mean specific force
-HEADING_STD = 0.3  # rad, where positions showed it; exact where nothing can
+HEADING_STD = 0.3  # rad, if shown by positions; exact without any reference
 # of MEMS sensors, from one switching-on to the next: rad/s and m/s2, and their walk in a second
 GYRO_BIAS_STD = 0.03
 ACCELEROMETER_BIAS_STD = 0.2
 GYRO_BIAS_WALK = 3e-4
 ACCELEROMETER_BIAS_WALK = 3e-3
-# of one sample, the least that is believed: rad/s and m/s2
+# least credible noise of one sample: rad/s and m/s2
 LEAST_GYRO_NOISE = 0.001
 LEAST_ACCELEROMETER_NOISE = 0.01
 LEVELLING = 5.0  # s, time constant of the first guess, which takes gravity for up
 ITERATIONS = 6
-SETTLED = 1e-4  # rad, change of attitude by which an iteration is the last
+SETTLED = 1e-4  # rad, largest change of attitude in the last iteration
 # attitude (body), velocity, position (world), gyro bias, accelerometer bias: three each
 N = 15
 ATTITUDE, VELOCITY, POSITION = 0, 3, 6  # the first of their three
@@ -114,8 +113,8 @@ def _log(R: Array) -> Array:
 def _integrate(
     gyro: Array, force: Array, dt: float, stride: int, turns: Array, ways: Array, moves: Array
 ) -> None:
-    """Write what the IMU says of each interval between knots: turn (m, 3, 3), and what the specific
-    force adds to velocity and position (m, 3), in the axes of its start.
+    """Write the IMU's motion in each interval between knots: turn (m, 3, 3), and the change of
+    velocity and position (m, 3) by the specific force, in the axes of its start.
     """
     for k in range(len(turns)):
         turn, speed, way = np.eye(3), np.zeros(3), np.zeros(3)
@@ -131,8 +130,8 @@ def _integrate(
 
 @compiled
 def _levelled(gyro: Array, force: Array, dt: float, time: float, R: Array, out: Array) -> None:
-    """Write the attitude (n, 3, 3) that the gyro integrates to and the specific force slowly levels
-    (R. Mahony, T. Hamel, J.-M. Pflimlin, IEEE Transactions on Automatic Control 53 (2008)).
+    """Write the attitude (n, 3, 3) integrated from the gyro and slowly levelled by the specific
+    force (R. Mahony, T. Hamel, J.-M. Pflimlin, IEEE Transactions on Automatic Control 53 (2008)).
     """
     for k in range(len(gyro)):
         out[k] = R
@@ -147,8 +146,8 @@ def _levelled(gyro: Array, force: Array, dt: float, time: float, R: Array, out: 
 
 @compiled
 def _predict(k: int, nominal: Nominal, F: Array, defect: Array) -> None:
-    """Write the step from knot ``k`` to the next about the nominal motion: its matrix, and what the
-    IMU says the next knot lacks.
+    """Write the step from knot ``k`` to the next about the nominal motion: its matrix, and the next
+    knot's defect by the IMU.
     """
     T, gravity, rotation, linear, turns, ways, moves = nominal
     R, b, a = rotation[k], linear[k, 6:9], linear[k, 9:12]
@@ -172,8 +171,8 @@ def _predict(k: int, nominal: Nominal, F: Array, defect: Array) -> None:
 
 @compiled
 def _update(x: Array, P: Array, first: int, late: float, z: Array, variance: float) -> None:
-    """Take in a measurement (3,) of three of the states from ``first`` on; of positions, ``late`` s
-    after the knot.
+    """Take in a measurement (3,) of three of the states from ``first`` on; positions are ``late`` s
+    behind the knot.
     """
     for i in range(3):
         h = np.zeros(N)
@@ -310,7 +309,7 @@ def _first_guess(
     """
     dt = float(times[1] - times[0])
     out = np.empty((len(times), 3, 3))
-    # roll and pitch come back to where they were: their mean rate is the bias
+    # roll and pitch return to their start: their mean rate is the bias
     rates = gyro - np.append(gyro.mean(axis=0)[:2], 0.0)
     first = force[: max(1, round(LEVELLING / dt))].mean(axis=0)
     up = first / np.linalg.norm(first)
@@ -320,8 +319,7 @@ def _first_guess(
     _levelled(rates, force, dt, LEVELLING, np.ascontiguousarray(level), out)
     if attitudes is not None and len(attitudes.t):
         nearest_knot = np.abs(np.subtract.outer(attitudes.t[:1], times)).argmin(axis=1)[0]
-        turned = attitudes.values[0] @ out[nearest_knot].T
-        heading = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])
+        heading = _turned_heading(out[nearest_knot], attitudes.values[0])
     elif positions is not None and len(positions.t) > 20:
         heading = _heading(times, out, force, gravity, noise, gyro, positions)
     else:
@@ -338,19 +336,23 @@ def _heading(
     gyro: Array,
     positions: Readings,
 ) -> float:
-    """Return by which heading (rad) a levelled IMU's horizontal motion is the positions': of the
-    turns by which velocity over some seconds follows.
+    """Return the heading (rad) that turns a levelled IMU's horizontal motion into the positions':
+    the mean turn between their changes of velocity over some seconds.
     """
     alone = fuse(times, gyro, force, gravity, noise)
     step = 2.0  # s: an IMU alone keeps a velocity's change over it, and a position shows it
     at = np.arange(times[0] + step, times[-1] - step, 0.5 * step)
-
     plane = np.array([1.0, 1.0j, 0.0])
     felt = second_difference(at, step, alone.t, alone.position) @ plane
     seen = second_difference(at, step, positions.t, positions.values) @ plane
-    turned = alone.rotation[0] @ rotation[0].T
-    zero = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])
+    zero = _turned_heading(rotation[0], alone.rotation[0])
     return float(np.angle(np.sum(np.conj(felt) * seen))) + zero
+
+
+def _turned_heading(before: Array, after: Array) -> float:
+    """Return the heading (rad) by which one attitude (3, 3) is turned from another."""
+    turn = after @ before.T
+    return math.atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
 
 
 def _measured(
@@ -360,8 +362,8 @@ def _measured(
     linear: Array,
     readings: Mapping[int, Readings],
 ) -> Measurements:
-    """Return how far all readings, by the first of the states that they show, are from a nominal
-    motion at the nearest knot.
+    """Return the distances of all readings, by the first of their states, from a nominal motion at
+    the nearest knot.
     """
     parts = []
     for first, r in readings.items():

@@ -1,10 +1,10 @@
-"""What an IMU says of a flight's motion where the pose does not: logs without a pose, or with
-positions a few times a second.
+"""A flight's motion by an IMU, for logs without a pose or with a few positions a second.
 
 The specific force is the balance of forces in body axes itself, whatever the attitude; the gyro is
-the angular velocity. So what rotors and body do shows without a pose. Attitude, and with it what
-acts in the world's axes, comes from ``inertial_fusion``; its errors turn needed and modelled force
-alike and make no residual of their own. Velocity and position are as uncertain as the fusion says.
+the angular velocity. So the effects of rotors and body show without a pose. Attitude, and with it
+effects in the world's axes, comes from ``inertial_fusion``. Its errors turn needed and modelled
+force alike and make no residual of their own. Velocity and position are as uncertain as the fusion
+states.
 """
 
 from dataclasses import dataclass, replace
@@ -16,54 +16,58 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
+from ..logs.table import Array, Mask
 from .inertial_fusion import FusedMotion, Readings, fuse
-from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals
-from .smoothing import CUTOFFS, derivative, high_pass, low_pass, resampled, robust_std, unbroken
+from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body
+from .smoothing import (
+    CUTOFFS,
+    derivative,
+    high_pass,
+    low_pass,
+    mean_square,
+    resampled,
+    robust_std,
+    unbroken,
+)
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-
-# poses a second, from which the pose alone tells the motion; with fewer the IMU is needed
+# poses a second, from which the pose alone shows the motion; with fewer the IMU is needed
 LEAST_POSE_HZ = 45.0
 MOST_HZ = 250.0  # of the signals; faster IMUs are low-passed and thinned out
-# m and rad, of a first guess, and the least that is believed, of a measured pose's axis
+# m and rad, standard deviations of a measured pose's axis: first guess, and least credible
 FIRST_POSITION_STD = 0.02
 LEAST_POSITION_STD = 0.0005
 FIRST_ATTITUDE_STD = 0.01
 LEAST_ATTITUDE_STD = 0.001
 # standard deviations from which a position or an attitude is a leap and is left out
 OUTLIER = 10.0
-DRIFT_TIME = 3.0  # s, over which what the fusion does not know drifts, in a sample of it
+DRIFT_TIME = 3.0  # s, over which the fusion's errors drift, in a sample of them
 
 
 @dataclass(frozen=True, eq=False)
 class InertialSignals(Signals):
-    """Signals of an IMU, with what its sensors read and how well the rest is known."""
+    """Signals of an IMU, with its sensors' readings and the standard deviations of the rest."""
 
     attitude_std: Array  # (n, 3) rad, body
     velocity_std: Array  # (n, 3) m/s, world
     position_std: Array  # (n, 3) m, world
-    bias_std: Array  # (3,) m/s2, of the accelerometer's bias that was taken out
+    bias_std: Array  # (3,) m/s2, of the accelerometer's subtracted bias
 
 
 def pose_rate(log: FlightLog) -> float:
-    """Return how many new poses a second a log holds; 0 where it holds none."""
+    """Return the number of new poses a second in a log; 0 without any."""
     rows = np.flatnonzero(np.isfinite(log.position).all(axis=1))
     times = log.t[_changed(rows, log.position)]
     return float(1.0 / np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
 def reads_imu(log: FlightLog) -> bool:
-    """Return whether a log's motion is that of its IMU: it has one, and no pose that is fast
-    enough.
-    """
+    """Return whether a log's motion is of its IMU: the log has one, and no pose fast enough."""
     return log.gyro is not None and log.accelerometer is not None and pose_rate(log) < LEAST_POSE_HZ
 
 
 def imu_noise(log: FlightLog) -> tuple[float, float]:
     """Return the standard deviation of one sample of gyro (rad/s) and accelerometer (m/s2), an
-    axis: what lies above a quarter of the sampling rate.
+    axis, by the noise above a quarter of the sampling rate.
     """
     return _level(log.gyro), _level(log.accelerometer)
 
@@ -76,19 +80,19 @@ def _level(x: Array | None) -> float:
 
 
 def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
-    """Return the rows of each unbroken run of IMU readings that is long enough to say something."""
+    """Return the rows of each unbroken run of IMU readings of sufficient length."""
     if log.gyro is None or log.accelerometer is None:
         return []
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
     return unbroken(log.t, read, LONGEST_GAP, 50, SHORTEST_PIECE)
 
 
-def inertial_signals(log: FlightLog, gravity: float = 9.81) -> list[InertialSignals]:
+def inertial_signals(log: FlightLog, gravity: float) -> list[InertialSignals]:
     """Return the motion over each unbroken piece of a log's IMU. No low-pass smooths the readings,
-    as a pose's does, which is differentiated twice: 15 Hz would take a per cent at 5 Hz.
+    unlike a twice differentiated pose: 15 Hz would take a per cent at 5 Hz.
 
     Args:
-        log: with gyro and accelerometer; positions and attitudes in it are used, however few.
+        log: with gyro and accelerometer; its positions and attitudes are used, however few.
         gravity: m/s2.
 
     Raises:
@@ -117,8 +121,8 @@ def _piece(
     even = even[even <= imu_times[-1]]
 
     def sampled(times: Array, x: Array) -> Array:
-        found = resampled(even, times, x)
-        return low_pass(found, 0.4 / period, fine)[::thin] if thin > 1 else found
+        even_x = resampled(even, times, x)
+        return low_pass(even_x, 0.4 / period, fine)[::thin] if thin > 1 else even_x
 
     gyro, force = (sampled(imu_times, x[rows]) for x in (log.gyro, log.accelerometer))
     speeds = sampled(log.t, log.rotor_speeds)
@@ -161,9 +165,7 @@ def _fused(
     noise: tuple[float, float],
     thin: int,
 ) -> FusedMotion:
-    """Return the fused motion, with the noise of positions and attitudes as they themselves show
-    it.
-    """
+    """Return the fused motion, with the noise of positions and attitudes by their own scatter."""
     thinned_noise = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
     placed = _measured(log, np.asarray(np.isfinite(log.position).all(axis=1)), t)
     turned = _measured(log, np.asarray(np.isfinite(log.quaternion).all(axis=1) & log.valid), t)
@@ -194,7 +196,7 @@ def _fused(
 
 
 def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
-    """Return the rows of new measurements within a piece; a pose that repeats the one before to the
+    """Return the rows of new measurements within a piece; a pose equal to the one before to the
     last digit was held.
     """
     rows = np.flatnonzero(there & (log.t >= t[0]) & (log.t <= t[-1]))
@@ -202,7 +204,7 @@ def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
 
 
 def _changed(rows: NDArray[np.intp], values: Array) -> NDArray[np.intp]:
-    """Return the rows whose values (N, k) are not those of the row before among them."""
+    """Return the rows whose values (N, k) differ from the row before among them."""
     new = np.any(np.diff(values[rows], axis=0, prepend=np.inf) != 0.0, axis=1)
     return np.asarray(rows[new])
 
@@ -217,17 +219,15 @@ def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:
     return np.asarray((Rotation.from_matrix(fused.rotation[knot]) * since).as_matrix())
 
 
-def with_drift(
-    s: InertialSignals, rng: np.random.Generator, gravity: float = 9.81
-) -> InertialSignals:
-    """Return signals as they would be with other errors of what the IMU does not know, drawn from
-    the fusion's standard deviations: attitude, velocity and position that drift slowly.
+def with_drift(s: InertialSignals, rng: np.random.Generator, gravity: float) -> InertialSignals:
+    """Return signals with other errors of the fusion, drawn from its standard deviations: slow
+    drifts of attitude, velocity and position.
     """
     slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), DRIFT_TIME / s.period, axis=0)
-    slow /= np.sqrt(np.mean(np.square(slow), axis=0)) + 1e-30
+    slow /= np.sqrt(mean_square(slow)) + 1e-30
     turn = Rotation.from_rotvec(slow[:, :3] * s.attitude_std).as_matrix()
     down, rotation = np.array([0.0, 0.0, gravity]), s.rotation @ turn
-    felt = np.einsum("nji,nj->ni", s.rotation, s.acceleration + down)
+    felt = in_body(s.acceleration + down, s.rotation)
     return replace(
         s,
         rotation=rotation,

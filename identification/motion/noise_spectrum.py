@@ -1,10 +1,9 @@
-"""Was the noise of a log filtered before it was written? Read from the spectrum of its channels.
+"""Filtering of a log's noise before it was written, by the spectrum of its channels.
 
 A sensor's own noise is white: its spectrum is level up to half the sampling rate. The motion of a
-rigid body is not up there, since rotors and inertia are low-passes of their own. So where the upper
-half of the band still falls, as behind a low-pass, an estimator or a resampling, nothing in the log
-shows how much noise there is at the frequencies of the motion: what is left at the top is a lower
-bound of it.
+rigid body is not up there, since rotors and inertia are low-passes of their own. In some logs the
+upper half of the band still falls, as behind a low-pass, an estimator or a resampling. Then no part
+of the log shows the noise at the frequencies of the motion: the rest at the top is a lower bound.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,50 +11,47 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..logs.flight_log import FlightLog
+from ..logs.table import Array
 from .smoothing import turned, unbroken
 
-Array = NDArray[np.float64]
-
-
-# shares of half the sampling rate between which the slope is read: above a vehicle's motion,
-# below the last bins, which rounding and jitter of the clock fill
+# shares of half the sampling rate between which the slope is read: above a vehicle's motion, below
+# the last bins, which rounding and jitter of the clock fill
 BAND = (0.5, 0.95)
 GAP = 2.5  # median time steps, from which a piece ends; a single lost sample is none
 SEGMENT = 128  # samples of a spectrum's segment
-LEAST_SEGMENTS = 8  # half overlapping; of fewer the slope's own error is above 0.2
-# power of 1/f by which the amplitude falls over the band. White noise has 0, cameras' poses and
-# onboard attitudes that were not filtered up to 1.0 (vibration), a first-order low-pass 1
+LEAST_SEGMENTS = 8  # half overlapping; with fewer the slope's own error is above 0.2
+# power of 1/f by which the amplitude falls over the band. White noise has 0, unfiltered poses of
+# cameras and onboard attitudes up to 1.0 (vibration), a first-order low-pass 1
 MOST_SLOPE = 1.2
-# more of it in rotor speeds: a rotor with a lag is a first-order low-pass itself, and what it
-# turns at is no sensor's noise. Recordings of the presets have up to 1.9
+# more of it in rotor speeds: a rotor with a lag is a first-order low-pass itself, and its speed is
+# no sensor's noise. Recordings of the presets have up to 1.9
 MORE_OF_ROTORS = 1.0
-# where the log is fast enough: level between these shares of half the sampling rate, over that
-# at the top of the band. White noise has 1; a first-order filter, as an estimator's own is, has
-# 2 there though its slope is no larger than a vibrating camera's
+# for fast logs: ratio of the level between these shares of half the sampling rate to the level at
+# the top of the band. White noise has 1; a first-order filter, like an estimator's own, has 2, at a
+# slope no larger than a vibrating camera's
 LOWER_BAND = (0.2, 0.35)
-LEAST_LOWER_HZ = 20.0  # of that lower band: a vehicle's motion ends below
-TOP_FROM = 0.8  # share of half the sampling rate, of the top of the band
+LEAST_LOWER_HZ = 20.0  # start of the lower band: a vehicle's motion ends below
+TOP_FROM = 0.8  # share of half the sampling rate, start of the top of the band
 MOST_FALL = 1.5
-DIFFERENCES = 2  # taken before the spectrum, so that slow motion leaks nowhere
+DIFFERENCES = 2  # taken before the spectrum, against leakage of slow motion
 
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """How the noise of one channel falls towards half the sampling rate."""
+    """The fall of one channel's noise towards half the sampling rate."""
 
     channel: str  # position, attitude, gyro, accelerometer, rotor speeds
     slope: float  # power of 1/f of the amplitude; 0 of white noise
-    # amplitude in a lower band over that at the top, 1 of white noise; NaN where the log is too
-    # slow for a band above the motion
+    # amplitude in a lower band over the amplitude at the top, 1 of white noise; NaN where the log
+    # is too slow for a band above the motion
     fall: float
-    band_hz: tuple[float, float]  # in which the slope was read
+    band_hz: tuple[float, float]  # of the slope
 
     @property
     def filtered(self) -> bool:
-        """Whether it falls faster than an unfiltered sensor's noise does."""
+        """Whether it falls faster than an unfiltered sensor's noise."""
         most = MOST_SLOPE + (self.channel == ROTORS) * MORE_OF_ROTORS
         return self.slope > most or (self.fall > MOST_FALL and self.channel in POSE_CHANNELS)
 
@@ -66,20 +62,16 @@ ROTORS = "rotor speeds"
 
 @lru_cache(maxsize=1)  # a diagnosis asks three times
 def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
-    """Return how the noise of each of a log's channels falls; channels too short to tell, or that
-    never change, are left out.
+    """Return the fall of the noise of each of a log's channels, without channels that are too short
+    or never change.
     """
     out = []
+    low, high = BAND
     for channel, pieces, period in _channels(log):
-        found = _amplitudes(pieces)
-        if found is not None:
+        if (spectrum := _amplitudes(pieces)) is not None:
             nyquist = 0.5 / period
-            low, high = BAND
-            out.append(
-                ChannelNoise(
-                    channel, _slope(*found), _fall(*found, nyquist), (low * nyquist, high * nyquist)
-                )
-            )
+            slope, fall = _slope(*spectrum), _fall(*spectrum, nyquist)
+            out.append(ChannelNoise(channel, slope, fall, (low * nyquist, high * nyquist)))
     return out
 
 
@@ -94,19 +86,20 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         ("accelerometer", log.accelerometer),
         (ROTORS, None if log.commanded else log.rotor_speeds),
     ):
-        rows = np.flatnonzero(np.isfinite(x).all(axis=1)) if x is not None else np.zeros(0, int)
-        if x is None or len(rows) <= SEGMENT:
+        if x is None:
+            continue
+        rows = np.flatnonzero(np.isfinite(x).all(axis=1))
+        if len(rows) <= SEGMENT:
             continue
         period = float(np.median(np.diff(log.t[rows])))
-        gap = GAP * period
-        pieces = unbroken(log.t, rows, gap, SEGMENT)
+        pieces = unbroken(log.t, rows, GAP * period, SEGMENT)
         turning = name == "attitude"
         yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period
 
 
 def _amplitudes(pieces: Sequence[Array]) -> tuple[Array, Array] | None:
     """Return shares of half the sampling rate (f,) and logarithms of the amplitude (f, k) of
-    pieces (n, k) there; None where there is too little to tell.
+    pieces (n, k) there; None for too short ones.
 
     The power is the median of half overlapping segments: a leap of the pose, or a touch of the
     ground, spoils some of them.
@@ -137,8 +130,8 @@ def _slope(share: Array, amplitude: Array) -> float:
 
 
 def _fall(share: Array, amplitude: Array, nyquist: float) -> float:
-    """Return the amplitude in the lower band over that at the top; NaN where motion may be in
-    that band.
+    """Return the amplitude in the lower band over the amplitude at the top; NaN if motion may be in
+    the lower band.
     """
     low, high = LOWER_BAND
     if low * nyquist < LEAST_LOWER_HZ:
@@ -149,8 +142,8 @@ def _fall(share: Array, amplitude: Array, nyquist: float) -> float:
 
 
 def filtering_notes(log: FlightLog) -> tuple[str, ...]:
-    """Return, as sentences, which of a log's channels were filtered before it was written, how that
-    is known, and what it means.
+    """Return, as sentences, the filtered channels of a log, the evidence for the filter, and its
+    consequence.
     """
     filtered = [noise for noise in noise_spectra(log) if noise.filtered]
     pose = [noise for noise in filtered if noise.channel in POSE_CHANNELS]
@@ -159,7 +152,7 @@ def filtering_notes(log: FlightLog) -> tuple[str, ...]:
 
 
 def _sentence(group: Sequence[ChannelNoise]) -> str:
-    """Return what is said of channels of one kind; the clearest of them is the evidence."""
+    """Return the sentence on channels of one kind; the clearest of them is the evidence."""
     clearest = max(group, key=lambda noise: (noise.slope, noise.fall))
     low, high = clearest.band_hz
     if clearest.slope > MOST_SLOPE:
@@ -187,5 +180,5 @@ def _sentence(group: Sequence[ChannelNoise]) -> str:
 
 
 def pose_was_filtered(log: FlightLog) -> bool:
-    """Return whether a log's pose was filtered, so that its noise cannot be read from it."""
+    """Return whether a log's pose was filtered, with its noise hidden."""
     return any(n.filtered for n in noise_spectra(log) if n.channel in POSE_CHANNELS)

@@ -1,22 +1,36 @@
-"""The residual wrench of a log: what the measured motion needs beyond what a vehicle's model gives.
+"""The residual wrench of a log: the wrench of the measured motion less the wrench of a vehicle's
+model.
 
-The model, with the effects that the vehicle declares, is the one that plant and estimator run.
+Plant and estimator run the same model, with the vehicle's declared effects.
 """
 
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
 from ...dynamics.motion import acceleration_of, angular_acceleration_of, body_numbers
 from ...dynamics.vehicle import Vehicle
-from ...runtime.compiled import Record, compiled_for_vectors
+from ...runtime.compiled import Record, compiled, compiled_for_vectors
+from ..logs.table import Array
 from .signals import Signals
 
-Array = NDArray[np.float64]
-
 _MODEL = np.dtype(MODEL_FIELDS)
+
+
+@compiled
+def model_numbers(
+    f: Record, R: Array
+) -> tuple[tuple[float, ...], tuple[float, float, float, float], tuple[float, ...]]:
+    """Return an attitude (9), and the wrenches of rotors (4) and effects (6) of a model, as numbers
+    of ``acceleration_of``.
+    """
+    r, e = f.rotor_wrench, f.effect_wrench
+    return (
+        (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2]),
+        (r[0], r[1], r[2], r[3]),
+        (e[0], e[1], e[2], e[3], e[4], e[5]),
+    )
 
 
 @compiled_for_vectors
@@ -34,9 +48,9 @@ def _act(
     J: Array,
     out: Array,
 ) -> None:
-    """Write the force (N, world) and the torque (Nm, body) that a model's accelerations mean to a
-    body of this mass and inertia at each sample (n, 6). Where the centre of mass is off the pose's
-    point, the measured angular acceleration ``turning`` moves that point.
+    """Write the force (N, world) and the torque (Nm, body) of a model's accelerations, for a body
+    of this mass and inertia, at each sample (n, 6). The measured angular acceleration ``turning``
+    moves the pose's point about a centre of mass off this point.
     """
     f = models[0]
     b, nothing = body_numbers(f.body), (0.0, 0.0, 0.0)
@@ -44,10 +58,9 @@ def _act(
         drive(f, speeds[k], period, voltage[k])
         apply_effects(f, position[k], rotation[k], velocity[k], rate[k])
         f.time += period
-        R, w, a, r, e = rotation[k], rate[k], turning[k], f.rotor_wrench, f.effect_wrench
-        turn = (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
+        turn, rotors, effects = model_numbers(f, rotation[k])
+        w, a = rate[k], turning[k]
         omega, measured = (w[0], w[1], w[2]), (a[0], a[1], a[2])
-        rotors, effects = (r[0], r[1], r[2], r[3]), (e[0], e[1], e[2], e[3], e[4], e[5])
         x, y, z = acceleration_of(b, turn, omega, measured, rotors, nothing, effects)
         out[k, 0], out[k, 1], out[k, 2] = mass * x, mass * y, mass * (z + b[22])
         x, y, z = angular_acceleration_of(b, turn, omega, rotors, nothing, effects)
@@ -58,13 +71,13 @@ def _act(
 def acting_wrench(
     signals: Signals, vehicle: Vehicle, body: Vehicle | None = None
 ) -> tuple[Array, Vehicle]:
-    """Return the force (N, world) and torque (Nm, body) that a model says act (n, 6), without the
-    weight, and by which body.
+    """Return the force (N, world) and torque (Nm, body) of a model (n, 6), without the weight, and
+    their body.
 
-    Both are as if the vehicle had the mass and inertia of ``body``: the accelerations that the
-    model says are right. By default it is the vehicle's own, with its body effects applied.
+    Both are for the mass and inertia of ``body``: the model's accelerations are right. By default
+    it is the vehicle's own, with its body effects applied.
     """
-    models, own = _loaded(vehicle)
+    models, own = loaded_model(vehicle)
     body = body or own
     out = np.empty((len(signals.t), 6))
     turning = np.ascontiguousarray(signals.angular_acceleration)
@@ -73,17 +86,19 @@ def acting_wrench(
 
 
 @lru_cache(maxsize=1)  # one vehicle acts on several pieces
-def _loaded(vehicle: Vehicle) -> tuple[np.ndarray, Vehicle]:
+def loaded_model(vehicle: Vehicle) -> tuple[np.ndarray, Vehicle]:
+    """Return the record (1,) of a vehicle's model, to be copied, and the vehicle with its body
+    effects applied.
+    """
     models = np.zeros(1, dtype=_MODEL)
     return models, load_model(models[0], vehicle)
 
 
 def needed_wrench(signals: Signals, body: Vehicle) -> Array:
-    """Return the force (N, world) beside the weight and the torque (Nm, body) that a body's
-    measured motion needs (n, 6).
+    """Return the force (N, world) without the weight and the torque (Nm, body) of a body's measured
+    motion (n, 6).
 
-    But for the inertia's torque of turning, and a centre of mass that is off: these are the model's
-    to know.
+    The gyroscopic torque and a centre of mass off the pose's point are left to the model.
     """
     return np.column_stack(
         [

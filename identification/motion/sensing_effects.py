@@ -1,8 +1,7 @@
-"""A log as it would be without the sensing effects that its vehicle declares: poses and rotor
-speeds brought back to truth.
+"""A log without its vehicle's declared sensing effects: true poses and rotor speeds.
 
-Everything in this folder that compares a log's motion with a model takes the corrected log; only
-the filter, which undoes these effects by itself, takes the log as it is.
+Every comparison of a log's motion with a model takes the corrected log. Only the filter takes the
+log as it is: it undoes these effects itself.
 """
 
 from dataclasses import replace
@@ -10,19 +9,18 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.effects import Role, get
-from ...dynamics.model import MODEL_FIELDS, load_model, rewrite_sample
+from ...dynamics.model import rewrite_sample
 from ...dynamics.vehicle import Array, EffectSetting, Vehicle
 from ...runtime.compiled import Record, compiled
 from ..logs.flight_log import FlightLog
+from .residual import loaded_model
 from .signals import LONGEST_GAP
-
-_MODEL = np.dtype(MODEL_FIELDS)
 
 
 @compiled
 def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
     """Bring ``samples`` (n, 11), rotor speeds and pose, back to the truth in place; ``seen`` (n,)
-    says where a pose is.
+    marks rows with a pose.
     """
     f = models[0]
     f.sample[7] = 1.0
@@ -38,12 +36,12 @@ def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
 
 
 def sensing_of(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
-    """Return the effects of a vehicle that change what a log's poses are."""
+    """Return a vehicle's effects on a log's poses."""
     return tuple(e for e in vehicle.effects if get(e.name).kind == "sensing")
 
 
 def delay_of(vehicle: Vehicle) -> float:
-    """Return by how much (s) rows without a vehicle's sensing effects tell of an earlier flight."""
+    """Return the delay (s) of rows without a vehicle's sensing effects behind the flight."""
     late = [e for e in sensing_of(vehicle) if get(e.name).role == Role.DELAY]
     return float(sum(abs(get(e.name).vector(e.coefficients)[0]) for e in late))
 
@@ -52,17 +50,20 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     """Return the log with the vehicle's declared sensing effects taken out of its poses and rotor
     speeds.
 
-    It is the log itself where the vehicle declares none. With a delay of dt between the clocks the
-    rows tell the flight of abs(dt) ago, as the filter's estimate does, and the first abs(dt) s
-    after a break of more than 0.1 s have no pose; the voltage, which is of the row's own instant,
-    is that of then, and the truth stays as it is.
+    Without declared ones it is the log itself. With a delay of dt between the clocks, the rows show
+    the flight of abs(dt) ago, like the filter's estimate. The first abs(dt) s after a break of more
+    than 0.1 s have no pose. The voltage, of the row's own instant before, is of the same past
+    instant; the truth stays as it is.
     """
     if not sensing_of(vehicle):
         return log
-    models = np.zeros(1, dtype=_MODEL)
-    load_model(models[0], vehicle)
     samples = np.column_stack([log.rotor_speeds, log.position, log.quaternion])
-    _undo(models, np.ascontiguousarray(log.t), np.ascontiguousarray(log.valid), samples)
+    _undo(
+        loaded_model(vehicle)[0].copy(),
+        np.ascontiguousarray(log.t),
+        np.ascontiguousarray(log.valid),
+        samples,
+    )
     delay = delay_of(vehicle)
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan
@@ -78,7 +79,7 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
 
 
 def _settled(log: FlightLog, delay: float) -> np.ndarray:
-    """Return where (n,) the last ``delay`` s had no break, so that what was delayed by it is no
+    """Return the rows (n,) without a break in the last ``delay`` s: their delayed signals are no
     longer made up.
     """
     seen = np.flatnonzero(log.valid)

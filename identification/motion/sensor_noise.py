@@ -1,20 +1,18 @@
-"""The noise of a log's sensors, estimated from the log itself, and the residual that it alone would
-leave.
+"""The noise of a log's sensors, estimated from the log itself, and the residual of this noise
+alone.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Mocap, Vehicle
 from ..logs.flight_log import FlightLog
+from ..logs.table import Array
 from .inertial_signals import imu_noise, pose_rate, reads_imu
 from .smoothing import CUTOFFS, high_pass, robust_std, turned
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -29,11 +27,10 @@ class SensorNoise:
 
 
 def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
-    """Return the noise of a log: of its pose what lies above a quarter of the sampling rate, taken
-    as white.
+    """Return the noise of a log. A pose's noise is the part above a quarter of the sampling rate,
+    taken as white.
 
-    The rotor speeds' is the step to which they are rounded, as the log shows it (no more than the
-    vehicle's file says).
+    The rotor speeds' noise is the vehicle's rounding step.
     """
     step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
     if reads_imu(log):  # the few poses beside it show no noise of their own
@@ -50,7 +47,7 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
 
 
 def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> FlightLog:
-    """Return a log with that much noise added to it once more."""
+    """Return a log with this noise added once more."""
     n = len(log.t)
     turn = Rotation.from_rotvec(noise.attitude * rng.standard_normal((n, 3)))
     quaternion = log.quaternion.copy()
@@ -76,11 +73,10 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
 def noisy_logs(
     logs: Sequence[FlightLog], vehicle: Vehicle, hidden: bool = False
 ) -> list[FlightLog]:
-    """Return logs with their own noise added once more, so that the change of whatever is made of
-    them is what noise makes.
+    """Return logs with their own noise added once more: any change of a result is made by noise.
 
     ``hidden``: a filter took the noise out of the logs' upper band, and only a part of it shows.
-    What the vehicle's file says of its motion capture is added then, if it is more.
+    Then the noise of motion capture by the vehicle's file is added, if larger.
     """
     rng = np.random.default_rng(0)
     out = []

@@ -1,8 +1,8 @@
-"""What a flight log says about motion, without a filter's delay: velocity, acceleration, angular
-velocity and its derivative.
+"""The motion in a flight log, without a filter's delay: velocity, acceleration, angular velocity
+and its derivative.
 
 A zero-phase low-pass (a Butterworth filter run forwards and backwards) smooths the pose before it
-is differentiated, wide enough (15 Hz) to leave a quadrotor's motion alone. Whatever is compared
+is differentiated, wide enough (15 Hz) to leave a quadrotor's motion alone. Every quantity compared
 with these signals must pass the same narrower filter afterwards, ``low_pass``: a causal filter's
 output against unfiltered regressors biases drag by a quarter.
 """
@@ -15,13 +15,11 @@ from numpy.typing import NDArray
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
+from ..logs.table import Array
 from .smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, turning, unbroken
 
-Array = NDArray[np.float64]
-
-
 SHORTEST_PIECE = 3.0  # s of unbroken pose; a shorter one is all edge to the filters
-LONGEST_GAP = 0.1  # s without a pose, or a reading of an IMU, over which nothing is interpolated
+LONGEST_GAP = 0.1  # s without a pose, or a reading of an IMU; nothing is interpolated over more
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +56,13 @@ class Signals:
         return speeds, volts, motion[0], motion[1], motion[2], motion[3]
 
 
-def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signals]:
-    """Return the motion over each unbroken piece of a log that is long enough to say something.
+def in_body(x: Array, rotation: Array) -> Array:
+    """Return world vectors (n, 3) in body axes."""
+    return np.asarray(np.einsum("nji,nj->ni", rotation, x))
 
+
+def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signals]:
+    """Return the motion over each unbroken piece of a log of sufficient length.
     Uneven time steps and single lost poses are bridged by interpolation; a gap of more than 0.1 s
     ends a piece.
 
@@ -71,7 +73,7 @@ def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signal
 
 
 def known_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
-    """Return the rows of each unbroken run of poses that is long enough to say something.
+    """Return the rows of each unbroken run of poses of sufficient length.
 
     Raises:
         InputError: none is longer than 3 s.
@@ -90,7 +92,7 @@ def pose_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
 
 
 def longest_step(log: FlightLog) -> float:
-    """Return the time (s) between two rows beyond which a log is broken there."""
+    """Return the longest time step (s) without a break in a log."""
     return max(LONGEST_GAP, 3.5 * log.period)
 
 

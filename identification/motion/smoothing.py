@@ -1,7 +1,7 @@
 """Smoothing and differentiation of a flight's signals, and the cut-off of every filter.
 
-All filters are of zero phase: a Butterworth filter run forwards and backwards. What is compared
-passes the same one: a causal filter's output against unfiltered regressors biases drag by a
+All filters are of zero phase: a Butterworth filter run forwards and backwards. Compared quantities
+pass the same filter: a causal filter's output against unfiltered regressors biases drag by a
 quarter.
 """
 
@@ -20,30 +20,30 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cutoffs:
-    """Cut-off frequencies (Hz), of low-passes if nothing else is said."""
+    """Cut-off frequencies (Hz), of low-passes unless stated."""
 
-    # of a log's pose before it is differentiated, and of rotor speeds worked out from commands:
-    # wide enough to leave a quadrotor's motion alone
+    # a log's pose before it is differentiated, and rotor speeds from commands: wide enough to leave
+    # a quadrotor's motion alone
     pose_hz: float = 15.0
-    # of the residual and of every column that is regressed on it
+    # the residual and every column regressed on it
     residual_hz: float = 5.0
-    # of the residual, where transient disturbances are searched for: they last as long, and sensor
-    # noise is weakest below these
+    # the residual, in the search for transient disturbances: they last as long, and sensor noise is
+    # weakest below these
     transient_hz: tuple[float, float] = (1.5, 3.0)
-    # of a disturbance that counts for the verdict; what is faster is in part noise: of the pose, of
-    # the rounding of rotor speeds
+    # a disturbance in the verdict; faster parts hold noise of the pose and of the rounding of rotor
+    # speeds
     calm_hz: float = 2.0
-    # of the motion by which a log's conventions are told: well above a trajectory, well below the
-    # noise of a differentiated pose
+    # the motion in the checks of a log's conventions: well above a trajectory, well below the noise
+    # of a differentiated pose
     convention_hz: float = 3.0
-    # of the thrust by which flight is told from the ground
+    # the thrust that tells flight from the ground
     flying_hz: float = 1.0
     # share of the sampling rate, of the high-pass that leaves a pose nothing but its noise
     noise_share_of_rate: float = 0.25
 
 
 CUTOFFS = Cutoffs()
-_EDGE = 9  # samples by which either end is continued, as its point reflection
+_EDGE = 9  # samples added to either end, as its point reflection
 
 
 def low_pass(x: Array, cutoff_hz: float, period: float) -> Array:
@@ -74,7 +74,7 @@ def _section(share_of_nyquist: float) -> tuple[Array, Array]:
 
 @compiled
 def _run(x: Array, section: Array, start: Array) -> None:
-    """Run a second-order filter over columns (n, k), in place, as if the first had lasted."""
+    """Run a second-order filter over columns (n, k), in place, as if the first row had lasted."""
     b, a = section[:3], section[4:]
     first, second = start[0] * x[0], start[1] * x[0]
     for row in x:
@@ -96,14 +96,20 @@ def high_pass(x: Array, share_of_rate: float) -> Array:
     return np.asarray(sosfiltfilt(sections, x, axis=0), dtype=np.float64) / kept
 
 
+def mean_square(x: Array) -> Array:
+    """Return the mean squares of the columns of ``x`` (n, ...)."""
+    out: Array = np.mean(np.square(x), axis=0)
+    return out
+
+
 def robust_std(x: Array) -> float:
     """Return the standard deviation of normal noise about zero, whatever the outliers."""
     return float(np.median(np.abs(x)) / 0.6745)
 
 
 def lagged(x: Array, lag: float, period: float) -> Array:
-    """Return ``x`` (n, ...) through a first-order lag (s), at rest before the first sample: as the
-    effect of the library has it, each sample held over the step that ends there.
+    """Return ``x`` (n, ...) through a first-order lag (s), at rest before the first sample. As in
+    the library's effect, each sample is held over the step before it.
     """
     if lag <= 1e-9:
         return x
@@ -125,15 +131,15 @@ def second_difference(at: Array, step: float, t: Array, x: Array) -> Array:
 def unbroken(
     t: Array, rows: NDArray[np.intp], gap: float, count: int = 0, seconds: float = -1.0
 ) -> list[NDArray[np.intp]]:
-    """Return the runs of ``rows`` between which no more than ``gap`` s pass, of those that have
-    more than ``count`` rows and last more than ``seconds`` s.
+    """Return the runs of ``rows`` with gaps of at most ``gap`` s, of more than ``count`` rows and
+    more than ``seconds`` s.
     """
     runs = np.split(rows, np.flatnonzero(np.diff(t[rows]) > gap) + 1)
     return [run for run in runs if len(run) > count and t[run[-1]] - t[run[0]] > seconds]
 
 
 def runs_of(rows: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first row, and the one after the last, of each run of rows (n,) that are true."""
+    """Return the first row, and the one after the last, of each run of true rows (n,)."""
     edges = np.flatnonzero(np.diff(rows, prepend=False, append=False))
     return [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
 
@@ -143,8 +149,8 @@ def derivative(x: Array, period: float, order: int = 1) -> Array:
     period.
 
     Central differences, applied twice, take a third of (omega period)^2 from an acceleration. The
-    direction of thrust loses nothing, and the difference, 0.08 mm times the angular acceleration at
-    200 Hz, would be a centre of mass that is off.
+    direction of thrust loses nothing. The difference, 0.08 mm times the angular acceleration at 200
+    Hz, would look like an offset of the centre of mass.
     """
     return np.asarray(savgol_filter(x, 5, 4, deriv=order, delta=period, axis=0))
 
@@ -181,14 +187,14 @@ def turn_between(before: Array, after: Array) -> Array:
 
 def turned(quaternion: Array) -> Array:
     """Return the sum (n - 1, 3) of the rotations (rad, body) between quaternions (n, 4). White
-    noise stays white in this sum, but for a small share that the motion turns.
+    noise stays white in this sum, except for a small share turned by the motion.
     """
     return np.asarray(np.cumsum(turn_between(quaternion[:-1], quaternion[1:]), axis=0))
 
 
 def continuous(quaternion: Array) -> Array:
-    """Return quaternions (n, 4) with the signs that make the sequence continuous, so that it can be
-    smoothed: a quaternion and its negative are one attitude.
+    """Return quaternions (n, 4) with the signs of a continuous sequence, ready for smoothing: a
+    quaternion and its negative are one attitude.
     """
     signs = np.sign(np.sum(quaternion[1:] * quaternion[:-1], axis=1))
     signs = np.cumprod(np.where(signs == 0, 1.0, signs))

@@ -1,4 +1,4 @@
-"""A diagnosis as a person and a machine read it: page, pictures, sentences, `report.json`."""
+"""A diagnosis for people and machines: page, pictures, sentences, `report.json`."""
 
 from .files import report_data, report_schema, write_report
 

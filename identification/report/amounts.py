@@ -1,8 +1,7 @@
-"""What a coefficient does, in a quantity that one can act on: newtons at 1 m/s, millimetres
-forward, per cent of thrust.
+"""Coefficients as practical quantities: newtons at 1 m/s, millimetres forward, per cent of thrust.
 
-The unit of a coefficient and the words of its meaning say what it does, so an effect of a user's
-own is told in the same way.
+The quantity follows from a coefficient's unit and the words of its meaning, also for an effect of a
+user's own.
 """
 
 import math
@@ -17,14 +16,14 @@ from .words import SPACE, coefficient_meaning, effect_summary, in_words, scale_o
 
 _ROTORS = 4
 _SMALL = 0.5
-# of a size below that: what people say in place of metres, seconds, kilograms and radians
+# units below this size, in place of metres, seconds, kilograms and radians
 _SMALL_UNITS = {
     "m": (1e3, "mm"),
     "s": (1e3, "ms"),
     "kg": (1e3, "g"),
     "rad": (180.0 / math.pi, "degrees"),
 }
-# of a coefficient's unit: what it does at which speed
+# a coefficient's unit: the unit of its effect, and the speed
 _AT = {
     "N/(m/s)": ("N", "at 1 m/s"),
     "N/(m/s)^2": ("N", "at 1 m/s"),
@@ -33,22 +32,22 @@ _AT = {
 _RELATIVE = {"1": (100.0, "%"), "1/s": (6000.0, "% a minute")}
 _PLACE = re.compile(r"(along|about) (body|world) ([xyz])|(rotor \d)$")
 _SIDES = {"x": ("forward", "backward"), "y": ("left", "right"), "z": ("up", "down")}
-_KNOWN = 2.0  # standard deviations, from which a coefficient is worth a word
-_BLOCK = 3.0  # s: longer than what correlates in what a model leaves
+_KNOWN = 2.0  # least standard deviations of a coefficient in the sentence
+_BLOCK = 3.0  # s: longer than the correlation of a residual
 _LEAST_BLOCKS = 4
-_STEADY = 4.0  # standard errors of a mean over blocks, from which it is no chance
+_STEADY = 4.0  # least standard errors of a mean over blocks, beyond chance
 
 
 @dataclass(frozen=True)
 class Amount:
-    """What a coefficient does.
+    """The practical quantity of a coefficient.
 
     Attributes:
         value: in ``unit``.
         std: standard deviation.
         unit: empty for a pure number.
-        where: along which axis, or at which rotor; empty for neither.
-        when: at which speed; empty for always.
+        where: axis or rotor; empty for neither.
+        when: speed; empty for always.
     """
 
     value: float
@@ -64,13 +63,13 @@ class Amount:
 
 
 def title(name: str) -> str:
-    """Return an effect's plain name: the words before the colon of what describes it."""
+    """Return an effect's plain name: the words before the colon of its summary."""
     plain, colon, _ = effect_summary(name).partition(":")
     return plain[:1].lower() + plain[1:] if colon else name
 
 
 def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
-    """Return what a coefficient of a named effect does to a vehicle as it is declared."""
+    """Return the quantity of a named effect's coefficient on the declared vehicle."""
     value, std = effect.coefficients[coefficient], effect.std.get(coefficient, 0.0)
     unit = effect.units.get(coefficient, "1")
     meaning = coefficient_meaning(effect.name, coefficient)
@@ -97,8 +96,8 @@ def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
 
 
 def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
-    """Return an effect's plain name, what its coefficients do, those that are known and of a sure
-    effect alone, and the name by which files and options have it.
+    """Return an effect's plain name, the known quantities of a sure effect, and its name in files
+    and options.
     """
     plain = title(effect.name)
     told = [] if plain.replace(" ", "_") == effect.name else [effect.name]
@@ -115,7 +114,7 @@ def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
 
 
 def steady_wrench(diagnosis: Diagnosis) -> str:
-    """Return the force and torque that are left on average, if these are no chance; else nothing.
+    """Return the mean force and torque of the residual, if beyond chance; else nothing.
 
     The mean of a block of 3 s is one number; all blocks together say how sure their mean is.
     """

@@ -17,10 +17,10 @@ from ..findings import Diagnosis, Errors
 from .headline import headline
 from .page import report_page
 
-# MAJOR.MINOR of ``report.json``, which ``report.schema.json`` beside this file describes: a new key
-# is a new minor version, a key that goes or changes its meaning a new major one
+# MAJOR.MINOR of ``report.json`` (see ``report.schema.json`` beside this file): a new key is a new
+# minor version, a removed key or a new meaning a new major one
 SCHEMA_VERSION = "1.2"
-# what ``report.json`` holds under the name that the diagnosis has for it
+# attributes of a diagnosis under their own names in ``report.json``
 _AS_FOUND = (
     *("advice", "notes", "needs_pose", "candidates", "structure", "rotor_faults"),
     *("logs", "test_logs", "seconds", "cutoff_hz"),
@@ -34,10 +34,10 @@ def write_report(
     at all.
 
     Args:
-        diagnosis: what was found.
-        folder: it is made if need be.
-        command: the command line that made the diagnosis, for the page; default: put together from
-            the names of the logs and the vehicle, which lack their folders and the reader.
+        diagnosis: the result.
+        folder: made if need be.
+        command: the diagnosis' command line, for the page; default: the names of the logs and the
+            vehicle, without folders and reader.
 
     Returns:
         the three paths.
@@ -57,8 +57,8 @@ def write_report(
 
 
 def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return what ``report.json`` holds: plain Python values, six significant digits, None for what
-    is not finite. ``report_schema`` describes it.
+    """Return the content of ``report.json``, as in ``report_schema``: plain Python values, six
+    significant digits, None for numbers that are not finite.
     """
     error: dict[str, Any] = {
         "held_out_segments": [[start, end] for _, start, end in diagnosis.held_out_segments],

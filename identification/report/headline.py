@@ -1,4 +1,4 @@
-"""The first sentences of a diagnosis: what acts, by its plain name and by how much."""
+"""The first sentences of a diagnosis: acting effects, with plain names and quantities."""
 
 from collections.abc import Sequence
 
@@ -43,7 +43,7 @@ def headline(diagnosis: Diagnosis) -> str:
 
 
 def _undecided(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
-    """Return which effects these logs cannot tell from which others, in one sentence."""
+    """Return one sentence on effects indistinguishable in these logs."""
     pairs = [
         f"{with_amounts(e, diagnosis.declared)} from "
         f"{in_words([title(x) for x in e.indistinguishable_from], 'or')}"
@@ -60,10 +60,9 @@ def _undecided(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
 def _lacked(
     diagnosis: Diagnosis, effects: Sequence[NamedEffect], before: Sequence[NamedEffect] = ()
 ) -> str:
-    """Return what effects are to the model, in words: new to it, or declared with other
-    coefficients.
+    """Return effects in words: new to the model, or declared with other coefficients.
 
-    After effects ``before`` that are all new as these are, the verb is not said again.
+    After effects ``before``, all new like these, the verb is not repeated.
     """
     declared = {e.name: set(e.coefficients) for e in diagnosis.declared.effects}
     changed = [

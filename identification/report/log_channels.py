@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ...runtime.arrays import Array
 from ...runtime.drawing import SERIES, new_figure, styled
 from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
 
-Array = NDArray[np.float64]
-
-_GAP = 3.0  # of a channel's own median steps
-_BINS = 4000  # of a picture's 900 pixels: in each a line's least and largest value is drawn
+_GAP = 3.0  # median steps of a channel
+_BINS = 4000  # for a picture's 900 pixels: each bin draws a line's least and largest value
 _AXES = ("x", "y", "z")
 _ROTORS = ("1 front-left", "2 rear-left", "3 rear-right", "4 front-right")
 
@@ -32,14 +31,14 @@ class Channel:
     low: float
     high: float
     t: Array  # (n,) s
-    drawn: Array  # (n, k) what its picture shows: of many rows the extremes
-    title: str  # of that picture
-    series: tuple[str, ...]  # names of its k lines
+    drawn: Array  # (n, k) lines of the picture: extremes of many rows
+    title: str  # the picture's
+    series: tuple[str, ...]  # names of the k lines
 
 
 def log_channels(log: FlightLog) -> list[Channel]:
-    """Return the channels that a log has."""
-    axis = np.full((len(log.t), 3), np.nan)  # of thrust, world
+    """Return a log's channels."""
+    axis = np.full((len(log.t), 3), np.nan)  # thrust axis, world
     if log.valid.any():
         turned = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
         axis[log.valid] = turned.apply([0.0, 0.0, 1.0])
@@ -77,15 +76,15 @@ def log_channels(log: FlightLog) -> list[Channel]:
         step = float(np.median(steps))
         rate = min(log.rates.get(section) or np.inf, 1.0 / step)
         gaps, longest = int(np.sum(steps > _GAP * step)), max(float(steps.max()), 1.0 / rate)
-        found = (len(rows), rate, gaps, longest, low, high)
+        numbers = (len(rows), rate, gaps, longest, low, high)
         shown = _extremes(drawn)
-        out.append(Channel(name, unit, *found, t[shown], drawn[shown], title, series))
+        out.append(Channel(name, unit, *numbers, t[shown], drawn[shown], title, series))
     return out
 
 
 def _extremes(values: Array) -> NDArray[np.intp]:
-    """Return the rows that draw the lines of values (N, k) over N: those of the extremes of each
-    line in each bin, or all where there are few.
+    """Return the rows for drawing the lines of values (N, k) over N: the extremes of each line in
+    each bin, or all if few.
     """
     size = len(values) // _BINS
     if size < 3:
@@ -94,8 +93,8 @@ def _extremes(values: Array) -> NDArray[np.intp]:
     bins = values[: whole * size].reshape(whole, size, -1)
     rows = size * np.arange(whole)[:, None]
     ends = rows[:, 0], np.arange(whole * size, len(values))
-    found = [(rows + pick(bins, axis=1)).ravel() for pick in (np.argmin, np.argmax)]
-    return np.unique(np.concatenate([*found, *ends]))
+    extremes = [(rows + pick(bins, axis=1)).ravel() for pick in (np.argmin, np.argmax)]
+    return np.unique(np.concatenate([*extremes, *ends]))
 
 
 @styled()

@@ -1,6 +1,4 @@
-"""What a flight log is: how it was read and why so, its channels with their rates and gaps, and
-what is doubtful about it.
-"""
+"""The check of a flight log: reader and map with reasons, channels with rates and gaps, doubts."""
 
 import re
 import warnings
@@ -25,31 +23,31 @@ from ..logs.table import Table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
 
-_SAID = ("unit", "samples", "rate_hz", "gaps", "longest_gap_s")  # of each channel
+_SAID = ("unit", "samples", "rate_hz", "gaps", "longest_gap_s")  # attributes of each channel
 
 
 @dataclass(frozen=True)
 class LogCheck:
-    """What was found of a log."""
+    """The result of a check."""
 
     log: FlightLog
     read_by: str
     channels: list[Channel]
     doubts: tuple[str, ...]
     guess: Guess | None = None
-    map_text: str = ""  # the map by which it was read, as a YAML file; empty where it needed none
+    map_text: str = ""  # the log's map as a YAML file; empty without one
 
     def sentence(self) -> str:
-        """Return how long the log is, and how it was read."""
+        """Return a sentence on the log's length and reader."""
         seconds = float(self.log.t[-1] - self.log.t[0])
         return f"{len(self.log.t)} rows, {seconds:.1f} s, read by {self.read_by}"
 
     def what_flew(self) -> list[tuple[str, str, str]]:
-        """Return what is known of the vehicle and its flight: what, its value, what says it."""
+        """Return facts of the vehicle and its flight: name, value, source."""
         return [*self.log.flown.rows(), ("flew", *flew(self.log))]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as plain values."""
+        """Return the check as plain values."""
         log = self.log
         reasons = self.guess.reasons if self.guess else ()
         fields = (
@@ -81,18 +79,18 @@ def check_log(
     log_map: str | None = None,
     piece: int | None = None,
 ) -> LogCheck:
-    """Return what a log is; a table of unknown columns is read by a map that is guessed.
+    """Return the check of a log; a table of unknown columns is read by a guessed map.
 
     Args:
-        path: of any log that can be read.
-        reader: its reader, or None.
-        vehicle: that flew, or None: the one that the log names, where it comes with the kit.
-        log_map: its map, or None.
+        path: a log of any readable kind.
+        reader: the log's reader, or None.
+        vehicle: the vehicle of the flight; None: the shipped one that the log names.
+        log_map: the log's map, or None.
         piece: as of ``read_log``.
 
     Raises:
-        InputError: it cannot be read.
-        UnreadLogError: it cannot be read yet, by the map that was guessed, which the error has.
+        InputError: the log cannot be read.
+        UnreadLogError: the guessed map, in the error, cannot read the log yet.
     """
     guess, text = None, ""
     with warnings.catch_warnings():
@@ -134,7 +132,7 @@ def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[
 
 
 def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
-    """Return what the motion and the noise of a log make doubtful."""
+    """Return the doubts raised by the motion and the noise of a log."""
     doubts = [
         f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
         f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "

@@ -1,8 +1,8 @@
-"""The page of a diagnosis's report: one HTML file that needs nothing else.
+"""The page of a diagnosis's report: one self-contained HTML file.
 
-A script and a small library (``uplot/``) draw its plots, with zoom and cursor. Where a browser runs
-no scripts, one still picture and a table of each plot show the same numbers. The page's policy
-allows no other script, and nothing from elsewhere.
+A script and a small library (``uplot/``) draw its plots, with zoom and cursor. In a browser without
+scripts, one still picture and a table of each plot show the same numbers. The page's policy allows
+no other script, and nothing from elsewhere.
 """
 
 import base64
@@ -21,7 +21,7 @@ from .headline import headline
 from .plot_numbers import candidate_bars, page_plots
 from .still_picture import still_picture
 
-TONES = {
+_TONES = {
     "explained": "good",
     "nothing to explain": "good",
     "partly explained": "warn",
@@ -30,19 +30,19 @@ TONES = {
 
 
 def report_page(diagnosis: Diagnosis, command: str) -> str:
-    """Return the page (HTML); ``command`` is what made it. Every text is escaped: names of files
-    come from users.
+    """Return the page (HTML) of a diagnosis and its command line. Every text is escaped: names of
+    files come from users.
     """
     plots, bars = page_plots(diagnosis), candidate_bars(diagnosis)
     data, drawn = plots.data, [*plots.time, *plots.frequency, *plots.signatures]
-    library, script = _library(), page_file("page.js")
+    library, script = _library(), _page_file("page.js")
     shown = {bar.name for bar in bars}
     return page_template(__package__, "page.html.j2").render(
         found=diagnosis,
         words=words,
         amounts=amounts,
         headline=headline(diagnosis),
-        tone=TONES[diagnosis.verdict],
+        tone=_TONES[diagnosis.verdict],
         stated=diagnosis.probabilities,
         table=error_table(diagnosis),
         missing=words.MISSING,
@@ -52,11 +52,11 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
         policy=_policy((library, script) if data else ()),
-        # as it may stand in a page's script element: no tag can begin in it
+        # escaped for a page's script element: no tag can begin inside
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c") if data else "",
         library=library,
-        shared_style=page_file("page.css"),
-        library_style=page_file("uplot/uPlot.min.css"),
+        shared_style=_page_file("page.css"),
+        library_style=_page_file("uplot/uPlot.min.css"),
         script=script,
         toggles=data["time"]["effects"] if "time" in data else [],
         command=command,
@@ -65,22 +65,22 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
 
 
 @cache
-def page_file(name: str) -> str:
-    """Return a text that stands beside this module."""
+def _page_file(name: str) -> str:
+    """Return a text beside this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 @cache
 def _library() -> str:
-    """Return the plotting library with the licence that must go with it."""
+    """Return the plotting library with its mandatory licence."""
     licence, code = (
-        page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
+        _page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
     )
     return f"/*\n{licence}\n*/\n{code}"
 
 
 def _policy(scripts: Iterable[str]) -> str:
-    """Return the page's content security policy: these scripts, and nothing that is not in it."""
+    """Return the page's content security policy: these scripts, and nothing from outside."""
     hashes = (
         f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'"
         for s in scripts
@@ -90,8 +90,8 @@ def _policy(scripts: Iterable[str]) -> str:
 
 
 def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the rows of the error before, after and at the floor: what, unit and three rounded
-    numbers.
+    """Return the rows of the error table: name, unit, and three rounded numbers (before, after,
+    floor).
     """
     floors = {
         "force_rms": ("Force, rms", "N", diagnosis.floor_force_rms),
@@ -103,7 +103,7 @@ def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
     for name, (what, unit, floor) in floors.items():
         before, after = (getattr(side, name) for side in (diagnosis.before, diagnosis.after))
         factor, unit = words.scale_of((before, after, floor), unit) if unit else (1.0, "")
-        # an error of zero before and after is one that these logs cannot tell
+        # zero before and after: these logs cannot tell this error
         told = bool(before or after)
         old, new, least = (
             words.rounded(factor * x) if told else words.MISSING for x in (before, after, floor)

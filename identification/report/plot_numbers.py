@@ -1,9 +1,9 @@
-"""The plots of a diagnosis's page: one object each, from which its three forms come.
+"""The plots of a diagnosis's page: one object with three forms each.
 
-``packed`` is what ``page.js`` draws with uPlot, ``lines`` what the still picture shows on pages
-without scripts, and ``table`` the same numbers for readers who do not see a plot. A plot over time
-keeps, in each column of the window, the samples with the lowest and the highest residual before and
-after: peaks stay, and every value is one of the log.
+``packed`` is for uPlot in ``page.js``, ``lines`` for the still picture on pages without scripts,
+and ``table`` for readers without sight of a plot. A plot over time keeps, in each column of the
+window, the samples with the lowest and the highest residual before and after: peaks stay, and every
+value is one of the log.
 """
 
 import base64
@@ -15,26 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from ...runtime.arrays import Array
 from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
 from ..motion.smoothing import runs_of
 from .words import percent, rounded, scale_of
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-
 
 # all series over time together, packed: beside library and text a page of 60 s of flight stays
 # below 600 kB
 _MOST_BYTES = 170_000
-_LEAST_COLUMNS = 150  # of a plot over time, however many effects share the bytes
-_STEPS = 32_000  # of a packed series, between zero and its largest value
-_TICK = 1e-4  # s, of packed times
-_ROWS = 16  # of a table over time or frequency
-_POINTS = 360  # of a signature
-_SPECTRUM_SECONDS = 8.0  # of the segments of a spectrum
-_FREQUENCIES = 160  # of a spectrum
-_MOST_PIECES = 40  # of flight that have rows of their own
+_LEAST_COLUMNS = 150  # in a plot over time, at any number of effects
+_STEPS = 32_000  # in a packed series, between zero and its largest value
+_TICK = 1e-4  # s, packed times
+_ROWS = 16  # in a table over time or frequency
+_POINTS = 360  # in a signature
+_SPECTRUM_SECONDS = 8.0  # segments of a spectrum
+_FREQUENCIES = 160  # in a spectrum
+_MOST_PIECES = 40  # pieces of flight with rows of their own
 _BASE64 = 4.0 / 3.0  # letters a byte
 _GROUPS = (("force", slice(0, 3), "N"), ("torque", slice(3, 6), "Nm"))
 _SYMBOLS = ("Fx", "Fy", "Fz", "τx", "τy", "τz")
@@ -53,12 +52,12 @@ class PlotTable:
 class Plot:
     """One plot of the page."""
 
-    packed: dict[str, Any]  # its ``key`` is its name in the page
+    packed: dict[str, Any]  # ``key`` is the plot's name in the page
     lines: dict[str, tuple[Array, Array]]  # x and y (n,) of ``before``, ``after`` and ``mean``
     table: PlotTable
-    title: str  # what is drawn, with its unit
-    axis: str  # what it is drawn over
-    alt: str  # in words, for a reader who does not see it
+    title: str  # quantity and unit
+    axis: str  # quantity of the x axis
+    alt: str  # words for readers without sight of the plot
     caption: str = ""
     readout: str = ""
 
@@ -68,7 +67,7 @@ class _Joined:
 
     def __init__(self, traces: Sequence[Trace], effects: Sequence[NamedEffect] = ()) -> None:
         self.traces = traces
-        # where each piece begins: its own time if there is one, side by side if there are several
+        # start of each piece: its own time for one piece, side by side for several
         lengths = [float(trace.t[-1] - trace.t[0]) for trace in traces]
         gap = 0.01 * sum(lengths)
         self.starts = [sum(lengths[:k]) + gap * k for k in range(len(traces))]
@@ -89,8 +88,8 @@ class _Joined:
             if all(effect.name in trace.parts for trace in traces)
         }
         self.first_rows = np.cumsum([0, *(len(trace.t) for trace in traces)])[:-1]
-        # the channels that were compared: force, torque or both. The torque is zero throughout
-        # where the logs cannot tell it, as where rotor speeds are commands
+        # the compared channels: force, torque or both. The torque is zero throughout if unknown, as
+        # with commands for rotor speeds
         self.channels = [
             i
             for _, group, _ in _GROUPS
@@ -99,7 +98,7 @@ class _Joined:
         ]
 
     def kept(self, i: int) -> list[Index]:
-        """Return the samples of each piece that stand for channel ``i``."""
+        """Return the drawn samples of each piece for channel ``i``."""
         a_sample = _BASE64 * 2.0 * (3 + len(self.parts)) * len(CHANNELS)
         share = max(int(_MOST_BYTES / a_sample / 4), _LEAST_COLUMNS) / len(self.x)
         return [
@@ -108,7 +107,7 @@ class _Joined:
         ]
 
     def held_out(self) -> list[tuple[float, float]]:
-        """Return from when to when samples were held out."""
+        """Return start and end of each held-out block."""
         return [
             (float(self.x[first + a]), float(self.x[first + min(b, len(trace.t) - 1)]))
             for first, trace in zip(self.first_rows, self.traces, strict=True)
@@ -118,7 +117,7 @@ class _Joined:
 
 @dataclass(frozen=True, eq=False)
 class PagePlots:
-    """The plots of a page, and what its script draws, as plain data; empty where nothing can be."""
+    """The plots of a page, and the script's plain data; empty without anything to draw."""
 
     time: list[Plot]  # one a channel
     frequency: list[Plot]  # force and torque
@@ -130,8 +129,8 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
     """Return all plots of a diagnosis's page.
 
     Over time the residual before and after, with held-out blocks shaded and pieces of flight side
-    by side; their amplitude spectra (root of the sum over three axes, mean removed); and the
-    residual against what drives each named effect, with the effect's own share of it.
+    by side. Their amplitude spectra (root of the sum over three axes, mean removed). The residual
+    against each named effect's regressor, with the effect's own share.
     """
     time, frequency = [], []
     data: dict[str, Any] = {}
@@ -309,8 +308,8 @@ def binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
 
 
 def telling_samples(trace: Trace, i: int, columns: int) -> Index:
-    """Return which samples of channel ``i`` stand for a piece of flight: all of a short one, or
-    in each of ``columns`` stretches the lowest and highest before and after.
+    """Return the drawn samples of a piece for channel ``i``: all of a short piece, or in each of
+    ``columns`` stretches the lowest and highest before and after.
     """
     n = len(trace.t)
     if n <= 4 * columns:
@@ -344,18 +343,18 @@ def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) 
 
 
 class Bar(NamedTuple):
-    """One candidate effect in the chart of what each explains alone."""
+    """One candidate effect in the chart of the shares each explains alone."""
 
     name: str
     share: str
-    kind: str  # named; rival, which these logs cannot tell from a named effect; or empty
-    left: float  # of the bar's ends, per cent of the chart's width
+    kind: str  # named; rival, indistinguishable from a named effect; or empty
+    left: float  # the bar's left end, per cent of the chart's width
     width: float
 
 
 def candidate_bars(diagnosis: Diagnosis, most: int = 14) -> list[Bar]:
-    """Return the ranking of the effects that were tried: the best ``most``, and whichever else is
-    named or cannot be told from a named one.
+    """Return the ranking of the tried effects: the best ``most``, named effects, and effects
+    indistinguishable from a named one.
     """
     rivals = {x for effect in diagnosis.effects for x in effect.indistinguishable_from}
     kinds = [
@@ -380,8 +379,8 @@ def candidate_bars(diagnosis: Diagnosis, most: int = 14) -> list[Bar]:
 
 
 def packed_series(x: Array) -> dict[str, Any] | None:
-    """Return a series (n,) as 16-bit integers in base64 and their scale; None for one that is zero
-    throughout, or nearly so.
+    """Return a series (n,) as 16-bit integers in base64 and their scale; None for zeros, or nearly
+    zeros, throughout.
     """
     x = np.nan_to_num(x)
     largest = float(np.abs(x).max(initial=0.0))

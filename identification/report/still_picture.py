@@ -1,4 +1,4 @@
-"""All plots of a diagnosis's page in one still picture, for browsers that run no scripts."""
+"""All plots of a diagnosis's page in one still picture, for browsers without scripts."""
 
 import base64
 import math
@@ -10,13 +10,13 @@ from ...runtime.page_files import png_of
 from .plot_numbers import Plot
 
 _COLUMNS = 3
-_LETTERS = 44  # of a line above a plot
+_LETTERS = 44  # in a line above a plot
 _COLOURS = {"before": BEFORE, "after": AFTER, "mean": BLACK}
 
 
 @styled()
 def still_picture(plots: Sequence[Plot]) -> str:
-    """Return the address (``data:``) of a PNG of some plots, those of one row side by side."""
+    """Return the address (``data:``) of a PNG of some plots, row by row."""
     rows = math.ceil(len(plots) / _COLUMNS)
     figure = new_figure(1.9 * rows)
     for place, plot in enumerate(plots, 1):

@@ -9,15 +9,13 @@ from ..findings import CHANNELS, Diagnosis, NamedEffect
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
 SPACE = "\N{NO-BREAK SPACE}"
-_LONGEST = 190  # letters of a piece of advice on the first screen
+_LONGEST = 190  # letters in a piece of advice on the first screen
 _CERTAIN = 0.001  # probability; closer to 0 or 1 no digit is meant
-_TELLING = 1.3  # times the floor, from which an error is worth a word in the first sentence
+_TELLING = 1.3  # times the floor: least error in the first sentence
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """Return a number with so many significant digits and no exponent; a dash if
-    it is not finite.
-    """
+    """Return a number with so many significant digits and no exponent; a dash if not finite."""
     if not math.isfinite(value):
         return MISSING
     value = float(f"{value:.{digits - 1}e}")
@@ -49,9 +47,7 @@ def with_std(value: float, std: float) -> str:
 
 
 def scale_of(values: Iterable[float], unit: str) -> tuple[float, str]:
-    """Return the factor and the unit, plain or milli, in which numbers (in ``unit``) that are
-    compared read best.
-    """
+    """Return the common factor and unit, plain or milli, for compared numbers (in ``unit``)."""
     largest = max((abs(v) for v in values if math.isfinite(v)), default=math.inf)
     return (1e3, f"m{unit}") if largest < 0.1 else (1.0, unit)
 
@@ -78,7 +74,7 @@ def percent(share: float) -> str:
 
 
 def chance(probability: float) -> str:
-    """Return a probability in per cent; close to 0 or 1, the bound that it is beyond."""
+    """Return a probability in per cent; close to 0 or 1, a bound."""
     if not _CERTAIN < probability < 1.0 - _CERTAIN:
         return f"above 99.9{SPACE}%" if probability > 0.5 else f"below 0.1{SPACE}%"
     return percent(probability)
@@ -93,26 +89,26 @@ def duration(seconds: float) -> str:
 
 
 def effect_summary(name: str) -> str:
-    """Return the library's sentence on an effect, empty for one that is not in it."""
+    """Return the library's sentence on an effect, empty for an unknown one."""
     if name not in library.names():
         return ""
     return " ".join(library.model_in_words(name).split("\n\n")[0].split()).replace("``", "")
 
 
 def coefficient_meaning(effect: str, coefficient: str) -> str:
-    """Return what a coefficient of the library is, empty for one that is not in it."""
+    """Return the meaning of a coefficient in the library, empty for an unknown one."""
     known = library.get(effect).coefficients if effect in library.names() else ()
     return next((c.meaning for c in known if c.name == coefficient), "")
 
 
 def tried(diagnosis: Diagnosis) -> str:
-    """Return of which effects it was asked whether they explain an error."""
+    """Return the extent of the tried effects, in words."""
     return "that these logs can show" if diagnosis.needs_pose else "in the library"
 
 
 def error_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return how the error on held-out data changes: force and torque, those that stand out from
-    the noise floor.
+    """Return the change of the error on held-out data: force and torque well above the noise
+    floor.
     """
     before, after = diagnosis.before, diagnosis.after
     rows = [
@@ -138,7 +134,7 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
-    """Return what the named effects leave: the residual's sentence."""
+    """Return the sentence on the residual."""
     if diagnosis.remainder == "none":
         return f"The residual is at the sensors' noise floor{_disturbances(diagnosis)}."
     if diagnosis.remainder == "random":
@@ -181,9 +177,7 @@ def _transient(diagnosis: Diagnosis) -> str:
 
 
 def ranking_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return why an effect that alone explains more than a named one was not named: where chart and
-    names differ.
-    """
+    """Return the reasons not to name an effect ahead of a named one in the chart."""
     named = [c for c in diagnosis.candidates if c.named]
     lowest = min((c.gain for c in named), default=math.inf)
     above = [c for c in diagnosis.candidates if not c.named and c.gain > lowest]
@@ -211,21 +205,21 @@ def ranking_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def name_in_words(effect: NamedEffect) -> str:
-    """Return an effect's name with what it may be instead, and whether it is tentative."""
+    """Return an effect's name with its alternatives, and a mark of a tentative one."""
     others = in_words(effect.indistinguishable_from, "or")
     tentative = " (tentative)" if effect.tentative else ""
     return f"{effect.name}{f' (or {others})' if others else ''}{tentative}"
 
 
 def confusion(effect: NamedEffect) -> str:
-    """Return which other effects would explain these logs as well as this one."""
+    """Return the sentence on effects indistinguishable from this one."""
     others = in_words(effect.indistinguishable_from, "or")
     told = f"These logs cannot distinguish {effect.name} from {others}"
     return f"{told}, which explain them equally well."
 
 
 def sureness_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return how sure each name is, and what the answer rests on."""
+    """Return the certainty of each name, and the data behind the answer."""
     sure = [e for e in diagnosis.effects if not e.tentative and not e.indistinguishable_from]
     told = _probability(diagnosis)
     if sure:
@@ -257,9 +251,7 @@ def held_out_sum(diagnosis: Diagnosis) -> str:
 
 
 def _probability(diagnosis: Diagnosis) -> list[str]:
-    """Return how probable the names are, and that something unknown acts; nothing where that is not
-    known.
-    """
+    """Return the probabilities of the names and of an unknown cause; nothing if not known."""
     stated = diagnosis.probabilities
     if math.isnan(stated.unknown):
         return []
@@ -269,8 +261,9 @@ def _probability(diagnosis: Diagnosis) -> list[str]:
 
 
 def _doubts(diagnosis: Diagnosis) -> list[str]:
-    """Return what the names do not settle: effects that these logs cannot tell apart, in one
-    sentence where there are several, since the headline has the alternatives; and tentative ones.
+    """Return the open questions: effects indistinguishable in these logs, and tentative ones.
+
+    Several of the former share one sentence, since the headline has the alternatives.
     """
     undecided = [effect for effect in diagnosis.effects if effect.indistinguishable_from]
     told = [confusion(effect) for effect in undecided]
@@ -312,7 +305,7 @@ def next_step(diagnosis: Diagnosis) -> str:
 
 
 def _short(text: str) -> str:
-    """Return the beginning of a text: whole sentences if it can be, or else whole clauses."""
+    """Return the beginning of a text: whole sentences if possible, else whole clauses."""
     if len(text) <= _LONGEST:
         return text
     kept = text[: _LONGEST + 1]

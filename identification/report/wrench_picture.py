@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
+from ...runtime.arrays import Array
 from ...runtime.drawing import BLACK, GREY, PALE, SERIES, new_figure, room_above, styled
 from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
@@ -20,21 +20,19 @@ from .words import scale_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
-
 _SHADES = {GROUND: PALE, TAKE_OFF: "#cfe8cf", FLIGHT: "#ffffff", LANDING: "#fbe3c4"}
 _THRUST = SERIES[3]
-_LASTING = 0.1  # s without a pose that is worth hatching
+_LASTING = 0.1  # s without a pose, at least, for hatching
 
 
 @styled()
 def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
-    """Draw height, force and torque with their 2-sigma bands, and the truth where the log has it,
-    into a PNG.
+    """Draw height, force and torque with their 2-sigma bands, and the log's truth if any, into a
+    PNG.
 
     Args:
         series: the estimate.
-        log: the flight that it was made from.
+        log: the estimated flight.
         path: the PNG to write.
 
     Raises:
@@ -97,8 +95,8 @@ def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "
 def _draw_vectors(
     panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, what: tuple[str, str]
 ) -> None:
-    """Draw three components (N, 3) of a symbol and unit with their 2-sigma bands, and the truth
-    dashed with its RMSE in the legend; where there are none, say so.
+    """Draw three components (N, 3) of a symbol and unit with their 2-sigma bands, or say there are
+    none. The truth is dashed, with its RMSE in the legend.
     """
     if not np.isfinite(mean).any():
         words = "not estimated: the rotors were measured too seldom"
@@ -124,8 +122,8 @@ def _draw_vectors(
 
 
 def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
-    """Shade the phases, and hatch the stretches without a pose that last; a pose slower than the
-    log is none of them.
+    """Shade the phases, and hatch long stretches without a pose; a pose slower than the log has
+    none.
     """
     for phase in phases:
         if phase.name != FLIGHT:

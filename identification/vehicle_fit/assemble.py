@@ -1,4 +1,4 @@
-"""The vehicle that estimates make, and what to fly where they say too little."""
+"""The vehicle made of estimates, and the flights to add for missing ones."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -29,8 +29,8 @@ def vehicle_of(
     step: float,
     motors: MotorResponse | None = None,
 ) -> Vehicle:
-    """Return the vehicle, ready for estimate, diagnose and the environment. Where its logs hold
-    measured speeds the lag is behind them, and no effect of the model.
+    """Return the vehicle, ready for estimate, diagnose and the environment. Measured rotor speeds
+    have the lag behind them already: then no effect of the model has one.
     """
     arm, reach = estimates["arm_l"].value, estimates["p/k"].value
     effects = list(_effects(estimates))
@@ -85,8 +85,8 @@ def vehicle_of(
 
 
 def _uncertainty(estimates: Mapping[str, Estimate], arm: float, commands: bool) -> Uncertainty:
-    """Return the standard deviations that 95 % intervals mean, thrust's with the spread from day to
-    day; that of the mass, which was given, is not known.
+    """Return the standard deviations of the 95 % intervals, thrust's with the spread from day to
+    day. The deviation of the given mass is not known.
     """
 
     def share(*names: str) -> list[float]:
@@ -108,7 +108,7 @@ def _uncertainty(estimates: Mapping[str, Estimate], arm: float, commands: bool) 
 
 
 def _shown(estimate: Estimate | None) -> float:
-    """Return a value whose interval leaves nothing out; else nothing."""
+    """Return the value of an identified quantity whose interval excludes 0; else 0."""
     if estimate is None or estimate.status != IDENTIFIED or estimate.low < 0.0 < estimate.high:
         return 0.0
     return estimate.value
@@ -132,7 +132,7 @@ def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
 
 
 def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
-    """Return what to fly, or to give, where the logs say too little."""
+    """Return the flights or arguments to add for quantities missing from the logs."""
     lag = effect_of(Role.LAG)
     climb = "Climb hard and let the vehicle sink: the thrust curve is known where it flew."
     brisk = "Climb and sink briskly: thrust that changes shows the centre of mass."

@@ -1,7 +1,7 @@
-"""What a log measures of force and torque balance, evenly sampled, piece by piece.
+"""The measured side of force and torque balance, evenly sampled, piece by piece.
 
-Specific force and angular velocity come from the IMU where the log has one, and from the pose's
-derivatives where it has none. Rotors come as measured speeds, or as motor commands.
+Specific force and angular velocity come from the IMU, or without one from the pose's derivatives.
+Rotors come as measured speeds, or as motor commands.
 """
 
 import math
@@ -22,15 +22,15 @@ from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroke
 from .geometry import GRAVITY
 
 _SHORTEST_PIECE = 3.0  # s; shorter ones have no frequency low enough to tell a bias
-_GAP = 0.1  # s without a sample, at which a piece ends
-# Hz: of angular velocity and velocity where they multiply something: what a quadrotor's motion
-# has, without the noise that would enter a product squared
+_GAP = 0.1  # s without a sample: a piece ends
+# Hz, low-pass of angular velocity and velocity as factors of products: it passes a quadrotor's
+# motion and keeps out noise, which a product squares
 _PRODUCT_HZ = 8.0
 # Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
 _FASTEST_HZ = 200.0
-# share of the hover thrust's command below which a vehicle stands on the ground
+# share of the hover thrust's command: a vehicle below it stands on the ground
 _FLYING_SHARE = 0.3
-# share of different values among all, below which rotor speeds are rounded
+# share of different values among all: rotor speeds below it are rounded
 _FEW_VALUES = 0.2
 
 
@@ -38,7 +38,7 @@ _FEW_VALUES = 0.2
 class MotionPiece:
     """n evenly spaced samples of one unbroken piece of a log; body axes forward, left, up."""
 
-    log: int  # which of the logs
+    log: int  # index of the log
     t: Array  # (n,) s
     period: float  # s
     specific_force: Array | None  # (n, 3) m/s2
@@ -66,7 +66,7 @@ class MotionPiece:
 
 @dataclass(frozen=True)
 class Sources:
-    """Which sensors the balance rests on."""
+    """The sensors of the balance."""
 
     force: str  # "accelerometer", "pose" or "" (none)
     rate: str  # "gyro" or "pose"
@@ -75,11 +75,11 @@ class Sources:
 
 
 def sources_of(logs: Sequence[FlightLog]) -> Sources:
-    """Return the sensors that all logs have.
+    """Return the sensors common to all logs.
 
     Raises:
-        InputError: a log has no motion, its rotors were measured too seldom, or logs differ in what
-            their rotors are given as.
+        InputError: a log has no motion, its rotors were measured too seldom, or some logs have
+            rotor speeds and others commands.
     """
     for log in logs:
         if not log.has_pose and log.gyro is None:
@@ -119,8 +119,8 @@ def _is_fast(log: FlightLog, channel: str) -> bool:
 
 
 def rounding_step(logs: Sequence[FlightLog]) -> float:
-    """Return the step (rad/s) to which logged rotor speeds are rounded, as the numbers themselves
-    show it; 0 where it would not matter.
+    """Return the step (rad/s) of rounded rotor speeds, from the numbers themselves; 0 where
+    rounding does not matter.
     """
     values = np.concatenate([log.rotor_speeds.ravel() for log in logs])
     kept = np.unique(np.round(values, 6))
@@ -130,9 +130,8 @@ def rounding_step(logs: Sequence[FlightLog]) -> float:
 
 
 def speed_noise(pieces: Sequence[MotionPiece]) -> float:
-    """Return the standard deviation (rad/s) of the white noise of rotor speeds, their rounding
-    included: what is left of their spectrum in the highest quarter of its frequencies, where no
-    rotor follows its command.
+    """Return the standard deviation (rad/s) of the white noise of rotor speeds with their rounding,
+    from the highest quarter of their spectrum: no rotor follows its command there.
     """
     powers = []
     for piece in pieces:
@@ -145,14 +144,14 @@ def speed_noise(pieces: Sequence[MotionPiece]) -> float:
 def pieces_of(
     logs: Sequence[FlightLog], windows: Sequence[tuple[float, float]]
 ) -> tuple[list[MotionPiece], Sources]:
-    """Return all unbroken pieces of the logs in flight, and what they rest on.
+    """Return all unbroken pieces of the logs in flight, and their sensors.
 
     Args:
         logs: flights of one vehicle.
         windows: for each log, from and to in s after its start.
 
     Raises:
-        InputError: a log lacks what is needed, or none of it is long enough in flight.
+        InputError: a log lacks a channel, or no piece in flight is long enough.
     """
     sources = sources_of(logs)
     pieces: list[MotionPiece] = []
@@ -163,6 +162,8 @@ def pieces_of(
             inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
             for part in _cut(piece, inside):
                 pieces += _cut(part, _flying(part))
+    moving = [piece for piece in pieces if piece.velocity is not None]
+    pieces, sources = moving or pieces, replace(sources, velocity=bool(moving))
     if not pieces:
         raise InputError(
             f"{logs[0].name}: no piece of {_SHORTEST_PIECE:g} s in flight is unbroken "
@@ -176,7 +177,7 @@ _Motion = tuple[Array, float, Array | None, Array, Array, Array | None]
 
 
 def _posed(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
-    """Yield motion whose force, and rate where there is no gyro, are the pose's derivatives."""
+    """Yield motion by the pose's derivatives, with accelerometer and gyro in their place if any."""
     for s in log_signals(log, wide_hz=np.inf):
         inverse = Rotation.from_matrix(s.rotation).inv()
         force = inverse.apply(s.acceleration + np.array([0.0, 0.0, GRAVITY]))
@@ -190,9 +191,7 @@ def _posed(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
 
 
 def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
-    """Yield motion whose rate, and force if any, are the IMU's; velocity is the pose's, where there
-    is one.
-    """
+    """Yield motion by the IMU: rate, and force if any; velocity is the pose's, if any."""
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
     period = float(np.median(np.diff(log.t[read])))
@@ -201,12 +200,19 @@ def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
+        turning = derivative(rate, period)
         velocity = _velocity(log, t) if sources.velocity else None
-        yield t, period, force, derivative(rate, period), rate, velocity
+        if velocity is None:
+            yield t, period, force, turning, rate, None
+            continue
+        for a, b in runs_of(np.isfinite(velocity[:, 0])):
+            if (b - a) * period >= _SHORTEST_PIECE:
+                felt = None if force is None else force[a:b]
+                yield t[a:b], period, felt, turning[a:b], rate[a:b], velocity[a:b]
 
 
 def _piece(log: FlightLog, number: int, motion: _Motion, sources: Sources) -> MotionPiece:
-    """Return a piece with the rotors beside its motion, thinned out where it is fast."""
+    """Return a piece with the rotors beside its motion; fast logs are thinned out."""
     t, period = motion[:2]
     speeds = log.rotor_speeds if sources.rotors == "rotor speeds" else None
     piece = MotionPiece(
@@ -239,7 +245,9 @@ def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
 
 
 def _velocity(log: FlightLog, t: Array) -> Array | None:
-    """Return the velocity (n, 3) in body axes at times; None where the pose does not say all."""
+    """Return the velocity (n, 3) in body axes at times, NaN in gaps of the pose; None where each
+    unbroken stretch is too short.
+    """
     try:
         signals = log_signals(log)
     except InputError:
@@ -249,7 +257,9 @@ def _velocity(log: FlightLog, t: Array) -> Array | None:
         inside = (t >= s.t[0]) & (t <= s.t[-1])
         body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
         out[inside] = resampled(t[inside], s.t, body)
-    return None if np.isnan(out).any() else out
+    known = runs_of(np.isfinite(out[:, 0]))
+    longest = max((b - a for a, b in known), default=0) * float(t[1] - t[0])
+    return out if longest >= _SHORTEST_PIECE else None
 
 
 def _flying(piece: MotionPiece) -> Mask:
@@ -262,7 +272,7 @@ def _flying(piece: MotionPiece) -> Mask:
 
 
 def _cut(piece: MotionPiece, keep: Mask) -> list[MotionPiece]:
-    """Return the runs of samples that are kept, if they are long enough."""
+    """Return the kept runs of samples that are long enough."""
     if keep.all():
         return [piece]
     return [

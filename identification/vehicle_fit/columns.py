@@ -1,11 +1,11 @@
-"""The columns that force and torque balance are made of: what rotors, turning and moving through
-the air may contribute, before any coefficient.
+"""The columns of force and torque balance: contributions of rotors, turning and moving through
+the air, before any coefficient.
 
-A rotor's thrust is ``sum_j a_j phi_j``: of measured speeds ``phi = [W^2]``, of commands
+A rotor's thrust is ``sum_j a_j phi_j``. Measured speeds give ``phi = [W^2]``, commands
 ``phi = [1, u, u^2] (V/V_ref)^gamma`` or some of these. Rotors follow with a first-order lag and a
 time offset. Drag, inflow and lift act at each rotor, at its own velocity, and so turn the vehicle,
-too. Forward velocity goes with pitch rate, so that the moment of lift while yawing looks like a
-gyroscopic one, from which ``Jz`` is told.
+too. Forward velocity goes with pitch rate. The moment of lift while yawing therefore looks like the
+gyroscopic one behind ``Jz``.
 """
 
 from dataclasses import dataclass, replace
@@ -17,28 +17,28 @@ from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece
 from .spectra import BAND, Segment, segments_of
 
-_STEP = {"lag": 1e-3, "gamma": 0.05}  # of finite differences
-# Hz: slower moments that nothing measures are answered by the flight loop with rotor torque, so
-# that part of a torque turns nothing. From 3 to 15 Hz regression finds nearly all of the torque,
-# below a fifth to a half (13 flights of a Crazyflie)
+_STEP = {"lag": 1e-3, "gamma": 0.05}  # finite differences
+# Hz: the flight loop answers slower, unmeasured moments with rotor torque, and this part of the
+# torque turns nothing. From 3 to 15 Hz regression finds nearly all of the torque, below a fifth to
+# a half (13 flights of a Crazyflie)
 ANSWERED_HZ = 3.0
 
 
 @dataclass(frozen=True)
 class Drive:
-    """How the rotors' columns are made."""
+    """Settings of the rotors' columns."""
 
     positions: Array  # (4, 3) m, or of length 1 where the arm is not known
     spin: Array  # (4,)
     known_arm: bool = True
     commands: bool = False  # the rotors are known by their commands, not by their speeds
-    exponents: tuple[int, ...] = (2,)  # of the basis functions
+    exponents: tuple[int, ...] = (2,)  # basis functions
     voltage_ref: float = 0.0  # V; 0: voltage is not used
     lag: float = 0.0  # s
-    delay: float = 0.0  # s, by which the motion comes behind the rotors
+    delay: float = 0.0  # s, of the motion behind the rotors
     gamma: float = 0.0  # exponent of the voltage
-    band: float = BAND  # Hz, up to which force and turning are compared
-    # rad/s, standard deviation of one measured speed; of those behind a lag nothing is known
+    band: float = BAND  # Hz: force and turning are compared up to here
+    # rad/s, standard deviation of one measured speed; not known of speeds behind a lag
     speed_noise: float = 0.0
 
 
@@ -48,8 +48,8 @@ class BalanceSpectra:
     the nonlinear parameters.
     """
 
-    drive: Drive  # about which they are linear
-    names: tuple[str, ...]  # of the columns
+    drive: Drive  # centre of linearisation
+    names: tuple[str, ...]  # columns
     nonlinear: tuple[str, ...]  # some of NONLINEAR
     segments: tuple[Segment, ...]
     seconds: float
@@ -88,7 +88,7 @@ def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...])
 
 
 def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
-    """Return the columns (n,) that depend on the rotors."""
+    """Return the columns (n,) of the rotors."""
     source = piece.command if drive.commands else piece.rotor_speeds
     assert source is not None
     speed = lagged(source, drive.lag, piece.period)  # (n, 4), or the command
@@ -125,15 +125,14 @@ def _local(piece: MotionPiece, velocity: Array, drive: Drive) -> Array:
 
 
 def air_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
-    """Return the columns (n,) that do not depend on the rotors' speeds."""
+    """Return the columns (n,) without rotor speeds."""
     w, period = piece.angular_velocity, piece.period
     dw = derivative(w, period)
     out = {"1": np.ones(len(piece.t))}
     for i, a in enumerate("xyz"):
         out[f"w{a}"], out[f"dw{a}"] = w[:, i], dw[:, i]
-        for j, b in enumerate("xyz"):
-            if j >= i:
-                out[f"w{a}w{b}"] = w[:, i] * w[:, j]
+        for j in range(i, 3):
+            out[f"w{a}w{'xyz'[j]}"] = w[:, i] * w[:, j]
     if piece.velocity is not None:
         v = piece.velocity
         speed = np.linalg.norm(v, axis=1)
@@ -156,8 +155,9 @@ def _with_delay(
     rotors: int,
     torques: list[int],
 ) -> Segment:
-    """Return a segment with its rotors' columns delayed, and their derivative by the delay, in the
-    order of ``nonlinear``; behind each block of columns the slow part of ``torques``.
+    """Return a segment with its rotors' columns delayed and their derivative by the delay.
+
+    Blocks are in the order of ``nonlinear``, each with the slow part of ``torques`` behind it.
     """
     turn = 2j * np.pi * s.frequency[None, :, None]
     measured, rest = s.columns[:, :, :6], s.columns[:, :, 6:]
@@ -174,8 +174,8 @@ def _with_delay(
 
 
 def _rotor_noise(piece: MotionPiece, drive: Drive, names: tuple[str, ...]) -> Array:
-    """Return what white noise of each rotor's speed makes in each column (4, c), root of a
-    spectrum: its column's standard deviation times the root of the period.
+    """Return the white noise of each rotor's speed in each column (4, c), as the root of a
+    spectrum: standard deviation of the column times the root of the period.
     """
     out = np.zeros((4, len(names)))
     if drive.speed_noise <= 0.0 or drive.lag > 0.0 or piece.rotor_speeds is None:

@@ -1,24 +1,22 @@
-"""The library's effects as a vehicle's own: which is known in which role, what its coefficients are
-called, and what a vehicle has of it.
-"""
+"""The library's effects by their roles: names, coefficients, and a vehicle's own values."""
 
 from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
 
 
 def effect_of(role: Role) -> str:
-    """Return the first effect of the library that plays a role."""
+    """Return the library's first effect of a role."""
     return playing(role)[0]
 
 
 def estimate_name(role: Role, index: int) -> str:
-    """Return what the estimate of a role's coefficient is called: effect and coefficient."""
+    """Return the name of a role's estimate: effect and coefficient."""
     effect = effect_of(role)
     return f"{effect} {get(effect).coefficients[index].name}"
 
 
 def coefficient_of(vehicle: Vehicle, role: Role, index: int) -> float:
-    """Return a coefficient of a vehicle's effects of a role; 0 where it has none."""
+    """Return a coefficient of a vehicle's effects of a role; 0 without one."""
     settings = [e for e in vehicle.effects if get(e.name).role == role]
     return sum(float(get(e.name).vector(e.coefficients)[index]) for e in settings)
 

@@ -1,5 +1,5 @@
-"""From fitted parameters to what is said of a vehicle: values with intervals, and what is assumed
-where the flight does not tell.
+"""From fitted parameters to a vehicle's estimates: values with intervals, and assumptions in place
+of quantities missing from the flight.
 """
 
 import math
@@ -28,20 +28,20 @@ def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
 
 @dataclass(eq=False)
 class Estimates:
-    """What is said of one vehicle, and the lengths that the rest scales with."""
+    """The estimates of one vehicle, and the lengths of their scale."""
 
     fit: VehicleFit
     sources: Sources
     geometry: Geometry
-    kept: Mapping[str, str]  # further effects that show, and why one is not to be believed
-    hidden: Interval | None  # moment of velocity that does not show: value, deviation, what would
-    doubt: str  # why nothing is to be believed that torque says; empty where it is
+    kept: Mapping[str, str]  # visible further effects, each with the reason to doubt it, or empty
+    hidden: Interval | None  # an invisible moment of velocity: value, deviation, least visible
+    doubt: str  # reason to believe no estimate of torque; empty without one
     said: dict[str, Estimate] = field(default_factory=dict)
     arm: float = 1.0  # m for each unit of the rotors' positions
     arm_range: tuple[float, float] = (1.0, 1.0)  # shares of it
 
     def say_all(self, pieces: Sequence[MotionPiece]) -> dict[str, Estimate]:
-        """Return what is known of every quantity.
+        """Return the estimate of every quantity.
 
         Raises:
             InputError: neither turning nor an arm says how large the vehicle is.
@@ -80,7 +80,7 @@ class Estimates:
         self._say(name, known, unit, how, status, doubt)
 
     def _scaled(self, known: Interval) -> Interval:
-        """Return what is a number times the arm, with the range of an arm that is assumed."""
+        """Return a multiple of the arm, with the range of an assumed arm."""
         value, *ends = (self.arm * x for x in known)
         corners = [end * share for end in ends for share in self.arm_range]
         return value, min(corners), max(corners)
@@ -132,7 +132,7 @@ class Estimates:
     def _say_arm_and_inertia(self) -> None:
         fit, usual, values = self.fit, USUAL, self.fit.values
         known_arm, mass = self.geometry.known, self.fit.model.mass
-        # 0.45 mass arm^2, by which the flight tells neither or one of the two
+        # 0.45 mass arm^2, for Jxx or Jyy missing from the flight
         guess = usual.gyration * mass * self.geometry.arm**2
         why = {
             axis: self.doubt or f"the flight hardly shows {motion}"
@@ -150,8 +150,8 @@ class Estimates:
         if known_arm:
             self._say("arm_l", 3 * (self.geometry.arm,), "m", "--geometry", GIVEN)
         else:
-            # with rotors at unit distance the fit's inertia is inertia over arm, which for a usual
-            # radius of gyration is gyration * mass * arm
+            # with rotors at unit distance the fit's inertia is inertia over arm: gyration * mass *
+            # arm at a usual radius of gyration
             value = 0.5 * (values["Jx"] + values["Jy"]) / mass / usual.gyration
             low, high = (value * usual.gyration / g for g in reversed(usual.gyration_range))
             how = (
@@ -203,7 +203,7 @@ class Estimates:
             low, high = (r * length for r in USUAL.reach_range)
             ratio, how = (USUAL.reach * length, low, high), f"{doubt}; {USUAL.reach:g} of the arm"
         elif inertia.status == ASSUMED:
-            # the inertia about z is not told by the flight: the ratio is, and carries it
+            # the flight tells the ratio alone: p/k carries the assumption of Jzz
             ratio = gain[0] * inertia.value, gain[1] * inertia.low, gain[2] * inertia.high
             how = f"{how}, with the Jzz that is assumed"
         else:

@@ -1,18 +1,18 @@
-"""An identified vehicle as other programs take it. What is not known is left out, and said.
+"""An identified vehicle for other programs. Unknown parameters are left out, with a comment.
 
 The texts are ``templates/``. Wind from drag in PX4 and ArduPilot: specific force along a body axis
 at airspeed v is predicted as ``MCOEF v + 0.5 rho v^2 / BCOEF`` (PX4,
 src/modules/ekf2/params_drag.yaml: kg/m^2 and 1/s; ArduPilot, libraries/AP_NavEKF3/AP_NavEKF3.cpp:
 kg/m/m and 1/s). Either part is left out where its coefficient is 0. PX4 starts with 100 kg/m^2 and
-0.15 1/s, so a part that was not found beside the other is set to 0: its start value would act
-beside what was found. Thrust curve: relative thrust ``T = f u^2 + (1 - f) u`` of a relative motor
-command u (PX4, THR_MDL_FAC; ArduPilot, MOT_THST_EXPO). Hover thrust is the share of the full thrust
-that carries the weight (MPC_THR_HOVER, MOT_THST_HOVER).
+0.15 1/s, so a missing part is set to 0: its start value would act beside the identified part.
+Thrust curve: relative thrust ``T = f u^2 + (1 - f) u`` of a relative motor command u (PX4,
+THR_MDL_FAC; ArduPilot, MOT_THST_EXPO). Hover thrust is the weight as a share of the full thrust
+(MPC_THR_HOVER, MOT_THST_HOVER).
 
-RotorPy (``Multirotor`` and its vehicles' files): rotors at positions from the centre of mass,
-``rotor_directions`` the sign of a rotor's torque on the body about +z, ``k_d`` N/(rad/s m/s) of
-each rotor, ``c_D`` N/(m/s)^2 of the frame. drone-models (0.1.0, ``first_principles``): rotors in
-the Crazyflie's order, polynomials in rpm with the index as the power, ``L`` the distance from
+RotorPy (``Multirotor`` and its vehicles' files) has rotors at positions from the centre of mass.
+``rotor_directions`` is the sign of a rotor's torque on the body about +z, ``k_d`` N/(rad/s m/s) of
+each rotor, ``c_D`` N/(m/s)^2 of the frame. drone-models (0.1.0, ``first_principles``) has rotors in
+the Crazyflie's order and polynomials in rpm with the index as the power. ``L`` is the distance from
 either axis, ``rotor_dyn_coef`` 1/s, ``drag_matrix`` N/(m/s) along body axes, negative. Gazebo
 (gz-sim, MulticopterMotorModel), once for each rotor: thrust ``motorConstant W^2``, torque
 ``momentConstant`` (m) times thrust, drag ``rotorDragCoefficient W v`` across the rotor's axis.
@@ -29,19 +29,19 @@ from ...runtime.page_files import page_template
 from .effect_settings import coefficient_of, effect_of, linear_drag
 from .result import ASSUMED, IDENTIFIED, Identified
 
-AIR_DENSITY = 1.225  # kg/m3, at sea level, as both autopilots take it
-NO_BLUFF_BODY = 0.0  # of BCOEF: both leave that part out then
+AIR_DENSITY = 1.225  # kg/m3, at sea level, as in both autopilots
+NO_BLUFF_BODY = 0.0  # BCOEF: both autopilots leave this part out then
 _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
 _CRAZYFLIE = [3, 2, 1, 0]  # front-right, rear-right, rear-left, front-left
 
 
 def _autopilot(
-    found: Identified, name: str, parameters: tuple[str, ...], most_ballistic: float
+    name: str, parameters: tuple[str, ...], most_ballistic: float, identified: Identified
 ) -> str:
     """Return an autopilot's parameters: momentum drag (1/s), ballistic coefficients along x and y
-    (kg/m2), hover thrust (share of the full thrust), and the square's share in the thrust curve.
+    (kg/m2), hover thrust (share of the full one), and the square's share in the curve.
     """
-    vehicle = found.vehicle
+    vehicle = identified.vehicle
     linear = [drag / vehicle.mass for drag in linear_drag(vehicle)[:2]]
     quadratic = [coefficient_of(vehicle, Role.BODY_DRAG, 3 + i) for i in range(2)]
     values: list[float | None] = [None] * 5
@@ -65,7 +65,7 @@ def _autopilot(
         for p, value, limit in zip(parameters, values, limits, strict=True)
         if value is not None and value > limit
     ]
-    full = found.estimates.get("thrust(1)")
+    full = identified.estimates.get("thrust(1)")
     if values[3] is not None and full is not None and full.status != IDENTIFIED:
         doubts.append(
             f"# {parameters[3]} and {parameters[4]}: the full thrust was not flown; {full.how}"
@@ -78,22 +78,22 @@ def _autopilot(
     ).removesuffix("\n")
 
 
-def _simulator(found: Identified, name: str) -> str:
+def _simulator(name: str, identified: Identified) -> str:
     """Return a simulator's parameters."""
-    v = found.vehicle
-    lag, drag = found.estimates[effect_of(Role.LAG)], linear_drag(v)
+    v = identified.vehicle
+    lag, drag = identified.estimates[effect_of(Role.LAG)], linear_drag(v)
     rows = [
         np.sign(v.positions[_CRAZYFLIE, 1]),
         -np.sign(v.positions[_CRAZYFLIE, 0]),
         -v.spin[_CRAZYFLIE],
     ]
     notes = ""
-    if found.fit.drive.commands:
+    if identified.fit.drive.commands:
         notes += (
             "# these logs hold commands, no rotor speeds: k and p are scaled so that rotors hover "
             f"at {v.hover_rate:.0f} rad/s; thrust and torque are right, speeds are not\n"
         )
-    assumed = [e.name for e in found.estimates.values() if e.status == ASSUMED]
+    assumed = [e.name for e in identified.estimates.values() if e.status == ASSUMED]
     notes += f"# assumed, not identified: {', '.join(assumed)}\n" if assumed else ""
     text = page_template(__package__, f"templates/{name}.j2", html=False)
     return text.render(
@@ -116,9 +116,9 @@ _ARDUPILOT = (
     *("MOT_THST_HOVER", "MOT_THST_EXPO"),
 )
 EXPORTS: dict[str, Callable[[Identified], str]] = {
-    "px4": lambda found: _autopilot(found, "px4", _PX4, 200.0),
-    "ardupilot": lambda found: _autopilot(found, "ardupilot", _ARDUPILOT, 1000.0),
-    "rotorpy": lambda found: _simulator(found, "rotorpy"),
-    "drone-models": lambda found: _simulator(found, "drone_models"),
-    "gazebo": lambda found: _simulator(found, "gazebo"),
+    "px4": partial(_autopilot, "px4", _PX4, 200.0),
+    "ardupilot": partial(_autopilot, "ardupilot", _ARDUPILOT, 1000.0),
+    "rotorpy": partial(_simulator, "rotorpy"),
+    "drone-models": partial(_simulator, "drone_models"),
+    "gazebo": partial(_simulator, "gazebo"),
 }

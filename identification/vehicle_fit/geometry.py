@@ -1,4 +1,4 @@
-"""Where the rotors stand, as a user says it, and what is usual of quadrotors."""
+"""The rotors' positions as a user gives them, and usual ratios of quadrotors."""
 
 from dataclasses import dataclass
 
@@ -14,28 +14,28 @@ GRAVITY = 9.81  # m/s2
 
 @dataclass(frozen=True)
 class Usual:
-    """Ratios of the vehicles that come with the kit (0.03 to 0.5 kg), for what a flight does not
-    tell; each has a range that is claimed in place of an interval.
+    """Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Each
+    has a range, claimed in place of an interval.
     """
 
-    # Jz over Jx + Jy: 0.88 to 0.96 of those vehicles; of a flat body it is 1, the most there is
+    # Jz over Jx + Jy: 0.88 to 0.96 in these vehicles; 1, the largest ratio, in a flat body
     flat: float = 0.9
     flat_range: tuple[float, float] = (0.75, 1.0)
-    # (Jx + Jy) / 2 over mass times the squared arm: 0.35 to 0.58 of those vehicles
+    # (Jx + Jy) / 2 over mass times the squared arm: 0.35 to 0.58 in these vehicles
     gyration: float = 0.45
     gyration_range: tuple[float, float] = (0.25, 0.8)
-    # reaction torque over thrust, as a share of the arm: 0.18 to 0.24 of those vehicles
+    # reaction torque over thrust, as a share of the arm: 0.18 to 0.24 in these vehicles
     reach: float = 0.2
     reach_range: tuple[float, float] = (0.1, 0.4)
-    radius: float = 0.78  # of a rotor, as a share of the arm: 0.71 to 0.83
-    # standard deviations, as shares, of thrust from day to day, which the logs of one day do not
-    # show: at one rotor speed sessions differ by 0.6 to 2.4 %, at one command by 10 %
+    radius: float = 0.78  # rotor radius, as a share of the arm: 0.71 to 0.83
+    # standard deviations, as shares, of thrust from day to day, invisible in the logs of one day:
+    # at one rotor speed sessions differ by 0.6 to 2.4 %, at one command by 10 %
     thrust_spread: float = 0.015
     command_spread: float = 0.1
-    # width of what a voltage's exponent may be: 0 where the firmware makes up for the battery, 2
-    # where rotor speed follows it
+    # range of a voltage's exponent: 0 if the firmware makes up for the battery, 2 if rotor speed
+    # follows the voltage
     voltage_exponents: float = 2.0
-    hover_speed: float = 1000.0  # rad/s, where no log says what a rotor's speed is
+    hover_speed: float = 1000.0  # rad/s, for logs without rotor speeds
 
 
 USUAL = Usual()
@@ -46,7 +46,7 @@ class Geometry:
     """Rotor positions (4, 3) in m, front-left, rear-left, rear-right, front-right."""
 
     positions: Array
-    known: bool = True  # False: of length 1 in x and y, since nobody said
+    known: bool = True  # False: length 1 in x and y stands for an unknown arm
 
     @property
     def arm(self) -> float:
@@ -58,7 +58,7 @@ def parse_geometry(text: str | None) -> Geometry:
     """Return the geometry of ``ARM`` or of ``X1,Y1;X2,Y2;X3,Y3;X4,Y4``, in m; None: not known.
 
     Raises:
-        InputError: neither of the two, or rotors that do not stand one in each quadrant.
+        InputError: neither of the two, or a quadrant without its rotor.
     """
     expected = (
         "expected the rotors' distance from the body x and y axes in m (0.12), or four positions "

@@ -1,10 +1,10 @@
 """A vehicle from nothing but its mass and its logs.
 
 The mass turns specific force into force, so the force along body z gives the thrust coefficient.
-Torque over inertia is what turning shows: with rotor positions given, roll and pitch give the
-inertia about x and y. Yaw gives reaction torque over the inertia about z alone; the two come apart
-where the vehicle yaws while it rolls or pitches, since ``w x J w`` then shows the inertia itself.
-What a flight does not show is fixed by an assumption that is named, or left out.
+Turning shows torque over inertia: with given rotor positions, roll and pitch yield the inertia
+about x and y. Yaw alone gives reaction torque over the inertia about z. Yaw beside roll or pitch
+separates the two, since ``w x J w`` then shows the inertia itself. Quantities missing from a flight
+are fixed by a named assumption, or left out.
 """
 
 import math
@@ -18,32 +18,33 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
 from ..logs.flight_log import FlightLog
-from ..prediction import PredictionErrors
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Sources, pieces_of, rounding_step, speed_noise
 from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
 from .estimates import Estimates, thrust_of
 from .geometry import SPIN, Geometry
-from .held_out import predicted, torque_refuted, warnings_of
+from .held_out import HeldOut, held_out, warnings_of, without_further
 from .motors import motor_response
 from .parameters import FORCE_BIAS, FURTHER, first_model
-from .result import IDENTIFIED, NOTHING, Estimate, Identified, told
-from .solve import Interval, VehicleFit, score_tests, solve
+from .plausible import check_rotors, check_thrust
+from .result import IDENTIFIED, NOTHING, REFUTED, Estimate, Identified, told
+from .solve import Interval, VehicleFit, nearest_body, score_tests, solve
 from .spectra import BAND
 
 Report = Callable[[float, str], None]
 
-# fall of twice the negative log-likelihood for each further parameter, in units of ln of the
-# count of frequencies: Schwarz's criterion, doubled since the noise's spectrum is fitted too
+# fall of twice the negative log-likelihood for each further parameter, in units of ln(count of
+# frequencies): Schwarz's criterion, doubled since the noise's spectrum is fitted too
 _PENALTY = 2.0
 # Hz: narrower bands, in turn, where the whole band contradicts itself
 _BANDS = (4.0, 1.5)
 _APART = 3.0  # standard deviations of thrust between two bands, or of a bias' prior
-_CLOSE = 0.01  # share of thrust by which two bands may differ whatever the intervals say
-_LEAST_VOLTAGE_RANGE = 0.03  # share: below it the voltage's exponent is not asked for
-_LEAST_LAG = 4.0  # standard deviations of a lag behind rotor speeds that were logged
-_LAGS = (0.03, 0.08)  # s, where the search for it starts
+_CLOSE = 0.01  # share of thrust: two bands may differ by it at any interval
+_LEAST_VOLTAGE_RANGE = 0.03  # share: no exponent is fitted to a smaller range of voltage
+_LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
+_LAGS = (0.03, 0.08)  # s, starts of the search for a lag
+WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 
 
 @one_thread()
@@ -55,25 +56,26 @@ def identify(
     name: str = "identified",
     report: Report = lambda share, text: None,
 ) -> Identified:
-    """Return what flights tell of their vehicle.
+    """Return the vehicle of some flights.
 
     Args:
-        logs: of one vehicle, all with rotor speeds or all with motor commands, and with an
+        logs: flights of one vehicle, all with rotor speeds or all with motor commands, and with an
             accelerometer and a gyro, or a pose.
         mass: kg.
-        geometry: where the rotors stand, or not known.
-        windows: for each log, from and to in s after its start; None: all of it.
-        name: of the vehicle.
-        report: is told the share that is done, and what is being done.
+        geometry: the rotors' positions, known or not.
+        windows: for each log, from and to in s after its start; None: the whole log.
+        name: the vehicle's name.
+        report: takes the finished share, and the step in words.
 
     Raises:
-        InputError: the logs lack what is needed, or contradict the rotors' order.
+        InputError: the logs lack a channel, or contradict the rotors' order.
     """
     if not (math.isfinite(mass) and mass > 0.0):
         raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
+    check_rotors(pieces, logs)
     notes: list[str] = []
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"
@@ -83,7 +85,7 @@ def identify(
         geometry.positions, SPIN, geometry.known, commands, voltage_ref=reference, speed_noise=noise
     )
     report(0.05, "fitting forces and torques")
-    fit, turned = _first_fit(pieces, sources, drive, mass)
+    fit = _first_fit(pieces, sources, drive, mass)
     report(0.4, "asking whether slow and quick motion agree")
     fit, doubt = _agreeing(pieces, fit), ""
     if fit.drive.band < BAND:
@@ -103,7 +105,7 @@ def identify(
             "what is quicker"
         )
     report(0.8, "asking what can be told")
-    if turned:
+    if fit.drive.spin[0] != SPIN[0]:
         notes.append(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
             "above): the opposite ones were taken"
@@ -116,17 +118,23 @@ def identify(
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
 
     def described(part: VehicleFit, doubt: str) -> tuple[dict[str, Estimate], Vehicle]:
+        part, _ = nearest_body(part)
         named = Estimates(part, sources, geometry, kept, hidden, doubt).say_all(pieces)
         return named, vehicle_of(name, part, named, geometry, logs, voltage, step, motors)
 
     report(0.9, "predicting what is held out")
-    errors: dict[str, PredictionErrors] = {}
-    try:
-        errors = predicted(pieces, logs, fit, lambda part: described(part, doubt)[1])
-    except InputError as error:
-        notes.append(f"nothing that is held out was predicted: {error}")
-    notes += warnings_of(errors)
-    named, vehicle = described(fit, doubt or torque_refuted(errors))
+    tested = held_out(pieces, logs, fit, lambda part: described(part, doubt)[1])
+    notes += warnings_of(tested)
+    named, vehicle = described(fit, doubt or tested.why)
+    if not commands:
+        check_thrust(named["k"].value, vehicle.rotor_radius, logs[0].name)
+    _, excess = nearest_body(fit)
+    if excess > _APART:
+        notes.append(
+            f"warning: turning shows a principal inertia {excess:.1f} standard deviations above "
+            "the sum of the other two, the most that a body has: something else turns the vehicle"
+        )
+    vehicle = _with_status(vehicle, named, tested)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:
@@ -141,12 +149,24 @@ def identify(
         fit,
         tuple(notes),
         tuple(advice_of(named)),
-        errors,
+        tested.errors,
+        tested.simplest,
     )
 
 
+def _with_status(vehicle: Vehicle, named: dict[str, Estimate], tested: HeldOut) -> Vehicle:
+    """Return the vehicle with its status, and without refuted effects; mark these in ``named``."""
+    flown = vehicle if tested.further else without_further(vehicle)
+    for effect in vehicle.effects:
+        for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
+            if effect not in flown.effects and name in named:
+                named[name] = replace(named[name], status=REFUTED, how=WITHOUT_EFFECTS)
+    sources = {e.name: e.status for e in named.values() if e.status != NOTHING}
+    return replace(flown, status=replace(tested.status, coefficients=sources))
+
+
 def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:
-    """Return the lag of a model that has no time offset, which then is in the lag."""
+    """Return the lag of a model without a time offset: the offset is then part of the lag."""
     place = fit.model.free.index("delay")
     model = replace(fit.model, free=(*fit.model.free[:place], *fit.model.free[place + 1 :]))
     alone = solve(pieces, replace(fit.drive, delay=0.0), model, np.delete(fit.theta, place))
@@ -167,29 +187,29 @@ def _voltage(pieces: Sequence[MotionPiece]) -> float:
 
 def _first_fit(
     pieces: list[MotionPiece], sources: Sources, drive: Drive, mass: float
-) -> tuple[VehicleFit, bool]:
-    """Return the fit of the basic model, and whether the rotors turn the other way."""
+) -> VehicleFit:
+    """Return the fit of the basic model."""
     if not drive.commands:
-        model, start, drive, turned = first_model(pieces, sources, drive, mass, ("delay",))
+        model, start, drive = first_model(pieces, sources, drive, mass, ("delay",))
         plain = solve(pieces, drive, model, start)
         # do the logged speeds lead the motion as commands do?
         late = balance(pieces, replace(plain.drive, speed_noise=0.0), ("delay", "lag"))
         _, (lag,), (size,) = score_tests(plain, {"lag": ("lag",)}, late)["lag"]
         if lag < _LEAST_LAG * size:
-            return plain, turned
+            return plain
         model, start = model.with_more(plain.theta, "lag")
         start[-1] = _LAGS[0]
         other = solve(pieces, drive, model, start)
         enough = _PENALTY * math.log(_frequencies(plain))
         lag, low, _ = other.interval("lag", logarithm=False)
         sure = lag > _LEAST_LAG * (lag - low) / other.width
-        return (other if sure and plain.loss - other.loss > enough else plain), turned
+        return other if sure and plain.loss - other.loss > enough else plain
     nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
-    best: tuple[float, VehicleFit, bool] | None = None
-    # from the richest curve down: a fit that starts poor takes its own misfit for noise
+    best: tuple[float, VehicleFit] | None = None
+    # from the richest curve down: a poor first fit takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         here = replace(drive, exponents=exponents)
-        model, start, here, turned = first_model(pieces, sources, here, mass, nonlinear)
+        model, start, here = first_model(pieces, sources, here, mass, nonlinear)
         fits = []
         for lag in _LAGS if best is None else (best[1].drive.lag,):
             start[model.free.index("lag")] = lag
@@ -199,17 +219,17 @@ def _first_fit(
         thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
         if rises and (best is None or cost < best[0]):
-            best = cost, fit, turned
+            best = cost, fit
     if best is None:
         raise InputError(
             "thrust does not grow with the motor commands; expected cmd1..cmd4, 0 to 1"
         )
-    return best[1], best[2]
+    return best[1]
 
 
 def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
-    """Return the fit up to the widest frequency at which thrust is what slower motion alone says
-    (Hausman's test), and no sensor's bias is beyond belief.
+    """Return the fit up to the highest frequency without a contradiction: thrust agrees with slower
+    motion alone (Hausman's test), and each sensor's bias is credible.
     """
     for band in _BANDS:
         slow = solve(pieces, replace(fit.drive, band=band), fit.model, fit.theta)
@@ -224,11 +244,11 @@ def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
 
 
 def _hover_thrust(fit: VehicleFit) -> tuple[float, float]:
-    """Return the thrust at what a hover takes by the fit's own start, as a share of the weight, and
-    its standard deviation, as a share of it.
+    """Return thrust as a share of the weight, at the hover speed or command of the fit's start, and
+    its relative standard deviation.
     """
     exponents, weight = fit.drive.exponents, fit.model.weight
-    # where the start's curve, in which each power carries its share, carries the weight
+    # the start's curve carries the weight here; each power carries its share
     scale = fit.model.scale
     u = (weight / (4.0 * scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
     value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, exponents, u) / weight, False)
@@ -236,24 +256,26 @@ def _hover_thrust(fit: VehicleFit) -> tuple[float, float]:
 
 
 def _frequencies(fit: VehicleFit) -> float:
-    """Count of independent numbers that the fit rests on."""
+    """Return the count of independent numbers behind the fit."""
     return float(6.0 * sum(len(s.frequency) for s in fit.balance.segments))
 
 
 def _with_optional(
     pieces: list[MotionPiece], fit: VehicleFit, sources: Sources
 ) -> tuple[VehicleFit, dict[str, str], Interval | None]:
-    """Return a fit with those further effects that make the logs much likelier, the one that makes
-    them likeliest first, lest another stands for it; which, and why one is not to be believed; and
-    of a moment of velocity that does not show the value, its standard deviation, and what would.
+    """Return a fit with further effects, their names, and a moment of velocity that stays hidden.
+
+    Effects join if the logs get much likelier, the likeliest first, lest another stands for it.
+    Each has the reason to doubt it, or an empty text. The hidden moment has its value, its standard
+    deviation and the least visible value.
     """
-    moving = "linear drag x" in fit.balance.names  # is there a velocity?
+    moving = "linear drag x" in fit.balance.names  # there is a velocity
     offered = {
         name: further.parameters
         for name, further in FURTHER.items()
         if (moving or further.role in (None, Role.RATE_DAMPING))
         and not (fit.drive.commands and further.of_speeds)
-        # the noise of a pose goes round the loop: quick torques then follow it, and say nothing
+        # the noise of a pose goes round the loop: quick torques then follow noise alone
         and (name != "answered torque" or sources.rate == "gyro")
     }
     kept: dict[str, str] = {}
@@ -272,8 +294,8 @@ def _with_optional(
         if all(richer.values[p] > 0.0 for f in asked if f.positive for p in f.parameters):
             fit = richer
             kept[name] = ""
-    # what was taken since it stood out is too large on average where another flight of the same
-    # vehicle would not have shown it: where its interval reaches what is not taken
+    # an effect taken because it stood out is too large on average, if another flight of the same
+    # vehicle would hide it: its interval reaches down to sizes below the bound
     for name in kept:
         at = [fit.model.free.index(p) for p in FURTHER[name].parameters]
         theta, covariance = fit.theta[at], fit.covariance[np.ix_(at, at)]
@@ -284,5 +306,5 @@ def _with_optional(
 
 
 def _least_fall(fit: VehicleFit, name: str) -> float:
-    """Return by how much twice the negative log-likelihood must fall with a further effect."""
+    """Return the least fall of twice the negative log-likelihood for a further effect."""
     return _PENALTY * len(FURTHER[name].parameters) * math.log(_frequencies(fit))

@@ -1,7 +1,7 @@
 """From a vehicle's parameters to the coefficients of the columns, axis by axis.
 
-Specific force, body axes, at the sensor (or the pose's point), which lies at ``r`` from the centre
-of mass: ``f = (T e3 + drag) / m + w' x r + w x (w x r) + bias``, with the thrust axis tilted a
+Specific force, body axes, at the sensor (or the pose's point), at ``r`` from the centre of
+mass: ``f = (T e3 + drag) / m + w' x r + w x (w x r) + bias``, with the thrust axis tilted a
 little. Angular acceleration: ``w' = J^-1 (torque - w x J w) + bias``.
 
 Parameters (``theta``) are numbers near 1 or 0; ``Model.scale`` holds the unit of each. Lag, time
@@ -27,7 +27,7 @@ _CROSS[[0, 1, 2], [1, 2, 0], [2, 0, 1]], _CROSS[[0, 1, 2], [2, 0, 1], [1, 2, 0]]
 
 @dataclass(frozen=True)
 class Model:
-    """Which parameters are fitted, and their sizes."""
+    """The fitted parameters, and their sizes."""
 
     mass: float  # kg
     powers: int
@@ -49,11 +49,11 @@ class Model:
 
     @property
     def nonlinear(self) -> tuple[str, ...]:
-        """Names of the parameters that change the columns themselves."""
+        """Names of the parameters inside the columns themselves."""
         return tuple(name for name in self.free if name in NONLINEAR)
 
     def with_more(self, theta: Array, *names: str) -> tuple["Model", Array]:
-        """Return the model with further parameters, which start at nothing, and the start."""
+        """Return the model with further parameters, and the start: 0 for each of them."""
         return replace(self, free=(*self.free, *names)), np.append(theta, np.zeros(len(names)))
 
 
@@ -71,7 +71,7 @@ def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, po
     for i, axis in enumerate(_AXES):
         out[:3, place[f"dw{axis}"]] = _CROSS[:, i] @ lever
         for j, other in enumerate(_AXES[i:], i):
-            products = np.zeros((3, 3))  # of the angular velocities, in this column
+            products = np.zeros((3, 3))  # angular velocities' products in this column
             products[i, j] = products[j, i] = 1.0
             column = place[f"w{axis}w{other}"]
             out[:3, column] = products @ lever - np.trace(products) * lever

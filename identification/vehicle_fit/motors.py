@@ -22,14 +22,12 @@ class MotorResponse:
     """Rotor speed in rad/s against command, and its lag."""
 
     speed: Array  # (3,) coefficients of u^0, u^1, u^2
-    known: tuple[float, float, float]  # s, the lag, and the ends of its 95 % interval
-    left: float  # share of the speeds' standard deviation that it does not explain
+    known: tuple[float, float, float]  # s, lag and ends of the 95 % interval
+    left: float  # unexplained share of the speeds' standard deviation
 
 
 def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
-    """Return how speeds follow commands; None where one of them is not in every piece, or where
-    commands do not move.
-    """
+    """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
     if any(p.command is None or p.rotor_speeds is None for p in pieces):
         return None
     speeds = np.concatenate([p.rotor_speeds for p in pieces if p.rotor_speeds is not None])
@@ -52,8 +50,8 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
         return float(np.sum(np.square(fitted(float(np.exp(log_lag)))[1])))
 
     bounds = tuple(np.log(_LAGS))
-    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-3})
-    lag = float(np.exp(found.x))
+    likeliest = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-3})
+    lag = float(np.exp(likeliest.x))
     best, residual = fitted(lag)
     step = 0.01 * lag
     slope = (columns(lag + step) - columns(lag - step)) @ best / (2.0 * step)

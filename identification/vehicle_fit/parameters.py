@@ -1,5 +1,5 @@
-"""Which parameters a fit has, from what the logs measure, and where they start: at plain least
-squares, axis by axis, in which every coefficient is linear.
+"""The parameters of a fit, chosen by the logs' sensors, and their start: plain least squares, axis
+by axis, with every coefficient linear.
 """
 
 from collections.abc import Sequence
@@ -12,22 +12,24 @@ from ...dynamics.effects import Role
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from .channels import MotionPiece, Sources
-from .columns import Drive, rotor_columns
+from .columns import ANSWERED_HZ, Drive, rotor_columns
 from .geometry import GRAVITY, USUAL
 from .model import Model
+from .spectra import BAND
 
-# of an accelerometer that is not calibrated beside its factory's, m/s2 and rad: 20 mg, as data
-# sheets of such sensors state
+# accelerometer with its factory's calibration alone, m/s2 and rad: 20 mg, as in data sheets of such
+# sensors
 FORCE_BIAS = 0.2
 TILT = 0.02
-# s: of the offset between the motion's clock and the rotors': sensors' own filters, transport
+# s, offset between the motion's clock and the rotors': sensors' own filters, transport
 DELAY = 0.02
-# s: the delays at which turning is compared with torque before the fit knows its own; commands of
-# a Crazyflie and of flight controllers lead the motion by 30 to 60 ms
+# s: turning is compared with torque at these delays, before the fit has its own. Commands of a
+# Crazyflie and of flight controllers lead the motion by 30 to 60 ms
 _FIRST_DELAYS = np.linspace(0.0, 0.08, 9)
-# correlation of turning with torque below which a log does not show that they oppose: a Crazyflie
-# that hardly rolls has -.06
+# correlation of turning with torque: a smaller one is no sign of opposition. A Crazyflie with
+# hardly any roll has -.06
 _OPPOSED = 0.15
+_SWING_HZ = (0.5, 8.0)
 
 BASE = (
     *("Jx", "Jy", "Jz", "reach", "cx", "cy", "Jr", "tilt x", "tilt y", "rx", "ry", "rz"),
@@ -38,11 +40,11 @@ BIASES = ("force bias x", "force bias y", "force bias z")
 
 @dataclass(frozen=True)
 class Further:
-    """An effect that is fitted where it makes the logs much likelier."""
+    """An effect for logs that get much likelier by it."""
 
     parameters: tuple[str, ...]
-    role: Role | None = None  # of the library's effect; None: it is none
-    first: int = 0  # of the effect's coefficients
+    role: Role | None = None  # the library effect's role; None: not in the library
+    first: int = 0  # index of the effect's first coefficient here
     shows: str = ""  # in force along body x and y; or along "z", or in "turning"
     of_speeds: bool = False  # takes measured rotor speeds
     positive: bool = True  # a negative value is no physics, but another fault of the model
@@ -57,7 +59,7 @@ FURTHER: dict[str, Further] = {
     "vertical drag": Further(("linear drag z",), Role.BODY_DRAG, 2),
     "inflow": Further(("rotor drag z",), Role.INFLOW_THRUST, 0, "z", of_speeds=True),
     "lift": Further(("lift",), Role.TRANSLATIONAL_LIFT, 0, "z", positive=False),
-    # shares of slow torques that turn nothing, since the flight loop answers with them
+    # shares of slow torques without a turn: the flight loop's answers
     "answered torque": Further(("answered x", "answered y", "answered z")),
     **{
         f"damping {a}": Further((f"damping {a}",), Role.RATE_DAMPING, i, "turning")
@@ -74,28 +76,30 @@ def first_model(
     drive: Drive,
     mass: float,
     nonlinear: Sequence[str],
-) -> tuple[Model, Array, Drive, bool]:
-    """Return the model, where it starts, the drive with the turning senses that yaw shows, and
-    whether they are the opposite of the drive's; ``nonlinear`` of its parameters start as the
-    drive has them.
+) -> tuple[Model, Array, Drive]:
+    """Return the model, its start, and the drive with the turning senses that yaw shows;
+    ``nonlinear`` parameters start at the drive's values.
 
     Raises:
         InputError: roll or pitch turn against their rotors.
     """
     columns = [rotor_columns(piece, drive) for piece in pieces]
-    # a basis coefficient at which it alone would carry the weight
+    # each basis function's coefficient if it alone carried the weight
     totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(len(drive.exponents))]
     each = [mass * GRAVITY / max(float(np.mean(total)), 1e-12) for total in totals]
     share = 1.0 / len(each)
-    gains, alike = _first_gains(pieces, columns, [share * a for a in each])
-    for axis, correlation in zip(("roll", "pitch"), alike, strict=False):
-        if correlation < -_OPPOSED:
+    shares = [share * a for a in each]
+    gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
+    # a loop that answers a swinging load opposes its own slow torque, and no quick one
+    _, quick = _first_gains(pieces, columns, shares, (ANSWERED_HZ, BAND))
+    for axis, both in zip(("roll", "pitch"), np.column_stack([alike, quick]), strict=False):
+        if both[0] < -_OPPOSED and both[1] < 0.0:
             raise InputError(
                 f"{axis} turns against the torque of its rotors; expected rotors in the order "
                 "front-left, rear-left, rear-right, front-right, and body axes forward, left, up"
             )
     arm = float(np.mean(np.abs(drive.positions[:, :2])))
-    # what hardly turns starts at the inertia that such a vehicle usually has
+    # an axis without a turn starts at the usual inertia of such a vehicle
     usual = USUAL.gyration * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
     flat = USUAL.flat * float(inertia.sum())
@@ -126,18 +130,21 @@ def first_model(
     known = {**{f"a{j}": share for j in range(len(each))}, "reach": 1.0}
     known |= {name: getattr(drive, name) for name in nonlinear}
     model = Model(mass, len(each), (*free, *nonlinear), size, prior)
-    turned = bool(gains[2] < 0.0)
-    if turned:
+    if gains[2] < 0.0:
         drive = replace(drive, spin=-drive.spin)
-    return model, np.array([known.get(name, 0.0) for name in model.free]), drive, turned
+    return model, np.array([known.get(name, 0.0) for name in model.free]), drive
 
 
 def _first_gains(
-    pieces: list[MotionPiece], columns: list[dict[str, Array]], thrust: list[float]
+    pieces: list[MotionPiece],
+    columns: list[dict[str, Array]],
+    thrust: list[float],
+    band: tuple[float, float],
 ) -> tuple[Array, Array]:
-    """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly: about x and y the
-    inertia's inverse, about z that times torque over thrust (m); and their correlation (3,). Each
-    at the delay, up to 80 ms, at which the two are most alike or most opposed.
+    """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly, and their correlation
+    (3,) in a ``band`` in Hz. About x and y the first is the inertia's inverse, about z the inverse
+    times torque over thrust (m). Each is taken at the delay, up to 80 ms, of the largest
+    correlation of either sign.
     """
     gains, alike = np.zeros(3), np.zeros(3)
     for i, letter in enumerate("XYZ"):
@@ -145,8 +152,8 @@ def _first_gains(
         for piece, column in zip(pieces, columns, strict=True):
             torque = np.sum([a * column[f"{letter}{j}"] for j, a in enumerate(thrust)], axis=0)
             # turning is the integral of torque: compared where neither is differentiated
-            spin = _swing(np.cumsum(torque - torque.mean()) * piece.period, piece.period)
-            rate = _swing(piece.angular_velocity[:, i], piece.period)
+            spin = _passed(np.cumsum(torque - torque.mean()) * piece.period, piece.period, band)
+            rate = _passed(piece.angular_velocity[:, i], piece.period, band)
             late = np.rint(_FIRST_DELAYS / piece.period).astype(int)
             cross += [float(spin[: len(spin) - n] @ rate[n:]) for n in late]
             power += float(spin @ spin)
@@ -157,7 +164,8 @@ def _first_gains(
     return gains, alike
 
 
-def _swing(x: Array, period: float) -> Array:
-    """Return what of ``x`` (n,) is faster than about 0.5 Hz."""
-    sections = butter(2, [1.0 * period, min(0.9, 16.0 * period)], btype="bandpass", output="sos")
+def _passed(x: Array, period: float, band: tuple[float, float]) -> Array:
+    """Return the part of ``x`` (n,) in a ``band`` in Hz."""
+    low, high = (2.0 * f * period for f in band)
+    sections = butter(2, [min(low, 0.8), min(0.9, high)], btype="bandpass", output="sos")
     return np.asarray(sosfiltfilt(sections, x))

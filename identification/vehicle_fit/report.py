@@ -1,5 +1,5 @@
-"""What identify writes: the vehicle's file, the estimates beside it, and a picture of measured
-against fitted force and torque.
+"""Files of identify: the vehicle, the estimates beside it, and a picture of measured against fitted
+force and torque.
 """
 
 import json
@@ -17,6 +17,7 @@ from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
+from .held_out import LEAST_HZ, powers
 from .model import coefficients
 from .result import ASSUMED, NOTHING, Identified
 
@@ -24,83 +25,120 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_SHOWN_HZ = 8.0  # of the picture: what is faster is the pose's noise
-_LEAST_HZ = 0.4  # of the shares: what is slower holds the mean, such as the weight
+_SHOWN_HZ = 8.0  # highest frequency of the picture: above it lies the pose's noise
 _SHOWN_SECONDS = 10.0
 
 
-def identified_data(found: Identified) -> dict[str, Any]:
-    """Return the dictionary of ``identify.json``; None for what is not known."""
+def identified_data(identified: Identified) -> dict[str, Any]:
+    """Return the dictionary of ``identify.json``; None for unknown values."""
     data: dict[str, Any] = {
-        "vehicle": found.vehicle.name,
-        "mass_kg": found.vehicle.mass,
-        "flight_s": found.fit.balance.seconds,
-        "segments": len(found.fit.balance.segments),
-        "channels": found.sources,
+        "vehicle": identified.vehicle.name,
+        "mass_kg": identified.vehicle.mass,
+        "flight_s": identified.fit.balance.seconds,
+        "segments": len(identified.fit.balance.segments),
+        "channels": identified.sources,
         "estimates": [
-            {"name": e.name, "value": e.value, "interval_95": [e.low, e.high]}
-            | {"unit": e.unit, "status": e.status, "how": e.how}
-            for e in found.estimates.values()
+            {
+                "name": e.name,
+                "value": e.value,
+                "interval_95": [e.low, e.high],
+                "unit": e.unit,
+                "status": e.status,
+                "how": e.how,
+            }
+            for e in identified.estimates.values()
         ],
-        "notes": found.notes,
-        "advice": found.advice,
+        "notes": identified.notes,
+        "advice": identified.advice,
     }
-    for where, errors in found.predicted.items():
+    data["status"] = identified.vehicle.status
+    for where, errors in identified.predicted.items():
         of = zip(QUANTITIES.items(), errors.model, errors.still, strict=True)
-        data[where] = {
-            "starts": errors.starts,
-            "horizon_s": errors.horizon,
-            **{
-                name.replace(" ", "_"): {"unit": unit, "model": model, "if_nothing_changes": still}
-                for (name, unit), model, still in of
-            },
-        }
+        data[where] = {"starts": errors.starts, "horizon_s": errors.horizon}
+        for i, ((name, unit), model, still) in enumerate(of):
+            data[where][name.replace(" ", "_")] = {
+                "unit": unit,
+                "model": model,
+                "if_nothing_changes": still,
+            }
+            if where in identified.simplest:
+                simplest = identified.simplest[where].model[i]
+                data[where][name.replace(" ", "_")]["thrust_and_drag"] = simplest
     told: dict[str, Any] = plain(data)
     return told
 
 
-def headline(found: Identified) -> str:
+def headline(identified: Identified) -> str:
     """Return one sentence on how much of the vehicle the logs tell."""
     essential = ["Jxx", "Jyy", "Jzz", "p/k"]
-    open_ones = [n for n in essential if found.estimates[n].status in (ASSUMED, NOTHING)]
-    told = "thrust" if found.fit.drive.commands else "k"
+    open_ones = [n for n in essential if identified.estimates[n].status in (ASSUMED, NOTHING)]
+    told = "thrust" if identified.fit.drive.commands else "k"
     if not open_ones:
         return f"{told}, inertia and reaction torque are identified"
     return f"{told} is identified; assumed, since these logs do not tell: {', '.join(open_ones)}"
 
 
-def write_identified(found: Identified, path: Path) -> list[Path]:
+def use_of(identified: Identified) -> str:
+    """Return one sentence: the use of the vehicle's file for predictions."""
+    status = identified.vehicle.status
+    refuted = [part for part in ("force", "torque") if getattr(status, part) == "refuted"]
+    if len(refuted) == 2:
+        return (
+            "Use: assume an unchanged velocity and body rate; the vehicle predicts no better. Fly "
+            "as advised and identify again."
+        )
+    if refuted == ["torque"]:
+        return (
+            "Use: the vehicle for force, with an unchanged body rate (predict does both). Inertia "
+            "and reaction torque are assumed."
+        )
+    if refuted:
+        return "Use: the vehicle for torque, with an unchanged velocity (predict does both)."
+    return "Use: this vehicle."
+
+
+def table_of(errors: PredictionErrors, simplest: PredictionErrors | None) -> list[tuple[str, ...]]:
+    """Return rows: quantity, mean error of the vehicle, of thrust and drag, of no change, unit."""
+    columns = [errors.model[:, -1], errors.still[:, -1]]
+    if simplest is not None:
+        columns.insert(1, simplest.model[:, -1])
+    cells = ([f"{x:.3g}" for x in row] for row in np.array(columns).T)
+    return [(name, *row, unit) for (name, unit), row in zip(QUANTITIES.items(), cells, strict=True)]
+
+
+def write_identified(identified: Identified, path: Path) -> list[Path]:
     """Write the vehicle to a YAML file, and beside it ``NAME.identify.json``,
-    ``NAME.identify.png`` and, where it predicted, ``NAME.prediction.png``; return them.
+    ``NAME.identify.png`` and, with predictions, ``NAME.prediction.png``; return the paths.
 
     Raises:
         InputError: a file cannot be written.
     """
-    known = found.estimates
+    known = identified.estimates
     std = {
         e.name: {
             c: (estimate.high - estimate.low) / 3.92
             for c in e.coefficients
             if (estimate := known.get(f"{e.name} {c}", known.get(e.name)))
         }
-        for e in found.vehicle.effects
+        for e in identified.vehicle.effects
     }
-    save_vehicle(found.vehicle, path, std)
+    save_vehicle(identified.vehicle, path, std)
     data, picture = (path.with_name(f"{path.stem}.identify.{end}") for end in ("json", "png"))
-    write_text(json.dumps(identified_data(found), indent=1) + "\n", data)
-    write_png(_picture(found), picture)
+    write_text(json.dumps(identified_data(identified), indent=1) + "\n", data)
+    write_png(_picture(identified), picture)
     written = [path, data, picture]
-    if found.predicted:
+    if identified.predicted:
         written.append(path.with_name(f"{path.stem}.prediction.png"))
-        write_png(_prediction_picture(*list(found.predicted.items())[-1]), written[-1])
+        write_png(_prediction_picture(*list(identified.predicted.items())[-1]), written[-1])
     return written
 
 
-def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
-    """Return measured and fitted specific force (m/s2) and angular acceleration (rad/s2), (n, 6)
-    each, of a piece; both through the picture's low-pass, within the band that was used.
+def fitted(identified: Identified, piece: MotionPiece) -> tuple[Array, Array]:
+    """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
+
+    Both are (n, 6), behind the picture's low-pass and within the band of the fit.
     """
-    fit = found.fit
+    fit = identified.fit
     then = piece.t - fit.drive.delay
     columns = {n: np.interp(then, piece.t, x) for n, x in rotor_columns(piece, fit.drive).items()}
     columns |= air_columns(piece, fit.drive)
@@ -113,31 +151,22 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     return low_pass(measured, shown_hz, piece.period), low_pass(model, shown_hz, piece.period)
 
 
-def explained(found: Identified) -> Array:
-    """Return the share (6,) of measured force and turning that the fit explains in the band that it
-    used: of the power, in which a frequency counts by how far it stands out of its noise; NaN where
-    nothing is measured.
+def explained(identified: Identified) -> Array:
+    """Return the share (6,) of measured power of force and turning that the fit explains in its
+    band. Each frequency counts by its ratio to the noise; NaN without a measurement.
     """
-    fit = found.fit
-    names, values = fit.balance.names, fit.values
-    model = coefficients(values, names, fit.model.mass, fit.model.powers)
-    total, left = np.zeros((2, 6))
-    for s, spectrum in zip(fit.balance.segments, fit.spectra, strict=True):
-        inside = s.frequency >= _LEAST_HZ
-        measured = s.columns[:, inside, :6]
-        residual = measured - s.columns[:, inside, 6 : 6 + len(names)] @ model.T
-        for sum_, x in ((total, measured), (left, residual)):
-            sum_ += np.sum(np.abs(x) ** 2 / spectrum[inside], axis=(0, 1))
+    fit = identified.fit
+    left, total = powers(fit, fit.balance.segments, fit.spectra)
     return np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0)
 
 
 @styled()
-def _picture(found: Identified) -> "Figure":
-    mass, inertia = found.vehicle.mass, np.diag(found.vehicle.inertia)
+def _picture(identified: Identified) -> "Figure":
+    mass, inertia = identified.vehicle.mass, np.diag(identified.vehicle.inertia)
     scale = np.concatenate([np.full(3, mass), inertia])
-    longest = max(found.pieces, key=lambda p: len(p.t))
-    measured, model = fitted(found, longest)
-    share, band = explained(found), found.fit.drive.band
+    longest = max(identified.pieces, key=lambda p: len(p.t))
+    measured, model = fitted(identified, longest)
+    share, band = explained(identified), identified.fit.drive.band
     middle = longest.t[len(longest.t) // 2]
     shown = np.abs(longest.t - middle) <= 0.5 * _SHOWN_SECONDS
     figure = new_figure(4.8)
@@ -153,7 +182,7 @@ def _picture(found: Identified) -> "Figure":
         axes[1, i].set_xlabel("time (s)")
     axes[0, 0].legend()
     figure.suptitle(
-        f"explained: of the power from {_LEAST_HZ:g} to {band:g} Hz, each frequency by its noise; "
+        f"explained: of the power from {LEAST_HZ:g} to {band:g} Hz, each frequency by its noise; "
         f"drawn: up to {min(_SHOWN_HZ, band):g} Hz"
     )
     return figure

@@ -1,4 +1,4 @@
-"""What was identified of a vehicle."""
+"""The result of an identification."""
 
 import math
 from collections.abc import Mapping
@@ -10,10 +10,11 @@ from .channels import MotionPiece, Sources
 from .solve import VehicleFit
 
 IDENTIFIED, ASSUMED, GIVEN, NOTHING = "identified", "assumed", "given", "not identifiable"
+REFUTED = "refuted"  # by data outside the fit
 
 
-# half-width of a 95 % interval as a share of the value (of its logarithm), beyond which a positive
-# quantity is not identifiable: a factor of 2 either way is what one would guess by the looks
+# half-width of a 95 % interval as a share of the value (of its logarithm): a positive quantity with
+# a wider one is not identifiable. By its looks alone one guesses a vehicle to a factor of 2
 WIDEST = 0.5
 
 
@@ -25,15 +26,15 @@ def told(known: tuple[float, float, float]) -> bool:
 
 @dataclass(frozen=True)
 class Estimate:
-    """One quantity: its value with a 95 % interval, and how it is known."""
+    """One quantity: value with a 95 % interval, and its source."""
 
-    name: str  # as vehicle files and reports name it
-    value: float  # SI units; NaN where nothing is known
+    name: str  # as in vehicle files and reports
+    value: float  # SI units; NaN if not known
     low: float
     high: float
     unit: str
-    status: str  # identified, assumed, given, not identifiable
-    how: str  # which channels carried it, which assumption, or why it cannot be told
+    status: str  # identified, assumed, given, refuted, not identifiable
+    how: str  # channels, assumption, or reason not to know
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +42,14 @@ class Identified:
     """A vehicle from its logs."""
 
     vehicle: Vehicle
-    estimates: Mapping[str, Estimate]  # by their names
+    estimates: Mapping[str, Estimate]  # keys: names
     sources: Sources
     pieces: tuple[MotionPiece, ...]
     fit: VehicleFit
     notes: tuple[str, ...]
     advice: tuple[str, ...]
-    # of what was not fitted to: held_out_blocks, flights_left_out (each in turn, of several), and
-    # prediction, of further flights
+    # errors on data outside the fit: held_out_blocks, flights_left_out (each in turn, of several),
+    # and prediction, of further flights
     predicted: Mapping[str, PredictionErrors]
+    # the same of thrust and drag with an unchanged body rate
+    simplest: Mapping[str, PredictionErrors]

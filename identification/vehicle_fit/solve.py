@@ -1,8 +1,8 @@
 """Fitting the parameters: Gauss-Newton on Whittle's likelihood, the noise's spectrum taken from the
-residual in turn, and the covariance of what comes out.
+residual in turn, and the covariance of the result.
 
-Rotor speeds are noisy (rounded) where they are measured: what that adds to the columns' own power
-is taken away before the normal equations are solved, so that it does not shrink the coefficients.
+Measured rotor speeds are noisy (rounded). Their noise adds to the columns' own power and would
+shrink the coefficients, so the addition is taken off before the normal equations are solved.
 """
 
 import math
@@ -25,18 +25,20 @@ Values = Mapping[str, float]
 Function = Callable[[Values], float]
 Interval = tuple[float, float, float]  # value, low and high
 
-_ROUNDS = 12  # of a new spectrum and a new linearisation
-_STEPS = 2  # of Gauss-Newton in each
-_CLOSE = 0.02  # of a standard deviation: a change that ends it
+_ROUNDS = 12  # each with a new spectrum and a new linearisation
+_STEPS = 2  # Gauss-Newton steps in each round
+_CLOSE = 0.02  # standard deviations: a smaller change ends the rounds
 _RANGES = {"lag": (0.0, 0.5), "delay": (-0.1, 0.1), "gamma": (-4.0, 4.0)}  # s, s, 1
-_MOST_CHANGE = 0.05  # of one of these in a round
-# of one frequency: where the parameters explain nearly all of it, its noise is not seen
+_MOST_CHANGE = 0.05  # for each of these in a round
+# one frequency's leverage: noise is hidden where the parameters explain nearly all power
 _MOST_LEVERAGE = 0.8
+# largest moment of inertia over the sum of the others: 1 of a flat body, and a file rounds
+_FLATTEST = 0.995
 
 
 @dataclass(frozen=True, eq=False)
 class VehicleFit:
-    """Parameters that fit best."""
+    """The best parameters."""
 
     model: Model
     theta: Array  # (p,)
@@ -44,7 +46,7 @@ class VehicleFit:
     scores: Array  # (s, p): each segment's gradient
     loss: float  # twice the negative log-likelihood, up to a constant
     balance: BalanceSpectra
-    spectra: list[Array]  # of each segment (m, 6)
+    spectra: list[Array]  # (m, 6) a segment
 
     @property
     def drive(self) -> Drive:
@@ -53,8 +55,8 @@ class VehicleFit:
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance (p, p), the larger of what the noise's spectrum says and what the segments'
-        own scatter says (White's sandwich), parameter by parameter.
+        """Covariance (p, p): by the noise's spectrum, or by the segments' own scatter (White's
+        sandwich), the larger of the two parameter by parameter.
         """
         inverse = np.asarray(LOSS * np.linalg.inv(self.information), dtype=np.float64)
         count = len(self.scores)
@@ -96,7 +98,7 @@ class VehicleFit:
 
 
 def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -> VehicleFit:
-    """Return the fit that Gauss-Newton reaches from ``start`` (p,)."""
+    """Return the fit of Gauss-Newton from ``start`` (p,)."""
     theta = start.copy()
 
     def linear() -> BalanceSpectra:
@@ -117,7 +119,7 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
     grams = _grams(made, spectra)
     _, information, slopes, v = _newton(made, np.sum(grams, axis=0), model, theta)
     scores = np.array([np.einsum("iac,acd,ad->i", slopes, g, v, optimize=True) for g in grams])
-    # twice the negative log-likelihood of a noise that has the residual's spectrum
+    # twice the negative log-likelihood of noise with the residual's spectrum
     logs = (
         np.sum(s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p)))
         for s, p in zip(made.segments, spectra, strict=True)
@@ -127,8 +129,8 @@ def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -
 
 
 def refitted(fit: VehicleFit, kept: Sequence[Mask]) -> list[VehicleFit]:
-    """Return a fit's coefficients by those of its segments (s,) alone that are ``kept``, of which
-    the noise has the spectrum that it has.
+    """Return a fit's coefficients by its ``kept`` segments (s,) alone, at the same spectrum of the
+    noise.
 
     Raises:
         InputError: no segment is kept.
@@ -144,18 +146,43 @@ def refitted(fit: VehicleFit, kept: Sequence[Mask]) -> list[VehicleFit]:
     return out
 
 
+def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
+    """Return a fit whose inertia a body can have, and the standard deviations to it.
+
+    No moment of inertia exceeds ``_FLATTEST`` of the sum of the other two. Where one does, all
+    parameters move to the likeliest ones that obey: along the constraint's slope in the metric of
+    the covariance.
+    """
+    names, size = ("Jx", "Jy", "Jz"), 0.0
+    at = [fit.model.free.index(name) for name in names]
+    for i in range(len(names)):
+        for _ in range(_ROUNDS):
+            moments = np.array([fit.values[name] for name in names])
+            share = np.where(np.arange(3) == i, 1.0, -_FLATTEST) * moments
+            if share.sum() <= 1e-9 * moments[i]:
+                break
+            slope = np.zeros(len(fit.theta))
+            slope[at] = share  # of logarithms
+            move = fit.covariance @ slope
+            variance = float(slope @ move)
+            size = max(size, float(share.sum()) / math.sqrt(variance))
+            fit = replace(fit, theta=fit.theta - move * (share.sum() / variance))
+    return fit, size
+
+
 def score_tests(
     fit: VehicleFit, groups: Mapping[str, Sequence[str]], made: BalanceSpectra | None = None
 ) -> dict[str, tuple[float, Array, Array]]:
-    """Return, for each group of further parameters alone, by how much twice the negative
-    log-likelihood would fall with them, where one step from nothing brings them, and their standard
-    deviations there, both in SI units; ``made``: in place of the fit's own transforms.
+    """Return, for each group of further parameters alone, the fall of twice the negative
+    log-likelihood, the parameters after one step from 0, and their standard deviations.
+
+    The last two are in SI units; ``made`` stands in place of the fit's own transforms.
     """
     model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
     made = made or fit.balance
     total = np.sum(_grams(made, fit.spectra), axis=0)
     step, information, *_ = _newton(made, total, model, start)
-    gradient, without, found = information @ step, list(range(len(fit.theta))), {}
+    gradient, without, tests = information @ step, list(range(len(fit.theta))), {}
 
     def reached(rows: list[int]) -> tuple[float, Array, Array]:
         inverse = np.linalg.inv(information[np.ix_(rows, rows)])
@@ -167,8 +194,8 @@ def score_tests(
         units = np.array([model.scale.get(p, 1.0) for p in group])
         fall, moved, size = reached(without + further)
         own = slice(len(without), None)
-        found[name] = fall - reached(without)[0], units * moved[own], units * size[own]
-    return found
+        tests[name] = fall - reached(without)[0], units * moved[own], units * size[own]
+    return tests
 
 
 def _moved(
@@ -187,8 +214,8 @@ def _moved(
 
 
 def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
-    """Return each segment's weighted Gram matrices (6, 1 + c + nc, ...), axis by axis: of the axis'
-    measurement and all columns, without what the rotors' noise adds.
+    """Return each segment's weighted Gram matrices (6, 1 + c + nc, ...), axis by axis: the axis'
+    measurement with all columns, less the rotors' noise.
     """
     noise, c = made.noise.T @ made.noise, len(made.names)
     grams = []
@@ -211,8 +238,10 @@ def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
 def _newton(
     made: BalanceSpectra, grams: Array, model: Model, theta: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Return a Gauss-Newton step (p,), the information (p, p), the residual's slopes (p, 6, 1 + c +
-    nc) and the residual (6, 1 + c + nc), as combinations of measurement and columns.
+    """Return a Gauss-Newton step (p,), the information (p, p), the residual's slopes and the
+    residual.
+
+    Slopes (p, 6, 1 + c + nc) and residual (6, 1 + c + nc) combine measurement and columns.
     """
     here, slopes = jacobian(model, theta, made.names)
     # columns, and their derivatives times the distance from where they are linear
@@ -232,13 +261,13 @@ def _newton(
             strength = (model.scale.get(name, 1.0) / model.prior[name]) ** 2
             information[i, i] += strength
             gradient[i] += theta[i] * strength
-    # what the flight does not excite at all stays where it is
+    # parameters without excitation stay
     information += 1e-8 * np.eye(len(information))
     return np.linalg.solve(information, -gradient), information, rows, v
 
 
 def _bounded(theta: Array, model: Model, drive: Drive) -> Array:
-    """Return parameters of which the nonlinear ones stay near the drive's, and in their range."""
+    """Return the parameters, the nonlinear ones bounded by their range and near the drive's."""
     bounded = theta.copy()
     for name in model.nonlinear:
         i, here = model.free.index(name), getattr(drive, name)
@@ -250,8 +279,8 @@ def _bounded(theta: Array, model: Model, drive: Drive) -> Array:
 def _powers(
     made: BalanceSpectra, spectra: Sequence[Array], model: Model, theta: Array, information: Array
 ) -> list[Array]:
-    """Return the residual's power (m, 6) in each segment, as it was before the parameters took
-    their share: they follow the noise most where they are told from few frequencies.
+    """Return the residual's power (m, 6) in each segment, before the parameters took their share:
+    parameters told by few frequencies follow the noise most.
     """
     here, slopes = jacobian(model, theta, made.names)
     c, inverse = len(made.names), np.linalg.inv(information)

@@ -1,10 +1,10 @@
 """Columns of a regression as tapered Fourier transforms, and the noise's spectrum.
 
-Least squares weighted with the residual's own spectrum is the maximum of Whittle's likelihood: in
-each frequency the motion counts by how much it stands out of disturbance and sensor noise, so no
-cut-off has to be chosen between the two. With a noise model that is free to take the residual's
-shape it is the prediction-error method, which closed-loop flight does not bias as plain least
-squares is biased (Ljung, System Identification, 1999, section 13.4).
+Least squares weighted with the residual's own spectrum is the maximum of Whittle's likelihood. In
+each frequency the motion counts by its ratio to disturbance and sensor noise, so no cut-off has to
+be chosen between the two. The noise model may take any shape: this is the prediction-error method,
+without the bias of plain least squares in closed-loop flight (Ljung, System Identification, 1999,
+section 13.4).
 """
 
 import itertools
@@ -15,14 +15,14 @@ import numpy as np
 
 from ...runtime.arrays import Array, Complex, Index
 
-_SEGMENT = 5.0  # s: of one transform; its inverse is the frequency's step
+_SEGMENT = 5.0  # s, length of one transform; the inverse is the step of frequency
 TAPERS = 3  # sine tapers (Riedel and Sidorenko, 1995): a low leak, and little lost
-# by what the variance of an estimate is larger than the information's inverse: the mean of the
-# tapers' squares, whose own mean is 1, weighs a segment's middle more than its ends
+# variance of an estimate over the information's inverse: the tapers' mean square, 1 on average,
+# weighs a segment's middle more than its ends
 LOSS = 1.0 + 0.5 / TAPERS
-# Hz: what is faster is vibration, and the loops' answer to noise; rotors follow no faster
+# Hz: above lie vibration and the loops' answer to noise; rotors follow no faster
 BAND = 15.0
-_SMOOTHING = 0.35  # of the spectrum: width as a share of the frequency,
+_SMOOTHING = 0.35  # spectrum's smoothing: width as a share of the frequency,
 _NARROWEST = 0.4  # and at least so many Hz
 
 
@@ -63,8 +63,8 @@ def segments_of(columns: Array, period: float, log: int, band: float) -> list[Se
 
 
 def residual_spectra(segments: Sequence[Segment], powers: Sequence[Array]) -> list[Array]:
-    """Return, for each segment, the spectrum (m, 6) of residuals whose powers (m, 6) are given,
-    smoothed over the segments of a log and over frequency; infinite where there is none.
+    """Return, for each segment, the spectrum (m, 6) of residuals with given powers (m, 6): smoothed
+    over the segments of a log and over frequency, infinite at no power.
     """
     out: list[Array] = []
     by_log: dict[int, tuple[Array, Array]] = {}

@@ -1,4 +1,4 @@
-"""The wrench filter of a vehicle, and a policy, as C that a flight controller compiles."""
+"""The wrench filter of a vehicle, and a policy, as C for a flight controller."""
 
 from .c_numbers import PRECISIONS
 from .export import ESTIMATORS, Exported, export_c

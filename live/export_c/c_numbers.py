@@ -1,8 +1,8 @@
 """Numbers as C writes them, and the same source in single or in double precision.
 
-Templates and translated effects are C in single precision. Numbers that come from Python stand in
-them with all their digits (``literal``, which ends in F). What is left to do once a file is whole
-is to write each as the precision has it.
+Templates and translated effects are C in single precision. Numbers from Python stand in
+them with all their digits (``literal``, with an F at the end). The last step on a whole file writes
+each number in the chosen precision.
 """
 
 import re
@@ -18,16 +18,16 @@ PRECISIONS = ("single", "double")
 _COMMENT = re.compile(r"(/\*.*?\*/)", re.S)
 _NUMBER = r"(?<![\w.])((?:\d+\.\d*|\d+(?=[eE]))(?:[eE][-+]?\d+)?)"
 _FROM_PYTHON, _ANY = re.compile(_NUMBER + r"F\b"), re.compile(_NUMBER + r"[fF]\b")
-# all of libm that a source may call; with f in single
+# the functions of libm in a source; with f in single
 FUNCTIONS = ("sqrt", "sin", "cos", "fabs", "exp", "log", "pow", "atan2", "tanh")
 _CALL = re.compile(rf"\b({'|'.join(FUNCTIONS)})f\b")
 
 
 def literal(value: float, what: str = "a number") -> str:
-    """Return a number as a C literal with all its digits, within what single precision holds.
+    """Return a number as a C literal with all its digits, within the range of single precision.
 
     Raises:
-        InputError: single precision does not hold it; ``what`` names it.
+        InputError: single precision does not hold the number; ``what`` names the number.
     """
     with np.errstate(over="ignore"):
         number = np.float32(value)
@@ -56,7 +56,7 @@ def shape(values: ArrayLike) -> str:
 def in_precision(source: str, precision: str) -> str:
     """Return a C source with its numbers, types and functions of libm in one of ``PRECISIONS``."""
     if precision == "single":
-        return _FROM_PYTHON.sub(lambda found: f"{_shortest(found[1])}f", source)
+        return _FROM_PYTHON.sub(lambda number: f"{_shortest(number[1])}f", source)
     parts = _COMMENT.split(source)  # every second one is a comment
     for i in range(0, len(parts), 2):
         parts[i] = re.sub(r"\bfloat\b", "double", _CALL.sub(r"\1", _ANY.sub(r"\1", parts[i])))
@@ -64,6 +64,6 @@ def in_precision(source: str, precision: str) -> str:
 
 
 def _shortest(number: str) -> str:
-    """Return the shortest number that single precision reads as the same."""
+    """Return the shortest text of the same number in single precision."""
     text = str(np.float32(float(number)))
     return text if "." in text or "e" in text else f"{text}.0"

@@ -1,4 +1,4 @@
-"""What an expression of Python is in C: a number, an array or a record."""
+"""Expressions of Python in C: numbers, arrays and records."""
 
 import ast
 import operator
@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from .c_numbers import literal
 
-# an operator in C, and what it makes of numbers that are known
+# operators in C, and their functions of known numbers
 _OPERATORS: dict[type[ast.AST], tuple[str, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", operator.add),
     ast.Sub: ("-", operator.sub),
@@ -25,7 +25,7 @@ _OPERATORS: dict[type[ast.AST], tuple[str, Callable[[Any, Any], Any]]] = {
     **dict.fromkeys((ast.And, ast.BitAnd), ("&&", operator.and_)),
     **dict.fromkeys((ast.Or, ast.BitOr), ("||", operator.or_)),
 }
-# words of C that may be names in Python
+# words of C, possible names in Python
 _KEYWORDS = {
     *("auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "goto"),
     *("inline", "long", "register", "restrict", "short", "signed", "sizeof", "static", "struct"),
@@ -34,7 +34,7 @@ _KEYWORDS = {
 
 
 class UntranslatableError(Exception):
-    """A function does something that is not translated; the message goes on from its name."""
+    """A function has no translation; the message goes on from its name."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Number:
     known: float | None = None
 
     def as_float(self) -> str:
-        """Return it where C needs a float."""
+        """Return the number as a float of C."""
         if self.kind == "float":
             return self.text
         return literal(self.known) if self.known is not None else f"(float){self.text}"
@@ -59,7 +59,7 @@ class Array:
     text: str
     shape: tuple[str, ...] = ("",)
     first: str = ""
-    root: str = ""  # the parameter or local array that it is of; none: a constant
+    root: str = ""  # its parameter or local array; none: a constant
     values: Any = field(default=None, compare=False)  # where an export knows them
     kind: str = "float"
 
@@ -80,18 +80,18 @@ class Array:
         return Number(text, self.kind, None if known is None else float(known))
 
     def pointer(self) -> str:
-        """Return it as an argument."""
+        """Return the array as an argument."""
         return f"{self.text} + {self.first}" if self.first else self.text
 
 
 @dataclass(frozen=True)
-class Fields:
-    """A record: the filter's, or one within it."""
+class CRecord:
+    """A record: the filter's, or one of its parts."""
 
     path: tuple[str, ...] = ()
 
 
-Value = Number | Array | Fields | tuple["Value", ...]
+Value = Number | Array | CRecord | tuple["Value", ...]
 
 
 def constant(value: float) -> Number:
@@ -101,7 +101,7 @@ def constant(value: float) -> Number:
 
 
 def combined(op: ast.AST, a: Number, b: Number) -> Number:
-    """Return what an operator makes of two numbers; a zero that is known takes its term along."""
+    """Return an operator's result of two numbers; a known zero removes its term."""
     sign = operator_of(op)
     if sign in ("&&", "||"):
         for one, other in ((a, b), (b, a)):
@@ -127,12 +127,12 @@ def combined(op: ast.AST, a: Number, b: Number) -> Number:
 
 
 def operator_of(node: ast.AST) -> str:
-    """Return an operator that is the same in C."""
+    """Return the same operator in C."""
     if type(node) not in _OPERATORS:
         raise UntranslatableError(f"has an operator {type(node).__name__}")
     return _OPERATORS[type(node)][0]
 
 
 def c_name(name: str) -> str:
-    """Return a name that is no word of C."""
+    """Return a name unlike the words of C."""
     return f"{name}_" if name in _KEYWORDS else name

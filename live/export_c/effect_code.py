@@ -1,8 +1,7 @@
-"""The equations of declared effects as C, translated from their Python, which stays the only place
-where they are written.
+"""The equations of declared effects as C, translated from Python, the only place of each equation.
 
 An effect model is plain arithmetic on four arrays (``dynamics.effects.base``), with functions of
-``dynamics.effects.parts``. What ``translate`` refuses, no export has.
+``dynamics.effects.parts``. An effect refused by ``translate`` is in no export.
 """
 
 from contextlib import suppress
@@ -14,16 +13,16 @@ from .translate import Function, Library
 
 
 def library() -> Library:
-    """Return what effect models may use."""
+    """Return the library of effect models."""
     why = "looks back among earlier samples, which the C does not keep"
     return Library(refused={parts.delay: why}, prefix="ww_")
 
 
 def translate(effect: Effect, parts: Library) -> str:
-    """Return an effect's model as a C function ``effect_NAME``; add what it calls to ``parts``.
+    """Return an effect's model as a C function ``effect_NAME``; add its callees to ``parts``.
 
     Raises:
-        UntranslatableError: it does something else than what is translated.
+        UntranslatableError: the model has no translation.
     """
     if effect.kind == "sensing" and effect.memory:
         raise UntranslatableError(
@@ -39,7 +38,7 @@ def translate(effect: Effect, parts: Library) -> str:
 
 
 def definitions(code: str) -> str:
-    """Return the definitions of the names of ``dynamics.effects.base`` that C code uses."""
+    """Return definitions for the names of ``dynamics.effects.base`` in C code."""
     used = {
         name: value
         for name, value in vars(base).items()
@@ -49,11 +48,11 @@ def definitions(code: str) -> str:
 
 
 def exportable_effects() -> list[str]:
-    """Return the names of all effects that can be exported."""
-    found = []
+    """Return the names of all exportable effects."""
+    exportable = []
     for name in names():
         with suppress(UntranslatableError):
             if get(name).kind != "body":  # its numbers are the vehicle's
                 translate(get(name), library())
-            found.append(name)
-    return found
+            exportable.append(name)
+    return exportable

@@ -1,9 +1,9 @@
 """The wrench filter of one vehicle as a C header and a C99 source, in single or double precision.
 
-Gaps, outliers and restarts are translated from the Python filter (``filter_code``), effects from
-their Python (``effect_code``); templates hold the other equations, written after it. Every number
-comes from the Python filter's own record (``estimator.filter_record``), so there is one place for
-each. ``tests/live/test_export_c.py`` holds C and Python together, flight by flight.
+Gaps, outliers and restarts are translated from the Python filter (``filter_code``), and effects
+from their Python (``effect_code``). Templates hold the other equations, written after the Python.
+Every number comes from the Python filter's own record (``estimator.filter_record``), its one place.
+``tests/live/test_export_c.py`` holds C and Python together, flight by flight.
 """
 
 import math
@@ -19,7 +19,7 @@ from ... import __version__
 from ...dynamics.effects import get
 from ...dynamics.effects.base import PARAMETERS, ROTORS_SIZE, STATE_SIZE, Effect
 from ...dynamics.vehicle import Vehicle
-from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchEKF, WrenchUKF
+from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
 from ...estimator.constant_gain import _LONGEST_GAP, _NEAR
 from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
@@ -37,7 +37,6 @@ from .policies import tracker_policy
 
 _FILTERS: dict[str, tuple[type[WrenchUKF], str]] = {
     "constant-gain": (ConstantGainFilter, "The filter with a constant gain"),
-    "ekf": (WrenchEKF, "The extended Kalman filter"),
     "ukf": (WrenchUKF, "The unscented Kalman filter"),
 }
 ESTIMATORS = tuple(_FILTERS)
@@ -54,14 +53,14 @@ _KNOWN = {
     "CATCH_UP": CATCH_UP,
     "IMU_PATIENCE": IMU_PATIENCE,
 }
-# that are written, each from the template of its name
+# written files, each from the template of its name
 FILES = ("windwrench_filter.h", "windwrench_filter.c", "main.c", "CMakeLists.txt")
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What an export wrote, before it is written: the texts of the files by their names, and the
-    Python filter that the C does the same as.
+    """An export, not yet written: the texts of the files by their names, and the equivalent Python
+    filter.
     """
 
     files: Mapping[str, str]
@@ -72,7 +71,7 @@ class Exported:
 
 def export_c(
     vehicle: Vehicle,
-    estimator: str = "ekf",
+    estimator: str = "ukf",
     rate: float | None = None,
     rise_time: float = 1.0,
     gate: float | None = 0.9999,
@@ -85,13 +84,13 @@ def export_c(
     Args:
         vehicle: the vehicle; its declared effects are part of the filter's model.
         estimator: one of ``ESTIMATORS``.
-        rate: poses a second; default that of the vehicle's motion capture.
+        rate: poses a second; default: the vehicle's motion capture's.
         rise_time: s, 10-90 %, of the estimated force and torque.
         gate: as of ``WrenchUKF``.
-        policy: of ``exportable_policy``, or None.
-        command: the command line that asked for it, for the files' heads.
-        precision: one of ``PRECISIONS``, of every number in it: single (float), or double, for
-            processors that calculate with double numbers as fast.
+        policy: from ``exportable_policy``, or None.
+        command: the command line, for the files' heads.
+        precision: one of ``PRECISIONS`` for every number: single (float), or double, for
+            processors as fast with double numbers.
 
     Raises:
         InputError: a setting is out of range, an effect cannot be exported, or single precision
@@ -151,7 +150,7 @@ def export_c(
         autoescape=False,  # C, no page
     )
     environment.filters |= {"literal": literal, "table": table, "shape": shape}
-    # places in arrays that the template of the motion names, beside that of the effects
+    # places in arrays named by the template of the motion, beside the effects'
     places = "WW_STEP WW_ROTOR_TIME" + (" WW_ROTOR_ACCELERATION" if wrench else "")
     effects_c = environment.get_template("effects.c.j2").render(context | {"places": places})
     context["places"] = definitions(effects_c)
@@ -170,21 +169,21 @@ def export_c(
 
 
 def _one_line(text: str) -> str:
-    """Return a text that stands in a C comment on one line and does not end it."""
+    """Return a text for one line of a C comment, without the comment's end."""
     kept = "".join(c if c.isprintable() else " " for c in text)
     return kept.replace("*/", "* /").replace("\\", "/")
 
 
 def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect], str]:
-    """Return the effects that have a model, wrench, rotor input and sensing, in the filter's order,
-    and their code.
+    """Return the effects with a model, wrench, rotor input and sensing, in the filter's order, and
+    their code.
 
     Raises:
-        InputError: one cannot be exported.
+        InputError: an effect cannot be exported.
     """
     parts = library()
     models: dict[str, str] = {}
-    found: dict[str, list[Effect]] = {"wrench": [], "rotor input": [], "sensing": []}
+    declared: dict[str, list[Effect]] = {"wrench": [], "rotor input": [], "sensing": []}
     for setting in vehicle.effects:
         effect = get(setting.name)
         if effect.kind == "body":  # its numbers are the vehicle's
@@ -195,11 +194,11 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
             raise InputError(
                 f"{vehicle.name}: effects: {effect.name} cannot be exported: it {error}; declare "
                 "the vehicle without it (--effects none: without any), or estimate in Python, where"
-                " ekf, ukf and constant-gain take every effect. C has "
+                " ukf and constant-gain take every effect. C has "
                 f"{', '.join(exportable_effects())}"
             ) from None
         models[effect.name] = code
-        found[effect.kind].append(effect)
-    found["wrench"].sort(key=lambda effect: not effect.sets_wind)
+        declared[effect.kind].append(effect)
+    declared["wrench"].sort(key=lambda effect: not effect.sets_wind)
     code = "\n".join([*([parts.code()] if parts.done else []), *models.values()])
-    return found["wrench"], found["rotor input"], found["sensing"], code
+    return declared["wrench"], declared["rotor input"], declared["sensing"], code

@@ -1,4 +1,4 @@
-"""The wrench filter's own functions as C, and the constants and fields that they use."""
+"""The wrench filter's own functions as C, with their constants and fields."""
 
 import re
 from collections.abc import Iterator
@@ -9,11 +9,11 @@ import numpy as np
 from ...dynamics.motion import rotor_wrench
 from ...dynamics.rotation import attitude_error, normalise
 from ...estimator.bias_states import bound_biases
-from ...estimator.ekf import model_jacobian
 from ...estimator.error_state import bound_variance, displace, error_from, fold
 from ...estimator.filter_record import FILTER, IMU, N, fields_between, propagate
 from ...estimator.hover_covariance import heading, turn_vectors, turn_world
 from ...estimator.imu import _believed, expected_imu
+from ...estimator.linear_model import model_jacobian
 from ...estimator.model_uncertainty import follow_loads
 from ...estimator.recovery import (
     MEMORY,
@@ -28,13 +28,12 @@ from ...estimator.recovery import (
 )
 from ...estimator.ukf import innovate
 from .c_numbers import literal, shape, table
-from .c_values import Array, Fields, Value
+from .c_values import Array, CRecord, Value
 from .translate import Library
 
-# functions that templates may call, and what their arguments are known to be; each brings along
-# what it calls
+# functions for templates, and their known arguments; each brings along the functions it calls
 _CALLED: dict[Any, tuple[Value | None, ...]] = {
-    rotor_wrench: (Fields(("body",)), None, None),
+    rotor_wrench: (CRecord(("body",)), None, None),
     **dict.fromkeys((attitude_error, normalise, propagate, expected_imu), ()),
     **dict.fromkeys((displace, error_from, fold), ()),
     **dict.fromkeys((after_prediction, believable, remember, grow_older, doubted_variance), ()),
@@ -45,30 +44,30 @@ _CALLED: dict[Any, tuple[Value | None, ...]] = {
     follow_loads: (None, Array("", ("3", "3"), root="matrix"), None),
     _believed: (None, Array("", ("6", "6"), root="matrix"), None, None, None),
 }
-# steps of difference quotients that single precision can still tell apart
+# steps of difference quotients, large enough for single precision
 _STEPS = {"EFFECT_TURN": 4e-3, "EFFECT_STEP": 1e-2}
-_BY_HAND = {"_nis", "_is_push", "restore_bias_prior"}  # functions of templates that these call
-# fields of the filter's record that change in flight: by their names in C, their types
+_BY_HAND = {"_nis", "_is_push", "restore_bias_prior"}  # functions in templates, called from here
+# fields of the filter's record with changes in flight: types by names in C
 _KEPT = {
     **{f"poses_{name}": MEMORY[name] for name in MEMORY.names or ()},
     **{name: FILTER[name] for name in ("rotors", "rotor_wrench", "effect_wrench")},
     **{name: FILTER[name] for name in fields_between("x", "last_speeds")},
     **{name: FILTER[name] for name in fields_between("z", "rows")},
 }
-# those that templates declare
+# fields declared in templates
 _OF_IMU = {
     f"imu_{name}": IMU[name] for name in ("used", "known", "refused", "in_row", "doubt", "mean")
 }
 
 
 def filter_code(record: np.void, source: str) -> str:
-    """Return the functions of a filter that C code calls, with what its record says decided."""
+    """Return a filter's functions called in C code, with branches decided by its record."""
     memory = {
         name: ("int" if kind.base.kind == "i" else "float", tuple(map(str, kind.shape)))
         for name, kind in (_KEPT | _OF_IMU).items()
     }
     by_hand = set(_BY_HAND)
-    if record["steady"]:  # which has no covariance at hand
+    if record["steady"]:  # without a covariance at hand
         by_hand.add("wrench_variance")
     if record["wrench_count"]:
         by_hand.add("apply_effects")
@@ -82,7 +81,7 @@ def filter_code(record: np.void, source: str) -> str:
 
 
 def fields(code: str) -> str:
-    """Return the declarations of the fields of ``ww_filter`` that C code uses."""
+    """Return declarations for the fields of ``ww_filter`` in C code."""
     return "\n".join(
         f"    float {name}{''.join(f'[{n}]' for n in kind.shape)};"
         for name, kind in _KEPT.items()
@@ -91,12 +90,12 @@ def fields(code: str) -> str:
 
 
 def constants(record: Any, code: str) -> str:
-    """Return the definitions of those fields of a filter's record that C code uses."""
+    """Return definitions for the fields of a filter's record in C code."""
     lines = []
     for name, value in _numbers(record, ""):
         word = f"ww_{name}" if value.shape else f"WW_{name.upper()}"
         if f"#define {word} " in code or f"const float {word}[" in code:
-            continue  # a template has it, in a shape of its own
+            continue  # defined in a template, in another shape
         if re.search(rf"\b{word}\b", code):
             lines.append(
                 f"static const float {word}{shape(value)} = {table(value, name)};"

@@ -1,4 +1,4 @@
-"""The model at hover as tables of what is not zero: of the filter with a constant gain."""
+"""The model at hover as tables of nonzero entries, for the filter with a constant gain."""
 
 from typing import Any
 
@@ -8,13 +8,13 @@ from scipy.sparse.csgraph import connected_components
 
 from ...estimator.filter_record import N
 
-_APART = 1e-4  # correlation of what has nothing to do with each other: what rounding leaves
+_APART = 1e-4  # correlation by rounding alone
 Entry = tuple[int, int, int, float]  # row, column, power of the time, value
 
 
 def couplings(f: Any) -> list[Entry]:
-    """Return the entries of the derivative of an error state after a time by that before, less the
-    identity, of a filter's record.
+    """Return the entries of an error state's transition matrix over a time, less the identity, from
+    a filter's record.
     """
     out: list[Entry] = [(i, 3 + i, 1, 0.25) for i in range(3)]  # an MRP is a quarter of an angle
     out += [(6 + i, 9 + i, 1, 1.0) for i in range(3)]
@@ -29,16 +29,16 @@ def couplings(f: Any) -> list[Entry]:
 
 
 def noises(f: Any) -> list[Entry]:
-    """Return the entries, lower half, of what a time adds to the covariance."""
+    """Return the entries, lower half, of the process noise over a time."""
     body, period = f["body"], float(f["period"])
     inverse, com = np.array(body["inverse_inertia"]), np.array(body["com"])
     # angular and linear acceleration by each input, (27)
     by_torque = np.vstack([inverse, np.cross(com, inverse, axis=0)])
     by_thrust = np.vstack([np.zeros((3, 3)), np.eye(3) / float(body["mass"])])
     given = by_torque * f["motor_torque"] @ by_torque.T + by_thrust * f["thrust"] @ by_thrust.T
-    white = period * given  # of accelerations; a longer step averages over more of it
+    white = period * given  # noise of accelerations; a longer step averages over more of it
     out: list[Entry] = []
-    # rows of the error state, which acceleration drives them, with which power of time and share
+    # rows of the error state, each with its acceleration, power of time and share
     rows = [(3 + i, i, 1, 1.0) for i in range(3)] + [(9 + i, 3 + i, 1, 1.0) for i in range(3)]
     rows += [(6 + i, 3 + i, 2, 0.5) for i in range(3)]
     for a, i, order_a, share_a in rows:
@@ -51,11 +51,11 @@ def noises(f: Any) -> list[Entry]:
 
 
 def kept(f: Any) -> list[tuple[int, int]]:
-    """Return rows and columns of the covariances, lower half, that are not always zero; first those
-    of the diagonal.
+    """Return rows and columns of the covariances' nonzero entries, lower half; the diagonal comes
+    first.
 
-    At hover the error state falls into chains that know nothing of each other (of a symmetric
-    vehicle four: along x, along y, vertical, yaw); an effect may tie some together.
+    At hover the error state falls into independent chains (four for a symmetric vehicle: along x,
+    along y, vertical, yaw); an effect may tie some together.
     """
     tied = np.abs(f["converged"]) > _APART * np.sqrt(
         np.outer(np.diag(f["converged"]), np.diag(f["converged"]))

@@ -1,5 +1,5 @@
-"""A policy as C: weights as tables, a law with its two gains, or the tracker: what a vehicle's own
-sensing makes of a moving fan, as tables.
+"""A policy as C: weights as tables, a law with its two gains, or the tracker: a vehicle's own
+sensing of a moving fan, as tables.
 """
 
 from collections.abc import Mapping
@@ -23,8 +23,8 @@ from ...estimator import UKFTuning
 from ...runtime.errors import InputError
 
 LAWS = ("lead", "tracker")
-PARTICLES = 400  # of the tracker, 40 kB: what a flight controller can spare
-# where the C has the numbers of an observation, in its order
+PARTICLES = 400  # the tracker's, 40 kB: a flight controller can spare as much
+# the numbers of an observation in the C, in order
 _COLUMNS = (
     *(f"e->{part}[{i}]" for part in ("force", "torque") for i in range(3)),
     *("e->velocity[1]", "m->command"),
@@ -32,10 +32,10 @@ _COLUMNS = (
 
 
 def exportable_policy(name: str) -> Mapping[str, Any]:
-    """Return what the templates need of a policy: a law, or a trained one by its name or path.
+    """Return the templates' numbers of a policy: a law, or a trained one by its name or path.
 
     Raises:
-        InputError: there is no such policy, or it is of a kind that is not exported.
+        InputError: there is no such policy, or its kind is not exported.
     """
     if name == "lead":
         return {
@@ -86,20 +86,20 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
 
 
 def briefing_of(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Briefing:
-    """Return what the tracker of a vehicle is told, whose wrench filter has this tuning and period
-    (s): beside that, the fan and the air of the scenario ``base``.
+    """Return the briefing of a vehicle's tracker: the vehicle, the tuning and period (s) of its
+    wrench filter, and the fan and the air of the scenario ``base``.
     """
     return nominal(Briefing(vehicle=vehicle, noise=FilterNoise.of(tuning, period)))
 
 
 def tracker_policy(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Mapping[str, Any]:
-    """Return what the templates need of the tracker of a vehicle, with the gains of ``Tracker`` and
-    the fan and the air of the scenario ``base``.
+    """Return the templates' numbers of a vehicle's tracker, with the gains of ``Tracker`` and the
+    fan and the air of the scenario ``base``.
 
     Args:
-        vehicle: that flies.
-        tuning: of its wrench filter.
-        period: of it, s.
+        vehicle: the vehicle in flight.
+        tuning: its wrench filter's.
+        period: the wrench filter's, s.
     """
     law = Tracker()
     return {

@@ -1,11 +1,10 @@
-"""Compiled Python functions as C, translated from their source, which stays the only place where
-they are written.
+"""Compiled Python functions as C, translated from their source, the only place of each equation.
 
-What is translated is plain arithmetic on numbers and arrays: assignments, ``for`` over a ``range``,
-``if``, functions of ``math`` that C has too, ``min``, ``max``, the questions of ``vector_lanes``
-for one lane, and calls of other compiled functions. A record's fields are those of ``ww_filter``,
-or constants where an export knows them: what depends on constants alone is decided here, and the C
-has the chosen branch only. Everything else is refused.
+Plain arithmetic on numbers and arrays is translated: assignments, ``for`` over a ``range``, ``if``,
+functions of ``math`` known in C, ``min`` and ``max``. So are the questions of ``vector_lanes`` for
+one lane, and calls of other compiled functions. A record's fields are the fields of ``ww_filter``,
+or constants known to an export. Conditions on constants alone are decided here, and the C has the
+chosen branch only. Everything else is refused.
 """
 
 import ast
@@ -15,12 +14,13 @@ import re
 import textwrap
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial, reduce
 from typing import Any, cast
 
 from ...dynamics.effects import base
 from .c_values import (
     Array,
-    Fields,
+    CRecord,
     Number,
     UntranslatableError,
     Value,
@@ -41,8 +41,8 @@ _MATHS = {
     "isfinite": "finite_number",
 }
 _FUNCTIONS = {"abs": "fabsf", "min": "smaller", "max": "larger"}
-_PASSED_ON = ("any_of", "all_of")  # of one lane
-# a line that gives a variable a value, and not by a call that may write elsewhere
+_PASSED_ON = ("any_of", "all_of")  # for one lane
+# an assignment to a variable, without a call with possible side effects
 _PURE = "|".join((*_MATHS.values(), *_FUNCTIONS.values()))
 _PUT = re.compile(
     r" *(?:const \w+ )?(?P<name>\w+)(?:\[\])? [-+*/]?= "
@@ -71,7 +71,7 @@ def results_of(tree: ast.FunctionDef) -> int:
 
 
 def is_read(targets: list[ast.expr], values: list[ast.expr]) -> bool:
-    """Return whether values may read what is assigned to the targets before them."""
+    """Return whether values may read a target assigned before them."""
     read = {node.id for value in values for node in ast.walk(value) if isinstance(node, ast.Name)}
     stored = {node.id for one in targets for node in ast.walk(one) if isinstance(node, ast.Name)}
     return bool(read & stored)
@@ -79,20 +79,20 @@ def is_read(targets: list[ast.expr], values: list[ast.expr]) -> bool:
 
 @dataclass
 class Library:
-    """What translated functions may use, and those that are translated so far."""
+    """Names known to translated functions, and the functions translated so far."""
 
-    constants: Any = None  # the filter's record, whose fields are constants but for those below
-    # fields that ``ww_filter`` has: int or float, and their shapes
+    constants: Any = None  # the filter's record: constants, but for the fields in ``memory``
+    # fields of ``ww_filter``: int or float, and their shapes
     memory: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
-    numbers: Mapping[str, float] = field(default_factory=dict)  # constants that are others in C
+    numbers: Mapping[str, float] = field(default_factory=dict)  # constants with another value in C
     counter: int = 0  # of names
-    by_hand: Collection[str] = ()  # functions of templates, which write no argument but the record
+    by_hand: Collection[str] = ()  # functions in templates: they write no argument but the record
     refused: Mapping[Any, str] = field(default_factory=dict)  # not translated, and why
     prefix: str = ""  # of the names of functions
     done: dict[tuple[Any, ...], "Function"] = field(default_factory=dict)
 
     def get(self, function: Callable[..., Any], bound: tuple[Value | None, ...] = ()) -> "Function":
-        """Return a compiled function, translated for arguments that are known (``bound``)."""
+        """Return a compiled function, translated for known arguments (``bound``)."""
         if "len" not in python_of(function).__code__.co_names:  # any number of rows will do
             bound = tuple(
                 replace(one, shape=("", *one.shape[1:]))
@@ -104,7 +104,7 @@ class Library:
         if key not in self.done:
             made = Function(function, self, bound=key[1])
             made.translate()
-            self.done[key] = made  # after what it calls
+            self.done[key] = made  # after the functions it calls
         return self.done[key]
 
     def field_of(self, path: tuple[str, ...]) -> Value:
@@ -121,13 +121,13 @@ class Library:
         for part in path:
             value = value[part]
         if getattr(value, "dtype", None) is not None and value.dtype.names:
-            return Fields(path)
+            return CRecord(path)
         if value.shape:
             return Array(f"ww_{name}", tuple(map(str, value.shape)), values=value)
         return replace(constant(value.item()), text=f"WW_{name.upper()}")
 
     def code(self) -> str:
-        """Return all that is translated, each function before those that call it."""
+        """Return all translations, each function before its callers."""
         return "\n".join(made.code() for made in self.done.values())
 
 
@@ -171,12 +171,12 @@ class Function:
         self.used = _words(*self.lines)
 
     def parameter(self, argument: ast.arg) -> Value:
-        """Return what a parameter is, by its annotation."""
+        """Return a parameter's value, by its annotation."""
         kind = getattr(argument.annotation, "id", "")
         if kind in _OF_ANNOTATION:
             return Number(c_name(argument.arg), _OF_ANNOTATION[kind])
         if kind == "Record":
-            return Fields()
+            return CRecord()
         return Array(c_name(argument.arg), root=argument.arg)
 
     def code(self) -> str:
@@ -186,7 +186,7 @@ class Function:
             value, name = self.names[argument.arg], argument.arg
             if bound is not None and not (isinstance(bound, Array) and bound.root):
                 continue  # a constant
-            if isinstance(value, Fields):
+            if isinstance(value, CRecord):
                 const = "" if "f" in self.written else "const "
                 parameters.append(f"{const}ww_filter *f")
                 name = "f"
@@ -268,11 +268,11 @@ class Function:
             case ast.Return(value=None):
                 self.lines.append("return;")
             case ast.Return(value=ast.Tuple(elts=values)):
-                found = [self.number(value) for value in values]
-                whole = all(one.kind == "int" for one in found)
-                self.out = "int" if whole else "float"
-                texts = [one.text if whole else one.as_float() for one in found]
-                self.lines += [f"out[{i}] = {text};" for i, text in enumerate(texts)]
+                numbers = list(map(self.number, values))
+                self.out = "int" if all(one.kind == "int" for one in numbers) else "float"
+                self.lines += [
+                    f"out[{i}] = {self.converted(one, self.out)};" for i, one in enumerate(numbers)
+                ]
                 self.lines += [] if node is self.tree.body[-1] else ["return;"]
             case ast.Return(value=ast.expr() as value):
                 self.lines.append(f"return {self.converted(self.number(value), self.result)};")
@@ -285,22 +285,22 @@ class Function:
 
     def assignment(self, target: ast.expr, value: ast.expr) -> None:
         """Add the lines of an assignment to one target, or to several at once."""
+        several: Value
         match target, value:
             case ast.Tuple(elts=targets), ast.Tuple(elts=values):
                 if not is_read(targets, values):
                     for one, its in zip(targets, values, strict=True):
                         self.assignment(one, its)
                     return
-                found = tuple(self.evaluated(one) for one in values)
+                several = tuple(map(self.evaluated, values))
             case ast.Tuple(elts=targets), _:
                 several = self.evaluated(value)
                 if isinstance(several, Array):
                     several = tuple(several.at(constant(i)) for i in range(len(targets)))
                 if not isinstance(several, tuple):
                     raise UntranslatableError("takes one number for several")
-                found = several
                 if self.suffix and all(isinstance(one, ast.Name) for one in targets):
-                    for one, of in zip(targets, map(self.kept, found), strict=True):
+                    for one, of in zip(targets, map(self.kept, several), strict=True):
                         name = cast(ast.Name, one).id
                         if self.is_put_once(name):
                             self.names[name] = of
@@ -310,7 +310,7 @@ class Function:
             case _:
                 self.put(target, self.evaluated(value))
                 return
-        texts = [cast(Number, one).as_float() for one in found]
+        texts = [cast(Number, one).as_float() for one in several]
         t = self.temporary()
         self.lines.append(f"const float {t}[] = {{{', '.join(texts)}}};")
         for i, one in enumerate(targets):
@@ -318,7 +318,7 @@ class Function:
                 self.put(one, Number(f"{t}[{i}]"))
 
     def put(self, target: ast.expr, value: Value) -> None:
-        """Add the line that gives a target its value; an array or a record gets a further name."""
+        """Add the assignment of a value to a target; an array or a record gets a further name."""
         if isinstance(target, ast.Name) and target.id not in self.names:
             if isinstance(value, tuple):
                 value = tuple(map(self.kept, value))
@@ -341,7 +341,7 @@ class Function:
         return sum(isinstance(n.ctx, ast.Store) for n in stored) == 1
 
     def target(self, node: ast.expr) -> str:
-        """Return a place that is written."""
+        """Return the target of an assignment."""
         match node:
             case ast.Subscript(value=array):
                 self.written.add(cast(Array, self.evaluated(array)).root)
@@ -352,7 +352,7 @@ class Function:
     # ---- expressions -----------------------------------------------------------------------------
 
     def number(self, node: ast.expr) -> Number:
-        """Return an expression that is a number."""
+        """Return the number of an expression."""
         value = self.evaluated(node)
         if not isinstance(value, Number):
             raise UntranslatableError(f"has an expression {type(node).__name__}")
@@ -369,7 +369,7 @@ class Function:
                 return Number("NAN") if name == "nan" else constant(getattr(math, name))
             case ast.Attribute(value=of, attr=name):
                 record = self.evaluated(of)
-                if not isinstance(record, Fields):
+                if not isinstance(record, CRecord):
                     raise UntranslatableError(f"has an attribute {name}")
                 return self.library.field_of((*record.path, name))
             case ast.Subscript(value=of, slice=place):
@@ -383,7 +383,10 @@ class Function:
                 return tuple(found_all)
             case ast.BinOp(left=left, op=ast.Pow(), right=exponent):
                 return self.power(self.number(left).as_float(), exponent)
-            case ast.BinOp(left=left, op=op, right=right):
+            case (
+                ast.BinOp(left=left, op=op, right=right)
+                | ast.Compare(left=left, ops=[op], comparators=[right])
+            ):
                 return combined(op, self.number(left), self.number(right))
             case ast.UnaryOp(op=ast.USub() | ast.Not() as op, operand=operand):
                 value = self.number(operand)
@@ -393,13 +396,8 @@ class Function:
                     known = -known if negative else not known
                 kind = value.kind if negative else "truth"
                 return Number(f"({'-' if negative else '!'}{value.text})", kind, known)
-            case ast.Compare(left=left, ops=[op], comparators=[right]):
-                return combined(op, self.number(left), self.number(right))
             case ast.BoolOp(op=op, values=values):
-                result = self.number(values[0])
-                for one in values[1:]:
-                    result = combined(op, result, self.number(one))
-                return result
+                return reduce(partial(combined, op), map(self.number, values))
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 return self.choice(test, body, orelse)
             case ast.Call():
@@ -412,9 +410,9 @@ class Function:
         if condition.known is not None:
             return self.evaluated(body if condition.known else orelse)
         yes, no = self.number(body), self.number(orelse)
-        if yes.kind == no.kind:
-            return Number(f"({condition.text} ? {yes.text} : {no.text})", yes.kind)
-        return Number(f"({condition.text} ? {yes.as_float()} : {no.as_float()})")
+        kind = yes.kind if yes.kind == no.kind else "float"
+        texts = (self.converted(yes, kind), self.converted(no, kind))
+        return Number(f"({condition.text} ? {texts[0]} : {texts[1]})", kind)
 
     def element(self, of: ast.expr, place: ast.expr) -> Value:
         """Return a part of an array or of several numbers."""
@@ -439,7 +437,7 @@ class Function:
         return Number(f"powf({base}, {self.number(exponent).as_float()})")
 
     def name_of(self, name: str) -> Value:
-        """Return what a name is: a parameter, a variable, or a constant of the file."""
+        """Return a name's value: a parameter, a variable, or a constant of the file."""
         if name in self.names:
             return self.names[name]
         value = self.library.numbers.get(name, self.globals.get(name))
@@ -452,7 +450,7 @@ class Function:
         )
 
     def kept(self, value: Value) -> Value:
-        """Return a number as one that is worked out only once."""
+        """Return a number in a variable, worked out only once."""
         if not isinstance(value, Number) or re.fullmatch(r"[\w.>\[\]-]+", value.text):
             return value
         t = self.temporary()
@@ -473,7 +471,7 @@ class Function:
         return f"t{self.library.counter}"
 
     def floats(self, given: list[ast.expr]) -> str:
-        """Return arguments that are numbers."""
+        """Return arguments as floats."""
         return ", ".join(self.number(one).as_float() for one in given)
 
     # ---- calls -----------------------------------------------------------------------------------
@@ -517,7 +515,7 @@ class Function:
         raise UntranslatableError(f"calls {name}, which the C has not")
 
     def inlined(self, function: Any, given: list[Value]) -> Value:
-        """Return what a function returns, whose lines are put before the one in hand."""
+        """Return a function's result, with its lines put before the current one."""
         self.library.counter += 1
         part = Function(function, self.library, suffix=f"_{self.library.counter}")
         part.lines, part.locals = self.lines, self.locals
@@ -540,7 +538,7 @@ class Function:
         return part.returned
 
     def callee(self, node: ast.Call) -> "Function | None":
-        """Return the function that is called, translated; None: it is written by hand."""
+        """Return the called function, translated; None: written by hand."""
         name = cast(ast.Name, node.func).id
         function: Any = self.globals.get(name)
         if function in self.library.refused:
@@ -553,7 +551,7 @@ class Function:
         return self.library.get(function, tuple(map(_bound, values)))
 
     def call(self, node: ast.expr, out: str) -> str:
-        """Return the call of a compiled function, which is translated too."""
+        """Return the call of a compiled function, translated too."""
         if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
             raise UntranslatableError(f"has an expression {type(node).__name__}")
         made = self.callee(node)
@@ -568,7 +566,7 @@ class Function:
             elif isinstance(value, Number):
                 wanted = made.names[made.arguments[i].arg] if made else value
                 texts.append(self.converted(value, cast(Number, wanted).kind))
-            elif isinstance(value, Fields) and not value.path:
+            elif isinstance(value, CRecord) and not value.path:
                 self.written |= {"f"} & (made.written if made else {"f"})
                 texts += ["f", "P"] if made and "P" in made.used else ["f"]
         name = made.name if made else node.func.id.lstrip("_")
@@ -580,8 +578,8 @@ def _words(*lines: str) -> set[str]:
 
 
 def _without_unread(lines: list[str]) -> list[str]:
-    """Return lines of C without those that give a variable that no line reads a value, but by a
-    call, which may write elsewhere.
+    """Return lines of C without assignments to unread variables; calls stay, since they may write
+    elsewhere.
     """
     put = [(_PUT.fullmatch(line), line) for line in lines]
     read = _words(*(one["value"] if one else line for one, line in put))
@@ -590,9 +588,9 @@ def _without_unread(lines: list[str]) -> list[str]:
 
 
 def _bound(value: Value) -> Value | None:
-    """Return what a call tells of an argument beforehand: a constant's table, a matrix' size."""
+    """Return the known part of a call's argument: a constant's table, a matrix' size."""
     match value:
-        case Array(root="") | Fields(path=(_, *_)):
+        case Array(root="") | CRecord(path=(_, *_)):
             return value
         case Array(shape=(rows, columns)):
             return Array("", (rows, columns), root="matrix")

@@ -1,1 +1,1 @@
-"""Where messages come from: one file a kind of source."""
+"""Sources of messages: one file a kind."""

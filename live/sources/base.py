@@ -1,4 +1,4 @@
-"""What a source of messages is, and how its address is read."""
+"""The base of all sources of messages, and their addresses."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -9,20 +9,17 @@ from urllib.parse import parse_qsl, urlsplit
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.log_map import LogMap
 from ...runtime.errors import InputError
-from ...runtime.extras import need
 from ..filtering import Output
-from ..messages import Malformed, Sample
+from ..messages import Malformed, Measurement
 from ..tallies import Tallies
 
-# s for which a file waits for those who take its estimates: someone leafs through them, or a disk
-# stalls, and nothing flies
+# s of waiting for a reader of the estimates or a stalled disk, for a file: nothing flies
 WAITS = 60.0
-Found = TypeVar("Found")
-_RESTARTED = 1_000  # messages; a count that falls by more has begun again
-_NONE_GOOD = 100  # malformed messages without a good one that say the stream is of another kind
-_TOLD = 3  # malformed messages that are told; all are counted
-LARGEST_SHARE = 1.5  # motor commands that none exceeds are shares of the full one
-_MOST_LOST = 1_000_000  # messages; a count that rises by more is another
+Result = TypeVar("Result")
+_RESTARTED = 1_000  # messages; a larger fall of a count is a new count
+_NONE_GOOD = 100  # malformed messages without a good one: a stream of another kind
+_TOLD = 3  # malformed messages in words; all are counted
+_MOST_LOST = 1_000_000  # messages; a larger rise of a count is another count
 
 
 class Source(ABC):
@@ -30,33 +27,30 @@ class Source(ABC):
 
     Args:
         text: the address.
-        vehicle: that flies.
-        tallies: where messages are counted that are lost or say nothing.
-        log_map: what the fields of its messages mean, where a source takes a map; None: this kit's.
+        vehicle: the vehicle in flight.
+        tallies: counts lost and malformed messages.
+        log_map: meaning of the messages' fields, for a source with a map; None: this kit's.
 
     Raises:
-        InputError: the address is none, or a library is not installed.
+        InputError: the address is wrong, or a library is not installed.
     """
 
-    kind = ""  # with which an address begins
-    options: tuple[str, ...] = ()  # of an address
-    library = ""  # that the extra of the kind's name brings
+    kind = ""  # begins an address
+    options: tuple[str, ...] = ()  # in an address
     paced = True  # messages arrive at the vehicle's own pace
-    patience = 0.0  # s for which what is not paced waits for those who take the estimates
-    strict = False  # where nothing but malformed messages comes, the stream is of another kind
+    patience = 0.0  # s of waiting for readers of the estimates, if not paced
+    strict = False  # malformed messages alone are an error
     answers = False  # estimates are sent back
-    link: Any = None  # a ``Link`` that messages come by, of a source that has one
-    expected = ""  # what must come, for the error of a stream from which nothing came
+    link: Any = None  # the ``Link`` of a source, if any
+    expected = ""  # the messages needed, for the error of an empty stream
 
     def __init__(
         self, text: str, vehicle: Vehicle, tallies: Tallies, log_map: LogMap | None = None
     ) -> None:
-        if self.library:
-            need(self.library, self.kind)
         self.name = text  # for people
         self.address = read_address(text, self.kind, self.options)
         self.vehicle, self.tallies, self.log_map = vehicle, tallies, log_map
-        self.problems: list[str] = []  # of the first malformed messages
+        self.problems: list[str] = []  # the first malformed messages'
         self._understood = not self.strict
         self._numbers: dict[object, int] = {}  # the newest of each sender's own count
         self._prepare()
@@ -66,38 +60,38 @@ class Source(ABC):
         """Read the options of the address.
 
         Raises:
-            InputError: one is wrong.
+            InputError: an option is wrong.
         """
 
     def open(self) -> None:
-        """Begin to listen: at the source's link, where it has one.
+        """Begin to listen, at the source's link if any.
 
         Raises:
-            InputError: there is no such source, or it cannot be opened.
+            InputError: there is no such source, or opening fails.
         """
         if self.link is not None:
             self.tallies.say(self.link.open())
 
     @abstractmethod
     def read(self, timeout: float) -> list[tuple[Any, int]] | None:
-        """Return the messages that have come, after at most ``timeout`` s, as they are, and when
-        they arrived, ns; None: the stream has ended.
+        """Return the raw messages so far, after at most ``timeout`` s, with their arrivals, ns;
+        None: the stream has ended.
 
         Raises:
-            InputError: what comes is none of this source's messages.
+            InputError: the stream is of another kind.
         """
 
-    def decode(self, message: Any, arrival: int) -> Sample | None:
-        """Return what a message holds, or None.
+    def decode(self, message: Any, arrival: int) -> Measurement | None:
+        """Return the measurement in a message, or None.
 
         Raises:
-            Malformed: it says nothing.
+            Malformed: there is none to read.
         """
-        found: Sample = message
-        return found
+        sample: Measurement = message
+        return sample
 
-    def receive(self, timeout: float) -> list[Sample] | None:
-        """Return what the messages hold that have come; None: the stream has ended.
+    def receive(self, timeout: float) -> list[Measurement] | None:
+        """Return the measurements so far; None: the stream has ended.
 
         Raises:
             InputError: as ``read``; or the first 100 messages of a strict source are malformed.
@@ -105,13 +99,13 @@ class Source(ABC):
         messages = self.read(timeout)
         if messages is None:
             return None
-        samples = [self.unless_malformed(self.decode, *message) for message in messages]
-        found = [sample for sample in samples if sample is not None]
-        self._understood |= bool(found)
-        return found
+        decoded = (self.unless_malformed(self.decode, *message) for message in messages)
+        samples = [sample for sample in decoded if sample is not None]
+        self._understood |= bool(samples)
+        return samples
 
-    def unless_malformed(self, decode: Callable[..., Found], *message: Any) -> Found | None:
-        """Return what a function makes of a message; None where it cannot, which is counted."""
+    def unless_malformed(self, decode: Callable[..., Result], *message: Any) -> Result | None:
+        """Return a function's result for a message; None: malformed, and counted."""
         try:
             with self.tallies.spared("not decoded", f"a message of {self.name}"):
                 return decode(*message)
@@ -127,8 +121,8 @@ class Source(ABC):
                 ) from why
         return None
 
-    def send(self, output: Output) -> None:  # noqa: B027 - most senders want to know nothing
-        """Tell the sender the estimate, where it wants to know.
+    def send(self, output: Output) -> None:  # noqa: B027 - most senders want nothing
+        """Send the estimate to the sender, if wanted.
 
         Raises:
             OSError: the link takes no more now.
@@ -140,11 +134,11 @@ class Source(ABC):
             self.link.close()
 
     def count_lost(self, sender: object, number: int, wraps: int = 0) -> None:
-        """Count what is missing before a message in its sender's own count.
+        """Count the messages missing before one in its sender's own count.
 
         Args:
-            sender: whose count it is.
-            number: of the message.
+            sender: the sender of the count.
+            number: the message's.
             wraps: the count begins at 0 again after so many; 0: never.
         """
         last = self._numbers.get(sender, number - 1)
@@ -160,9 +154,7 @@ class Source(ABC):
 
 
 def unwrapped(count: int, last: int, wraps: int) -> int:
-    """Return the number nearest to the last of all that a count stands for, which begins at 0 again
-    after ``wraps``.
-    """
+    """Return the number of a count modulo ``wraps`` that lies nearest to the last number."""
     return last + (count - last + wraps // 2) % wraps - wraps // 2
 
 
@@ -178,10 +170,10 @@ class Address:
     options: dict[str, str] = field(default_factory=dict)
 
     def number(self, name: str, default: float, least: float = 0.0) -> float:
-        """Return an option that is a number.
+        """Return a number from the options.
 
         Raises:
-            InputError: it is none, or below the least.
+            InputError: the option is no number, or below the least.
         """
         text = self.options.get(name)
         if text is None:
@@ -195,10 +187,10 @@ class Address:
         return value
 
     def choice(self, name: str, known: tuple[str, ...]) -> str:
-        """Return an option that is one of several words, the first of which it is unless stated.
+        """Return one of several words from the options; default: the first word.
 
         Raises:
-            InputError: it is none of them.
+            InputError: the option is another word.
         """
         value = self.options.get(name, known[0])
         if value not in known:
@@ -210,7 +202,7 @@ def read_address(text: str, kind: str, options: tuple[str, ...]) -> Address:
     """Return the parts of a source's address.
 
     Raises:
-        InputError: it is none, or has an option that is not known.
+        InputError: the address is wrong, or an option is unknown.
     """
     rest = text.removeprefix(kind).removeprefix(":")
     try:

@@ -1,7 +1,7 @@
-"""MAVLink's ESC_STATUS, which PX4 sends and the dialects that pymavlink ships lack: made known to a
-dialect as its other messages are.
+"""MAVLink's ESC_STATUS: PX4 sends it, and pymavlink's dialects lack it. This file adds the message
+to a dialect.
 
-Of MAVLink's common set, message 291: index (of the first of four ESCs), time_usec, rpm[4] (with the
+Message 291 of MAVLink's common set: index (of the first of four ESCs), time_usec, rpm[4] (with the
 sense of rotation), voltage[4] in V, current[4] in A.
 """
 
@@ -9,13 +9,13 @@ import struct
 from typing import Any
 
 NUMBER = 291
-# what the sender and we must have the same definition of, by MAVLink's rule for it
+# by MAVLink's rule: the sender's and our definition must agree
 CHECKSUM = 10
 _LAYOUT = "<Q4i4f4fB"  # in the order of the wire: larger types first
 
 
 def add_esc_status(dialect: Any) -> Any:
-    """Return the class of the message in a dialect; add it where it is not there."""
+    """Return the class of the message in a dialect; add a missing one."""
     if NUMBER in dialect.mavlink_map:
         return dialect.mavlink_map[NUMBER]
 
@@ -35,7 +35,7 @@ def add_esc_status(dialect: Any) -> Any:
         def __init__(
             self, index: int, time_usec: int, rpm: Any, voltage: Any, current: Any
         ) -> None:
-            dialect.MAVLink_message.__init__(self, NUMBER, "ESC_STATUS")
+            super().__init__(NUMBER, "ESC_STATUS")
             self._fieldnames = self.fieldnames
             self._instance_field = self.instance_field
             self._instance_offset = self.instance_offset

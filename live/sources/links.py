@@ -1,4 +1,4 @@
-"""What messages of bytes come by: datagrams, or a serial port."""
+"""Links for messages of bytes: datagrams, or a serial port."""
 
 import importlib
 import os
@@ -13,14 +13,14 @@ from ...runtime.extras import need
 from ..messages import Malformed
 from .base import Address
 
-_AT_ONCE = 65_536  # bytes that are read at once of a port
-# bytes of a datagram of MAVLink: 14 of its longest messages, and far more than a network takes
+_AT_ONCE = 65_536  # bytes of one read from a port
+# bytes of a MAVLink datagram: 14 of the longest messages, far more than a network takes
 _LARGEST = 4096
-_BUFFER = 4 * 2**20  # bytes that wait for us, of which the system gives what it allows
+_BUFFER = 4 * 2**20  # bytes waiting for us, if the system allows as many
 
 
 class Link(ABC):
-    """A link that is not open yet.
+    """A link, not yet open.
 
     Args:
         text: its address, for errors.
@@ -28,16 +28,16 @@ class Link(ABC):
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self.opened: Any = None  # a socket or a port, once it is open
-        self.peer: Any = None  # whom to send to, once it is known
-        self.sender: Any = None  # of what was read last
+        self.opened: Any = None  # a socket or a port, once open
+        self.peer: Any = None  # receiver of our messages, once known
+        self.sender: Any = None  # the last message's
 
     @abstractmethod
     def open(self) -> str:
-        """Open it; return where it is open, in words.
+        """Open the link; return its place, in words.
 
         Raises:
-            InputError: it cannot be opened.
+            InputError: opening fails.
         """
 
     @abstractmethod
@@ -45,17 +45,17 @@ class Link(ABC):
         """Send to the peer, and do not wait.
 
         Raises:
-            OSError: it does not take more now.
+            OSError: the link takes no more now.
         """
 
     @abstractmethod
     def _receive(self) -> bytes | None: ...
 
     def read(self, timeout: float) -> bytes | None:
-        """Return what there is, waiting up to ``timeout`` s for it; None: nothing.
+        """Return the bytes so far, after at most ``timeout`` s; None: there are none.
 
         Raises:
-            Malformed: it is more than one message can be.
+            Malformed: there are more than in any message.
         """
         return self._receive() if select.select([self.opened], [], [], timeout)[0] else None
 
@@ -64,19 +64,19 @@ class Link(ABC):
         self.peer = sender
 
     def close(self) -> None:
-        """Close it."""
+        """Close the link."""
         if self.opened is not None:
             self.opened.close()
             self.opened = self.peer = None
 
 
 class Datagrams(Link):
-    """A link by UDP: listens, on this machine alone unless the address names another host, and
-    answers who is listened to; or calls an address.
+    """A link by UDP: calls an address; or listens, on this machine alone unless the address names
+    another host, and answers the last sender.
 
     Args:
-        address: where.
-        largest: bytes of a datagram; a larger one is left unread.
+        address: host and port.
+        largest: most bytes of a datagram; a larger one is left unread.
     """
 
     def __init__(self, address: Address, largest: int) -> None:
@@ -125,7 +125,7 @@ class Datagrams(Link):
             super().answer(sender)
 
     def write(self, data: bytes) -> None:
-        """Send to whoever there is."""
+        """Send to the peer, if any."""
         if self.peer is not None:
             self.opened.sendto(data, self.peer)
 
@@ -161,15 +161,15 @@ class SerialPort(Link):
 
 
 def sender_name(sender: Any) -> str:
-    """Return a sender of a link in words."""
+    """Return the name of a link's sender."""
     return sender if isinstance(sender, str) else "{}:{}".format(*sender)
 
 
 def make_link(address: Address, baud: int) -> Link:
-    """Return the link of an address; ``baud`` of a serial port that states none.
+    """Return the link of an address; ``baud`` is the default of a serial port.
 
     Raises:
-        InputError: the address is none, or there is no such port.
+        InputError: the address is wrong, or there is no such port.
     """
     if address.scheme in ("udp", "udpin", "udpout"):
         if address.port is None:

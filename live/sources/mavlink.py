@@ -1,31 +1,32 @@
 """MAVLink of PX4 and ArduPilot, by UDP or a serial port, read with pymavlink.
 
-``mavlink:udp://HOST:PORT`` listens there (without a host, to this machine alone),
-``mavlink:udpout://HOST:PORT`` calls there, ``mavlink:/dev/ttyUSB0`` opens a port
-(``?baud=921600``). With ``?rate=100`` the autopilot is asked for the messages at that rate, Hz.
+``mavlink:udp://HOST:PORT`` listens there (without a host, to this machine alone).
+``mavlink:udpout://HOST:PORT`` calls there. ``mavlink:/dev/ttyUSB0`` opens a port
+(``?baud=921600``). ``?rate=100`` asks the autopilot for the messages at 100 Hz.
 
-**Pose**, the first of these that comes (``?pose=NAME`` chooses): ATT_POS_MOCAP,
-VISION_POSITION_ESTIMATE, ODOMETRY (in NED or FRD), or LOCAL_POSITION_NED with the attitude of
-ATTITUDE_QUATERNION, carried to its time by the body rates that come with it. The world is turned
-from north, east, down to north, west, up, and the body from forward, right, down to forward, left,
-up: both by half a turn about x, as in logs of PX4.
+**Pose**, the first of these messages (``?pose=NAME`` chooses): ATT_POS_MOCAP,
+VISION_POSITION_ESTIMATE, ODOMETRY (in NED or FRD), or LOCAL_POSITION_NED. The last takes its
+attitude from ATTITUDE_QUATERNION, carried to the position's time by that message's body rates. The
+world is turned from north, east, down to north, west, up, and the body from forward, right, down to
+forward, left, up: both by half a turn about x, as in logs of PX4.
 
 **Rotors**: ESC_STATUS, ESC_TELEMETRY_1_TO_4 (rpm), else commands: ACTUATOR_OUTPUT_STATUS or
-SERVO_OUTPUT_RAW, which the vehicle's motor curve turns into thrust. Motors 1 to 4 are those of a
-quad x, which PX4 and ArduPilot number alike.
+SERVO_OUTPUT_RAW, turned into thrust by the vehicle's motor curve. PX4 and ArduPilot number motors 1
+to 4 of a quad x alike.
 
 **Sent back**, in north, east, down: DEBUG_FLOAT_ARRAY ``wrench`` for each pose (force, torque,
-their standard deviations, NIS, status), and ten times a second what ground stations plot:
-NAMED_VALUE_FLOAT ``force_n, force_e, force_d, torque_n, torque_e, torque_d``. Where the vehicle
-declares a drag (rotor_drag), also WIND_COV: the steady wind whose drag the force would be.
+their standard deviations, NIS, status). Ten times a second NAMED_VALUE_FLOAT ``force_n, force_e,
+force_d, torque_n, torque_e, torque_d`` follow, for plots of ground stations. A vehicle with a
+declared drag (rotor_drag) also gets WIND_COV: the steady wind whose drag equals the force.
 """
 
 import importlib
 import time
 from typing import Any
 
+from ...runtime.extras import need
 from ..filtering import Output
-from ..messages import SECOND, Malformed, Sample
+from ..messages import SECOND, Malformed, Measurement
 from .base import Source
 from .esc_status import add_esc_status
 from .links import make_link, sender_name
@@ -52,11 +53,10 @@ _WANTED = (
 class Mavlink(Source):
     """Messages of an autopilot."""
 
-    kind, options = "mavlink", ("baud", "rate", "pose")
-
-    library, answers = "pymavlink", True
+    kind, options, answers = "mavlink", ("baud", "rate", "pose"), True
 
     def _prepare(self) -> None:
+        need("pymavlink", "mavlink")
         self.link = make_link(self.address, _BAUD)
         self._rate = self.address.number("rate", 0.0)
         self._reader = MessageReader(self.vehicle, self.address.choice("pose", ("", *POSES)))
@@ -75,7 +75,7 @@ class Mavlink(Source):
         self._dialect = dialect
 
     def read(self, timeout: float) -> list[tuple[Any, int]] | None:
-        """Return the messages that are there."""
+        """Return the messages so far."""
         now = time.monotonic_ns()
         if now >= self._due_heartbeat and self.link.peer is not None:
             self._due_heartbeat = now + SECOND
@@ -88,8 +88,8 @@ class Mavlink(Source):
         messages = self.unless_malformed(self._mav.parse_buffer, data) if data else None
         return [(message, arrival) for message in messages or ()]
 
-    def decode(self, message: Any, arrival: int) -> Sample | None:
-        """Return what a message of the autopilot holds, or None."""
+    def decode(self, message: Any, arrival: int) -> Measurement | None:
+        """Return the measurement in a message of the autopilot, or None."""
         kind = message.get_type()
         if kind == "BAD_DATA":
             raise Malformed("bytes that are no message")
@@ -113,7 +113,7 @@ class Mavlink(Source):
         return sample
 
     def _request(self, heartbeat: Any) -> None:
-        """Ask the autopilot for the messages, once, at the rate that the user wants."""
+        """Ask the autopilot once for the messages at the user's rate."""
         if not self._rate or self._requested:
             return
         self._requested = True
@@ -140,7 +140,7 @@ class Mavlink(Source):
 
     @property
     def expected(self) -> str:  # type: ignore[override]
-        """What must come, and what came."""
+        """The messages needed, and the kinds so far."""
         seen = self._reader.seen
         came = f" (came: {', '.join(sorted(seen))})" if seen else ""
         return (

@@ -1,9 +1,9 @@
-"""The wrench on its way back to an autopilot, in north, east, down; and the steady wind whose drag
-the force would be, of a vehicle that declares rotor drag.
+"""The wrench on its way back to an autopilot, in north, east, down. A vehicle with declared rotor
+drag also gets the steady wind whose drag equals the force.
 
-The declared drag is that of still air. In a horizontal wind w it grows by
-``sum_i W_i R diag(kdx, kdy, 0) R' w`` (``dynamics.effects.rotor_drag``), which the filter sees as
-external force. The wind is solved for in that linear equation: any other force counts as wind too.
+The declared drag holds in still air. A horizontal wind w adds
+``sum_i W_i R diag(kdx, kdy, 0) R' w`` (``dynamics.effects.rotor_drag``), an external force for the
+filter. This linear equation is solved for the wind: any other force counts as wind too.
 """
 
 import math
@@ -17,20 +17,20 @@ from ..filtering import Output
 from ..messages import Array
 from .mavlink_messages import HALF_TURN, WRAP
 
-_TILTED = 0.2  # of the drag of a level vehicle, below which the rest is no measure of wind
+_TILTED = 0.2  # least share of a level vehicle's drag that still measures wind
 
 
 def send_wrench(mav: Any, output: Output, vehicle: Vehicle, plotted: bool) -> None:
     """Send an estimate with pymavlink's ``MAVLink``.
 
     Args:
-        mav: of pymavlink.
+        mav: pymavlink's.
         output: the estimate.
-        vehicle: that flies; its declared drag makes a wind of the force.
-        plotted: whether what ground stations plot is due too.
+        vehicle: its declared drag turns the force into a wind.
+        plotted: values for plots of ground stations are due too.
 
     Raises:
-        OSError: the link does not take it.
+        OSError: the link takes no more now.
     """
     force, torque = output.wrench.reshape(2, 3) * HALF_TURN
     microseconds = max(round(1e6 * output.t), 0)
@@ -53,8 +53,8 @@ def send_wrench(mav: Any, output: Output, vehicle: Vehicle, plotted: bool) -> No
 
 
 def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
-    """Return the horizontal wind (2,) in m/s, world, and its standard deviation (2,): none is
-    assumed to be vertical; None where the vehicle declares no ``rotor_drag``.
+    """Return the horizontal wind (2,) in m/s, world, and its standard deviation (2,), with no
+    vertical wind assumed; None: the vehicle declares no ``rotor_drag``.
     """
     given = next((e.coefficients for e in vehicle.effects if e.name == "rotor_drag"), {})
     still = np.array([given.get("kdx", 0.0), given.get("kdy", 0.0), 0.0])
@@ -67,5 +67,7 @@ def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
     if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
         return None
     inverse = np.linalg.inv(drag)
-    covariance = inverse @ output.covariance[:2, :2] @ inverse.T
+    noise = output.estimate.covariance[15:17, 15:17]  # of the force; the vehicle's adds to it
+    force = noise + np.diag(output.std[:2] ** 2 - np.diag(noise))
+    covariance = inverse @ force @ inverse.T
     return inverse @ output.estimate.force[:2], np.sqrt(np.diagonal(covariance))

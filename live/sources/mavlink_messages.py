@@ -1,4 +1,4 @@
-"""What messages of an autopilot say, in this kit's frames and units."""
+"""Measurements in an autopilot's messages, in this kit's frames and units."""
 
 import math
 from collections.abc import Callable
@@ -9,22 +9,23 @@ from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.flight_log import NORM_TOLERANCE
-from ...identification.logs.rotor_orders import ORDERS
-from ..messages import Array, Malformed, Sample
-from .base import LARGEST_SHARE, unwrapped
+from ...identification.logs.what_flew import ORDERS
+from ..messages import Array, Malformed, Measurement
+from .base import unwrapped
 
-HALF_TURN = np.array([1.0, -1.0, -1.0])  # of a vector
+HALF_TURN = np.array([1.0, -1.0, -1.0])  # turns a vector
 _ORDER = [motor - 1 for motor in ORDERS["px4-x"]]
+_LARGEST_SHARE = 1.5  # largest command in shares of full; larger ones are pulses
 _RPM = math.pi / 30.0  # rad/s
 _Z_DOWN = (1, 20)  # MAV_FRAME_LOCAL_NED, MAV_FRAME_LOCAL_FRD
 _GYRO, _ACCELEROMETER = 0b111000, 0b111  # bits of HIGHRES_IMU's fields_updated
 _MISSING_CELL = 65_535  # mV
 WRAP = 2**32  # us, of SERVO_OUTPUT_RAW
 POSES = ("ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "ODOMETRY", "LOCAL_POSITION_NED")
-# s that better poses are waited for once one comes: at 5 Hz and more each kind has come by then
+# s after the first pose until the best kind is chosen: at 5 Hz each kind has come by then
 _CHOOSING = 0.5
-_ATTITUDE_AGE = 0.1  # s over which an attitude is carried by its rates; it turns 1 rad
-_PULSES = 1000.0, 2000.0  # us, where the motor curve states no range
+_ATTITUDE_AGE = 0.1  # s, longest prediction of an attitude by its rates: 1 rad at most
+_PULSES = 1000.0, 2000.0  # us, default range
 _STAMPS = (("time_usec", 1_000), ("usec", 1_000), ("time_boot_ms", 1_000_000))  # fields, their ns
 
 
@@ -32,18 +33,18 @@ class MessageReader:
     """Makes samples of messages.
 
     Args:
-        vehicle: that flies.
-        forced: the message that is read for the pose; empty: the best that comes.
+        vehicle: the vehicle in flight.
+        forced: the message for the pose; empty: the best kind.
     """
 
     def __init__(self, vehicle: Vehicle, forced: str) -> None:
         self._vehicle, self._forced = vehicle, forced
-        self._poses: dict[str, int] = {}  # kinds that have come, and when first, ns
+        self._poses: dict[str, int] = {}  # kinds so far, and their first arrivals, ns
         self._attitude: tuple[int, Array, Array] | None = None  # stamp, quaternion, rates
         self.seen: set[str] = set()  # kinds of messages
-        self._servo_time: int | None = None  # us, of the newest
-        # each puts what a message holds into a sample, and returns whether it is to be used
-        self._readers: dict[str, Callable[[Any, Sample], bool]] = {
+        self._servo_time: int | None = None  # us, the newest
+        # each fills a measurement from a message, and returns whether to use the measurement
+        self._readers: dict[str, Callable[[Any, Measurement], bool]] = {
             "ODOMETRY": self._odometry,
             "ATT_POS_MOCAP": lambda m, sample: self._pose(m, sample, m.q),
             "VISION_POSITION_ESTIMATE": self._vision,
@@ -59,22 +60,22 @@ class MessageReader:
         }
 
     def reads(self, kind: str) -> bool:
-        """Return whether messages of a kind are read; keep that one came."""
+        """Return whether messages of a kind are read; note the kind."""
         self.seen.add(kind)
         return kind in self._readers
 
-    def read(self, message: Any, arrival: int) -> Sample | None:
-        """Return what a message that arrived at ``arrival`` ns holds, or None.
+    def read(self, message: Any, arrival: int) -> Measurement | None:
+        """Return the measurement in a message with its ``arrival``, ns, or None.
 
         Raises:
-            Malformed: it says nothing.
+            Malformed: there is none to read.
         """
         kind = message.get_type()
         reader = self._readers.get(kind)
         if reader is None:
             return None
         stamps = [ns * getattr(message, name) for name, ns in _STAMPS if hasattr(message, name)]
-        sample = Sample(kind, stamps[0] if stamps else None, arrival)
+        sample = Measurement(kind, stamps[0] if stamps else None, arrival)
         if not reader(message, sample):
             return None
         if not all(np.isfinite(part).all() for part in sample.measured.values()):
@@ -82,7 +83,7 @@ class MessageReader:
         return sample
 
     def _chosen(self, kind: str, arrival: int) -> bool:
-        """Return whether poses of a kind are read: the best of those that come."""
+        """Return whether poses of a kind are read: the best kind so far."""
         if not self._forced:
             self._poses.setdefault(kind, arrival)
             if arrival - min(self._poses.values()) < _CHOOSING * 1e9:
@@ -90,8 +91,8 @@ class MessageReader:
             self._forced = min(self._poses, key=POSES.index)
         return kind == self._forced
 
-    def _pose(self, m: Any, sample: Sample, quaternion: Any) -> bool:
-        """Take a pose of north, east, down, if its kind is read."""
+    def _pose(self, m: Any, sample: Measurement, quaternion: Any) -> bool:
+        """Take a pose in north, east, down, if its kind is read."""
         if not self._chosen(sample.kind, sample.arrival):
             return False
         turn = np.array(quaternion, dtype=np.float64)
@@ -104,16 +105,16 @@ class MessageReader:
         sample.quaternion = turn / length * np.append(1.0, HALF_TURN)
         return True
 
-    def _odometry(self, m: Any, sample: Sample) -> bool:
+    def _odometry(self, m: Any, sample: Measurement) -> bool:
         if m.frame_id not in _Z_DOWN:
             raise Malformed("an unknown frame")
         return self._pose(m, sample, m.q)
 
-    def _vision(self, m: Any, sample: Sample) -> bool:
+    def _vision(self, m: Any, sample: Measurement) -> bool:
         turn = Rotation.from_euler("ZYX", (m.yaw, m.pitch, m.roll))
         return self._pose(m, sample, turn.as_quat(scalar_first=True))
 
-    def _local_position(self, m: Any, sample: Sample) -> bool:
+    def _local_position(self, m: Any, sample: Measurement) -> bool:
         if self._attitude is None or sample.stamp is None:
             return False
         at, quaternion, rates = self._attitude
@@ -123,8 +124,8 @@ class MessageReader:
         turn = Rotation.from_quat(quaternion, scalar_first=True) * Rotation.from_rotvec(rates * age)
         return self._pose(m, sample, turn.as_quat(scalar_first=True))
 
-    def _take_attitude(self, m: Any, sample: Sample) -> bool:
-        """Keep an attitude for the positions that come without one."""
+    def _take_attitude(self, m: Any, sample: Measurement) -> bool:
+        """Keep an attitude for positions without one."""
         quaternion = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
         rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
         good = abs(float(np.linalg.norm(quaternion)) - 1.0) <= NORM_TOLERANCE
@@ -134,44 +135,44 @@ class MessageReader:
             self._attitude = sample.stamp, quaternion, rates
         return False
 
-    def _imu(self, m: Any, sample: Sample) -> bool:
+    def _imu(self, m: Any, sample: Measurement) -> bool:
         if m.fields_updated & _GYRO:
             sample.gyro = np.array([m.xgyro, m.ygyro, m.zgyro], dtype=np.float64) * HALF_TURN
         if m.fields_updated & _ACCELEROMETER:
             sample.accelerometer = np.array([m.xacc, m.yacc, m.zacc], dtype=np.float64) * HALF_TURN
         return True
 
-    def _rpm(self, m: Any, sample: Sample) -> bool:
-        if getattr(m, "index", 0) != 0 or not any(m.rpm):  # of other ESCs, or of none
+    def _rpm(self, m: Any, sample: Measurement) -> bool:
+        if getattr(m, "index", 0) != 0 or not any(m.rpm):  # other ESCs, or none
             return False
         sample.rotor_speeds = _motors(m.rpm) * _RPM
         return True
 
-    def _servo_outputs(self, m: Any, sample: Sample) -> bool:
+    def _servo_outputs(self, m: Any, sample: Measurement) -> bool:
         if m.port != 0:
             return False
         self._servo_time = unwrapped(m.time_usec, self._servo_time or m.time_usec, WRAP)
         sample.stamp = 1000 * self._servo_time
         return self._command(sample, (m.servo1_raw, m.servo2_raw, m.servo3_raw, m.servo4_raw))
 
-    def _command(self, sample: Sample, values: Any) -> bool:
+    def _command(self, sample: Measurement, values: Any) -> bool:
         raw, curve = _motors(values), self._vehicle.motor_curve
         low, high = (0.0, 1.0) if curve is None else curve.command
-        if high <= LARGEST_SHARE < float(np.max(raw)):
+        if high <= _LARGEST_SHARE < float(np.max(raw)):
             low, high = _PULSES
         sample.command = np.clip((raw - low) / (high - low), 0.0, 1.0)
         return True
 
-    def _battery(self, m: Any, sample: Sample) -> bool:
+    def _battery(self, m: Any, sample: Measurement) -> bool:
         cells = [v for v in m.voltages if 0 < v < _MISSING_CELL]
         sample.voltage = 1e-3 * sum(cells)
         return bool(cells) and m.id == 0
 
-    def _system_status(self, m: Any, sample: Sample) -> bool:
+    def _system_status(self, m: Any, sample: Measurement) -> bool:
         sample.voltage = 1e-3 * m.voltage_battery
         return 0 < m.voltage_battery < _MISSING_CELL and "BATTERY_STATUS" not in self.seen
 
 
 def _motors(values: Any) -> Array:
-    """Return what belongs to the kit's rotors of motors 1 to 4."""
+    """Return the values of motors 1 to 4 in the order of the kit's rotors."""
     return np.abs(np.array([values[i] for i in _ORDER], dtype=np.float64))

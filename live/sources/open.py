@@ -1,4 +1,4 @@
-"""From what a user names to a source."""
+"""From an address to a source."""
 
 import importlib
 
@@ -8,26 +8,24 @@ from ...runtime.errors import InputError, unknown_name
 from ..tallies import Tallies
 from .base import Source
 
-# by kind: the module, which is loaded when it is needed, its class, and how it is named
+# by kind: the module, loaded on demand, its class, and the form of the address
 SOURCES = {
     "sim": ("simulated", "Simulated", "sim:SCENARIO"),
-    "csv": ("text_stream", "TextStream", "- or csv:- (a table on standard input)"),
-    "udp-json": ("udp_json", "UdpJson", "udp-json://HOST:PORT"),
+    "-": ("json_messages", "JsonLines", "- (lines of JSON on standard input)"),
+    "udp-json": ("json_messages", "UdpJson", "udp-json://HOST:PORT"),
     "mavlink": ("mavlink", "Mavlink", "mavlink:udp://HOST:PORT or mavlink:/dev/ttyUSB0"),
-    "crazyflie": ("crazyflie", "CrazyflieLog", "crazyflie:radio://0/80/2M/E7E7E7E7E7"),
-    "ros2": ("ros2", "Ros2", "ros2:TOPICS.yaml"),
 }
-MAPPED = ("csv", "udp-json")  # kinds whose fields a map can name
+MAPPED = ("-", "udp-json")  # kinds with a map of fields
 
 
 def kind_of(text: str) -> str:
-    """Return which kind of source a user names.
+    """Return the kind of source in an address.
 
     Raises:
         InputError: there is no such kind.
     """
-    kind = "csv" if text == "-" else text.partition(":")[0]
-    if kind not in SOURCES or (text != "-" and ":" not in text):
+    kind = text.partition(":")[0]
+    if kind not in SOURCES or (kind == "-") == (":" in text):
         raise unknown_name(
             "source", text, [form for *_, form in SOURCES.values()], "windwrench live"
         )
@@ -35,15 +33,15 @@ def kind_of(text: str) -> str:
 
 
 def make_source(text: str, vehicle: Vehicle, log_map: LogMap | None, tallies: Tallies) -> Source:
-    """Return the source that a user names; it is not opened yet.
+    """Return the source of an address, not yet open.
 
     Raises:
-        InputError: there is no such source, an option of it is wrong, or it takes no map.
+        InputError: there is no such source, an option is wrong, or the source takes no map.
     """
     kind = kind_of(text)
     if log_map is not None and kind not in MAPPED:
         raise InputError(
-            f"--map: {text} states what its messages mean; expected a map with csv:- or "
+            f"--map: {text} states what its messages mean; expected a map with - or "
             "udp-json:// alone"
         )
     module, name, _ = SOURCES[kind]

@@ -1,10 +1,10 @@
-"""Whose messages are taken where several send to one address.
+"""The choice among several senders to one address.
 
-Two vehicles in one stream would give one calm and wrong estimate. So each quantity is taken from
-the sender that has sent it first, and all messages of a second sender of the same are left out,
-until the first is silent for 2 s. Senders of different quantities (a camera's poses, an autopilot's
-rotor speeds) join. A program that opens a socket for each message never sends twice from one
-address: nobody is first by a single message.
+Two vehicles in one stream would give one calm and wrong estimate. Each quantity is taken from its
+first sender. All messages of a second sender of the same quantity are left out until the first is
+silent for 2 s. Senders of different quantities (a camera's poses, an autopilot's rotor speeds)
+join. A program with a socket for each message never sends twice from one address: nobody is first
+by a single message.
 """
 
 from collections import deque
@@ -13,31 +13,31 @@ from collections.abc import Collection
 from ..messages import SECOND
 from ..tallies import Tallies
 
-_SILENT = 2.0  # s without a message, after which another sender is taken
+_SILENT = 2.0  # s without a message until another sender is taken
 _REMEMBERED = 64  # senders
 _TOLD = 4  # lines, however many senders there are
 
 
 class Senders:
-    """Who sends what to an address.
+    """The senders to an address, and their quantities.
 
     Args:
-        name: of the address, for people.
-        tallies: where messages of others are counted.
+        name: the address, for people.
+        tallies: counts other senders' messages.
     """
 
     def __init__(self, name: str, tallies: Tallies) -> None:
         self._name, self._tallies = name, tallies
-        self._last: dict[str, int] = {}  # ns, of senders that are taken, the first one first
-        self._single: dict[str, bool] = {}  # of the same: whether one message came
-        self._sender_of: dict[str, str] = {}  # of a quantity
-        self._rivals: dict[str, str] = {}  # senders that are left out, and beside whom
-        self._once: deque[str] = deque(maxlen=_REMEMBERED)  # senders of one message
+        self._last: dict[str, int] = {}  # ns, the senders taken, in order of arrival
+        self._single: dict[str, bool] = {}  # the same: only one message so far
+        self._sender_of: dict[str, str] = {}  # by quantity
+        self._rivals: dict[str, str] = {}  # senders left out, and their first sender
+        self._once: deque[str] = deque(maxlen=_REMEMBERED)  # senders with one message
         self._lines = 0
         self._changed = False
 
     def take(self, sender: str, quantities: Collection[str], arrival: int) -> bool:
-        """Return whether a message of a sender is taken that came at ``arrival``, ns."""
+        """Return whether a sender's message with its ``arrival``, ns, is taken."""
         other = self._rivals.get(sender)
         for name in quantities:
             if other is None and self._sender_of.get(name, sender) != sender:
@@ -67,7 +67,7 @@ class Senders:
         return sender in self._rivals
 
     def changed(self) -> bool:
-        """Return whether another sender is taken since the last call, for one that was silent."""
+        """Return whether a sender has replaced a silent one since the last call."""
         changed, self._changed = self._changed, False
         return changed
 

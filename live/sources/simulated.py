@@ -2,7 +2,7 @@
 
 ``sim:SCENARIO`` flies a scenario of the fan-tracking task with the paper's admittance controller,
 for as long as one watches. ``?seed=N`` draws another flight, ``?speed=X`` lets time pass X times as
-fast (0: as fast as it can be computed).
+fast (0: as fast as the machine computes).
 """
 
 import math
@@ -11,19 +11,20 @@ import time
 import numpy as np
 
 from ...controllers import make_controller
-from ...envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
+from ...envs.fan_tracking import FanTrackingEnv
 from ...envs.plant import NOISE, TICK
 from ...envs.scenarios import SCENARIOS, draw_fan_path, find_scenario
 from ...runtime.errors import InputError
-from ..messages import SECOND, Array, Sample
+from ..messages import SECOND, Array, Measurement
 from .base import WAITS, Source
 
-_AT_ONCE = 0.05  # s of flight that are made up for at once, at most
-_BEHIND = 1.0  # s: a machine that is further behind flies on from now
+_AT_ONCE = 0.05  # s of flight caught up at once, at most
+DECISION_TICKS = round(1.0 / (TICK * FanTrackingEnv.decision_hz))
+_BEHIND = 1.0  # s: after a longer delay the flight goes on from now
 
 
 class Simulated(Source):
-    """A vehicle that flies in this process."""
+    """A vehicle flying in this process."""
 
     kind, options = "sim", ("seed", "speed")
     expected = "a flight of the plant"
@@ -40,8 +41,8 @@ class Simulated(Source):
         self._command = 0.0
 
     def _fan_path(self, t: Array) -> Array:
-        """Return where the fan stands (n,), m, at times (n,), s: drawn anew from the same numbers,
-        so that a flight may last for as long as one watches.
+        """Return the fan's positions (n,), m, at times (n,), s: drawn anew from the same numbers,
+        for a flight of any length.
         """
         return draw_fan_path(self._scenario, np.random.default_rng(self._seed), t)[1]
 
@@ -53,8 +54,8 @@ class Simulated(Source):
         self._loop = task.loop
         self._begun = time.monotonic_ns()  # when tick 0 was due
 
-    def read(self, timeout: float) -> list[tuple[Sample, int]] | None:
-        """Fly as far as time has passed; return what was measured."""
+    def read(self, timeout: float) -> list[tuple[Measurement, int]] | None:
+        """Fly up to the present time; return the measurements."""
         now = time.monotonic_ns()
         if self._speed == 0.0:
             return [self._tick() for _ in range(DECISION_TICKS)]
@@ -70,11 +71,11 @@ class Simulated(Source):
         due = min(due, max(1, round(_AT_ONCE * max(self._speed, 1.0) / TICK)))
         return [self._tick() for _ in range(due)]
 
-    def _tick(self) -> tuple[Sample, int]:
-        """Fly one tick; return the pose that it samples, the rotor speeds then, and when it was."""
+    def _tick(self) -> tuple[Measurement, int]:
+        """Fly one tick; return its pose and rotor speeds, and their arrival, ns."""
         loop, arrival = self._loop, time.monotonic_ns()
         phase = self._ticks % DECISION_TICKS
-        if phase == 0:  # move the fan, and have the controller answer what the vehicle feels
+        if phase == 0:  # move the fan; the controller answers the wrench felt
             t = TICK * (self._ticks + np.arange(DECISION_TICKS, dtype=np.float64))
             self._fan_y, x = self._fan_path(t), loop.state
             observation = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
@@ -84,12 +85,12 @@ class Simulated(Source):
         loop.run(self._rng.standard_normal((1, NOISE)), self._fan_y[phase : phase + 1])
         if not loop.healthy():
             raise InputError(f"{self.name}: the simulated {self.vehicle.name} crashed")
-        # a rotor speed as it is at the instant of the pose: see ``envs.recording``
+        # rotor speeds at the instant of the pose: see ``envs.recording``
         speeds = 0.25 * before + 0.75 * loop.unrounded
         if self.vehicle.omega_lsb > 0:
             speeds = self.vehicle.omega_lsb * np.round(speeds / self.vehicle.omega_lsb)
         seen, battery = loop.seen, loop.battery
-        sample = Sample(
+        sample = Measurement(
             "row",
             round(self._ticks * TICK * SECOND),
             arrival,

@@ -122,7 +122,7 @@ SCENARIO = "motions: [sine]\nspeed: [0.1, 0.2]\nvaried: true\nvariation: {mass: 
 def test_a_scenario_of_one_s_own_is_a_file(call, tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(SCENARIO)
-    env = gym.make("windwrench/FanTracking-v0", scenario=str(path)).unwrapped
+    env = gym.make("windwrench/FanTracking-v1", scenario=str(path)).unwrapped
     _, info = env.reset(seed=1)
     assert (info["fan_motion"], env.scenario.rise_time) == ("sine", 0.45)
     assert 1.1 < env.drawn["mass"] < 1.2
@@ -140,7 +140,6 @@ def test_results_go_into_a_folder_or_a_file_that_is_named(call, tmp_path):
 def test_an_option_s_earlier_name_is_taken_and_not_shown(call):
     assert "--view" not in call("live", "--help")[1]
     assert "unknown scenario 'none'" in call("live", "sim:none", "--view")[2]
-    assert call("estimate", "absent.csv", "--film", "--from", 3)[2].startswith("error: absent.csv")
 
 
 def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
@@ -157,13 +156,10 @@ def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
         f"out/{name}" for name in ("wrench.csv", "wrench.png", "tuning.yaml", "run.json")
     }
     wrench = np.genfromtxt(tmp_path / "out" / "wrench.csv", delimiter=",", names=True)
-    for ending in ("mcap", "rrd"):
-        track = tmp_path / f"track.{ending}"
-        assert call("estimate", log, "--no-smooth", "--no-tune", "--out", track)[0] == 0
-        beside = {"track.png", "track.tuning.yaml", "track.run.json", track.name}
-        assert beside == {p.name for p in tmp_path.glob("track.*")}
-        for path in tmp_path.glob("track.*"):
-            path.unlink()
+    track = tmp_path / "track.mcap"
+    assert call("estimate", log, "--no-smooth", "--no-tune", "--out", track)[0] == 0
+    beside = {"track.png", "track.tuning.yaml", "track.run.json", track.name}
+    assert beside == {p.name for p in tmp_path.glob("track.*")}
     names = "t fx fy fz tx ty tz std_fx std_fy std_fz std_tx std_ty std_tz nis status"
     assert list(wrench.dtype.names) == names.split()
     assert np.mean(wrench["fx"][wrench["t"] > 5.0]) == pytest.approx(0.2, abs=0.03)
@@ -211,7 +207,7 @@ def test_a_benchmark_writes_its_leaderboard_and_how_it_came_about(call, tmp_path
     arguments = f"{command}--seed 7 --out out".split()
     assert call(*arguments)[0] == 0
     out = tmp_path / "out"
-    files = ("leaderboard.json", "leaderboard.md", "leaderboard.png", "run.json")
+    files = ("leaderboard.json", "leaderboard.md", "leaderboard.png", "submission.json", "run.json")
     assert sorted(p.name for p in out.iterdir()) == sorted(files)
     rows = json.loads((out / "leaderboard.json").read_text(encoding="utf-8"))
     said = [(row["controller"], row["scenario"], row["episodes"], row["seed"]) for row in rows]

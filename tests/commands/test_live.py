@@ -11,7 +11,7 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from tests.live.stream import Running, as_csv, flight
+from tests.live.stream import Running, as_lines, flight
 from tests.live.test_pipeline import offline
 from tests.support.browser import browse, needs_browser
 from tests.support.programs import started, until
@@ -63,8 +63,8 @@ def test_an_address_is_printed_as_it_is(capsys):
     """Not as a picture: ``:radio:`` is the name of one."""
     from windwrench.commands.terminal import errors
 
-    errors.print("crazyflie:radio://0/80/2M", markup=False)
-    assert "crazyflie:radio://0/80" in capsys.readouterr().err
+    errors.print("mavlink:radio://0/80/2M", markup=False)
+    assert "mavlink:radio://0/80" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")
@@ -137,10 +137,10 @@ def test_its_user_or_its_system_ends_it_and_loses_nothing(tmp_path, sent, taken,
     lines = []
     reader = threading.Thread(target=lambda: lines.extend(running.stdout))
     reader.start()
-    fed = as_csv(flight()).splitlines(keepends=True)[:701]
+    fed = as_lines(flight()).splitlines(keepends=True)[:700]
     running.stdin.write("".join(fed).encode())
     running.stdin.flush()
-    until(lambda: len(lines) >= len(fed) or running.poll() is not None)
+    until(lambda: len(lines) > len(fed) or running.poll() is not None)
     running.send_signal(sent)
     said = running.stderr.read().decode()
     assert running.wait() == code

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from windwrench.controllers import CONTROLLERS, AdmittancePID, make_controller
@@ -19,11 +20,13 @@ from windwrench.controllers.observation import (
 from windwrench.controllers.preview import DISTURBANCE_TIME, lasting
 from windwrench.controllers.registry import TASK_LAWS, tuned_gains
 from windwrench.controllers.wind_laws import INDI, PID, L1Adaptive, PIDWithWrench
-from windwrench.controllers.wind_observation import TORQUE, WIND_OBSERVATION_SIZE, WIND_PERIOD
+from windwrench.controllers.wind_observation import WIND_PERIOD
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, PlantSettings
+from windwrench.envs.wind_tasks import WindTrajectoryEnv
 from windwrench.estimator.estimate import STATE_SIZE
+from windwrench.evaluation.episodes import fly_episode
 
 
 @pytest.mark.parametrize("task", sorted(TASK_LAWS.keys() - {"FanTracking"}))
@@ -49,17 +52,18 @@ def test_the_integral_of_a_pid_waits_at_the_limit():
     assert abs(law(frame())[0]) < 0.01
 
 
+def hovering(**parts):
+    return frame(SPECIFIC_FORCE=[0, 0, 9.81], ROTOR_FORCE=[0, 0, 9.81], **parts)
+
+
 @pytest.mark.parametrize("law", [INDI(), L1Adaptive()])
 def test_the_flight_loop_turns_against_a_steady_torque(law):
     """The attitude loop makes k_attitude a / g of an acceleration; tau / J stands against it."""
-    level = {"SPECIFIC_FORCE": [0, 0, 9.81], "ROTOR_FORCE": [0, 0, 9.81]}
-    law(frame(**level))
-    ahead = law(frame(TORQUE=[0.01, 0.02, 0.03], **level))
-    for _ in range(100):
-        action = law(frame(TORQUE=[0.01, 0.02, 0.03], **level))
+    law(hovering())
+    ahead, *_, action = (law(hovering(TORQUE=[0.01, 0.02, 0.03])) for _ in range(101))
     inertia = load_vehicle("ardrone2").inertia
     cancels = 9.81 / 110.0 * np.array([-0.02 / inertia[1, 1], 0.01 / inertia[0, 0], 0.0])
-    np.testing.assert_allclose(action, cancels, atol=1e-6)
+    assert_allclose(action, cancels, atol=1e-6)
     assert ahead[0] < action[0]  # a torque that grows is met before it is seen in full
 
 
@@ -101,18 +105,16 @@ def test_an_axis_moves_as_the_vehicle_in_mujoco_does(axis, pushed):
 
 def test_the_torque_is_answered_before_anything_has_moved():
     law = LQG()
-    law(np.zeros(WIND_OBSERVATION_SIZE) + _hovering())
-    felt = _hovering()
-    felt[TORQUE] = [-0.02, 0.02, 0.0]
+    law(hovering())
+    felt = hovering(TORQUE=[-0.02, 0.02, 0.0])
     x, y, z = law(felt)
     assert x < -0.05
     assert y < -0.05
     assert abs(z) < 1e-6
     fed = PIDWithWrench(tilt=10.0, tilt_lead=0.1)
-    np.testing.assert_allclose(fed(felt), [-0.2, -0.2, 0.0], atol=1e-6)
-    felt[TORQUE] = [-0.02, 0.03, 0.0]
+    assert_allclose(fed(felt), [-0.2, -0.2, 0.0], atol=1e-6)
     expected = -10.0 * (0.03 + 0.1 * 0.01 / WIND_PERIOD)
-    np.testing.assert_allclose(fed(felt)[0], expected, rtol=1e-5)
+    assert_allclose(fed(hovering(TORQUE=[-0.02, 0.03, 0.0]))[0], expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -126,23 +128,38 @@ def test_what_lasts_longer_is_answered_by_more(felt, axes, time, other):
     """A torque has no part in the vertical axis, and a force's duration none in a torque's answer
     (0.1 %).
     """
-    seen_in_hover = _hovering() + frame(**felt)
 
     def answer(**times):
         law = LQG(**times)
-        return np.abs([law(seen_in_hover) for _ in range(10)][-1][axes])
+        return np.abs([law(hovering(**felt)) for _ in range(10)][-1][axes])
 
     usual = answer()
     assert (answer(**{time: 4.0 * getattr(LQG, time)}) > 1.01 * usual).all()
     assert (answer(**{time: 0.25 * getattr(LQG, time)}) < 0.97 * usual).all()
     for share in (0.25, 4.0):
-        np.testing.assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
+        assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
 
 
-def _hovering():
-    o = np.zeros(WIND_OBSERVATION_SIZE)
-    o[20] = o[23] = 9.81
-    return o
+class Unturned(LQG):
+    """Takes every reference for one that has not changed its acceleration."""
+
+    def __call__(self, observation, info=None):
+        self._wanted = None
+        return super().__call__(observation, info)
+
+
+def test_a_reference_that_turns_is_followed_closer_where_the_turn_is_known():
+    env = WindTrajectoryEnv("calm")
+    known, unknown = (fly_episode(env, law, 3).error[75:] for law in (LQG(), Unturned()))
+    assert np.sqrt(np.mean(known**2)) < 0.8 * np.sqrt(np.mean(unknown**2))
+
+
+def test_a_steady_bias_of_the_accelerometer_is_no_wind():
+    """Where neither pose nor wrench shows a force, what the accelerometer shows is its bias."""
+    biased = frame(SPECIFIC_FORCE=[0.05, -0.05, 9.86], ROTOR_FORCE=[0, 0, 9.81])
+    told, untold = (np.abs([law(biased) for _ in range(101)]) for law in (LQG(), LQG(bias=1e-6)))
+    assert_allclose(told[0], untold[0], rtol=0.01)
+    assert (told[100] < 0.5 * untold[100]).all()
 
 
 VEHICLE = load_vehicle("ardrone2")
@@ -180,6 +197,11 @@ def flown(c, q, rate=(0.0, 0.0, 0.0)):
     """Thrust (N) and torques (Nm, body) that a flight loop commands at an attitude and a rate."""
     x = np.zeros(STATE_SIZE)
     x[3:7], x[10:13] = q.as_quat(scalar_first=True), rate
+    return commanded(c, x)
+
+
+def commanded(c, x):
+    """Thrust (N) and torques (Nm, body) that a flight loop commands in a state."""
     fly(c, x, 0.005)
     thrust, *torque = VEHICLE.mixing @ c["command"] ** 2
     return thrust, np.array(torque)
@@ -209,7 +231,7 @@ def test_a_steady_turn_about_the_vertical_costs_a_tilted_vehicle_the_gyroscopic_
     tilted["setpoint"][9] = turning["setpoint"][9] = 0.7
     turning["setpoint"][10] = 1.5
     more = flown(turning, q, rate)[1] - flown(tilted, q)[1]
-    np.testing.assert_allclose(more, np.cross(rate, VEHICLE.inertia @ rate), atol=1e-12)
+    assert_allclose(more, np.cross(rate, VEHICLE.inertia @ rate), atol=1e-12)
 
 
 @pytest.mark.parametrize("period", [WIND_PERIOD, DECISION_PERIOD])
@@ -217,7 +239,7 @@ def test_what_an_oracle_expects_of_a_disturbance_is_its_mean_over_each_decision(
     t = np.arange(0.0, 12 * period, period / 200) + period / 400
     means = np.exp(-t / DISTURBANCE_TIME).reshape(12, 200).mean(axis=1)
     wrench = np.array([0.2, -0.01])
-    np.testing.assert_allclose(lasting(wrench, 12, period), np.outer(means, wrench), rtol=4e-3)
+    assert_allclose(lasting(wrench, 12, period), np.outer(means, wrench), rtol=4e-3)
 
 
 def test_a_moving_set_point_waits_for_the_vehicle():
@@ -232,21 +254,21 @@ def test_a_moving_set_point_waits_for_the_vehicle():
     assert c["setpoint"][1] < c["leash"] - 0.005
 
 
-def test_a_set_point_at_rest_is_not_dragged_along():
-    """A vehicle that a gust has thrown off must find its way back."""
+@pytest.mark.parametrize(
+    ("velocity", "vehicle", "there"),
+    [
+        ([0.0, 0.0, 0.0], [3.0, -2.0, 1.0], [0.0, 0.0, 0.0]),  # at rest it is not dragged along
+        ([-0.4, 0.4, 0.4], [-3.0, 3.0, -3.0], [-0.4, 0.4, 0.0]),  # it comes nearer, not further
+    ],
+)
+def test_a_set_point_beyond_the_leash_still_comes_back(velocity, vehicle, there):
+    """A gust has thrown the vehicle 3 m off; it must find its way back."""
     c = flight_record(VEHICLE)[0]
-    for _ in range(400):
-        move_setpoint(c, np.array([3.0, -2.0, 1.0]), 0.005)
-    np.testing.assert_array_equal(c["setpoint"], np.zeros(len(c["setpoint"])))
-
-
-def test_a_set_point_beyond_the_leash_still_comes_back():
-    """A gust has thrown the vehicle 3 m off: the set point may come nearer, but go no further."""
-    c, vehicle = flight_record(VEHICLE)[0], np.array([-3.0, 3.0, -3.0])
-    c["setpoint"][3:6] = -0.4, 0.4, 0.4
+    c["setpoint"][3:6] = velocity
+    expected = np.concatenate([there, c["setpoint"][3:]])
     for _ in range(200):
-        move_setpoint(c, vehicle, 0.005)
-    np.testing.assert_allclose(c["setpoint"][:3], [-0.4, 0.4, 0.0], atol=1e-12)
+        move_setpoint(c, np.array(vehicle), 0.005)
+    assert_allclose(c["setpoint"], expected, atol=1e-12)
 
 
 def test_a_vehicle_held_for_long_is_not_thrown_on():
@@ -257,14 +279,13 @@ def test_a_vehicle_held_for_long_is_not_thrown_on():
     x[3], c["setpoint"][2], c["setpoint"][9] = 1.0, 1.0, 1.0
 
     def pushed():
-        fly(c, x, 0.005)
-        thrust, *torque = VEHICLE.mixing @ c["command"] ** 2
+        thrust, torque = commanded(c, x)
         return thrust / VEHICLE.mass - VEHICLE.gravity, torque[2] / VEHICLE.inertia[2, 2]
 
     for _ in range(60 * 200):
         fly(c, x, 0.005)
     x[2], c["setpoint"][9] = 1.0, 0.0
-    np.testing.assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)
+    assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)
     x[2], highest = 0.0, 0.0
     for _ in range(10 * 200):
         x[9] += 0.005 * pushed()[0]

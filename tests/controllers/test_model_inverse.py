@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from windwrench.controllers.flight import flight_record
 from windwrench.controllers.model_inverse import HORIZON, foresee, through_the_rotors
@@ -58,16 +59,16 @@ def test_commands_deliver_the_wanted_rotor_speeds(name):
         float(model["voltage"]),
         rotors,
     )
-    np.testing.assert_allclose(rotors[:4], wanted, rtol=1e-6)
+    assert_allclose(rotors[:4], wanted, rtol=1e-6)
 
 
 def test_a_lag_is_led_by_what_remains_after_the_horizon():
     wanted = _SPEEDS + 10.0
     command, _, model = commanded(wanted, "motor_lag:tau=0.035")
     share = 1.0 - math.exp(-HORIZON / 0.035)
-    np.testing.assert_allclose(command, _SPEEDS + 10.0 / share, rtol=1e-9)
+    assert_allclose(command, _SPEEDS + 10.0 / share, rtol=1e-9)
     # and looking ahead has not moved the model's own rotors
-    np.testing.assert_allclose(model["rotors"][:4], _SPEEDS, rtol=1e-3)
+    assert_allclose(model["rotors"][:4], _SPEEDS, rtol=1e-3)
 
 
 def test_drag_is_foreseen_at_the_reference_and_not_at_the_vehicle():
@@ -78,9 +79,7 @@ def test_drag_is_foreseen_at_the_reference_and_not_at_the_vehicle():
     state[3:7] = quaternion_of_yaw(0.4)
     state[7:10] = -3.0, 2.0, 1.0
     foresee(flight, model, state)
-    np.testing.assert_allclose(
-        flight["foreseen"][:3], [-1e-4 * _SPEEDS.sum() * 1.5, 0.0, 0.0], atol=1e-12
-    )
+    assert_allclose(flight["foreseen"][:3], [-1e-4 * _SPEEDS.sum() * 1.5, 0.0, 0.0], atol=1e-12)
 
 
 def test_without_effects_the_flight_is_the_same_bit_for_bit():
@@ -89,7 +88,7 @@ def test_without_effects_the_flight_is_the_same_bit_for_bit():
         env.reset(seed=3)
         return [env.step(np.array([0.3, -0.2, 0.1]))[0] for _ in range(25)]
 
-    np.testing.assert_array_equal(flown(True), flown(False))
+    assert_array_equal(flown(True), flown(False))
 
 
 @pytest.mark.parametrize("text", ["com_offset", "rotor_efficiency"])

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.synthetic_wrench import TICKS, observations
 from windwrench.controllers import InformedTracker, Limit, Tracker, TrackerLQG
@@ -17,7 +18,7 @@ from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.scenarios import SCENARIOS
 from windwrench.evaluation.episodes import fly_episode
 from windwrench.evaluation.tasks import TASKS
-from windwrench.studies.kept_results import kept
+from windwrench.evidence.kept_results import kept
 
 BRIEFING = Briefing()
 TRACKERS = [Tracker, InformedTracker, TrackerLQG]
@@ -39,8 +40,8 @@ def test_the_map_is_what_the_environment_s_jet_does_to_the_vehicle():
     assert torque == pytest.approx(shown_torque, rel=0.05)
     assert force == pytest.approx(shown_force, rel=0.05)
     # odd and even across the axis
-    np.testing.assert_allclose(table.mean[0], -table.mean[0][::-1], atol=1e-9)
-    np.testing.assert_allclose(table.gust, table.gust[:, ::-1], rtol=1e-6, atol=1e-12)
+    assert_allclose(table.mean[0], -table.mean[0][::-1], atol=1e-9)
+    assert_allclose(table.gust, table.gust[:, ::-1], rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.parametrize("make", TRACKERS)
@@ -50,8 +51,8 @@ def test_an_episode_does_not_depend_on_what_flew_before_or_on_global_random_numb
     first = fly_episode(env, pilot, 5)
     np.random.seed(1)  # noqa: NPY002 - what a tracker must not look at
     fly_episode(env, pilot, 6)
-    np.testing.assert_array_equal(fly_episode(env, pilot, 5).command, first.command)
-    np.testing.assert_array_equal(fly_episode(env, make(particles=200), 5).command, first.command)
+    assert_array_equal(fly_episode(env, pilot, 5).command, first.command)
+    assert_array_equal(fly_episode(env, make(particles=200), 5).command, first.command)
 
 
 class Blind:
@@ -71,7 +72,7 @@ def test_a_tracker_does_not_look_at_the_truth(make):
     seeing, blind = (
         fly_episode(env, p, 2) for p in (make(particles=100), Blind(make(particles=100)))
     )
-    np.testing.assert_array_equal(seeing.command, blind.command)
+    assert_array_equal(seeing.command, blind.command)
 
 
 def test_a_briefing_says_what_the_scenario_measures_with_and_no_more():
@@ -115,7 +116,7 @@ def test_the_expected_path_is_the_mean_of_all_paths():
         tracker._move()
         flown.append(tracker._place.mean())
     assert flown[-1] < 0.1 + 0.9 * 24 * 0.08 * 0.3  # some turned round
-    np.testing.assert_allclose(flown, expected, atol=0.006)
+    assert_allclose(flown, expected, atol=0.006)
 
 
 def test_a_fan_that_leaves_the_family_is_found_again():
@@ -174,7 +175,7 @@ def test_who_foresees_nothing_is_told_what_everybody_is(task):
         (plain.reset(seed=5), knowing.reset(seed=5)),
         (plain.step(action)[::4], knowing.step(action)[::4]),
     ):
-        np.testing.assert_array_equal(seen[0], told[0])
+        assert_array_equal(seen[0], told[0])
         assert seen[1].keys() < told[1].keys()
         assert {"velocity", "up", "integral"} <= told[1].keys() - seen[1].keys()
 
@@ -190,20 +191,20 @@ def test_what_the_oracle_is_told_is_true(task):
         jets.append(env.loop.jet[:3].copy())
         quaternion_to_matrix(env.loop.quaternion, R)
         moving = env.loop.motion[1]
-        np.testing.assert_array_equal(info["velocity"], moving[:3])
-        np.testing.assert_array_equal(info["rate"], R @ moving[3:6])
-        np.testing.assert_array_equal(info["up"], R[:, 2])
+        assert_array_equal(info["velocity"], moving[:3])
+        assert_array_equal(info["rate"], R @ moving[3:6])
+        assert_array_equal(info["up"], R[:, 2])
     if task.startswith("Wind"):
         ahead = np.array([info["wrench_ahead"][0, :3] for info in infos[:-1]])
         assert np.abs(ahead - jets).max() < 0.02 < 0.2 < np.abs(jets).max()  # N
         return
-    np.testing.assert_array_equal(infos[-1]["place"], env.loop.position)
-    np.testing.assert_array_equal(infos[-1]["setpoint"], env.loop.setpoint[:3])
+    assert_array_equal(infos[-1]["place"], env.loop.position)
+    assert_array_equal(infos[-1]["setpoint"], env.loop.setpoint[:3])
     for k, info in enumerate(infos):
         fan = info["fan"] if "fan" in info else [info["fan_y"]]
-        np.testing.assert_array_equal(info["fan_ahead"][0, : len(fan)], fan)
+        assert_array_equal(info["fan_ahead"][0, : len(fan)], fan)
         for later, one in enumerate(infos[k : k + 5]):
-            np.testing.assert_array_equal(info["fan_ahead"][later], one["fan_ahead"][0])
+            assert_array_equal(info["fan_ahead"][later], one["fan_ahead"][0])
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from windwrench.controllers.features import Features
 from windwrench.controllers.registry import shipped_policies
@@ -13,7 +14,7 @@ from windwrench.controllers.trained_policy import (
 )
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.evaluation.benchmark import fly_all
+from windwrench.evaluation.benchmark import Request, fly_all
 from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds, fly_episode
 from windwrench.evaluation.leaderboard import leaderboard
 from windwrench.evaluation.tasks import TASKS, make_pilot
@@ -38,7 +39,7 @@ def follower(gain=18.0):
 
 def test_a_linear_policy_is_the_admittance_law(tmp_path):
     path = save_policy(CARD, follower(), tmp_path / "law.npz")
-    results = fly_all([str(path), "admittance"], ["base"], 3, seed=0, jobs=1)
+    results = fly_all(Request((str(path), "admittance"), ("base",), 3, 0), jobs=1)
     rows = {row.controller: row for row in leaderboard(results, [str(path), "admittance"], 0)}
     assert rows[str(path)].rmse_m == pytest.approx(rows["admittance"].rmse_m, rel=1e-4)
     assert rows["admittance"].rmse_m < 0.3
@@ -50,7 +51,7 @@ def test_what_is_written_is_what_is_read(tmp_path):
     assert path.read_bytes() == again.read_bytes()
     for name in ("a.npz", "a.json"):
         policy = load_policy(tmp_path / name)
-        np.testing.assert_array_equal(policy.weights["weight0"], follower()["weight0"])
+        assert_array_equal(policy.weights["weight0"], follower()["weight0"])
         assert policy.card["algorithm"] == "test"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "a.npz", "b.json", "b.npz"]
 
@@ -59,7 +60,7 @@ def test_a_held_command_changes_every_other_decision():
     policy = TrainedPolicy({**CARD, "repeat": 2}, follower())
     episode = fly_episode(FanTrackingEnv("static"), policy, 1)
     commands = episode.command[:40].reshape(20, 2)
-    np.testing.assert_array_equal(commands[:, 0], commands[:, 1])
+    assert_array_equal(commands[:, 0], commands[:, 1])
     assert len(np.unique(commands[:, 0])) > 15
 
 
@@ -121,7 +122,7 @@ def test_a_shipped_policy_of_two_axes_flies_better_than_hover():
 
 def test_what_is_mirrored_is_known():
     features = Features(("torque_z", "force_x", "path_y"), 2)
-    np.testing.assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])
+    assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])
 
 
 def test_seeds_of_training_validation_and_test_never_meet():

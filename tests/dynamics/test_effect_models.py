@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -82,8 +83,13 @@ class Sensing(Called):
         return sample[:4], sample[4:7], sample[7:11]
 
 
+def declared(effects):
+    """The vehicle with effects: coefficients by their names, by effect."""
+    return VEHICLE.with_effects(*(EffectSetting(name, c) for name, c in effects.items()))
+
+
 def setting(name, **coefficients):
-    return VEHICLE.with_effects(EffectSetting(name, coefficients))
+    return declared({name: coefficients})
 
 
 def offset(com):
@@ -101,8 +107,8 @@ def at_rotors(law, com=(0.0, 0.0, 0.0), wind=(0.0, 0.0, 0.0)):
 
 
 def assert_wrench(got, force, torque, rtol=1e-12):
-    np.testing.assert_allclose(got[0], force, rtol=rtol, atol=1e-15)
-    np.testing.assert_allclose(got[1], torque, rtol=rtol, atol=1e-15)
+    assert_allclose(got[0], force, rtol=rtol, atol=1e-15)
+    assert_allclose(got[1], torque, rtol=rtol, atol=1e-15)
 
 
 def near_a_plane(distance):
@@ -203,8 +209,7 @@ ACCELERATION = np.array([100.0, -50.0, 20.0, 300.0])
     ids=lambda value: "+".join(value) if isinstance(value, dict) else "",
 )
 def test_the_wrench_of_an_effect_is_its_formula(effects, given, force, torque):
-    vehicle = VEHICLE.with_effects(*(EffectSetting(name, c) for name, c in effects.items()))
-    assert_wrench(wrench(vehicle, **given), force, torque, rtol=1e-9)
+    assert_wrench(wrench(declared(effects), **given), force, torque, rtol=1e-9)
 
 
 def test_ground_effect_stays_finite_on_the_floor_and_fades_far_from_it():
@@ -219,7 +224,7 @@ def test_ground_effect_stays_finite_on_the_floor_and_fades_far_from_it():
     assert all(low > high for low, high in pairwise(heights))
     assert heights[-1] < 1e-3 * thrust
     no_ceiling = setting("ceiling_effect", rho=3.0)
-    np.testing.assert_array_equal(wrench(no_ceiling, (0, 0, 2.4))[0], 0.0)
+    assert_array_equal(wrench(no_ceiling, (0, 0, 2.4))[0], 0.0)
 
 
 def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
@@ -233,14 +238,14 @@ def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
     force = force - R @ (np.linalg.norm(air) * c_D * air)
     for r, rate in zip(VEHICLE.positions, W, strict=True):
         torque = torque - k_flap * rate * np.cross(air + np.cross(OMEGA, r), [0, 0, 1])
-    vehicle = VEHICLE.with_effects(
-        EffectSetting("rotor_drag", {"kdx": k_d, "kdy": k_d}),
-        EffectSetting("inflow_thrust", {"kz": k_z}),
-        EffectSetting("translational_lift", {"kh": k_h}),
-        EffectSetting("flapping_moment", {"kflap": k_flap}),
-        EffectSetting("body_drag", dict(zip(("cx", "cy", "cz"), c_D, strict=True))),
-    )
-    assert_wrench(wrench(vehicle, wind=WIND), force, torque)
+    effects = {
+        "rotor_drag": {"kdx": k_d, "kdy": k_d},
+        "inflow_thrust": {"kz": k_z},
+        "translational_lift": {"kh": k_h},
+        "flapping_moment": {"kflap": k_flap},
+        "body_drag": dict(zip(("cx", "cy", "cz"), c_D, strict=True)),
+    }
+    assert_wrench(wrench(declared(effects), wind=WIND), force, torque)
 
 
 def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart():
@@ -259,11 +264,11 @@ def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart(
     lean = 2.0 * induced * np.tan(0.5 * back) / along
     lift = -W @ (kp * lean * leads + kw * np.clip(-leads, 0.0, None))
     force, torque = wrench(setting("rotor_interaction", kp=kp, kw=kw), wind=WIND)
-    np.testing.assert_allclose(force, R @ [0.0, 0.0, lift], rtol=1e-9)
-    np.testing.assert_allclose(torque, 0.0, atol=1e-15)
+    assert_allclose(force, R @ [0.0, 0.0, lift], rtol=1e-9)
+    assert_allclose(torque, 0.0, atol=1e-15)
     # rotors that turn alike lose in the wake alone
     alike = wrench(setting("rotor_interaction", kp=kp), speeds=np.full(4, 400.0))
-    np.testing.assert_allclose(alike, 0.0, atol=1e-12)
+    assert_allclose(alike, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -284,23 +289,16 @@ def test_a_central_model_is_that_of_rotors_drawn_into_the_centre(name, size):
 
 
 def test_wind_blows_through_declared_drag_whatever_its_place_in_the_list():
-    w = np.array([2.0, -1.0, 0.3])
-    drag, wind = (
-        EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
-        EffectSetting("wind", {"wx": 2, "wy": -1, "wz": 0.3}),
-    )
-    for effects in ((drag, wind), (wind, drag)):
-        got = wrench(VEHICLE.with_effects(*effects))
-        np.testing.assert_allclose(got, wrench(VEHICLE.with_effects(drag), wind=w), rtol=1e-12)
+    drag = {"rotor_drag": {"kdx": 1e-4, "kdy": 1e-4}}
+    wind = {"wind": {"wx": 2, "wy": -1, "wz": 0.3}}
+    for effects in (drag | wind, wind | drag):
+        assert_wrench(wrench(declared(effects)), *wrench(declared(drag), wind=(2.0, -1.0, 0.3)))
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
 def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
-    fan, position, com = (
-        Fan(turbulence=0.0),
-        np.array([2.1, 0.3, 1.1]),
-        np.array([0.01, 0.0, -0.02]),
-    )
+    fan, com = Fan(turbulence=0.0), np.array([0.01, 0.0, -0.02])
+    position, where = np.array([2.1, 0.3, 1.1]), np.array([0.5, -0.4, 0.0])
     out, turn = np.zeros(6), Rotation.from_euler("z", heading).as_matrix()
     record = fan_record(fan, VEHICLE.positions, PERIOD)
     jet_wrench(
@@ -313,39 +311,24 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
         np.zeros(3),
         out,
     )
-    where = np.array([0.5, -0.4, 0.0])
-    got = wrench(
-        VEHICLE.with_effects(
-            offset(com),
-            EffectSetting(
-                "fan_jet",
-                {
-                    "u0": fan.speed,
-                    "x": where[0],
-                    "y": where[1],
-                    "z": fan.height,
-                    "heading": heading,
-                    "kd": fan.rotor_drag,
-                    "area": fan.hull_area,
-                },
-            ),
-        ),
-        turn @ position + where,
-    )
-    np.testing.assert_allclose(got[0], turn @ out[:3], rtol=1e-10)
-    np.testing.assert_allclose(R @ got[1], turn @ out[3:], rtol=1e-10)
+    place = {"x": where[0], "y": where[1], "z": fan.height, "heading": heading}
+    jet = {"u0": fan.speed, "kd": fan.rotor_drag, "area": fan.hull_area} | place
+    moved = VEHICLE.with_effects(offset(com), EffectSetting("fan_jet", jet))
+    got = wrench(moved, turn @ position + where)
+    assert_allclose(got[0], turn @ out[:3], rtol=1e-10)
+    assert_allclose(R @ got[1], turn @ out[3:], rtol=1e-10)
     assert np.linalg.norm(out[:3]) > 0.1
 
 
 def test_motor_lag_is_the_exact_exponential_however_a_time_is_cut_up():
     tau, rng = 0.035, np.random.default_rng(0)
     rotors = Rotors(setting("motor_lag", tau=tau))
-    np.testing.assert_array_equal(rotors([400.0] * 4), [400.0] * 4)  # starts at the first rates
+    assert_array_equal(rotors([400.0] * 4), [400.0] * 4)  # starts at the first rates
     times = rng.uniform(0.001, 0.01, 20)
     steps = np.array([rotors([500.0, 300.0, 400.0, 450.0], dt=dt) for dt in times])
     share = 1 - np.exp(-np.cumsum(times) / tau)
     expected = 400.0 + share[:, None] * np.array([100.0, -100.0, 0.0, 50.0])
-    np.testing.assert_allclose(steps, expected, rtol=1e-12)
+    assert_allclose(steps, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -364,7 +347,7 @@ def test_motor_lag_is_the_exact_exponential_however_a_time_is_cut_up():
 )
 def test_the_thrust_that_a_rotor_effect_leaves(name, size, given, share):
     thrust = np.square(Rotors(setting(name, **size))(W, **given) / W)
-    np.testing.assert_allclose(thrust, share + np.zeros(4), rtol=1e-12)
+    assert_allclose(thrust, share + np.zeros(4), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -376,9 +359,7 @@ def test_latency_is_a_pure_delay_between_samples_too(d, dt, count):
     for k in range(count):
         t = k * dt
         out = rotors(400.0 + 10.0 * t * np.array([1, -1, 2, 0]), dt=dt)
-        np.testing.assert_allclose(
-            out, 400.0 + 10.0 * max(t - d, 0.0) * np.array([1, -1, 2, 0]), rtol=1e-12
-        )
+        assert_allclose(out, 400.0 + 10.0 * max(t - d, 0.0) * np.array([1, -1, 2, 0]), rtol=1e-12)
 
 
 @pytest.mark.parametrize("d", [0.0013, 0.0125, 0.0311])
@@ -386,7 +367,7 @@ def test_latency_takes_nothing_from_what_falls_between_samples(d):
     rotors, phase = Rotors(setting("latency", d=d)), 2.0 * np.pi * 8.0 * PERIOD * np.arange(80)
     out = np.array([rotors(400.0 + 10.0 * np.sin(x + np.arange(4.0))) for x in phase])
     wanted = 400.0 + 10.0 * np.sin(phase[:, None] - 2.0 * np.pi * 8.0 * d + np.arange(4.0))
-    np.testing.assert_allclose(
+    assert_allclose(
         out[20:], wanted[20:], atol=0.02
     )  # a line between two samples would be off by up to 0.08
 
@@ -401,7 +382,7 @@ def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
         dt = 0.03 if k % 4 == 0 else PERIOD
         t += dt
         out = rotors(400.0 + 10.0 * t * np.ones(4), dt=dt)
-    np.testing.assert_allclose(out, 400.0 + 10.0 * (t - 0.0125), rtol=1e-12)
+    assert_allclose(out, 400.0 + 10.0 * (t - 0.0125), rtol=1e-12)
 
 
 def test_latency_draws_a_line_where_samples_are_six_times_as_far_apart_as_others():
@@ -410,7 +391,7 @@ def test_latency_draws_a_line_where_samples_are_six_times_as_far_apart_as_others
     speeds = 400.0 + 10.0 * np.random.default_rng(0).standard_normal(len(times))
     steps = np.diff(times, prepend=0.0)
     late = [rotors(w * np.ones(4), dt=dt)[0] for w, dt in zip(speeds, steps, strict=True)]
-    np.testing.assert_allclose(late, np.interp(times - 0.0125, times, speeds), rtol=1e-12)
+    assert_allclose(late, np.interp(times - 0.0125, times, speeds), rtol=1e-12)
 
 
 POSE = np.array([0.4, -1.2, 1.5])
@@ -424,12 +405,12 @@ def rotation_of(q):
 def test_a_tilted_world_turns_the_pose_and_a_marker_offset_moves_it_with_the_body():
     turn = Rotation.from_rotvec([0.1, -0.05, 0.0])
     speeds, position, q = Sensing(setting("world_tilt", ax=0.1, ay=-0.05), 1.0)(W, POSE, Q)
-    np.testing.assert_array_equal(speeds, W)
-    np.testing.assert_allclose(position, turn.apply(POSE), rtol=1e-12)
-    np.testing.assert_allclose(rotation_of(q).as_matrix(), turn.as_matrix() @ R, atol=1e-14)
+    assert_array_equal(speeds, W)
+    assert_allclose(position, turn.apply(POSE), rtol=1e-12)
+    assert_allclose(rotation_of(q).as_matrix(), turn.as_matrix() @ R, atol=1e-14)
     _, position, q = Sensing(setting("marker_offset", mx=0.01, my=0.02, mz=-0.03), 1.0)(W, POSE, Q)
-    np.testing.assert_allclose(position, POSE + R @ [0.01, 0.02, -0.03], rtol=1e-14)
-    np.testing.assert_array_equal(q, Q)
+    assert_allclose(position, POSE + R @ [0.01, 0.02, -0.03], rtol=1e-14)
+    assert_array_equal(q, Q)
 
 
 def test_an_attitude_gain_scales_the_tilt_and_nothing_else():
@@ -437,9 +418,7 @@ def test_an_attitude_gain_scales_the_tilt_and_nothing_else():
     _, position, q = Sensing(setting("attitude_gain", g=g), 1.0)(W, POSE, Q)
     z = rotation_of(q).as_matrix()[:, 2]
     assert np.arccos(z[2]) == pytest.approx((1 + g) * np.arccos(R[2, 2]), rel=1e-12)
-    np.testing.assert_allclose(
-        z[:2] / np.linalg.norm(z[:2]), R[:2, 2] / np.linalg.norm(R[:2, 2]), rtol=1e-12
-    )
+    assert_allclose(z[:2] / np.linalg.norm(z[:2]), R[:2, 2] / np.linalg.norm(R[:2, 2]), rtol=1e-12)
     # what is left after the tilt is taken off, the turn about the vertical, is the same
     level = [
         Rotation.from_rotvec(
@@ -448,8 +427,8 @@ def test_an_attitude_gain_scales_the_tilt_and_nothing_else():
         @ A
         for up, A in ((z, rotation_of(q).as_matrix()), (R[:, 2], R))
     ]
-    np.testing.assert_allclose(level[0], level[1], atol=1e-12)
-    np.testing.assert_array_equal(position, POSE)
+    assert_allclose(level[0], level[1], atol=1e-12)
+    assert_array_equal(position, POSE)
 
 
 SENSING = [
@@ -462,20 +441,17 @@ SENSING = [
 
 @pytest.mark.parametrize("effects", SENSING, ids=lambda effects: "+".join(effects))
 def test_an_estimator_undoes_a_sensing_effect(effects):
-    vehicle = VEHICLE.with_effects(*(EffectSetting(name, c) for name, c in effects.items()))
+    vehicle = declared(effects)
     reported = Sensing(vehicle, 1.0)(W, POSE, Q)
     assert not np.allclose(np.concatenate(reported[1:]), np.concatenate([POSE, Q]), atol=1e-4)
     _, position, q = Sensing(vehicle, -1.0)(*reported)
-    np.testing.assert_allclose(position, POSE, atol=1e-14)
-    np.testing.assert_allclose(q, Q, atol=1e-14)
+    assert_allclose(position, POSE, atol=1e-14)
+    assert_allclose(q, Q, atol=1e-14)
 
 
 @pytest.mark.parametrize("dt", [0.02, -0.02, 0.0125, -0.0125])
 def test_a_clock_offset_delays_pose_or_rates_and_an_estimator_the_other(dt):
-    clock, undo = (
-        Sensing(setting("clock_offset", dt=dt), 1.0),
-        Sensing(setting("clock_offset", dt=dt), -1.0),
-    )
+    clock, undo = (Sensing(setting("clock_offset", dt=dt), way) for way in (1.0, -1.0))
     rng = np.random.default_rng(0)
     for k in range(40):
         t = k * PERIOD
@@ -484,16 +460,16 @@ def test_a_clock_offset_delays_pose_or_rates_and_an_estimator_the_other(dt):
             true[0], true[1], rng.choice([-1.0, 1.0]) * true[2].as_quat(scalar_first=True)
         )
         if k > 20:
-            np.testing.assert_allclose(speeds, true[0] - max(-dt, 0.0) * np.arange(4.0), rtol=1e-12)
-            np.testing.assert_allclose(
+            assert_allclose(speeds, true[0] - max(-dt, 0.0) * np.arange(4.0), rtol=1e-12)
+            assert_allclose(
                 position, np.array([t, -t, 1.0]) - max(dt, 0.0) * np.array([1, -1, 0]), atol=1e-12
             )
             yaw = (rotation_of(q) * Rotation.from_euler("z", -3.0 - t)).as_rotvec()
-            np.testing.assert_allclose(yaw, [0, 0, -max(dt, 0.0)], atol=1e-5)
+            assert_allclose(yaw, [0, 0, -max(dt, 0.0)], atol=1e-5)
         speeds, position, q = undo(speeds, position, q)
         if k > 20:
-            np.testing.assert_allclose(speeds, true[0] - abs(dt) * np.arange(4.0), rtol=1e-12)
-            np.testing.assert_allclose(
+            assert_allclose(speeds, true[0] - abs(dt) * np.arange(4.0), rtol=1e-12)
+            assert_allclose(
                 position, np.array([t, -t, 1.0]) - abs(dt) * np.array([1, -1, 0]), atol=1e-12
             )
 
@@ -506,20 +482,20 @@ def test_a_clock_offset_counts_the_time_through_lost_poses():
         undo(W, np.zeros(3), Q, parts=4)
         if k % 3 == 0:
             _, position, _ = undo(W, np.array([t, 0.0, 0.0]), Q, parts=3, dt=0.0)
-            np.testing.assert_allclose(position[0], max(t - 0.02, 0.0), atol=1e-12)
+            assert_allclose(position[0], max(t - 0.02, 0.0), atol=1e-12)
 
 
 def test_the_body_is_changed_as_declared_and_nothing_else():
     vehicle = compile_effects(setting("inertia", jx=0.2, jz=-0.1)).vehicle
-    np.testing.assert_allclose(
+    assert_allclose(
         np.diag(vehicle.inertia), np.diag(VEHICLE.inertia) * [1.2, 1.0, 0.9], rtol=1e-15
     )
     assert vehicle.mass == VEHICLE.mass
     skew = replace(VEHICLE, inertia=np.array([[2e-3, 9e-4, 0], [9e-4, 2e-3, 0], [0, 0, 4e-3]]))
     with pytest.raises(InputError, match="inertia"):
         compile_effects(skew.with_effects(EffectSetting("inertia", {"jx": -0.85})))
-    mass = EffectSetting("mass", {"dm": 0.05})
-    vehicle = compile_effects(VEHICLE.with_effects(mass, offset((0.01, 0.0, 0.0)))).vehicle
+    moved = declared({"mass": {"dm": 0.05}, "com_offset": {"cx": 0.01}})
+    vehicle = compile_effects(moved).vehicle
     assert vehicle.mass == pytest.approx(VEHICLE.mass + 0.05)
-    np.testing.assert_array_equal(vehicle.com, [0.01, 0, 0])
-    np.testing.assert_array_equal(vehicle.inertia, VEHICLE.inertia)
+    assert_array_equal(vehicle.com, [0.01, 0, 0])
+    assert_array_equal(vehicle.inertia, VEHICLE.inertia)

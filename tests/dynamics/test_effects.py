@@ -24,12 +24,11 @@ from windwrench.dynamics.effects import (
 )
 from windwrench.dynamics.effects.declaration import Found
 from windwrench.dynamics.effects.vanishing import does_nothing_alone
-from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import NOISE, TICK, PlantSettings
 from windwrench.envs.recording import draw_trajectory, record_flight
-from windwrench.envs.suspended_load import SuspendedLoad
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log
+from windwrench.reproduction.suspended_load import LoadedLoop, SuspendedLoad
 
 # nothing but the effect comes between model and flight: no disturbance, no lag, no quantised
 # rotor speeds, no noise
@@ -96,7 +95,7 @@ def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
     )
     t = TICK * np.arange(2401)
     setpoints, samples = draw_trajectory("excite", rng, t), np.empty((len(t), 11))
-    loop = ClosedLoop(VEHICLE, settings=QUIET, load=load)
+    loop = LoadedLoop(VEHICLE, settings=QUIET, load=load)
     loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))
     loop.hang_load()
     for k in range(len(t)):

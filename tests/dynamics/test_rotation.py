@@ -3,6 +3,7 @@
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import rotation as r
@@ -40,8 +41,8 @@ def mrp_of(rotation):
 
 @drawn(quaternions)
 def test_the_matrix_takes_body_to_world(q):
-    np.testing.assert_allclose(r.matrix_of(q), scipy_of(q).as_matrix(), atol=1e-14)
-    np.testing.assert_allclose(r.matrix_of(-q), r.matrix_of(q), atol=0)
+    assert_allclose(r.matrix_of(q), scipy_of(q).as_matrix(), atol=1e-14)
+    assert_allclose(r.matrix_of(-q), r.matrix_of(q), atol=0)
 
 
 @drawn(quaternions)
@@ -51,7 +52,7 @@ def test_an_mrp_goes_there_and_back_whatever_the_quaternion_s_sign(q):
         assert np.linalg.norm(rho) <= 1 + 1e-12
         back = call(r.quaternion_from_mrp, rho)
         assert back[0] >= -1e-15
-        np.testing.assert_allclose(scipy_of(back).as_matrix(), scipy_of(q).as_matrix(), atol=1e-13)
+        assert_allclose(scipy_of(back).as_matrix(), scipy_of(q).as_matrix(), atol=1e-13)
 
 
 @drawn(quaternions, quaternions)
@@ -62,21 +63,21 @@ def test_the_attitude_error_stands_in_the_world_frame(q, reference):
     expected = mrp_of(error)
     for sign in (1.0, -1.0):
         rho = call(r.attitude_error, sign * q, reference, shape=3)
-        np.testing.assert_allclose(rho, expected, atol=1e-12)
+        assert_allclose(rho, expected, atol=1e-12)
     # turning the reference by the error from the left gives q
     again = call(r.quaternion_multiply, call(r.quaternion_from_mrp, expected), reference)
-    np.testing.assert_allclose(scipy_of(again).as_matrix(), scipy_of(q).as_matrix(), atol=1e-12)
+    assert_allclose(scipy_of(again).as_matrix(), scipy_of(q).as_matrix(), atol=1e-12)
 
 
 @drawn(quaternions, st.tuples(numbers, numbers, numbers), st.floats(0.01, 6.0))
 def test_a_turn_of_any_size_is_the_exponential_of_its_vector(q, axis, time):
     turned = call(r.turn_body, q, *axis, time)
     expected = scipy_of(q) * Rotation.from_rotvec(time * np.array(axis))
-    np.testing.assert_allclose(scipy_of(turned).as_matrix(), expected.as_matrix(), atol=1e-14)
+    assert_allclose(scipy_of(turned).as_matrix(), expected.as_matrix(), atol=1e-14)
 
 
 @drawn(quaternions, st.tuples(numbers, numbers, numbers), st.floats(1e-12, 1e-3))
 def test_turning_by_next_to_nothing_loses_no_digits(q, axis, angle):
     turned = call(r.turn_body, q, *axis, angle)
     change = call(r.quaternion_multiply, q * [1, -1, -1, -1], turned)
-    np.testing.assert_allclose(change[1:], 0.5 * angle * np.array(axis), rtol=1e-3, atol=1e-15)
+    assert_allclose(change[1:], 0.5 * angle * np.array(axis), rtol=1e-3, atol=1e-15)

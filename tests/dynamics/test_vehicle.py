@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.data_paths import data_file
 from windwrench.dynamics import (
@@ -34,7 +35,7 @@ def test_presets_load_can_hover_and_survive_dumping(name):
     vehicle = load_vehicle(name)
     assert vehicle.name == name
     wrench = vehicle.rotor_wrench(np.full(4, vehicle.hover_rate))
-    np.testing.assert_allclose(wrench, [vehicle.weight, 0, 0, 0], atol=1e-9)
+    assert_allclose(wrench, [vehicle.weight, 0, 0, 0], atol=1e-9)
     assert 1.5 * vehicle.hover_rate < vehicle.omega_max
     text = dump_vehicle(vehicle)
     assert dump_vehicle(parse_vehicle(text)) == text
@@ -46,7 +47,7 @@ def test_the_measured_flights_vehicle_loads():
     assert vehicle.mocap.sigma_pos_m == 0.001  # the file says "nominal 0.001"
     assert vehicle.ceiling_z == 2.6
     default = load_vehicle("ardrone2")
-    np.testing.assert_array_equal(np.sign(vehicle.mixing), np.sign(default.mixing))
+    assert_array_equal(np.sign(vehicle.mixing), np.sign(default.mixing))
 
 
 def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
@@ -76,7 +77,7 @@ def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
     assert vehicle.motor_curve == MotorCurve((0.0, 0.02, 0.1), 2.0, (0.0, 65535.0))
     for name, value in given.items():
         if name not in ("effects", "mocap", "motor_curve"):
-            np.testing.assert_array_equal(getattr(vehicle, name), value)
+            assert_array_equal(getattr(vehicle, name), value)
     assert vehicle.effects == (EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}),)
     # numbers of numpy's own, and one of more digits than YAML's writer gives by itself
     drag = EffectSetting("rotor_drag", {"kdx": np.float64(1 / 3e5), "kdy": 2e-6})
@@ -88,7 +89,7 @@ def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
     again = load_vehicle(path)
     assert again.effects == vehicle.effects
     for f in fields(vehicle):
-        np.testing.assert_array_equal(getattr(again, f.name), getattr(vehicle, f.name), f.name)
+        assert_array_equal(getattr(again, f.name), getattr(vehicle, f.name), f.name)
     assert [p.name for p in path.parent.iterdir()] == ["vehicle.yaml"]
     with pytest.raises(InputError, match=r"vehicle\.yaml.*cannot be written"):
         save_vehicle(vehicle, path / "vehicle.yaml")
@@ -112,7 +113,7 @@ def test_a_measured_vehicle_has_the_digits_that_are_known():
 def test_mixing_is_the_paper_s():
     k, p = np.array([8e-6, 8.2e-6, 7.9e-6, 8.1e-6]), np.array([2e-7, 2.2e-7, 1.9e-7, 2.1e-7])
     vehicle = parse_vehicle(yaml.safe_dump({**GOOD, "k": k.tolist(), "p": p.tolist()}))
-    np.testing.assert_array_equal(vehicle.inertia, np.diag(GOOD["inertia"]))
+    assert_array_equal(vehicle.inertia, np.diag(GOOD["inertia"]))
     W = np.array([400.0, 410.0, 395.0, 420.0])
     c, M, arm = k * W**2, p * W**2, GOOD["arm_l"]
     expected = [
@@ -121,14 +122,14 @@ def test_mixing_is_the_paper_s():
         arm * (-c[0] + c[1] + c[2] - c[3]),  # (9)
         M[0] - M[1] + M[2] - M[3],  # (10)
     ]
-    np.testing.assert_allclose(vehicle.rotor_wrench(W), expected, rtol=1e-12)
-    np.testing.assert_allclose(vehicle.rotor_wrench(np.stack([W, W]))[1], expected, rtol=1e-12)
+    assert_allclose(vehicle.rotor_wrench(W), expected, rtol=1e-12)
+    assert_allclose(vehicle.rotor_wrench(np.stack([W, W]))[1], expected, rtol=1e-12)
 
 
 def test_rotor_speeds_invert_the_rotor_wrench_and_clip_what_no_rotor_can_give():
     rng = np.random.default_rng(0)
     for W in rng.uniform(200, 600, (50, 4)):
         wrench = VEHICLE.rotor_wrench(W)
-        np.testing.assert_allclose(VEHICLE.rotor_speeds(wrench[0], wrench[1:]), W, rtol=1e-10)
+        assert_allclose(VEHICLE.rotor_speeds(wrench[0], wrench[1:]), W, rtol=1e-10)
     assert VEHICLE.rotor_speeds(1.0, np.array([0.5, 0.0, 0.0])).min() == 0.0
     assert VEHICLE.rotor_speeds(100.0, np.zeros(3)).max() == VEHICLE.omega_max

@@ -12,15 +12,13 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-import windwrench  # noqa: F401  registers the environments
-from tests.support.vector_flights import fly_alone, make
+from tests.support.vector_flights import fly_alone, make, make_single
 from windwrench.dynamics import EffectSetting
 from windwrench.envs import SCENARIOS, FanTrackingEnv
-from windwrench.envs.observing import FRAMES, SCALES
+from windwrench.envs.fan_tracking import FRAMES, SCALES
 from windwrench.envs.scenarios import Variation
 from windwrench.evaluation.tasks import TASKS
 
-NAME = "windwrench/FanTracking-v0"
 ACTIONS = np.random.default_rng(1).uniform(-0.6, 0.6, (12, 1)).astype(np.float32)
 
 
@@ -71,7 +69,7 @@ def test_episodes_follow_each_other_as_gymnasium_s_own_vector_environment_has_it
     given = {"scenario": "fast", **seen}
     native = make(2, autoreset_mode=mode, max_episode_steps=4, **given)
     plain = gym.vector.SyncVectorEnv(
-        [lambda: gym.make(NAME, max_episode_steps=4, **given)] * 2, autoreset_mode=mode
+        [lambda: make_single(max_episode_steps=4, **given)] * 2, autoreset_mode=mode
     )
     assert native.metadata["autoreset_mode"] is mode
     np.testing.assert_array_equal(native.reset(seed=5)[0], plain.reset(seed=5)[0])
@@ -95,21 +93,13 @@ def test_the_stated_distribution_is_the_one_drawn_from():
     assert 1.06 < max(drawn) <= 1.07
 
 
-COUNT = 2
-SEEDS = [4, 5]
-
-
-def versioned(task, version, **given):
-    return gym.make(f"windwrench/{task}-v{version}", **given)
-
-
 @pytest.mark.parametrize("task", TASKS)
 def test_gymnasium_s_checker_finds_nothing_and_spaces_are_scaled(task):
-    env = versioned(task, 1)
+    env = gym.make(f"windwrench/{task}-v1")
     check_env(env.unwrapped, skip_render_check=True)
     kind = TASKS[task].environment
     assert env.spec.max_episode_steps == TASKS[task].decisions
-    np.testing.assert_array_equal(env.action_space.high, np.ones(kind.action_size))
+    np.testing.assert_array_equal(env.action_space.high, np.ones(env.action_space.shape))
     bound = np.array(kind.limits, dtype=np.float32) / np.array(kind.scales, dtype=np.float32)
     np.testing.assert_array_equal(env.observation_space.high, bound)
     np.testing.assert_array_equal(env.observation_space.low, -bound)
@@ -117,37 +107,38 @@ def test_gymnasium_s_checker_finds_nothing_and_spaces_are_scaled(task):
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("plant", ["single", "mujoco", "lanes"])
-def test_it_is_version_0_after_scaling_which_info_says_in_si_units(task, plant):
+def test_an_old_id_is_the_new_one_in_si_units_which_info_has(task, plant):
     kind = TASKS[task].environment
     scales, largest = np.array(kind.scales, dtype=np.float32), np.float32(kind.largest_action)
 
-    def made(version):
+    def made(name, **given):
         if plant == "single":
-            return versioned(task, version)
-        return gym.make_vec(f"windwrench/{task}-v{version}", num_envs=COUNT, plant=plant)
+            return gym.make(name, **given)
+        return gym.make_vec(name, num_envs=2, plant=plant, **given)
 
-    plain, scaled = made(0), made(1)
-    seed = SEEDS[0] if plant == "single" else SEEDS
+    name = f"windwrench/{task}-v"
+    with pytest.warns(DeprecationWarning, match=f"{name}0 is kept until 3.0; take {name}1 with"):
+        old = made(f"{name}0")
+    plain, scaled = made(f"{name}1", normalize=False), made(f"{name}1")
+    seed = 4 if plant == "single" else [4, 5]
     (a, _), (b, told) = plain.reset(seed=seed), scaled.reset(seed=seed)
+    np.testing.assert_array_equal(old.reset(seed=seed)[0], a)
     np.testing.assert_array_equal(told["observation"], a)
     np.testing.assert_array_equal(told["command"], 0.0)
     rng = np.random.default_rng(1)
     for _ in range(6):
         action = rng.uniform(-1.0, 1.0, scaled.action_space.shape).astype(np.float32)
-        a, reward, *_, info = plain.step(largest * action)
+        a, reward, *_ = plain.step(largest * action)
         b, other, *_, told = scaled.step(action)
+        np.testing.assert_array_equal(old.step(largest * action)[0], a)
         np.testing.assert_array_equal(told["observation"], a)
         np.testing.assert_array_equal(told["command"], largest * action)
         np.testing.assert_array_equal(b, a / scales)
         np.testing.assert_array_equal(other, reward)
-        assert set(told) - set(info) == {"observation", "command"} | (
-            set() if plant == "single" else {"_observation", "_command"}
-        )
 
 
-def test_si_units_and_other_views_are_still_there():
-    env = versioned("FanTracking", 1, normalize=False, observe="history")
-    frames, info = env.reset(seed=3)
+def test_info_has_the_frame_of_another_view():
+    frames, info = make_single(observe="history").reset(seed=3)
     np.testing.assert_array_equal(frames[-8:], info["observation"])
 
 
@@ -163,7 +154,7 @@ COPIES = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.d
     ids=["varied", "effects"],
 )
 def test_a_copy_in_flight_goes_on_like_the_original_bit_for_bit(name, how, given):
-    env = gym.make(f"windwrench/{name}-v0", **given)
+    env = make_single(name, **given)
     env.reset(seed=5)
     fly_alone(env)
     other = COPIES[how](env)
@@ -175,7 +166,7 @@ def test_a_copy_in_flight_goes_on_like_the_original_bit_for_bit(name, how, given
 
 
 def test_a_copy_goes_on_in_another_process(tmp_path):
-    env = gym.make("windwrench/WindHover-v0", effects=LAG)
+    env = make_single("WindHover", effects=LAG)
     env.reset(seed=5)
     (tmp_path / "env").write_bytes(pickle.dumps(env))
     code = (

@@ -1,132 +1,181 @@
-"""Subclasses of tasks: many environments fly them as a single one does, or refuse them."""
+"""Tasks of one's own: what is overridden holds alone, side by side, and in lanes."""
 
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TransformReward
 
+import windwrench
 from tests.support.vector_flights import make
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.envs.lanes.vector import TaskLanes, make_vector
-from windwrench.envs.task import Task
-from windwrench.envs.vector import TaskVectorEnv
+from windwrench.envs.state import Start
 from windwrench.envs.wind_tasks import WindHoverEnv
 from windwrench.training.training_envs import MixedFanTracking
 
-FANS = (TaskVectorEnv, TaskLanes)
-WRAPPER = "wrappers argument"
+
+class Land(windwrench.envs.Task):
+    """From 1.5 m to .3 m within 10 s, softly, in the scenario's winds."""
+
+    decision_hz, action, episode_s = 25, "acceleration", 0.4
+
+    def start(self, rng, n):
+        down = np.zeros((n, 4001, 3))
+        down[:, :, 2] = np.clip(1.5 - 0.0006 * np.arange(4001), 0.3, None)
+        return down[:, 0], down, [self.draw_winds(rng) for _ in range(n)]
+
+    def observe(self, s):
+        return np.concatenate([s.reference[:, :3] - s.estimate.position, s.estimate.force], axis=1)
+
+    def reward_terms(self, s):
+        soft = -0.1 * s.velocity[:, 2] ** 2
+        return {"tracking": 1.0 / (1.0 + (s.distance / 0.1) ** 2), "soft": soft, "cost": -0.1}
+
+    def is_lost(self, s):
+        return s.position[:, 2] < 0.1
+
+    def info(self, s):
+        return {"height": s.position[:, 2], "std": s.estimate.std_force, "error": s.distance}
 
 
-def override(base, name):
-    """A task whose ``name`` is its own, and does what the base's does."""
-
-    def method(self, *args, **kwargs):
-        return getattr(base, name)(self, *args, **kwargs)
-
-    return type("Mine", (base,), {name: method})
-
-
-class Doubled(WindHoverEnv):
-    """Twice the reward."""
-
-    def step(self, action):
-        seen, reward, *rest = super().step(action)
-        return (seen, 2.0 * reward, *rest)
+gym.register("me/Land-v0", entry_point=Land, vector_entry_point=Land.vector)
+WAYS = {
+    "sync": {"vectorization_mode": "sync"},
+    "async": {"vectorization_mode": "async"},
+    "mujoco": {},
+    "lanes": {"plant": "lanes"},
+}
 
 
-@pytest.mark.parametrize("many", FANS)
-@pytest.mark.parametrize(
-    "name",
-    ["step", "reset", "_get_obs", "_get_info", "_told", "_look_around", "_lay_episode", "_compile"],
-)
-@pytest.mark.parametrize("base", [FanTrackingEnv, WindHoverEnv])
-def test_a_method_that_many_never_call_is_refused_by_class_and_name(many, name, base):
-    hooks = "hover and look" if many is TaskLanes else "hover, fly and look"
-    told = rf"^{many.__name__}: task Mine overrides {name}, .*SyncVectorEnv.*, {hooks}$"
-    with pytest.raises(InputError, match=told):
-        many(2, task=override(base, name))
+def flown(envs, decisions, seed=5):
+    """Observations, rewards, ends and an own entry of ``info`` of an environment's decisions."""
+    rows, infos = [], {}
+    rng = np.random.default_rng(0)
+    envs.reset(seed=seed)
+    for _ in range(decisions):
+        actions = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
+        seen, rewards, lost, over, infos = envs.step(actions[: envs.num_envs])
+        rows.append(np.column_stack([seen, rewards, lost, over, infos["reward_soft"]]))
+    envs.close()
+    return np.array(rows), infos
 
 
-@pytest.mark.parametrize("name", ["fly", "draw_loop", "_begin"])
-def test_lanes_refuse_what_only_environments_with_mujoco_call(name):
-    mine = override(FanTrackingEnv, name)
-    with pytest.raises(InputError, match=f"TaskLanes: task Mine overrides {name}"):
-        make_vector(mine, 2, plant="lanes")
-    make_vector(mine, 2).close()
+@pytest.mark.parametrize("way", WAYS)
+def test_a_task_of_ten_lines_flies_alike_in_each_way_and_is_truncated(way):
+    env = gym.make("me/Land-v0")
+    frame, _ = env.reset(seed=5)
+    assert frame.shape == (6,)
+    rng, alone = np.random.default_rng(0), []
+    for _ in range(10):
+        action = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)[0]
+        frame, reward, lost, over, info = env.step(action)
+        assert reward == info["reward_tracking"] + info["reward_soft"] + info["reward_cost"]
+        alone.append([*frame, reward, lost, over, info["reward_soft"]])
+    assert (lost, over, info["reward_cost"]) == (False, True, -0.1)
+    assert info["height"] == pytest.approx(1.5, abs=0.3)
+    assert np.all(info["std"] > 0.0)
+    rows, infos = flown(gym.make_vec("me/Land-v0", num_envs=3, **WAYS[way]), 10)
+    np.testing.assert_allclose(rows[:, 0], alone, atol=2e-5 if way == "lanes" else 0.0)
+    assert not np.array_equal(rows[:, 0], rows[:, 1])
+    assert infos["height"].shape == (3,)
+    assert infos["reward_cost"].tolist() == [-0.1] * 3
 
 
-def test_an_inherited_override_and_one_of_an_instance_are_refused():
-    class Heir(Doubled):
-        name = "Heir"
-
-    class Late(WindHoverEnv):
-        def __init__(self, **named):
-            super().__init__(**named)
-            self._get_obs = lambda: np.zeros(27, np.float32)
-
-    for task, name in ((Heir, "step"), (Late, "_get_obs")):
-        with pytest.raises(InputError, match=f"{task.__name__} overrides {name}"):
-            TaskVectorEnv(2, task=task)
+def test_gymnasium_s_and_sb3_s_checkers_find_nothing_wrong_with_a_task_of_one_s_own():
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    check_env(gym.make("me/Land-v0").unwrapped, skip_render_check=True)
+    checker.check_env(gym.make("me/Land-v0"), warn=False)
 
 
-def test_every_task_of_the_kit_flies_side_by_side():
-    """All of the kit's own overrides are of methods that are called."""
-    for task in (FanTrackingEnv, WindHoverEnv):
-        for many in FANS:
-            many(1, task=task).close()
-    TaskVectorEnv(1, task=MixedFanTracking, scenario=("base", "fast")).close()
-    with pytest.raises(InputError, match="MixedFanTracking overrides draw_loop"):
-        TaskLanes(1, task=MixedFanTracking, scenario=("base", "fast"))
+class Mine(WindHoverEnv):
+    """One override each."""
+
+    largest_action, decision_hz = 6.0, 50.0
+
+    def start(self, rng, n):
+        start = super().start(rng, n)
+        return start._replace(references=np.array(start.references) + 0.1, labels=["higher"] * n)
+
+    def reward_terms(self, s):
+        return {name: 2.0 * term for name, term in super().reward_terms(s).items()}
+
+    def is_lost(self, s):
+        return s.decision >= 3
+
+    def info(self, s):
+        return super().info(s) | {"height": s.position[:, 2]}
 
 
-def test_all_methods_of_a_task_are_called_or_refused():
-    """A new hook of ``Task`` is refused until the vector environment calls it."""
-    own = {name for name in vars(Task) if not name.startswith("__")}
-    assert TaskLanes.called < TaskVectorEnv.called < own
+@pytest.mark.parametrize("plant", ["mujoco", "lanes"])
+def test_what_a_subclass_overrides_of_the_kit_s_task_holds_in_many_as_in_a_single_one(plant):
+    single, many = Mine(), Mine.vector(2, plant=plant)
+    frame, _ = single.reset(seed=4)
+    frames, infos = many.reset(seed=4)
+    assert infos["trajectory"].tolist() == ["higher"] * 2
+    np.testing.assert_allclose(infos["reference"][0], [2.4, 0.1, 1.6])
+    for k, action in enumerate(([5.0, 0.0, 0.0], [-7.0, 1.0, 0.0], [0.0, 0.0, 0.0])):
+        frame, reward, lost, _, info = single.step(np.array(action))
+        frames, rewards, losts, _, infos = many.step(np.tile(action, (2, 1)))
+        np.testing.assert_allclose(frames[0], frame, atol=2e-5)
+        assert rewards[0] == pytest.approx(reward, abs=1e-9)
+        assert info["reward_tracking"] == 2.0 / (1.0 + (info["error"] / 0.1) ** 2)
+        assert info["time"] == 0.02 * (k + 1)
+        assert infos["height"][0] == pytest.approx(info["height"], abs=1e-9)
+        assert (lost, losts.tolist()) == (k == 2, [k == 2] * 2)
+        if k == 1:
+            assert infos["command"][0].tolist() == pytest.approx([-6.0, 1.0, 0.0])
+
+
+def test_an_observation_of_one_s_own_needs_no_statement_of_its_size():
+    class Short(FanTrackingEnv):
+        def observe(self, s):
+            return s.estimate.force[:, :2]
+
+    frame, _ = Short(normalize=True).reset(seed=0)
+    assert frame.shape == Short().observation_space.shape == (2,)
+
+
+WRONG = {
+    "references must be": {"references": np.zeros((1, 5, 4))},
+    "poses must be": {"poses": np.full((1, 4), np.nan)},
+    "paths must be": {"paths": np.zeros((2, 5, 2))},
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_a_wrong_start_is_named(said):
+    class Wrong(windwrench.envs.Task):
+        def start(self, rng, n):
+            return Start(**{"poses": np.zeros((1, 4)), **WRONG[said]})
+
+    with pytest.raises(InputError, match=f"^Wrong: start: {said}"):
+        Wrong().reset(seed=0)
+
+
+def test_a_start_in_which_no_flight_loop_can_stay_is_refused():
+    class Floor(windwrench.envs.Task):
+        def start(self, rng, n):
+            return Start(np.array([[0.0, 0.0, -1.0, 0.0]]))
+
+    with pytest.raises(InputError, match=r"^Floor: the vehicle is lost before"):
+        Floor().reset(seed=0)
+
+
+@pytest.mark.parametrize("name", ["step", "reset"])
+def test_a_method_that_is_not_called_side_by_side_is_refused(name):
+    mine = type("Mine", (WindHoverEnv,), {name: lambda self, *_, **__: None})
+    with pytest.raises(InputError, match=f"Mine: {name} of its own is not called side by side"):
+        mine.vector(2)
+
+
+def test_training_s_mixed_task_flies_with_mujoco_alone():
+    MixedFanTracking.vector(1, scenario=("base", "fast")).close()
+    with pytest.raises(InputError, match="plant='lanes' flies one scenario"):
+        MixedFanTracking.vector(1, plant="lanes", scenario=("base", "fast"))
 
 
 @pytest.mark.parametrize("given", [{}, {"plant": "lanes"}])
 def test_wrappers_of_single_environments_are_refused(given):
-    with pytest.raises(gym.error.Error, match=WRAPPER):
+    with pytest.raises(gym.error.Error, match="wrappers argument"):
         make(2, wrappers=[lambda env: TransformReward(env, lambda r: 2 * r)], **given)
-
-
-class Wide(WindHoverEnv):
-    """A larger action, and a heavier vehicle, by instance and by hooks."""
-
-    def __init__(self, **named):
-        self.largest_action = 6.0
-        super().__init__(**named)
-
-    def make_loop(self, vehicle, fan, **given):
-        return super().make_loop(vehicle, fan, **given)
-
-    def hover(self):
-        super().hover()
-        self.reference[:, 2] += 0.1
-        self.drawn_label = "higher"
-
-
-@pytest.mark.parametrize("plant", ["mujoco", "lanes"])
-def test_hooks_and_numbers_of_a_user_s_own_hold_in_many_as_in_a_single_one(plant):
-    given = {"version": 1, "normalize": False}
-    single, many = Wide(**given), make_vector(Wide, 2, plant=plant, **given)
-    frame, _ = single.reset(seed=4)
-    frames, infos = many.reset(seed=4)
-    assert infos["trajectory"].tolist() == ["higher"] * 2
-    for action in ([5.0, 0.0, 0.0], [-7.0, 1.0, 0.0]):
-        frame, reward, _, _, info = single.step(np.array(action))
-        frames, rewards, _, _, infos = many.step(np.tile(action, (2, 1)))
-        np.testing.assert_allclose(frames[0], frame, atol=2e-5)
-        assert rewards[0] == pytest.approx(reward, abs=1e-9)
-        assert infos["reference"][0, 2] == info["reference"][2]
-        np.testing.assert_array_equal(infos["command"][0], info["command"])
-    assert infos["command"][0].tolist() == [-6.0, 1.0, 0.0]
-
-
-def test_sync_vector_env_flies_what_is_refused():
-    envs = gym.vector.SyncVectorEnv([Doubled, WindHoverEnv])
-    envs.reset(seed=[1, 1])
-    rewards = envs.step(np.zeros((2, 3), np.float32))[1]
-    assert rewards[0] == 2.0 * rewards[1]

@@ -1,4 +1,4 @@
-"""The plant against the mechanics of a rigid body, what it senses, and a load that hangs on it."""
+"""The plant against the mechanics of a rigid body, and its sensing."""
 
 import math
 from dataclasses import replace
@@ -25,7 +25,6 @@ from windwrench.envs.plant import (
     sense,
 )
 from windwrench.envs.recording import TRAJECTORIES, record_flight
-from windwrench.envs.suspended_load import SuspendedLoad
 
 QUIET = PlantSettings(
     disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False
@@ -37,40 +36,26 @@ HOVER = VEHICLE.hover_rate
 class Bench:
     """A plant driven by rotor speeds, without filter and flight loop."""
 
-    def __init__(
-        self,
-        vehicle=VEHICLE,
-        settings=QUIET,
-        position=(0.0, 0.0, 5.0),
-        quaternion=(1.0, 0.0, 0.0, 0.0),
-    ):
+    def __init__(self, vehicle=VEHICLE, settings=QUIET, quaternion=(1.0, 0.0, 0.0, 0.0)):
         self.record, body = plant_record(vehicle, settings)
         self.plant = self.record[0]
         reset_plant(self.plant, body)
         self.model, self.data = load_world(body)
-        self.data.qpos[:3], self.data.qpos[3:7] = position, quaternion
+        self.data.qpos[:] = 0.0, 0.0, 5.0, *quaternion
         self.fan = fan_record(Fan(speed=0.0), vehicle.positions, TICK)
         self.table = np.stack(jet_table(0.45, 0.10))
 
-    def run(self, command, ticks, noise=None):
+    def run(self, command, ticks):
         """Hold rotor speeds (4,) for some ticks; return position, attitude, velocity and body rate
         after each (n, 13).
         """
-        rows = np.empty((ticks, 13))
+        rows, rotors = np.empty((ticks, 13)), np.asarray(command, float)
+        motion = self.data.qpos, self.data.qvel
         xfrc = self.data.xfrc_applied[self.model.body("vehicle").id]
         for k in range(ticks):
-            actuate(
-                self.plant,
-                np.asarray(command, float),
-                self.fan[0],
-                self.table,
-                self.data.qpos,
-                self.data.qvel,
-                np.zeros(NOISE) if noise is None else noise[k],
-                xfrc,
-            )
+            actuate(self.plant, rotors, self.fan[0], self.table, *motion, np.zeros(NOISE), xfrc)
             mujoco.mj_step(self.model, self.data, SUBSTEPS)
-            rows[k] = np.concatenate([self.data.qpos, self.data.qvel])
+            rows[k] = np.concatenate(motion)
         return rows
 
 
@@ -131,12 +116,12 @@ def test_a_recorded_rotor_speed_is_rounded_once():
 def test_the_disturbance_has_its_declared_size_and_lasts_as_long_as_it_says():
     """100 s on six axes: 0.03 N and 0.01 Nm, a correlation of 1/e after 0.3 s."""
     settings, rng = PlantSettings(), np.random.default_rng(0)
-    bench, found = Bench(settings=settings), np.empty((20_000, 6))
-    for row in found:
+    bench, disturbed = Bench(settings=settings), np.empty((20_000, 6))
+    for row in disturbed:
         disturb(bench.plant, rng.standard_normal(NOISE))
         row[:] = bench.plant["disturbance"]
     sizes = np.repeat([settings.disturbance_force, settings.disturbance_torque], 3)
-    unit = found[1000:] / sizes
+    unit = disturbed[1000:] / sizes
     assert np.sqrt(np.mean(unit**2)) == pytest.approx(1.0, abs=0.06)
     later = round(settings.disturbance_time / TICK)
     assert np.mean(unit[later:] * unit[:-later]) == pytest.approx(np.exp(-1.0), abs=0.08)
@@ -150,19 +135,19 @@ def test_a_battery_sags_by_a_twentieth_under_twice_the_hover_s_load():
         assert bench.plant["battery"] / VEHICLE.voltage_ref == pytest.approx(full, abs=1e-4)
 
 
-def sensed(quaternion, count=400, settings=QUIET, seed=0):
-    bench = Bench(settings=settings, quaternion=quaternion)
-    rng = np.random.default_rng(seed)
-    rows, seen = np.empty((count, 7)), np.empty(count)
-    for k in range(count):
-        seen[k] = sense(bench.plant, bench.data.qpos, rng.standard_normal(NOISE))
-        rows[k] = bench.plant["z"][4:11]
-    return rows, seen
+def sensed(quaternion, count=400):
+    bench = Bench(settings=replace(QUIET, sensor_noise=True), quaternion=quaternion)
+    rng = np.random.default_rng(0)
+    rows = np.empty((count, 7))
+    for row in rows:
+        sense(bench.plant, bench.data.qpos, rng.standard_normal(NOISE))
+        row[:] = bench.plant["z"][4:11]
+    return rows
 
 
 def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backwards():
     q = Rotation.from_euler("z", math.pi).as_quat(scalar_first=True)
-    rows, _ = sensed(q, settings=replace(QUIET, sensor_noise=True))
+    rows = sensed(q)
     assert rows[:, 3].min() >= 0.0
     flips = np.count_nonzero(np.diff(np.sign(rows[:, 6])))
     assert flips > 50  # of 400 samples; noise alone decides the sign
@@ -170,7 +155,7 @@ def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backw
 
 
 def test_the_pose_has_the_noise_that_the_vehicle_s_motion_capture_states():
-    rows, _ = sensed([1.0, 0.0, 0.0, 0.0], 3000, replace(QUIET, sensor_noise=True))
+    rows = sensed([1.0, 0.0, 0.0, 0.0], 3000)
     angles = Rotation.from_quat(rows[:, 3:], scalar_first=True).as_rotvec()
     mocap = VEHICLE.mocap
     np.testing.assert_allclose(angles.std(axis=0), mocap.sigma_att_rad, rtol=0.06)
@@ -212,42 +197,3 @@ def test_every_preset_holds_its_place(vehicle):
     columns = record_flight(load_vehicle(vehicle), (), "hover", 8.0, 0)
     error = columns["position"][800:] - [0, 0, 1.2]
     assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.05
-
-
-STILL = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)
-LOAD = SuspendedLoad(anchor=(0.1, -0.05, -0.02), length=0.2)
-
-
-def _hung(load, seconds):
-    loop = ClosedLoop(VEHICLE, settings=STILL, load=load)
-    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
-    loop.hang_load()
-    loop.run(np.zeros((round(seconds * 200), NOISE)))
-    return loop
-
-
-def test_a_load_at_rest_pulls_with_its_weight():
-    loop = _hung(LOAD, 40.0)
-    weight = LOAD.mass * 9.81
-    expected = [0, 0, -weight, 0.05 * weight, 0.1 * weight, 0]
-    np.testing.assert_allclose(loop.load_pull(), expected, atol=0.01 * weight)
-    stretch = loop.data.tendon("thread").length[0] - LOAD.length
-    assert 0.0 < stretch < 1e-3
-
-
-def test_the_load_does_not_touch_the_vehicle_before_it_is_hung_on():
-    flown = []
-    for load in (None, LOAD):
-        loop = ClosedLoop(VEHICLE, load=load)
-        rng = np.random.default_rng(3)
-        loop.reset(rng, np.array([0.0, 0.0, 1.5]))
-        loop.run(rng.standard_normal((400, NOISE)))
-        flown.append(np.concatenate([loop.state[:19], loop.position, loop.quaternion]))
-    np.testing.assert_array_equal(flown[0], flown[1])
-
-
-def test_reset_takes_the_load_off():
-    loop = _hung(LOAD, 1.0)
-    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
-    loop.run(np.zeros((200, NOISE)))
-    np.testing.assert_array_equal(loop.load_pull(), 0.0)

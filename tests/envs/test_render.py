@@ -1,9 +1,8 @@
-"""Pictures and films of the world; each in a fresh process, because MuJoCo chooses its OpenGL when
-it is imported.
+"""Pictures, captions and films of the world; each in a fresh process, because MuJoCo chooses its
+OpenGL when it is imported.
 """
 
 import ctypes.util
-import json
 import os
 import subprocess
 import sys
@@ -13,10 +12,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from windwrench.dynamics import InputError, load_vehicle
-from windwrench.envs.replay import Flight
-from windwrench.envs.rerun_export import write_rrd
-from windwrench.envs.video import Film
+from tests.support.vector_flights import TASKS
+from windwrench.envs.scene_shapes import ESTIMATED, TRUE
 
 BACKEND = next(
     (
@@ -36,21 +33,24 @@ pytestmark = pytest.mark.skipif(
 # not even warn.
 DRAWN = """
 import warnings
-from pathlib import Path
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils.env_checker import check_env
 import windwrench
 from windwrench.envs import FanTrackingEnv, Scenario
-from windwrench.envs.video import Film
+from windwrench.envs.captions import captioned
 still = Scenario("still", motions=("still",), offset=(0.3, 0.3))
 env = FanTrackingEnv(still, "rgb_array", width=320, height=240)
 env.reset(seed=0)
-env.step(np.zeros(1, np.float32))
+info = env.step(np.zeros(1, np.float32))[4]
 pictures = {"jet": env.render()}
 loop = env.loop
 loop.record["fan"]["speed"] = 0.0  # the drops in the jet drift from picture to picture
 pictures["still"], pictures["again"] = env.render(), env.render()
+for name, flown in (
+    ("captioned", info), ("later", info | {"time": 2.0}), ("farther", info | {"offset": 0.2})
+):
+    pictures[name] = captioned(env, "a film", [flown])
 for body in ("vehicle", "fan"):
     geoms = loop.model.geom_bodyid == loop.model.body(body).id
     kept = loop.model.geom_rgba[geoms].copy(), loop.model.geom_matid[geoms].copy()
@@ -60,23 +60,9 @@ for body in ("vehicle", "fan"):
 loop.data.qpos[1] += 0.3
 pictures["moved"] = env.render()
 np.savez("pictures.npz", **pictures)
-env.reset(seed=0)
-for kind in KINDS:
-    with Film(Path("film." + kind), 320, 240, longest=0.4) as film:
-        for _ in range(7):
-            env.step(np.zeros(1, np.float32))
-            film.add(env.render())
-    assert film.is_full
-    try:
-        with Film(Path("broken." + kind), 320, 240) as film:
-            film.add(env.render())
-            raise KeyError("on the way")
-    except KeyError:
-        pass
 env.close()
 warnings.simplefilter("error")
-warnings.filterwarnings("ignore", ".*-v0 is out of date", DeprecationWarning)
-check_env(gym.make("windwrench/FanTracking-v0", render_mode="rgb_array").unwrapped)
+check_env(gym.make("windwrench/FanTracking-v2", render_mode="rgb_array").unwrapped)
 import mujoco  # after the kit, which tells MuJoCo how to draw
 def broken(*arguments):
     raise RuntimeError("no display")
@@ -86,34 +72,27 @@ try:
 except Exception as error:
     print(type(error).__name__, error)
 """
-KINDS = ["gif", *(["mp4"] if find_spec("imageio_ffmpeg") else [])]
 
 
 def run(folder, code, **changes):
-    environment = {**os.environ, **changes}
-    return subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=folder,
-        env=environment,
+        env={**os.environ, **changes},
         capture_output=True,
         text=True,
         check=False,
     )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
-    """Folder of pictures and films, and what a machine that cannot draw is told."""
+    """Pictures, and the words of a machine that cannot draw."""
     folder = tmp_path_factory.mktemp("drawn")
-    no_screen = {"MUJOCO_GL": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
-    done = run(folder, DRAWN.replace("KINDS", repr(KINDS)), **no_screen)
-    assert done.returncode == 0, done.stderr
-    return folder, done.stdout
-
-
-@pytest.fixture(scope="module")
-def pictures(drawn):
-    return np.load(drawn[0] / "pictures.npz")
+    said = run(folder, DRAWN, MUJOCO_GL="", DISPLAY="", WAYLAND_DISPLAY="")
+    return np.load(folder / "pictures.npz"), said
 
 
 def changed(a, b):
@@ -121,41 +100,25 @@ def changed(a, b):
     return np.mean(np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 20)
 
 
-def test_a_picture_has_the_size_asked_for_and_shows_the_vehicle_where_it_is_and_the_fan(pictures):
+def test_a_picture_has_the_size_asked_for_and_shows_the_vehicle_where_it_is_and_the_fan(drawn):
+    pictures, _ = drawn
     assert (pictures["jet"].shape, pictures["jet"].dtype) == ((240, 320, 3), np.uint8)
     assert changed(pictures["still"], pictures["again"]) == 0.0
     for other in ("without vehicle", "without fan", "moved"):
         assert changed(pictures["still"], pictures[other]) > 0.005, other
 
 
-def test_a_film_is_written_whole_or_not_at_all(drawn):
-    folder, _ = drawn
-    assert {p.name for p in folder.iterdir()} == {"pictures.npz", *(f"film.{k}" for k in KINDS)}
-
-
-@pytest.mark.skipif(
-    "mp4" not in KINDS,
-    reason="imageio-ffmpeg is not installed: pip install 'windwrench[video]'",
-)
-def test_an_mp4_has_a_picture_a_decision(drawn):
-    import imageio_ffmpeg
-
-    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(drawn[0] / "film.mp4"))
-    assert frames == 5
-    assert seconds == pytest.approx(0.4, abs=0.05)
-
-
-def test_a_gif_keeps_the_colours_of_the_arrows(drawn):
-    from PIL import Image
-
-    with Image.open(drawn[0] / "film.gif") as gif:
-        assert gif.n_frames == 5
-        assert gif.info["duration"] == 80
-        assert gif.size == (320, 240)
-        gif.seek(4)
-        picture = np.array(gif.convert("RGB")).astype(int)
-    red, green, blue = np.moveaxis(picture, 2, 0)
-    assert np.count_nonzero((red - green > 60) & (red - blue > 60)) > 3  # the estimated force
+def test_a_caption_has_a_colour_for_truth_and_estimate_time_and_error(drawn):
+    pictures, _ = drawn
+    first = pictures["captioned"]
+    assert first.shape == (240, 320, 3)
+    true, estimated = (
+        np.count_nonzero(np.all(first == np.round(255 * mark[:3]), axis=2))
+        for mark in (TRUE, ESTIMATED)
+    )
+    assert true > estimated > 10  # wide and narrow, as the arrows
+    for other in ("later", "farther"):
+        assert np.any(first != pictures[other])
 
 
 def test_a_machine_that_cannot_draw_is_told_what_to_install(drawn):
@@ -165,82 +128,53 @@ def test_a_machine_that_cannot_draw_is_told_what_to_install(drawn):
     assert "MUJOCO_GL" in said
 
 
-def test_a_film_without_its_extra_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(InputError, match=r"windwrench\[video\]"):
-        Film(tmp_path / "film.mp4", 320, 240)
-
-
-COMMANDS = """
-import contextlib, sys
+FLY = """
+import sys
 from windwrench.cli import main
-for line in LINES:
-    sys.argv = ["windwrench", *line.split()]
-    with contextlib.suppress(SystemExit):
-        main()
+sys.argv = "windwrench fly --scenario static --gif --film-seconds 0.5 --out out".split()
+main()
 """
-LINES = (
-    "fly --scenario static --gif --film-seconds 0.2 --out out",
-    "record --seconds 3 --trajectory circle --vehicle crazyflie --effect constant_force:fx=0.1 "
-    "--out log.csv",
-    "estimate log.csv --film --vehicle crazyflie --from 2 --film-seconds 0.5 --json --out again",
-)
 
 
-def test_commands_write_films_and_replays(tmp_path):
-    def files(folder):
-        return {p.name for p in (tmp_path / folder).iterdir()}
+def test_an_episode_is_written_as_a_gif_that_keeps_the_colours_of_the_arrows(tmp_path):
+    from PIL import Image
 
-    done = run(tmp_path, COMMANDS.replace("LINES", repr(LINES)), MUJOCO_GL=BACKEND)
-    assert files("out") == {"fly.gif", "fly.png", "fly.scene.png", "run.json"}, done.stderr
-    again = {"film.gif", "film.png", "run.json", "tuning.yaml", "wrench.csv", "wrench.png"}
-    assert files("again") == again
-    told = next(line for line in done.stdout.splitlines() if '"force_mean_N"' in line)
-    assert json.loads(told)["result"]["force_mean_N"][0] > 0.02
-    picture = matplotlib.image.imread(tmp_path / "again" / "film.png")
-    red, green, blue = np.moveaxis(picture[..., :3], 2, 0)
-    assert np.count_nonzero((red - green > 0.25) & (red - blue > 0.25)) > 30  # path and force
+    run(tmp_path, FLY, MUJOCO_GL=BACKEND)
+    out = tmp_path / "out"
+    assert {p.name for p in out.iterdir()} == {"fly.gif", "fly.png", "fly.scene.png", "run.json"}
+    with Image.open(out / "fly.gif") as gif:
+        assert (gif.n_frames, gif.info["duration"], gif.size) == (3, 160, (960, 540))
+        gif.seek(2)
+        last = np.array(gif.convert("RGB")) / 255.0
+    for picture in (last, matplotlib.image.imread(out / "fly.scene.png")):
+        red, green, blue = np.moveaxis(picture[..., :3], 2, 0)
+        force = (red - green > 0.25) & (red - blue > 0.25)  # estimated
+        assert np.count_nonzero(force) > 30
 
 
-def a_flight(count=20):
-    t = 0.1 * np.arange(count)
-    position = np.column_stack([np.sin(t), np.cos(t), 1.0 + 0.0 * t])
-    quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-    force = np.tile([0.2, 0.0, 0.0], (count, 1))
-    return Flight(
-        t,
-        position,
-        quaternion,
-        force,
-        0.01 * force[:, [2, 1, 0]],
-        true_force=force,
-        true_torque=force,
-        fan_y=t,
-    )
+RECORDED = """
+import gymnasium as gym, itertools, windwrench
+from gymnasium.wrappers import RecordVideo
+from windwrench.envs import ACTIONS, OBSERVATIONS
+for task, action, observation in itertools.product(TASKS, ACTIONS, OBSERVATIONS):
+    seen = {"action": action, "observation": observation, "width": 64, "height": 48}
+    env = gym.make(f"windwrench/{task}-v2", render_mode="rgb_array", **seen)
+    env = RecordVideo(env, f"{task}-{action}-{observation}")
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(env.action_space.sample())
+    env.close()
+"""
 
 
 @pytest.mark.skipif(
-    find_spec("rerun") is None, reason="rerun is not installed: pip install 'windwrench[rerun]'"
+    find_spec("moviepy") is None, reason="moviepy is not installed: pip install 'windwrench[video]'"
 )
-def test_a_rerun_recording_holds_the_flight(tmp_path):
-    path = tmp_path / "flight.rrd"
-    write_rrd(a_flight(), load_vehicle("ardrone2"), path)
-    assert [p.name for p in tmp_path.iterdir()] == ["flight.rrd"]
-    kept = path.read_bytes()
-    assert kept.startswith(b"RRF")
-    for entity in (
-        b"/world/vehicle",
-        b"/world/force/estimated",
-        b"/world/force/true",
-        b"/world/path",
-        b"/world/fan",
-        b"/force_x",
-    ):
-        assert entity in kept, entity
+def test_gymnasium_s_recorder_films_every_task_action_and_observation(tmp_path):
+    import imageio_ffmpeg
 
-
-def test_a_rerun_recording_without_its_extra_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(InputError, match=r"windwrench\[rerun\]"):
-        write_rrd(a_flight(), load_vehicle("ardrone2"), tmp_path / "flight.rrd")
-    assert list(tmp_path.iterdir()) == []
+    run(tmp_path, RECORDED.replace("TASKS", repr(TASKS)), MUJOCO_GL=BACKEND)
+    films = list(tmp_path.glob("*/*.mp4"))
+    assert len(films) == 5 * 4 * len(TASKS)
+    for film in films[::7]:
+        assert imageio_ffmpeg.count_frames_and_secs(str(film))[0] == 4

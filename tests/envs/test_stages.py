@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tests.support.vector_flights import TASKS, fly, fly_alone, make
+from tests.support.vector_flights import TASKS, fly, fly_alone, make, make_single
 from windwrench.dynamics import load_vehicle
 from windwrench.envs import SCENARIOS, FanTrackingEnv, Stage
 from windwrench.envs.closed_loop import STAGES, ClosedLoop
@@ -14,8 +14,12 @@ from windwrench.envs.plant import PlantSettings
 from windwrench.envs.wind_scenarios import WIND_SCENARIOS
 
 
+def push(loop):
+    loop.applied[2] = -0.2
+
+
 def alone(name, **given):
-    return fly_alone(gym.make(f"windwrench/{name}-v0", **given), seed=3)
+    return fly_alone(make_single(name, **given), seed=3)
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -28,11 +32,8 @@ def test_stage_by_stage_the_flight_is_that_of_the_compiled_call_bit_for_bit(name
 
 
 def test_so_it_flies_in_a_vector_of_environments():
-    def push(loop):
-        loop.applied[2] = -0.2
-
     given = {"stages": [Stage("push", push, before="actuate")]}
-    single = [lambda: gym.make("windwrench/FanTracking-v0", **given)] * 2
+    single = [lambda: make_single(**given)] * 2
     many = fly(make(2, **given), 4)
     np.testing.assert_array_equal(many, fly(gym.vector.SyncVectorEnv(single), 4))
     assert not np.array_equal(many, fly(make(2), 4))
@@ -45,9 +46,6 @@ def test_a_sensor_an_actuator_and_a_wind_of_one_s_own_change_the_flight():
     def stop(loop):
         if loop.time >= 0.0:
             loop.command[:] = 0.0
-
-    def push(loop):
-        loop.applied[2] = -0.2
 
     def flying(*stage):
         env = FanTrackingEnv("static", stages=[Stage(*stage)] if stage else [])
@@ -69,11 +67,10 @@ def test_a_sensor_an_actuator_and_a_wind_of_one_s_own_change_the_flight():
 
 def test_stages_run_before_the_one_that_they_name_in_the_order_given():
     order = []
+    places = {"second": "sense", "last": "move", "third": "sense", "first": "wind"}
     stages = [
-        Stage("second", lambda loop: order.append("second"), before="sense"),
-        Stage("last", lambda loop: order.append("last"), before="move"),
-        Stage("third", lambda loop: order.append("third"), before="sense"),
-        Stage("first", lambda loop: order.append("first"), before="wind"),
+        Stage(name, lambda loop, name=name: order.append(name), before)
+        for name, before in places.items()
     ]
     env = FanTrackingEnv("static", stages=stages)
     env.reset(seed=0)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numba import njit
 
-from tests.support.vector_flights import TASKS, fly, make
+from tests.support.vector_flights import TASKS, fly, make, make_single
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.lanes.flight import LOOPS, Blocks, fly_freely
+from windwrench.envs.lanes.flight import LOOPS, LoopBlocks, fly_freely
 from windwrench.envs.plant import SUBSTEPS, TICK, PlantSettings, load_world
 from windwrench.envs.scenarios import SCENARIOS
 from windwrench.runtime.vector_lanes import WIDTH
@@ -44,7 +44,7 @@ def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_pa
     for one in (envs, healthy):
         one.reset(seed=0)
     if plant == "mujoco":
-        envs.envs[1].loop.data.qvel[0] = np.nan
+        envs.loops[1].data.qvel[0] = np.nan
     else:
         envs._flying.loops["qvel"][0, 0, 1] = np.nan
     frames, rewards, lost, _, infos = envs.step(actions)
@@ -109,7 +109,7 @@ def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():
 @pytest.mark.parametrize("scenario", ["base", "varied"])
 def test_side_by_side_is_single_bit_for_bit_and_lanes_to_rounding(task, scenario):
     many = fly(make(3, "mujoco", task, scenario=scenario), 6)
-    alone = [lambda: gym.make(f"windwrench/{task}-v0", scenario=scenario)] * 3
+    alone = [lambda: make_single(task, scenario=scenario)] * 3
     np.testing.assert_array_equal(fly(gym.vector.SyncVectorEnv(alone), 6), many)
     difference = np.abs(fly(make(3, "lanes", task, scenario=scenario), 6) - many)
     size = alone[0]().observation_space.shape[0]  # of a frame, which is of single precision
@@ -166,7 +166,7 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
     """Centre of mass off the centre, inertia with products, another turn in each lane."""
     inertia = np.array([[2.2, 0.3, -0.2], [0.3, 3.0, 0.1], [-0.2, 0.1, 4.0]]) * 1e-3
     vehicle = replace(load_vehicle("ardrone2"), inertia=inertia, com=np.array([0.02, -0.03, 0.01]))
-    blocks = Blocks(1, ClosedLoop(vehicle))
+    blocks = LoopBlocks(1, ClosedLoop(vehicle))
     rng = np.random.default_rng(0)
     start, wrench = rng.normal(0, 5, (6, WIDTH)), rng.normal(0, 0.02, (6, WIDTH))
     blocks.loops["qpos"][0], blocks.loops["qpos"][0, 3] = 0.0, 1.0

@@ -86,54 +86,37 @@ def test_the_air_keeps_its_volume():
 def test_shear_grows_with_height():
     points = np.array([[0, 0, h * FOOT] for h in (0.1, 3.0, 20.0, 200.0)])
     log = Shear((0, 5.0, 0), law="log").velocity(points, 0.0)
-    expected = [
-        5.0 * math.log(max(h, 0.15) / 0.15) / math.log(20 / 0.15) for h in (0.1, 3, 20, 200)
-    ]
-    np.testing.assert_allclose(log[:, 1], expected, atol=1e-12)
+    above = np.log(np.maximum(points[:, 2] / FOOT, 0.15) / 0.15)
+    np.testing.assert_allclose(log[:, 1], 5.0 * above / math.log(20 / 0.15), atol=1e-12)
     power = Shear((5.0, 0, 0), reference=10.0, law="power", exponent=0.2)
     np.testing.assert_allclose(power.velocity(points, 0.0)[:, 0], 5.0 * (points[:, 2] / 10) ** 0.2)
 
 
 def test_a_gust_comes_and_goes_by_its_cosine():
-    gust = Gust((0, 0, -2.0), length=3.0, start=1.0, speed=4.0, direction=(1, 0, 0))
-    held = Gust((0, 0, -2.0), 3.0, start=1.0, speed=4.0, direction=(1, 0, 0), falls=False)
-    at = np.array([[2.0, 7.0, 1.0]])
-    for time, share, behind in (
-        (1.0, 0, 0),
-        (1.5, 0, 0),
-        (1.875, 0.5, 0.5),
-        (2.25, 1, 1),
-        (3.2, 0, 1),
-    ):
-        assert gust.velocity(at, time)[0, 2] == pytest.approx(-2.0 * share, abs=1e-12)
-        assert held.velocity(at, time)[0, 2] == pytest.approx(-2.0 * behind, abs=1e-12)
+    given = {"start": 1.0, "speed": 4.0, "direction": (1, 0, 0)}
+    for falls, last in ((True, 0), (False, 1)):
+        gust = Gust((0, 0, -2.0), 3.0, **given, falls=falls)
+        seen = [gust.velocity([[2, 7, 1]], t)[0, 2] for t in (1.0, 1.5, 1.875, 2.25, 3.2)]
+        np.testing.assert_allclose(seen, np.multiply(-2.0, [0, 0, 0.5, 1, last]), atol=1e-12)
 
 
 def test_one_fan_of_a_wall_is_the_fan_of_the_environment():
-    fan = Fan(turbulence=0.0)
-    wall = FanWall([fan.speed], 1, 1, radius=fan.radius, hub_radius=fan.hub_radius, turbulence=0.0)
-    record, tables = fan_record(fan, np.zeros((4, 3)), 0.005), jet_table(fan.radius, fan.hub_radius)
+    wall = FanWall([FAN.speed], 1, 1, radius=FAN.radius, hub_radius=FAN.hub_radius, turbulence=0.0)
     points = np.random.default_rng(3).uniform([0.1, -1.5, 0.0], [6.0, 1.5, 2.5], (50, 3))
-    wind = np.empty(3)
-    for point, seen in zip(points, wall.velocity(points, 3.0), strict=True):
-        jet_at(record[0], *tables, *point, wind)
-        np.testing.assert_allclose(seen, wind, atol=1e-12)
+    expected = [wind(*point) for point in points]
+    np.testing.assert_allclose(wall.velocity(points, 3.0), expected, atol=1e-12)
 
 
 def test_a_wall_adds_momentum_and_turns_with_its_direction():
-    speeds = np.zeros(6)
-    speeds[[0, 1]] = 4.0, 3.0
-    alone = []
-    for i in (0, 1):
-        one = np.where(np.arange(6) == i, speeds, 0.0)
-        alone.append(FanWall(one, 2, 3, turbulence=0.0).velocity([[2.0, 0.4, 0.9]], 0.0)[0])
-    both = FanWall(speeds, 2, 3, turbulence=0.0).velocity([[2.0, 0.4, 0.9]], 0.0)[0]
-    assert both[0] == pytest.approx(math.hypot(alone[0][0], alone[1][0]))
-    np.testing.assert_allclose(both[1:], alone[0][1:] + alone[1][1:])
-    turned = FanWall(speeds, 2, 3, direction=(0, 1, 0), turbulence=0.0)
-    np.testing.assert_allclose(
-        turned.velocity([[-0.4, 2.0, 0.9]], 0.0)[0], [-both[1], both[0], both[2]], atol=1e-12
-    )
+    def blown(speeds, point=(2.0, 0.4, 0.9), **given):
+        wall = FanWall([*speeds, 0, 0, 0, 0], 2, 3, turbulence=0.0, **given)
+        return wall.velocity([point], 0.0)[0]
+
+    one, other, both = blown((4, 0)), blown((0, 3)), blown((4, 3))
+    assert both[0] == pytest.approx(math.hypot(one[0], other[0]))
+    np.testing.assert_allclose(both[1:], one[1:] + other[1:])
+    turned = blown((4, 3), (-0.4, 2.0, 0.9), direction=(0, 1, 0))
+    np.testing.assert_allclose(turned, [-both[1], both[0], both[2]], atol=1e-12)
 
 
 def test_a_wash_carries_its_vehicle():
@@ -169,13 +152,12 @@ class Vortex:
 def test_a_wind_of_one_s_own_flies_as_a_grid():
     grid = on_grid(Vortex(), (-1, -1, 0), (1, 1.1, 2), 0.5, times=[0.0, 1.0, 2.0])
     points = np.random.default_rng(6).uniform([-1, -1, 0], [1, 1.1, 2], (30, 3))
-    for time in (0.0, 0.3, 1.7):
-        np.testing.assert_allclose(
-            grid.velocity(points, time), Vortex().velocity(points, time), atol=1e-12
-        )
-    np.testing.assert_allclose(
-        grid.velocity([[5.0, 0.0, 1.0]], 9.0), Vortex().velocity([[1.0, 0.0, 1.0]], 2.0), atol=1e-12
-    )
+    for there, at, when in (
+        *((points, points, (time, time)) for time in (0.0, 0.3, 1.7)),
+        ([[5.0, 0.0, 1.0]], [[1.0, 0.0, 1.0]], (9.0, 2.0)),  # beyond the ends
+    ):
+        seen, expected = grid.velocity(there, when[0]), Vortex().velocity(at, when[1])
+        np.testing.assert_allclose(seen, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", [".npz", ".nc"])
@@ -185,9 +167,7 @@ def test_a_grid_comes_back_from_its_file(tmp_path, kind):
     grid = on_grid(Vortex(), (-1, -1, 0), (1, 1, 2), 0.5, times=[0.0, 1.0])
     path = write_wind(grid, tmp_path / f"wind{kind}")
     again = read_wind(path)
-    np.testing.assert_array_equal(again.wind, grid.wind)
-    for a, b in zip(again.axes, grid.axes, strict=True):
-        np.testing.assert_array_equal(a, b)
+    np.testing.assert_equal((again.wind, *again.axes), (grid.wind, *grid.axes))
 
 
 def test_a_netcdf_of_another_order_and_without_a_time_is_read(tmp_path):
@@ -209,31 +189,22 @@ def test_a_file_that_lacks_an_axis_or_numbers_is_named(tmp_path):
             read_wind(tmp_path / "a.npz")
 
 
-VEHICLE = load_vehicle("ardrone2")
-PERIOD = 0.005
 FAN = Fan(turbulence=0.0)
+RECORD = fan_record(FAN, load_vehicle("ardrone2").positions, 0.005)[0]
 JET = np.stack(jet_table(FAN.radius, FAN.hub_radius))
 
 
 def wind(x, y, z):
     out = np.full(3, np.nan)
-    jet_at(fan_record(FAN, VEHICLE.positions, PERIOD)[0], *JET, x, y, z, out)
+    jet_at(RECORD, *JET, x, y, z, out)
     return out
 
 
 def wrench(y, yaw=np.pi, velocity=(0.0, 0.0, 0.0)):
     """Force and torque (6,), world, on a level vehicle at 2.3 m that faces the fan."""
-    out = np.full(6, np.nan)
-    jet_wrench(
-        fan_record(FAN, VEHICLE.positions, PERIOD)[0],
-        JET,
-        np.array([2.3, y, FAN.height]),
-        Rotation.from_euler("z", yaw).as_matrix(),
-        np.array([*velocity, 0.0, 0.0, 0.0]),
-        np.zeros(3),
-        np.empty(3),
-        out,
-    )
+    out, place = np.full(6, np.nan), np.array([2.3, y, FAN.height])
+    attitude, motion = Rotation.from_euler("z", yaw).as_matrix(), np.array([*velocity, 0, 0, 0.0])
+    jet_wrench(RECORD, JET, place, attitude, motion, np.zeros(3), np.empty(3), out)
     return out
 
 

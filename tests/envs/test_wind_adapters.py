@@ -1,7 +1,7 @@
 """The same wind in other simulators, by stand-ins of what each of them documents."""
 
 import sys
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +16,6 @@ from windwrench.envs.wind import (
     WindDrag,
     blow_crazyflow,
     blow_pybullet_drones,
-    isaac_lab_multirotor_type,
     pyflyt_wind_type,
 )
 
@@ -41,7 +40,6 @@ def test_pyflyt_and_rotorpy_get_the_same_field():
     field = pyflyt_wind_type(wind)(np_random=np.random.default_rng(0))
     for one in (field, PyFlytWind(wind)):
         np.testing.assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
-        assert one(0.0, np.array([[0.0, 0.0, 1.0]] * 5)).shape == (5, 3)
     wind = FanWall(np.full(9, 4.0))
     seen = RotorPyWind(wind).update(0.4, np.array([2.0, 0.1, 1.2]))
     np.testing.assert_array_equal(seen, wind.velocity([[2.0, 0.1, 1.2]], 0.4)[0])
@@ -69,18 +67,14 @@ def expected(time):
     return WindDrag(Sheared(), ARM, DRAG).wrench(time, PLACE, ROTATION, VELOCITY, RATE)
 
 
-class Leaf(np.ndarray):
-    """An array with JAX's ``at[:].set``."""
+class Leaf:
+    """Zeros with JAX's ``at[:].set``."""
 
-    @property
-    def at(self):
-        return self
+    shape, set = (2, 1, 3), staticmethod(np.asarray)
+    at = property(lambda self: self)
 
     def __getitem__(self, key):
-        return self if key == slice(None) else super().__getitem__(key)
-
-    def set(self, new):
-        return np.asarray(new).view(Leaf)
+        return self
 
 
 class Tree(SimpleNamespace):
@@ -89,31 +83,23 @@ class Tree(SimpleNamespace):
 
 
 def test_crazyflow_gets_force_and_torque_of_all_worlds():
-    parts = {
-        "pos": PLACE,
-        "quat": ROTATION.as_quat(),
-        "vel": VELOCITY,
-        "ang_vel": ROTATION.inv().apply(RATE),  # body
-        "force": np.zeros((2, 3)),
-        "torque": np.zeros((2, 3)),
-    }
-    states = Tree(**{name: part[:, None].view(Leaf) for name, part in parts.items()})
+    body_rate = ROTATION.inv().apply(RATE)
+    parts = {"pos": PLACE, "quat": ROTATION.as_quat(), "vel": VELOCITY, "ang_vel": body_rate}
+    moving = {name: part[:, None] for name, part in parts.items()}
+    states = Tree(**moving, force=Leaf(), torque=Leaf())
     data = Tree(states=states, core=Tree(steps=np.full((2, 1), 250), freq=500))
     blown = blow_crazyflow(data, WindDrag(Sheared(), ARM, DRAG)).states
     for seen, wanted in zip((blown.force, blown.torque), expected(0.5), strict=True):
-        np.testing.assert_allclose(np.asarray(seen)[:, 0], wanted, atol=1e-12)
+        np.testing.assert_allclose(seen[:, 0], wanted, atol=1e-12)
     assert blown.pos is states.pos
 
 
 def test_pybullet_drones_get_force_and_torque(monkeypatch):
-    applied = {"Force": [], "Torque": []}
-    bullet = ModuleType("pybullet")
-    bullet.WORLD_FRAME = 2
-    bullet.applyExternalForce = lambda body, link, force, at, frame, client: applied[
-        "Force"
-    ].append((body, link, *force, *at, frame, client))
-    bullet.applyExternalTorque = lambda body, link, torque, frame, client: applied["Torque"].append(
-        (body, link, *torque, frame, client)
+    forces, torques = [], []
+    bullet = SimpleNamespace(
+        WORLD_FRAME=2,
+        applyExternalForce=lambda *given: forces.append(np.hstack(given)),
+        applyExternalTorque=lambda *given: torques.append(np.hstack(given)),
     )
     monkeypatch.setitem(sys.modules, "pybullet", bullet)
     env = SimpleNamespace(
@@ -133,37 +119,8 @@ def test_pybullet_drones_get_force_and_torque(monkeypatch):
     blow_pybullet_drones(env, drag)
     force, torque = expected(0.5)
     for i, body in enumerate(env.DRONE_IDS):
-        np.testing.assert_allclose(applied["Force"][i], [body, -1, *force[i], *PLACE[i], 2, 1])
-        np.testing.assert_allclose(applied["Torque"][i], [body, -1, *torque[i], 2, 1])
+        np.testing.assert_allclose(forces[i], [body, -1, *force[i], *PLACE[i], 2, 1])
+        np.testing.assert_allclose(torques[i], [body, -1, *torque[i], 2, 1])
     env.PYB_STEPS_PER_CTRL, env.CTRL_FREQ = 5, 48
     with pytest.raises(InputError, match="expected ctrl_freq equal to pyb_freq, got 48 and 240 Hz"):
         blow_pybullet_drones(env, drag)
-
-
-def test_isaac_lab_adds_the_wind_to_the_thrust(monkeypatch):
-    torch = pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
-
-    class Multirotor:
-        def __init__(self):
-            self._internal_force_target_sim = torch.zeros(2, 5, 3)
-            self._internal_torque_target_sim = torch.zeros(2, 5, 3)
-            quaternion = ROTATION.as_quat(scalar_first=True)
-            names = "root_pos_w", "root_quat_w", "root_lin_vel_w", "root_ang_vel_w"
-            values = PLACE, quaternion, VELOCITY, RATE
-            self.data = SimpleNamespace(
-                **dict(zip(names, map(torch.as_tensor, values), strict=True))
-            )
-
-        def _combine_thrusts(self):
-            self._internal_force_target_sim[:, 0, 2] = 7.0
-
-    for name in ("isaaclab_contrib", "isaaclab_contrib.assets"):
-        monkeypatch.setitem(sys.modules, name, ModuleType(name))
-    sys.modules["isaaclab_contrib.assets"].Multirotor = Multirotor
-    robot = isaac_lab_multirotor_type(WindDrag(Sheared(), ARM, DRAG), lambda: 0.5)()
-    robot._combine_thrusts()
-    force, torque = (ROTATION.inv().apply(part) for part in expected(0.5))
-    seen = robot._internal_force_target_sim, robot._internal_torque_target_sim
-    for target, wanted in zip(seen, (force + np.array([0, 0, 7.0]), torque), strict=True):
-        np.testing.assert_allclose(target[:, 0], wanted, rtol=1e-5, atol=1e-6)
-        assert not target[:, 1:].any()

@@ -18,13 +18,7 @@ from tests.support.model_flights import (
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import Uncertainty
 from windwrench.envs.recording import record_flight
-from windwrench.estimator import (
-    ConstantGainFilter,
-    UKFTuning,
-    WrenchEKF,
-    WrenchEstimate,
-    WrenchUKF,
-)
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchEstimate, WrenchUKF
 from windwrench.estimator.consistency import chi2_band, nees, state_error
 from windwrench.estimator.model_uncertainty import factors_alone, factors_of
 from windwrench.identification.logs.flight_log import FlightLog
@@ -38,17 +32,13 @@ def share_within(values, band):
 
 
 @pytest.mark.parametrize(
-    ("make", "vehicle", "tuning"),
-    [
-        (WrenchUKF, VEHICLE, UKFTuning()),
-        (WrenchUKF, WITH_EFFECTS, ANISOTROPIC),
-        (WrenchEKF, WITH_EFFECTS, ANISOTROPIC),
-    ],
-    ids=["unscented", "unscented with effects", "extended with effects"],
+    ("vehicle", "tuning"),
+    [(VEHICLE, UKFTuning()), (WITH_EFFECTS, ANISOTROPIC)],
+    ids=["plain", "with effects"],
 )
-def test_a_filter_is_consistent(make, vehicle, tuning):
+def test_a_filter_is_consistent(vehicle, tuning):
     """Truth drawn from the filter's own model, yawed by 120 degrees and turning at 3 rad/s."""
-    runs, steps, estimator = 40, 400, make(vehicle, tuning)
+    runs, steps, estimator = 40, 400, WrenchUKF(vehicle, tuning)
     found = np.empty((2, runs, steps))
     for r in range(runs):
         speeds = np.full((steps, 4), vehicle.hover_rate)
@@ -128,7 +118,7 @@ def test_intervals_hold_on_flights_of_another_model(name):
     assert all(share > (0.78 if t == "hover" else 0.9) for t, share in shares.items()), shares
 
 
-@pytest.mark.parametrize("make", [WrenchUKF, WrenchEKF, ConstantGainFilter])
+@pytest.mark.parametrize("make", [WrenchUKF, ConstantGainFilter])
 def test_the_filter_stays_as_it_is_and_says_in_hover_what_follows_by_hand(make):
     known = VEHICLE.uncertainty
     exact, stated = make(replace(VEHICLE, uncertainty=Uncertainty())), make(VEHICLE)

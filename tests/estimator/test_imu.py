@@ -9,7 +9,7 @@ from tests.support import flights
 from tests.support.flights import PERIOD, matrix, yawing_flight
 from tests.support.model_flights import simulate_model
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
-from windwrench.estimator import UKFTuning, WrenchEKF, WrenchUKF
+from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.error_state import displace
 from windwrench.estimator.imu import expected_imu
@@ -65,8 +65,8 @@ def drawn(steps, dt=0.005, seed=0, tuning=None, vehicle=VEHICLE, **settings):
     return simulate_model(vehicle, tuning, hover, dt, seed=seed, **settings)
 
 
-def started(flight, tuning=None, period=0.005, kind=WrenchUKF, vehicle=VEHICLE, gate=None):
-    f = kind(vehicle, tuning or UKFTuning.for_vehicle(vehicle, period), period, gate)
+def started(flight, tuning=None, period=0.005, vehicle=VEHICLE, gate=None):
+    f = WrenchUKF(vehicle, tuning or UKFTuning.for_vehicle(vehicle, period), period, gate)
     flight.begin(f)
     return f
 
@@ -94,15 +94,14 @@ OFFSET = replace(VEHICLE, com=np.array([0.02, -0.015, 0.01]))
 
 
 @pytest.mark.parametrize("vehicle", [VEHICLE, OFFSET], ids=["centred", "offset"])
-@pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])
-def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(kind, vehicle):
+def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicle):
     """With x' = F x + G w and z = h(x') + D w + v: P_xz = P H' + G Q D', S = H P H' + H G Q D' +
     D Q G' H' + D Q D' + R, and biases beside it.
     """
     period = 0.002
     flight = drawn(41, period, vehicle=vehicle, velocity=(1.0, 0.0, 0.0))
     tuning = UKFTuning.for_vehicle(vehicle, period)
-    f = fly(started(flight, tuning, period, kind, vehicle), flight, 40)
+    f = fly(started(flight, tuning, period, vehicle), flight, 40)
     f.predict(flight.rotor_speeds[40])
     P, x = f.covariance_with_biases, f.estimate.state
     b = np.concatenate([f.gyro_bias, f.accelerometer_bias])
@@ -163,7 +162,7 @@ def test_pose_and_imu_of_one_moment_may_come_in_either_order():
         assert np.max(np.abs(difference) / deviation) < 0.02
 
 
-def consistency(rate, pose_hz, runs, seconds, fine=1, kind=WrenchUKF, vehicle=VEHICLE):
+def consistency(vehicle, rate, pose_hz, fine, runs, seconds):
     """Return mean IMU-NIS (6), force-NEES (3), NEES (18) and NEES with biases (24), and the bands
     of one step's mean over the runs. ``fine`` steps make a period of the filter.
     """
@@ -174,7 +173,7 @@ def consistency(rate, pose_hz, runs, seconds, fine=1, kind=WrenchUKF, vehicle=VE
     found = np.empty((4, runs, steps))
     for r in range(runs):
         flight = drawn(steps, dt, r, drawn_with, vehicle, angular_velocity=(0.0, 0.0, 1.0))
-        f = started(flight, tuning, dt * fine, kind, vehicle)
+        f = started(flight, tuning, dt * fine, vehicle)
         for k in range(steps):
             fly(f, flight, 1, dt, every=steps + 1, after=k)
             nis = f.estimate.nis
@@ -192,21 +191,17 @@ RATES = [(200, 50, 1), (500, 50, 1), (1000, 50, 1), (1000, 100, 10)]
 
 
 @pytest.mark.parametrize(
-    ("kind", "vehicle", "rate", "pose_hz", "fine", "runs", "seconds"),
+    ("vehicle", "rate", "pose_hz", "fine", "runs", "seconds"),
     [
-        (WrenchUKF, OFFSET, 500, 50, 1, 25, 0.6),
-        *(
-            pytest.param(kind, VEHICLE, *rates, 100, 2.0, marks=pytest.mark.slow)
-            for kind in (WrenchUKF, WrenchEKF)
-            for rates in RATES
-        ),
+        (OFFSET, 500, 50, 1, 25, 0.6),
+        *(pytest.param(VEHICLE, *rates, 100, 2.0, marks=pytest.mark.slow) for rates in RATES),
     ],
 )
-def test_the_filter_with_an_imu_is_consistent(kind, vehicle, rate, pose_hz, fine, runs, seconds):
+def test_the_filter_with_an_imu_is_consistent(vehicle, rate, pose_hz, fine, runs, seconds):
     """Off the centre of mass the torque's noise is in the specific force; the last rates predict in
     tenths of the period for which the tuning is stated.
     """
-    mean, bands = consistency(rate, pose_hz, runs, seconds, fine, kind, vehicle)
+    mean, bands = consistency(vehicle, rate, pose_hz, fine, runs, seconds)
     for value, (low, high) in zip(mean, bands, strict=True):
         assert low <= value <= high
     # innovations are independent from step to step, so all of them have a narrow band
@@ -288,10 +283,9 @@ def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
 
 
 @pytest.mark.parametrize("begun", ["by a reset", "by a restart"])
-@pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])
-def test_a_flight_that_begins_anew_has_the_prior_of_the_biases(kind, begun):
+def test_a_flight_that_begins_anew_has_the_prior_of_the_biases(begun):
     flight = drawn(100)
-    f = fly(started(flight, kind=kind), flight, 100)
+    f = fly(started(flight), flight, 100)
     assert np.all(f.gyro_bias_std < 0.1)
     if begun == "by a reset":
         f.reset([0, 0, 1], [1, 0, 0, 0])

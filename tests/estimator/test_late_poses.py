@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.support.flights import PERIOD, yawing_flight
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
-from windwrench.estimator import ConstantGainFilter, TimedFilter, WrenchEKF, WrenchUKF
+from windwrench.estimator import ConstantGainFilter, TimedFilter, WrenchUKF
 
 LAG = EffectSetting("motor_lag", {"tau": 0.04})
 DELAY = EffectSetting("latency", {"d": 0.02})
@@ -19,7 +19,7 @@ VEHICLES = {
     "effects that remember": PLAIN.with_effects(LAG, DELAY),
     "drag, seen at a marker": load_vehicle("hummingbird").with_effects(MARKER, DRAG, LAG),
 }
-FILTERS = (WrenchUKF, WrenchEKF, ConstantGainFilter)
+FILTERS = (WrenchUKF, ConstantGainFilter)
 
 
 def fly(vehicle, steps, seed):

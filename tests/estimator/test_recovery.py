@@ -11,10 +11,10 @@ from tests.support.exported_c.hostile import KINDS, befall
 from tests.support.parameters import mostly_slow
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.rotation import quaternion_multiply
-from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchEKF, WrenchUKF
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 
 VEHICLES = {name: load_vehicle(name) for name in ("ardrone2", "crazyflie", "hummingbird")}
-FILTERS = {"ukf": WrenchUKF, "ekf": WrenchEKF, "constant gain": ConstantGainFilter}
+FILTERS = {"ukf": WrenchUKF, "constant gain": ConstantGainFilter}
 HEIGHT = 1.2  # m
 FORCE = 0.1  # of the weight, upwards: what the rotors need not carry
 RISE = 1.0  # s, of the default tuning
@@ -25,6 +25,19 @@ STILL = np.array([1.0, 0.0, 0.0, 0.0])
 def hover(vehicle):
     """Rotor speeds (4,) of a hover under an upward force of ``FORCE`` weights."""
     return np.full(4, vehicle.hover_rate * np.sqrt(1.0 - FORCE))
+
+
+def pushed(vehicle, weights, rows, begin):
+    """Positions (rows, 3) at 200 Hz under a force along x that sets in at row ``begin``."""
+    t = 0.005 * np.maximum(0, np.arange(rows) - begin)
+    return np.column_stack([0.5 * weights * vehicle.gravity * t * t, 0.0 * t, HEIGHT + 0.0 * t])
+
+
+def along(estimator, vehicle, poses):
+    """Return the estimates of a hover after each of some poses, or of some positions."""
+    estimator.reset([0.0, 0.0, HEIGHT], STILL)
+    speeds = np.full(4, vehicle.hover_rate)
+    return [estimator.step(speeds, *(x if len(x) == 2 else (x, STILL))) for x in poses]
 
 
 class Flight:
@@ -162,7 +175,6 @@ SPINS = (
 )
 STARTS = ((np.pi / 2, 0.999), (3.0, None), (np.pi, 0.999))
 SLOW = (("crazyflie", 0.1), ("ardrone2", 0.05))
-KALMAN = ("ukf", "ekf")
 LIVES = (
     *(
         (vehicle, kind, dt, gate, fault)
@@ -172,11 +184,10 @@ LIVES = (
         for fault in POSES
     ),
     *(
-        ("crazyflie" if fault[1] % 400 else "ardrone2", kind, 0.005, 0.9999, fault, 0.0, True)
-        for kind in KALMAN
+        ("crazyflie" if fault[1] % 400 else "ardrone2", "ukf", 0.005, 0.9999, fault, 0.0, True)
         for fault in BESIDE_AN_IMU
     ),
-    *(("crazyflie", kind, 0.01, gate, None, turn) for kind in KALMAN for turn, gate in STARTS),
+    *(("crazyflie", "ukf", 0.01, gate, None, turn) for turn, gate in STARTS),
     *(
         (vehicle, kind, dt, 0.999, fault, 3.0)
         for vehicle, dt in SLOW
@@ -244,43 +255,32 @@ def test_a_bias_stays_within_its_bound():
 @pytest.mark.parametrize(
     "burst", ["one offset", "one after another", "each its own", "upside down"]
 )
-@pytest.mark.parametrize("kind", KALMAN)
-def test_a_burst_of_bad_poses_costs_what_a_gap_costs(kind, burst):
+def test_a_burst_of_bad_poses_costs_what_a_gap_costs(burst):
     """Half a second of poses 10 cm off, while a force that the filter does not foresee sets in:
     none is believed, and those that are back are, at once, though they are far from what is
     expected.
     """
     vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(3)
-    begin, end, dt = 400, 500, 0.005
-    t = dt * np.maximum(0, np.arange(700) - 350)
-    poses = np.column_stack([0.2 * vehicle.gravity * t * t, 0.0 * t, 1.0 + 0.0 * t])
+    begin, end = 400, 500
+    poses = pushed(vehicle, 0.4, 700, 350)
     poses += 0.001 * rng.standard_normal(poses.shape)
     drawn = rng.standard_normal((end - begin, 3))
     away = {"one offset": drawn[:1], "each its own": drawn, "upside down": np.zeros((1, 3))}.get(
         burst, drawn[[0] * 40 + [1] * 60]
     )
     away = 0.1 * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-    said, force = {}, {}
-    for bad in (False, True):
-        estimator = FILTERS[kind](vehicle, period=dt, gate=0.9999)
-        estimator.reset(poses[0], STILL)
-        statuses, forces = [], []
-        for k, pose in enumerate(poses):
-            hit = begin <= k < end
-            q = [0.0, 1.0, 0.0, 0.0] if hit and burst == "upside down" else STILL
-            place = pose + (np.broadcast_to(away, (end - begin, 3))[k - begin] if hit else 0.0)
-            gone = hit and not bad
-            e = estimator.step(
-                np.full(4, vehicle.hover_rate), None if gone else place, None if gone else q
-            )
-            statuses.append(e.status)
-            forces.append(e.force[0])
-        assert e.restarts == 0
-        said[bad], force[bad] = statuses, np.array(forces)
-    assert set(said[True][begin:end]) == {"rejected"}
-    back = said[True].index("tracking", end)
-    assert back <= end + 2
-    assert np.all(np.abs(force[True] - force[False])[end + 20 :] < 0.05 * vehicle.weight)
+    turned = [0.0, 1.0, 0.0, 0.0] if burst == "upside down" else STILL
+    seen = [(pose, STILL) for pose in poses]
+    gone, bad = seen.copy(), seen.copy()
+    gone[begin:end] = [(None, None)] * (end - begin)
+    bad[begin:end] = [(pose, turned) for pose in poses[begin:end] + away]
+    unseen, hit = (along(WrenchUKF(vehicle, gate=0.9999), vehicle, each) for each in (gone, bad))
+    assert unseen[-1].restarts == hit[-1].restarts == 0
+    said = [e.status for e in hit]
+    assert set(said[begin:end]) == {"rejected"}
+    assert said.index("tracking", end) <= end + 2
+    apart = [abs(a.force[0] - b.force[0]) for a, b in zip(unseen, hit, strict=True)]
+    assert max(apart[end + 20 :]) < 0.05 * vehicle.weight
 
 
 @pytest.mark.parametrize(("late", "seed"), [(0.005, 1), (0.006, 0), (0.008, 0), (0.015, 1)])
@@ -301,31 +301,23 @@ def test_poses_of_a_blurred_clock_are_not_held_out(late, seed):
     assert 0 < said.count("rejected") <= 1.2 * hit
 
 
-@pytest.mark.parametrize("kind", KALMAN)
-def test_an_attitude_alone_does_not_end_the_doubt_of_a_position(kind):
+def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
     """The first pose after half a second is off and likely, so it is believed; those that follow
     have jumped then, until they have lasted. Attitudes without a position come between them.
     """
-    vehicle, rng, dt = VEHICLES["ardrone2"], np.random.default_rng(0), 0.005
-    estimator = FILTERS[kind](vehicle, period=dt, gate=0.999)
-    estimator.reset([0, 0, 1], STILL)
-    speeds, q, said = np.full(4, vehicle.hover_rate), STILL, []
-    for k in range(700):
-        position = [0.0, 0.0, 1.0] + 0.001 * rng.standard_normal(3)
-        if 300 <= k < 400:
-            e = estimator.step(speeds, None, None)
-        elif k == 400:
-            e = estimator.step(speeds, position + np.array([0.29, -0.29, 0.29]), q)
-            assert e.status == "tracking"
-        else:
-            e = estimator.step(speeds, None if k % 25 == 0 else position, q)
-        said.append(e.status)
-        if k > 600:
-            assert np.all(np.abs(e.force) < 0.03 * vehicle.weight)
-    assert "rejected" in said[401:425]
-    assert said[425] == "tracking"
-    assert said[426] == "rejected"
-    assert estimator.estimate.restarts == 1
+    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(0)
+    position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((700, 3))
+    position[400] += [0.29, -0.29, 0.29]
+    poses = [(None if k > 400 and k % 25 == 0 else x, STILL) for k, x in enumerate(position)]
+    poses[300:400] = [(None, None)] * 100
+    said = along(WrenchUKF(vehicle, gate=0.999), vehicle, poses)
+    status = [e.status for e in said]
+    assert status[400] == "tracking"
+    assert "rejected" in status[401:425]
+    assert status[425] == "tracking"
+    assert status[426] == "rejected"
+    assert said[-1].restarts == 1
+    assert np.all(np.abs([e.force for e in said[601:]]) < 0.03 * vehicle.weight)
 
 
 def test_a_doubted_wrench_may_be_none_at_all():
@@ -339,28 +331,24 @@ def test_a_doubted_wrench_may_be_none_at_all():
     assert np.sqrt(e.covariance[17, 17]) > abs(e.force[2]) > 0.9 * vehicle.weight
 
 
-@pytest.mark.parametrize("kind", KALMAN)
-def test_rates_do_not_run_away_where_positions_alone_are_measured(kind):
+def test_rates_do_not_run_away_where_positions_alone_are_measured():
     """A hover that is lost and found by two poses, and then by its positions: they tell neither an
     attitude nor a rate, of which nothing is known but the prior's 10 rad/s.
     """
-    vehicle, most = VEHICLES["crazyflie"], []
+    vehicle = VEHICLES["crazyflie"]
     for seed in range(5):
         rng = np.random.default_rng(seed)
-        estimator = FILTERS[kind](vehicle, period=0.02, gate=0.9999)
-        estimator.reset([0.0, 0.0, 1.0], STILL)
-        for k in range(177):
-            position = np.array([0.0, 0.0, 1.0]) + 0.001 * rng.standard_normal(3)
-            q = np.array([1.0, *(0.0025 * rng.standard_normal(3))])
-            lost = 50 <= k < 125
-            e = estimator.step(
-                np.full(4, vehicle.hover_rate),
-                None if lost else position,
-                None if lost or k >= 127 else q / np.linalg.norm(q),
-            )
-            most.append(np.linalg.norm(e.angular_velocity) if k >= 127 else 0.0)
-        assert estimator.estimate.restarts == 1
-    assert max(most) < 20.0
+        position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((177, 3))
+        turns = np.column_stack([np.ones(177), 0.0025 * rng.standard_normal((177, 3))])
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        poses = [
+            (x, q if k < 127 else None)
+            for k, (x, q) in enumerate(zip(position, turns, strict=True))
+        ]
+        poses[50:125] = [(None, None)] * 75
+        said = along(WrenchUKF(vehicle, period=0.02, gate=0.9999), vehicle, poses)
+        assert said[-1].restarts == 1
+        assert max(np.linalg.norm(e.angular_velocity) for e in said[127:]) < 20.0
 
 
 def test_what_happened_is_said():
@@ -385,14 +373,9 @@ def test_a_push_is_not_taken_for_an_outlier():
     vehicle = VEHICLES["ardrone2"]
     force = {}
     for gate in (None, 0.999):
-        ukf = WrenchUKF(vehicle, gate=gate)
-        ukf.reset([0, 0, 1], STILL)
-        for k in range(600):
-            t = 0.005 * max(0, k - 300)
-            pushed = [0.5 * vehicle.gravity * t * t, 0.0, 1.0]
-            e = ukf.step(np.full(4, vehicle.hover_rate), pushed, STILL)
-            assert e.status in ("tracking", "restarted")
-        force[gate] = e.force[0]
+        said = along(WrenchUKF(vehicle, gate=gate), vehicle, pushed(vehicle, 1.0, 600, 300))
+        assert {e.status for e in said} <= {"tracking", "restarted"}
+        force[gate] = said[-1].force[0]
     assert force[0.999] == pytest.approx(vehicle.weight, rel=0.1)
     assert force[None] == pytest.approx(force[0.999], rel=0.05)
 
@@ -448,40 +431,28 @@ def test_a_restart_does_not_bring_the_next(kind, gate):
     assert np.sqrt(np.mean(np.sum(np.square(force), axis=1))) < 0.05 * VEHICLES["crazyflie"].weight
 
 
-@pytest.mark.parametrize("kind", KALMAN)
-def test_a_gust_is_no_noise(kind):
+def test_a_gust_is_no_noise():
     """Half a weight that sets in at once moves the innovations for a second, and hardly what poses
     add to each other.
     """
-    vehicle, rng, dt = VEHICLES["ardrone2"], np.random.default_rng(1), 0.005
-    estimator, scales = FILTERS[kind](vehicle, period=dt), []
-    estimator.reset([0.0, 0.0, HEIGHT], STILL)
-    for k in range(1000):
-        t = dt * max(0, k - 400)
-        position = [0.25 * vehicle.gravity * t * t, 0.0, HEIGHT]
-        position += vehicle.mocap.sigma_pos_m * rng.standard_normal(3)
-        e = estimator.step(np.full(4, vehicle.hover_rate), position, STILL)
-        scales.append(e.noise_scales[1])
-    assert e.force[0] == pytest.approx(0.5 * vehicle.weight, rel=0.1)
-    assert max(scales[400:]) < 1.15
+    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(1)
+    position = pushed(vehicle, 0.5, 1000, 400)
+    position += vehicle.mocap.sigma_pos_m * rng.standard_normal((1000, 3))
+    said = along(WrenchUKF(vehicle), vehicle, position)
+    assert said[-1].force[0] == pytest.approx(0.5 * vehicle.weight, rel=0.1)
+    assert max(e.noise_scales[1] for e in said[400:]) < 1.15
 
 
 def test_what_an_unlikely_pose_leaves_is_forgotten_in_the_patience():
     """A tilt of 2 degrees goes on from the pose before: the variances widen by its NIS, and 1/e of
     that is left after 0.6 s.
     """
-    vehicle, dt = VEHICLES["ardrone2"], 0.005
-    ukf = WrenchUKF(vehicle, period=dt, gate=0.99)
-    ukf.reset([0.0, 0.0, HEIGHT], STILL)
-    speeds, place = np.full(4, vehicle.hover_rate), [0.0, 0.0, HEIGHT]
-    for _ in range(600):
-        calm = ukf.step(speeds, place, STILL)
-    half = np.radians(1.0)
-    widened = []
-    for k in range(121):
-        q = [np.cos(half), np.sin(half), 0.0, 0.0] if k == 0 else STILL
-        e = ukf.step(speeds, place, q)
-        assert e.status == "tracking"
-        widened.append(e.std[17] ** 2 / calm.std[17] ** 2 - 1.0)
+    vehicle, half, place = VEHICLES["ardrone2"], np.radians(1.0), [0.0, 0.0, HEIGHT]
+    poses = [(place, STILL)] * 721
+    poses[600] = place, [np.cos(half), np.sin(half), 0.0, 0.0]
+    said = along(WrenchUKF(vehicle, gate=0.99), vehicle, poses)
+    assert {e.status for e in said[600:]} == {"tracking"}
+    variances = np.array([e.std[17] ** 2 for e in said[599:]])
+    widened = variances[1:] / variances[0] - 1.0
     assert widened[0] > 1.0
     assert widened[120] == pytest.approx(widened[0] / np.e, rel=0.1)

@@ -1,6 +1,6 @@
 """The filters and the smoother against the literal ones, and what they must hold.
 
-A mass that is hung on, its rise time and its lateral force are ``tests/paper/test_figures.py``'s.
+``tests/reproduction/test_figures.py`` hangs a mass on: rise time and lateral force.
 """
 
 from dataclasses import replace
@@ -21,8 +21,8 @@ from tests.support.reference_filters import (
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF
-from windwrench.estimator.ekf import WrenchEKF, model_jacobian
 from windwrench.estimator.filter_record import drive, propagate
+from windwrench.estimator.linear_model import model_jacobian
 from windwrench.estimator.reference import difference, displaced
 from windwrench.estimator.smoother import RecordingUKF
 from windwrench.runtime.compiled import compiled
@@ -108,7 +108,7 @@ def one_step(record, speeds, dt, A):
 @pytest.mark.parametrize("rate", [0.0, 4.0])
 def test_jacobian_equals_finite_differences(vehicle, rate):
     rng = np.random.default_rng(0)
-    ekf = WrenchEKF(vehicle)
+    record = WrenchUKF(vehicle).record
     x = np.zeros(20)
     x[0:3] = [0.1, -0.2, 0.5]
     x[3:7] = Rotation.random(rng=rng).as_quat(scalar_first=True)
@@ -119,9 +119,9 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
 
     def stepped(error):
         A = np.zeros((12, 18))
-        ekf.record[0]["x"][KIT_ORDER] = displaced(start, error)
-        one_step(ekf.record, speeds, PERIOD, A)
-        return ekf.record[0]["centre"][KIT_ORDER], A
+        record[0]["x"][KIT_ORDER] = displaced(start, error)
+        one_step(record, speeds, PERIOD, A)
+        return record[0]["centre"][KIT_ORDER], A
 
     centre, A = stepped(np.zeros(18))
     F = np.eye(18)

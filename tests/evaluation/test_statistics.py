@@ -11,6 +11,7 @@ from windwrench.evaluation.statistics import (
     hierarchical_bootstrap,
     hierarchical_draws,
     holm,
+    interquartile_mean,
     interval_of,
     mean,
     paired_wins,
@@ -21,6 +22,11 @@ from windwrench.evaluation.statistics import (
 
 RNG = np.random.default_rng(5)
 X, Y = RNG.normal(1.0, 0.3, (5, 12)), RNG.normal(0.8, 0.3, (4, 12))
+
+
+def covered(intervals):
+    """Share of the intervals around 2."""
+    return np.mean([low <= 2.0 <= high for low, high in intervals])
 
 
 def test_probability_of_improvement_counts_all_pairs_of_runs_task_by_task():
@@ -43,13 +49,31 @@ def test_paired_wins_are_of_an_episode_and_changes_of_the_means():
     assert paired_wins([[1.9], [2.1]], [[1.0], [3.0]]) == 0.5
 
 
+def test_the_interquartile_mean_is_that_of_the_middle_half_of_all():
+    assert interquartile_mean([[0.0, 1.0], [2.0, 99.0]]) == 1.5
+    flat = np.sort(X.ravel())
+    assert interquartile_mean(X) == pytest.approx(flat[15:45].mean())
+    np.testing.assert_allclose(
+        interquartile_mean(np.stack([X, 2.0 * X])), np.array([1.0, 2.0]) * flat[15:45].mean()
+    )
+    lost = np.append(X.ravel()[:-1], 1e3)  # one lost episode
+    assert interquartile_mean(lost) < flat.max()
+
+
+def test_strata_are_drawn_among_themselves():
+    """Between strata that differ, and hold equal numbers, nothing varies."""
+    scores = np.repeat([1.0, 5.0], [6, 6])[None]
+    apart = hierarchical_draws(mean, scores, resamples=50, strata=(6, 6))
+    np.testing.assert_array_equal(apart, np.full(50, 3.0))
+    assert hierarchical_draws(mean, scores, resamples=50).std() > 0.1
+    uneven = [1.0, 2.0, 7.0, 9.0, 5.0]
+    draws = hierarchical_draws(lambda x: x.max(axis=(1, 2)), [uneven], strata=(2, 3))
+    assert set(draws) == {5.0, 7.0, 9.0}
+
+
 def test_the_bootstrap_covers_the_truth_as_often_as_it_says():
-    inside = 0
-    for k in range(120):
-        sample = np.random.default_rng(k).normal(2.0, 1.0, 40)
-        low, high = episode_bootstrap(mean, sample, resamples=300)
-        inside += low <= 2.0 <= high
-    assert 0.87 <= inside / 120 <= 0.99
+    samples = [np.random.default_rng(k).normal(2.0, 1.0, 40) for k in range(120)]
+    assert 0.87 <= covered(episode_bootstrap(mean, s, resamples=300) for s in samples) <= 0.99
     assert episode_bootstrap(mean, [[3.0]]) == (3.0, 3.0)
 
 
@@ -68,18 +92,12 @@ def test_hierarchical_draws_have_the_variance_of_crossed_policies_and_episodes(p
 
 
 def test_the_hierarchical_interval_covers_other_policies_and_other_episodes():
-    inside = 0
-    for k in range(150):
-        rng = np.random.default_rng(k)
-        scores = (
-            2.0
-            + rng.normal(0.0, 0.3, (8, 1))
-            + rng.normal(0.0, 1.0, (1, 40))
-            + rng.normal(0.0, 0.5, (8, 40))
-        )
-        low, high = hierarchical_bootstrap(mean, scores, resamples=400, seed=k)
-        inside += low <= 2.0 <= high
-    assert 0.88 <= inside / 150 <= 0.99
+    def interval(k):
+        rng, sizes = np.random.default_rng(k), {(8, 1): 0.3, (1, 40): 1.0, (8, 40): 0.5}
+        scores = 2.0 + sum(rng.normal(0.0, sigma, shape) for shape, sigma in sizes.items())
+        return hierarchical_bootstrap(mean, scores, resamples=400, seed=k)
+
+    assert 0.88 <= covered(map(interval, range(150))) <= 0.99
 
 
 def test_a_single_policy_stays_and_a_pair_is_drawn_together():

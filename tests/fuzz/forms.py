@@ -134,12 +134,11 @@ def _betaflight_table():
 def _bag(kind):
     """Return the files of a bag with a pose and rotor speeds: one of ROS 1, or a folder's of ROS 2,
     by the ending of the file that holds the messages."""
-    count = len(_times())
     still = FlightLog(
         _times(),
-        np.tile([0.0, 0.0, 1.0], (count, 1)),
-        np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-        np.full((count, 4), 376.0),
+        np.tile([0.0, 0.0, 1.0], (_COUNT, 1)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (_COUNT, 1)),
+        np.full((_COUNT, 4), 376.0),
     )
     name = "flight.bag" if kind == "bag" else "flight"
     return _written(lambda path: write_bag(still, path, kind, "/pose"), name)
@@ -345,38 +344,66 @@ def forms():
         log("crazyflie_sd, old", "log01", lambda: sd_card_before_2021(*_events()), _BYTES, *sd),
         Form("vehicle with effects", "v.yaml", _vehicle_with_effects, _WORDS, _use_vehicle, flown),
         Form(
-            *("log map", "map.yaml", lambda: _MAP, _WORDS, _use_map),
+            "log map",
+            "map.yaml",
+            lambda: _MAP,
+            _WORDS,
+            _use_map,
             ("check", "log.csv", "--out", "out", "--map"),
             lambda: {"log.csv": own()},
         ),
         Form(
-            *("table of other columns", "log.csv", _foreign_table, _CELLS, _use_foreign),
+            "table of other columns",
+            "log.csv",
+            _foreign_table,
+            _CELLS,
+            _use_foreign,
             ("check", "--out", "out", "--vehicle", "ardrone2"),
         ),
         Form(
-            *("policy, weights", "policy.npz", lambda: _policy()["policy.npz"], _BYTES),
-            *(_use_policy, scored, lambda: {"policy.json": _policy()["policy.json"]}),
+            "policy, weights",
+            "policy.npz",
+            lambda: _policy()["policy.npz"],
+            _BYTES,
+            _use_policy,
+            scored,
+            lambda: {"policy.json": _policy()["policy.json"]},
         ),
         Form(
-            *("policy, card", "policy.json", lambda: _policy()["policy.json"], _WORDS),
-            *(_use_policy, scored, lambda: {"policy.npz": _policy()["policy.npz"]}),
+            "policy, card",
+            "policy.json",
+            lambda: _policy()["policy.json"],
+            _WORDS,
+            _use_policy,
+            scored,
+            lambda: {"policy.npz": _policy()["policy.npz"]},
         ),
         log("Parquet", "log.parquet", partial(_own_log, "log.parquet"), _PARQUET),
         log("px4_ulog", "log.ulg", _ulog, _BYTES, "px4_ulog"),
         *(
             log(
-                *(name, f"flight.{kind}", lambda kind=kind: _bag(kind)[f"flight.{kind}"], _BYTES),
-                *("rosbag", "ardrone2", lambda: {"flight.topics.yaml": TOPIC_MAP}),
+                name,
+                f"flight.{kind}",
+                lambda kind=kind: _bag(kind)[f"flight.{kind}"],
+                _BYTES,
+                "rosbag",
+                beside=lambda: {"flight.topics.yaml": TOPIC_MAP},
             )
             for name, kind in _BAGS.items()
         ),
         Form(
-            *("rosbag 2, metadata", "metadata.yaml", lambda: _bag("db3")["metadata.yaml"], _WORDS),
-            *(_folder_bag, ()),
-            lambda: {"flight.db3": _bag("db3")["flight.db3"], "map.yaml": TOPIC_MAP},
+            "rosbag 2, metadata",
+            "metadata.yaml",
+            lambda: _bag("db3")["metadata.yaml"],
+            _WORDS,
+            _folder_bag,
+            beside=lambda: {"flight.db3": _bag("db3")["flight.db3"], "map.yaml": TOPIC_MAP},
         ),
         Form(
-            *("topic map", "flight.topics.yaml", lambda: TOPIC_MAP, _WORDS),
+            "topic map",
+            "flight.topics.yaml",
+            lambda: TOPIC_MAP,
+            _WORDS,
             lambda path: _log(path.with_name("flight.bag"), "rosbag"),
             beside=lambda: {"flight.bag": _bag("bag")["flight.bag"]},
         ),

@@ -12,9 +12,9 @@ from tests.support.imu_flights import imu_flight, pose_removed
 from tests.support.own_effects import renamed
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
+from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.report.files import report_data
-from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 

@@ -2,7 +2,7 @@
 diagnosed.
 
 The excerpts lie in ``tests/data``, with where they come from; the whole flights are in
-``tests/studies/test_measured_flights.py``.
+``tests/evidence/test_measured_flights.py``.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ import pytest
 
 from tests.support.data_paths import excerpt
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.evidence.measured_flights import compare, imu_check, linear_drag
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.wrench_series import estimate_log
-from windwrench.studies.measured_flights import compare, imu_check, linear_drag
 
 VEHICLE = load_vehicle("crazyflie")
 NANOBENCH = ("B2_circle_fast_rep3", "B5_helix_fast_rep2")

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.flown import VEHICLE, recorded, settings, without_pose
+from tests.support.flown import VEHICLE, recorded, resting, settings, without_pose
 from tests.support.imu_flights import imu_flight
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.plant import PlantSettings
 from windwrench.identification import predict
 from windwrench.identification.causal_states import causal_states
-from windwrench.identification.logs.flight_log import FlightLog, with_rows
+from windwrench.identification.logs.flight_log import with_rows
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import log_signals
@@ -171,8 +171,7 @@ def test_a_state_is_taken_as_it_is():
     rng = np.random.default_rng(0)
     n, period = 400, 0.01
     t = period * np.arange(n) + rng.uniform(-1e-4, 1e-4, n)
-    pose = np.zeros((n, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-    log = FlightLog(t, *pose, np.zeros((n, 4)), name="falling")
+    log = resting(t, rotor_speeds=np.zeros((n, 4)), name="falling")
     state = rng.normal(size=(n, 13))
     state[:, 3:7] /= np.linalg.norm(state[:, 3:7], axis=1)[:, None]
     state[:, 10:12] = 0.0
@@ -251,12 +250,11 @@ def test_a_turn_at_one_rate_is_no_change():
     t = np.arange(1500) * 0.005
     half = 0.4 * t
     turned = np.column_stack([np.cos(half), 0.0 * t, 0.0 * t, np.sin(half)])
-    speeds = np.full((1500, 4), VEHICLE.hover_rate)
-    log = FlightLog(t, np.outer(t, [1.0, -0.5, 0.2]), turned, speeds)
+    log = resting(t, position=np.outer(t, [1.0, -0.5, 0.2]), quaternion=turned)
     found = prediction_errors([log], VEHICLE)
     assert np.all(found.still < 2e-3)
     assert np.all(found.model < 2e-3)
-    with pytest.raises(InputError, match=r"flight: expected poses at one rate, unbroken for 4 s"):
+    with pytest.raises(InputError, match=r"flight: expected a pose, unbroken for 4 s"):
         prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [[(0.0, 2.0)]])
 
 

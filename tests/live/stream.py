@@ -1,9 +1,13 @@
 """Flights as streams: messages by arrival, with the faults that links have."""
 
+import json
+import os
 import socket
 import threading
+from contextlib import contextmanager, suppress
 from functools import cache
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 
@@ -19,6 +23,9 @@ from windwrench.live.tallies import Tallies
 from windwrench.runtime.errors import InputError
 
 VEHICLE = load_vehicle("ardrone2")
+NED = np.array([1.0, -1.0, -1.0])
+HALF = np.array([1.0, 1.0, -1.0, -1.0])
+MOTORS = [3, 1, 0, 2]  # the kit's rotors that are PX4's motors 1 to 4
 
 
 @cache
@@ -45,11 +52,40 @@ def as_objects(flown):
     ]
 
 
-def as_csv(flown):
-    objects = as_objects(flown)
-    lines = [",".join(objects[0])]
-    lines += [",".join(repr(value) for value in one.values()) for one in objects]
-    return "\n".join(lines) + "\n"
+def rpm_of(flown, k):
+    return [round(w * 30 / np.pi) for w in flown["rotor_speeds"][k][MOTORS]]
+
+
+def send_rotors(mav, esc_status, us, flown, k):
+    mav.send(esc_status(0, us, rpm_of(flown, k), [11.0] * 4, [1.0] * 4))
+
+
+def send_odometry(mav, us, flown, k):
+    pose = *flown["position"][k] * NED, flown["quaternion"][k] * HALF
+    mav.odometry_send(us, 1, 12, *pose, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0)
+
+
+def as_lines(flown):
+    return "".join(json.dumps(one) + "\n" for one in as_objects(flown))
+
+
+@contextmanager
+def standard_input(text, pieces=1):
+    """Standard input is a pipe with a text, written in pieces."""
+    data = text.encode() if isinstance(text, str) else text
+    size = max(-(-len(data) // pieces), 1)
+    read, write = os.pipe()
+
+    def feed():
+        with suppress(BrokenPipeError), os.fdopen(write, "wb", 0) as file:
+            for i in range(0, len(data), size):
+                file.write(data[i : i + size])
+
+    feeder = threading.Thread(target=feed)
+    feeder.start()
+    with os.fdopen(read) as file, mock.patch("sys.stdin", file):
+        yield
+    feeder.join()
 
 
 def wrench_of(outputs):
@@ -98,6 +134,7 @@ class Pipeline:
     def take(self, samples):
         for sample in samples:
             self.session.take(sample)
+            self.session.watch.look(sample.arrival)
         return self
 
     def wrench(self):
@@ -107,14 +144,10 @@ class Pipeline:
 class Running:
     """A session of a source, in a thread of its own."""
 
-    def __init__(
-        self, text, vehicle=VEHICLE, log_map=None, descriptor=None, kept=None, record=None,
-        **settings
-    ):  # fmt: skip
+    def __init__(self, text, vehicle=VEHICLE, log_map=None, kept=None, record=None, **settings):
         self.tallies, self.kept, self.failed = Tallies(), kept or Kept(), []
         self.outputs = self.kept.items
         self.source = make_source(text, vehicle, log_map, self.tallies)
-        self.source.descriptor = descriptor  # of a table
         self.session = Session(
             self.source,
             LiveSettings(**{"wait": 0.0} | settings),

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from tests.live import stream
-from tests.live.stream import VEHICLE, Pipeline
+from tests.live.stream import (
+    VEHICLE,
+    Pipeline,
+    as_objects,
+    rpm_of,
+    send_odometry,
+    send_rotors,
+)
 from windwrench.live.clock_line import ClockLine
 from windwrench.live.messages import SECOND
 from windwrench.live.sources.open import make_source
@@ -41,22 +48,23 @@ def times_of(flown, ours, jitter=JITTER, bursts=(), in_order=False):
     return sorted(found, key=lambda one: one[0])
 
 
-class Json:
-    """Objects of JSON."""
+FIELDS = {
+    "motors": [f"omega{i}" for i in range(1, 5)],
+    "pose": ["px", "py", "pz", "qw", "qx", "qy", "qz"],
+}
 
-    def __init__(self, flown):
-        self.flown = flown
+
+class Json:
+    """Objects of JSON, of one sender until ``moves``, s, and then of another."""
+
+    def __init__(self, flown, moves=np.inf):
+        self.flown, self.objects, self.moves = flown, as_objects(flown), moves
         self.source = make_source("udp-json://:9", VEHICLE, None, Tallies())
 
     def message(self, kind, k, stamp):
-        flown = self.flown
-        named = {"t": stamp} if stamp is not None else {}
-        if kind == "motors":
-            values = flown["rotor_speeds"][k]
-            return named | {f"omega{i + 1}": float(x) for i, x in enumerate(values)}, "here"
-        values = [*flown["position"][k], *flown["quaternion"][k]]
-        names = ("px", "py", "pz", "qw", "qx", "qy", "qz")
-        return named | dict(zip(names, map(float, values), strict=True)), "here"
+        named = {} if stamp is None else {"t": stamp}
+        named |= {name: self.objects[k][name] for name in FIELDS[kind]}
+        return named, ("127.0.0.1", 1 + int(self.flown["t"][k] > self.moves))
 
 
 class Mavlink:
@@ -75,16 +83,12 @@ class Mavlink:
 
     def message(self, kind, k, stamp):
         flown, us = self.flown, round(1e6 * (stamp or 0.0))
-        if kind == "motors":
-            rpm = [round(w * 30 / np.pi) for w in flown["rotor_speeds"][k][[3, 1, 0, 2]]]
-            if stamp is None:
-                self.sender.esc_telemetry_1_to_4_send(*[[0] * 4] * 4, rpm, [0] * 4)
-            else:
-                self.sender.send(self.esc_status(0, us, rpm, [11.0] * 4, [1.0] * 4))
+        if kind == "pose":
+            send_odometry(self.sender, us, flown, k)
+        elif stamp is None:
+            self.sender.esc_telemetry_1_to_4_send(*[[0] * 4] * 4, rpm_of(flown, k), [0] * 4)
         else:
-            x, y, z = flown["position"][k] * [1, -1, -1]
-            q = flown["quaternion"][k] * [1, 1, -1, -1]
-            self.sender.odometry_send(us, 1, 12, x, y, z, q, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0)
+            send_rotors(self.sender, self.esc_status, us, flown, k)
         return self.parser.parse_buffer(self.bytes.pop())[0]
 
 
@@ -94,8 +98,7 @@ def played(sender, times, stamped, stamp_of=lambda kind, t: t):
     for at, kind, k in times:
         stamp = stamp_of(kind, float(flown["t"][k])) if kind in stamped else None
         message = sender.message(kind, k, stamp)
-        live.session.take(sender.source.decode(message, round(at * SECOND)))
-        live.session.watch.look(round(at * SECOND))
+        live.take([sender.source.decode(message, round(at * SECOND))])
     return live
 
 
@@ -195,14 +198,9 @@ def test_a_sender_that_restarts_is_followed_after_20_messages(kind, stamped, rat
 @pytest.mark.parametrize("stamped", [("motors", "pose"), ("pose",)])
 def test_another_sender_in_place_of_a_silent_one_is_another_clock_at_once(stamped):
     """Also where the first message that comes of it has no stamp."""
-    flown, live = flight(), Pipeline()
-    sender = Json(flown)
-    for at, kind, k in times_of(flown, lambda t: t + 2.5 * (t > 4.0)):
-        t, other = float(flown["t"][k]), flown["t"][k] > 4.0
-        stamp = t - 4.0 * other if kind in stamped else None
-        fields, _ = sender.message(kind, k, stamp)
-        message = fields, ("127.0.0.1", 1 + int(other))
-        live.session.take(sender.source.decode(message, round(at * SECOND)))
+    flown = flight()
+    times = times_of(flown, lambda t: t + 2.5 * (t > 4.0))
+    live = played(Json(flown, 4.0), times, stamped, lambda kind, t: t - 4.0 * (t > 4.0))
     assert live.tallies.found.keys() <= {"clock jumps", "late", "waiting"}
     assert live.tallies.counts["clock jumps"] == 1
     assert len(live.outputs) >= 795
@@ -236,13 +234,12 @@ def test_a_stream_without_any_stamp_is_in_our_time_and_says_so():
 @pytest.mark.parametrize(("simulator", "camera"), [(0.9, 1.0), (0.5, 1.0), (1.0, 0.9), (1.5, 1.0)])
 def test_two_clocks_of_different_rates_are_one_time(simulator, camera):
     """Rotor speeds in the simulator's time, poses stamped from 1970 on another clock."""
-    flown, live = flight(), Pipeline()
-    sender = Json(flown)
-    for at, kind, k in times_of(flown, lambda t: t / simulator, JITTER):
-        t = float(flown["t"][k])
-        stamp = 1.7e9 + camera * t / simulator if kind == "pose" else t
-        message = sender.message(kind, k, stamp)
-        live.session.take(sender.source.decode(message, round(at * SECOND)))
+    live = played(
+        Json(flight()),
+        times_of(flight(), lambda t: t / simulator),
+        ("motors", "pose"),
+        lambda kind, t: 1.7e9 + camera * t / simulator if kind == "pose" else t,
+    )
     assert live.session.clocks.count == 2
     assert live.tallies.counts["too late"] <= 8  # 1 %
     assert error_of(live) < 0.04

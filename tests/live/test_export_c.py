@@ -27,17 +27,17 @@ from tests.support.exported_c.hostile import PERIOD, hostile
 from tests.support.paths import ROOT
 from tests.support.synthetic_wrench import TICKS, observations
 from windwrench.controllers import Tracker
-from windwrench.controllers.observation import FORCE_X, FORCE_Y, TORQUE_Z, VELOCITY_Y
+from windwrench.controllers.observation import FORCE_X, TORQUE_Z, VELOCITY_Y
 from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import compile_effects, get, parse_setting
 from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZE
 from windwrench.estimator import UKFTuning
+from windwrench.evidence.recovery import QUIET_NOISES, exact_flight, measured
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.c_numbers import FUNCTIONS
 from windwrench.live.export_c.effect_code import exportable_effects
 from windwrench.live.export_c.policies import PARTICLES, briefing_of
-from windwrench.studies.recovery import QUIET_NOISES, exact_flight, measured
 
 LARGEST = 0.01  # of a standard deviation
 QUICK = 1_200  # steps of each of five flights
@@ -60,9 +60,8 @@ def assert_same(worst):
 
 
 FLOWN = [
-    *((e, n) for e in ESTIMATORS for n in FLIGHTS if e == "ekf" or "brisk" in n or "effects" in n),
+    *((e, n) for e in ESTIMATORS for n in FLIGHTS if e == "ukf" or "brisk" in n or "effects" in n),
     ("constant-gain", "crazyflie, 50 poses a second"),
-    ("ukf", "crazyflie, 50 poses a second"),
 ]
 
 
@@ -70,8 +69,7 @@ FLOWN = [
     ("estimator", "name", "gate", "imu"),
     [
         *((estimator, name, 0.9999, False) for estimator, name in FLOWN),
-        ("ekf", "crazyflie, brisk", None, False),
-        ("ekf", TURNING, 0.9999, True),
+        ("ukf", "crazyflie, brisk", None, False),
         ("ukf", TURNING, 0.9999, True),
     ],
 )
@@ -96,8 +94,8 @@ SUFFERED = ("world_tilt:ax=0.03,ay=-0.05", "marker_offset:mx=0.03,mz=0.05", "att
     ("estimator", "effects", "part", "size"),
     [
         ("constant-gain", SUFFERED, "position", 0.02),
-        ("ekf", SUFFERED, "position", 0.02),
-        ("ekf", ("battery_sag:n=1.7",), "force", 0.2),
+        ("ukf", SUFFERED, "position", 0.02),
+        ("ukf", ("battery_sag:n=1.7",), "force", 0.2),
     ],
 )
 def test_c_undoes_what_is_declared_of_pose_and_battery(estimator, effects, part, size, tmp_path):
@@ -118,10 +116,10 @@ def test_c_undoes_what_is_declared_of_pose_and_battery(estimator, effects, part,
 HOSTILE = [
     ("constant-gain", None, False, "double"),
     ("constant-gain", 0.9999, False, "single"),
-    ("ekf", None, False, "single"),
-    ("ekf", 0.9999, True, "double"),
     ("ukf", None, True, "single"),
+    ("ukf", None, False, "single"),
     ("ukf", 0.9999, False, "double"),
+    ("ukf", 0.9999, True, "double"),
 ]
 ROUNDING = {"single": 0.05, "double": 1e-6}  # of a standard deviation
 OTHERS = [(*given, *(ROUNDING.keys() - {precision})) for *given, precision in HOSTILE]
@@ -184,37 +182,34 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
     model = load_vehicle("ardrone2")
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
     model = declaring(model, *effects)
-    names = {"ekf": "sac-0", "ukf": "tracker", "constant-gain": "lead"}
-    policy = exportable_policy(names[estimator])
     few = model.with_effects(model.effects[0])
-    for number, exported in enumerate(
-        (
-            export_c(model, estimator, policy=policy),
-            export_c(few, estimator, gate=None, policy=policy, precision="double"),
-        )
-    ):
-        folder = write(exported, tmp_path / str(number))
-        run(compiler, *STRICT, "-fsyntax-only", "windwrench_filter.c", "main.c", cwd=folder)
+    names = {"ukf": ("tracker", "sac-0"), "constant-gain": ("lead",)}
+    for name in names[estimator]:
+        policy = exportable_policy(name)
+        for precision, exported in (
+            ("single", export_c(model, estimator, policy=policy)),
+            ("double", export_c(few, estimator, gate=None, policy=policy, precision="double")),
+        ):
+            folder = write(exported, tmp_path / f"{name}-{precision}")
+            run(compiler, *STRICT, "-fsyntax-only", "windwrench_filter.c", "main.c", cwd=folder)
 
 
 def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     needs("nm")
     model = declaring(load_vehicle("ardrone2"), *exportable_effects())
     allowed = {*(f"{name}f" for name in FUNCTIONS), "memcpy", "memset"}
-    for estimator in ("ekf", "ukf"):
-        exported = export_c(model, estimator, policy=exportable_policy("sac-0"))
-        folder = write(exported, tmp_path / estimator)
-        # a compiler that optimises may make one call of two (sincosf), or none
-        plain = ("-std=c99", "-O0", "-fno-stack-protector", "-c")
-        run("gcc", *plain, "windwrench_filter.c", cwd=folder)
-        called = run("nm", "-u", "windwrench_filter.o", cwd=folder).split()[1::2]
-        assert set(called) - {"_GLOBAL_OFFSET_TABLE_"} <= allowed
+    folder = write(export_c(model, policy=exportable_policy("sac-0")), tmp_path)
+    # a compiler that optimises may make one call of two (sincosf), or none
+    plain = ("-std=c99", "-O0", "-fno-stack-protector", "-c")
+    run("gcc", *plain, "windwrench_filter.c", cwd=folder)
+    called = run("nm", "-u", "windwrench_filter.o", cwd=folder).split()[1::2]
+    assert set(called) - {"_GLOBAL_OFFSET_TABLE_"} <= allowed
 
 
 @pytest.mark.parametrize(
     ("estimator", "steps"),
     [
-        *(("constant-gain", 5_000), ("ekf", 5_000), ("ukf", 3_000)),
+        *(("constant-gain", 5_000), ("ukf", 3_000)),
         *(pytest.param(e, 1_000_000, marks=pytest.mark.slow) for e in ESTIMATORS),
     ],
 )
@@ -242,7 +237,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
     names = [n for n in exportable_effects() if get(n).kind != "body"]
     assert {"rotor_drag", "body_drag", "inflow_thrust", "motor_lag", "ground_effect"} <= set(names)
     model = declaring(model, *names)
-    folder = write(export_c(model, "ekf"), tmp_path)
+    folder = write(export_c(model, "ukf"), tmp_path)
     # its functions are the file's own: here they are called from outside
     text = (folder / "windwrench_filter.c").read_text()
     (folder / "effects.c").write_text(text.replace("static void effect_", "void effect_"))
@@ -278,31 +273,37 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             np.testing.assert_allclose(given[which], double[which], rtol=0, atol=1e-5 * scale)
 
 
+def commands(c, seen):
+    """The commands (n,) of the C along observations (n, 8)."""
+    c.c.ww_policy_init(c._policy)
+    e, out = c.estimate, []
+    for row in seen:
+        e.force[:], e.torque[:], e.velocity[1] = row[:3], row[3:6], row[VELOCITY_Y]
+        out.append(c.policy(e))
+    return np.array(out)
+
+
 def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
     policy = exportable_policy("sac-0")
     c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
-    python, rng, command = load_policy(POLICY), np.random.default_rng(0), 0.0
-    e = c.estimate
-    for _ in range(50):
-        force, torque = rng.normal(0.3, 0.3, 3), rng.normal(0.0, 0.03, 3)
-        e.force[:], e.torque[:], e.velocity[1] = force, torque, 0.2
-        mine = c.policy(e)
-        observation = np.array([*force, *torque, 0.2, command])
-        command = float(python(observation)[0])
-        assert mine == pytest.approx(command, abs=2e-5)
+    python, rng = load_policy(POLICY), np.random.default_rng(0)
+    force, torque = rng.normal(0.3, 0.3, (50, 3)), rng.normal(0.0, 0.03, (50, 3))
+    seen = np.column_stack([force, torque, np.full(50, 0.2), np.zeros(50)])
+    wanted = np.zeros(51)
+    for k in range(50):
+        wanted[k + 1] = python(np.append(seen[k, :7], wanted[k]))[0]
+    np.testing.assert_allclose(commands(c, seen), wanted[1:], rtol=0, atol=2e-5)
 
 
 def test_the_law_with_lead(tmp_path):
     policy = exportable_policy("lead")
     c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
-    e = c.estimate
-    torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
-    force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
+    seen = np.zeros((5, 8))
+    seen[:, TORQUE_Z] = torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
+    seen[:, FORCE_X] = force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
     x = torque / np.maximum(force, 0.183)
     wanted = np.clip(-(11.35 * x + 2.79 * np.diff(x, prepend=x[0]) / 0.08), -1.0, 1.0)
-    for k in range(5):
-        e.force[0], e.torque[2] = force[k], torque[k]
-        assert c.policy(e) == pytest.approx(wanted[k], abs=1e-5)
+    np.testing.assert_allclose(commands(c, seen), wanted, rtol=0, atol=1e-5)
 
 
 def test_the_example_finds_the_force_that_it_is_given(tmp_path):
@@ -324,7 +325,6 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
     flown = flight(TURNING, 150, faults=False)
     for estimator, ram, instructions in (
         ("constant-gain", 1_152, 8_400),
-        ("ekf", 16_384, 168_000),
         ("ukf", 16_384, 168_000),
     ):
         exported = export_c(vehicle_of(TURNING), estimator)
@@ -412,17 +412,6 @@ def c(tmp_path_factory):
     policy = exportable_policy("tracker")
     exported = export_c(VEHICLE, "constant-gain", 200.0, 0.45, policy=policy)
     return CompiledFilter(exported, tmp_path_factory.mktemp("tracker"))
-
-
-def commands(c, seen):
-    """The commands (n,) of the C along observations (n, 8)."""
-    c.c.ww_policy_init(c._policy)
-    e, out = c.estimate, []
-    for row in seen:
-        e.torque[2], e.force[0], e.force[1] = row[TORQUE_Z], row[FORCE_X], row[FORCE_Y]
-        e.velocity[1] = row[VELOCITY_Y]
-        out.append(c.policy(e))
-    return np.array(out)
 
 
 def fans(count, decisions, rng):

@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.live.stream import VEHICLE, Running, flight, free_port
+from tests.live.stream import (
+    HALF,
+    MOTORS,
+    NED,
+    VEHICLE,
+    Running,
+    flight,
+    free_port,
+    send_odometry,
+    send_rotors,
+)
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.live.sources.esc_status import CHECKSUM, add_esc_status
@@ -19,9 +29,6 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 
 ESC_STATUS = add_esc_status(common)
-NED = np.array([1.0, -1.0, -1.0])
-HALF = np.array([1.0, 1.0, -1.0, -1.0])
-MOTORS = [3, 1, 0, 2]  # the kit's rotors that are PX4's motors 1 to 4
 
 
 class Autopilot(Running):
@@ -51,7 +58,7 @@ class Autopilot(Running):
         q = flight()["quaternion"][k] * HALF
         us = self.us(k)
         if kind == "ODOMETRY":
-            self.mav.odometry_send(us, 1, 12, x, y, z, q, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0)
+            send_odometry(self.mav, us, flight(), k)
         elif kind == "ATT_POS_MOCAP":
             self.mav.att_pos_mocap_send(us, q, x, y, z)
         elif kind == "VISION_POSITION_ESTIMATE":
@@ -65,8 +72,7 @@ class Autopilot(Running):
         return round(flight()["t"][k] * 1e6)
 
     def esc(self, k):
-        rpm = [round(w * 30 / np.pi) for w in flight()["rotor_speeds"][k][MOTORS]]
-        self.mav.send(ESC_STATUS(0, self.us(k), rpm, [11.0] * 4, [1.0] * 4))
+        send_rotors(self.mav, ESC_STATUS, self.us(k), flight(), k)
 
     def end(self):
         super().end()
@@ -131,7 +137,7 @@ def test_a_flight_with_faults():
 
 def test_of_two_vehicles_at_one_address_one_is_listened_to():
     """The second has another number and comes from elsewhere; a ground station disturbs nobody."""
-    pilot = Autopilot()
+    pilot, away = Autopilot(), flight() | {"position": flight()["position"] + [9.0, 0.0, 0.0]}
     other, station = (
         mavutil.mavlink_connection(
             f"udpout:127.0.0.1:{pilot.port}",
@@ -147,9 +153,7 @@ def test_of_two_vehicles_at_one_address_one_is_listened_to():
         if k > 20:
             q = flight()["quaternion"][k] * HALF
             other.mav.att_pos_mocap_send(pilot.us(k), q, 9.0, 0.0, 0.0)
-            other.mav.odometry_send(
-                pilot.us(k), 1, 12, 9.0, 0.0, 0.0, q, *[0] * 6, *[[0.0] * 21] * 2, 0, 0, 0
-            )
+            send_odometry(other.mav, pilot.us(k), away, k)
 
     pilot.play(range(200), beside=beside)
     pilot.until(lambda: pilot.tallies.counts["other senders"] >= 179)

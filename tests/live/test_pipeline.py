@@ -12,7 +12,7 @@ from windwrench.dynamics import EffectSetting
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.wrench_series import estimate_log, tune_to_log
-from windwrench.live.messages import Sample
+from windwrench.live.messages import Measurement
 from windwrench.live.recorder import Recorder
 from windwrench.live.tallies import Tallies
 from windwrench.live.terminal_page import tuning_words
@@ -23,7 +23,7 @@ SECOND = 1_000_000_000
 def whole(flown, delay=0.01, start=100.0, drift=0.0):
     """Each row as one message: stamped by a clock that begins at 0, on its way for ``delay`` s."""
     return [
-        Sample(
+        Measurement(
             "row",
             round(t * SECOND),
             round((start + (1.0 - drift) * t + delay) * SECOND),
@@ -43,10 +43,10 @@ def split(flown, sensor_clock=0.0, sensor_delay=0.01):
     for k, t in enumerate(flown["t"]):
         speeds = flown["rotor_speeds"][k]
         arrival = round((50.0 + t + 0.004) * SECOND)
-        samples.append(Sample("esc", round(t * SECOND), arrival, rotor_speeds=speeds))
+        samples.append(Measurement("esc", round(t * SECOND), arrival, rotor_speeds=speeds))
         if k % 2 == 0:
             samples.append(
-                Sample(
+                Measurement(
                     "pose",
                     round((t + sensor_clock) * SECOND),
                     round((50.0 + t + sensor_delay) * SECOND),
@@ -172,7 +172,7 @@ def test_measured_rotor_speeds_are_waited_for():
     samples = []
     for sample in split(flown)[:900]:
         if sample.kind == "esc":
-            command = Sample("servo", sample.stamp, sample.arrival, command=np.full(4, 0.5))
+            command = Measurement("servo", sample.stamp, sample.arrival, command=np.full(4, 0.5))
             samples += [command] if 1e-9 * sample.stamp < 0.5 else [command, sample]
         else:
             samples.append(sample)

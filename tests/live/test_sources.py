@@ -1,13 +1,20 @@
-"""Tables on standard input, datagrams of JSON, and the simulated vehicle, through a session."""
+"""JSON on standard input and in datagrams, and the simulated vehicle, through a session."""
 
 import json
-import os
 import socket
 
 import numpy as np
 import pytest
 
-from tests.live.stream import VEHICLE, Running, as_csv, as_objects, flight, free_port
+from tests.live.stream import (
+    VEHICLE,
+    Running,
+    as_lines,
+    as_objects,
+    flight,
+    free_port,
+    standard_input,
+)
 from tests.live.test_pipeline import offline
 from windwrench.identification.logs.log_map import load_map
 from windwrench.identification.logs.reading import read_log
@@ -17,34 +24,34 @@ from windwrench.live.sources.open import make_source
 from windwrench.live.sources.senders import Senders
 from windwrench.live.tallies import Tallies
 
-OWN = "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n"
-
 
 def run_text(text, log_map=None, pieces=1):
-    """Run a table through a pipe; return the stream that it was."""
-    read, write = os.pipe()
-    data = text.encode() if isinstance(text, str) else text
-    running = Running("-", log_map=log_map, descriptor=read)
-    size = max(-(-len(data) // pieces), 1)
-    try:
-        for i in range(0, len(data), size):
-            os.write(write, data[i : i + size])
-    finally:
-        os.close(write)
-    running.thread.join()
-    os.close(read)
-    return running
+    """Run a text from a pipe; return the stream that it was."""
+    with standard_input(text, pieces):
+        running = Running("-", log_map=log_map)
+        running.thread.join()
+    return running.end()
 
 
 @pytest.mark.parametrize("pieces", [1, 977])
-def test_a_table_on_standard_input_is_the_log(pieces):
-    stream = run_text(as_csv(flight()), pieces=pieces)
+def test_lines_on_standard_input_are_the_log(pieces):
+    stream = run_text(as_lines(flight()), pieces=pieces)
     np.testing.assert_allclose(stream.wrench(), offline(flight()), atol=1e-9, rtol=0)
     assert stream.session.ended == "the source ended"
     assert not stream.tallies.counts
 
 
-def test_a_table_of_another_kind_by_its_map(tmp_path):
+def test_a_file_on_standard_input_is_not_paced(tmp_path, monkeypatch):
+    (tmp_path / "flight.jsonl").write_text(as_lines(flight()).rstrip())  # no end of the last line
+    with (tmp_path / "flight.jsonl").open() as file:
+        monkeypatch.setattr("sys.stdin", file)
+        running = Running("-")
+        running.thread.join()
+    assert not running.source.paced
+    assert len(running.outputs) == 1601
+
+
+def test_fields_of_another_kind_by_their_map(tmp_path):
     """NED, degrees, rpm in PX4's order: field by field what the map makes of the whole table."""
     text = (
         "time_ms;N;E;D;roll;pitch;yaw;r1;r2;r3;r4;v\n"
@@ -63,35 +70,39 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
     log = read_log(tmp_path / "log.csv", map=tmp_path / "map.yaml")
     fields = FieldMap(wanted, VEHICLE, "here")
     header, *lines = text.splitlines()
-    for k, line in enumerate(lines):
-        values = dict(zip(header.split(";"), map(float, line.split(";")), strict=True))
-        sample = fields.sample("row", values, 0)
+    rows = [
+        dict(zip(header.split(";"), map(float, line.split(";")), strict=True)) for line in lines
+    ]
+    for k, row in enumerate(rows):
+        sample = fields.sample(row, 0)
         assert sample.stamp == round(log.t[k] * 1e9)
         np.testing.assert_allclose(sample.position, log.position[k])
         sign = np.sign(sample.quaternion @ log.quaternion[k])
         np.testing.assert_allclose(sign * sample.quaternion, log.quaternion[k], atol=1e-12)
         np.testing.assert_allclose(sample.rotor_speeds, log.rotor_speeds[k])
         assert sample.voltage == log.voltage[k]
-    assert run_text(text, wanted).session.estimates == 3
+    assert run_text("\n".join(map(json.dumps, rows)), wanted).session.estimates == 3
 
 
-@pytest.mark.parametrize("bad", [(500,), (1,), (1, 2, 3)])
+@pytest.mark.parametrize("bad", [(500,), (0,), (0, 1, 2)])
 def test_bad_lines_are_counted_wherever_they_stand(bad):
-    """Also right behind the header, such as a line of units."""
-    lines = as_csv(flight()).splitlines()
+    lines = as_lines(flight()).splitlines()
     for k in bad:
         lines[k] = lines[k][:20]
-    stream = run_text("\n".join(lines))
+    stream = run_text("\n\n".join(lines))  # empty lines are none
     assert not stream.failed
-    assert stream.tallies.counts == {"malformed": len(bad)}
+    found = stream.tallies.counts
+    assert found["malformed"] == len(bad)
     assert len(stream.outputs) == len(flight()["t"]) - len(bad)
     said = stream.tallies.news()
-    assert "standard input: left out as malformed: a row of 2 field(s)" in said[0]
+    assert len(said) == len(bad)
+    assert "standard input: left out as malformed: b'{" in said[0]
+    assert said[0].endswith("; expected a line of JSON")
 
 
-def test_a_table_without_a_good_line_is_refused_after_100():
-    said = run_text(OWN + 200 * "1,2\n").failed[0]
-    assert "all of the first 100 messages are malformed, the first: a row of 2 field(s)" in said
+def test_lines_without_a_good_one_are_refused_after_100():
+    said = run_text(200 * "[1, 2]\n").failed[0]
+    assert "standard input: all of the first 100 messages are malformed, the first: 1; exp" in said
 
 
 class Sender(Running):
@@ -226,52 +237,39 @@ def test_what_is_missing_in_a_senders_count_is_lost_unless_it_was_late(wraps, nu
     assert lost == [0, 0, 3, 2, 2]
 
 
-def first_datagram(data):
-    """Nothing else comes: 100 times the same."""
-    sender = Sender()
-    for _ in range(100):
-        sender.send(data)
-    sender.thread.join()
-    return sender.end()
-
-
 @pytest.mark.parametrize(
-    ("run", "data", "said"),
+    ("data", "said"),
     [
-        (run_text, "t,px,py\n1,2,3\n", "no column 'pz' of position, 'qw' of attitude"),
-        (run_text, as_csv(flight())[:40], "expected"),
-        (run_text, OWN + "1,2,x" + ",1" * 9, "not a number"),
-        (run_text, OWN + "1,2\n", "row of 2 field"),
-        (run_text, OWN + "0,0,0,1,2,0,0,0" + ",9" * 4, "length"),
-        (run_text, "", "no message came"),
-        (run_text, b"\x00\x01\x02" * 50_000, "a line of more than"),
-        (first_datagram, b"hello", "expected a datagram of JSON"),
-        (first_datagram, b"[1, 2]", "1; expected an object"),
-        (first_datagram, b"null", "null; expected an object"),
-        (first_datagram, b"[null]", "null; expected an object"),
-        (first_datagram, b"[]", "[]; expected an object"),
-        (first_datagram, b"3", "3; expected an object"),
-        (first_datagram, b'"x"', '"x"; expected an object'),
-        (first_datagram, b"NaN", "NaN; expected an object"),
-        (first_datagram, b"", "expected a datagram of JSON"),
-        (first_datagram, b"{}", "none of the fields"),
-        (first_datagram, b'{"t": NaN, "px": 1}', "nan; expected a time"),
-        (first_datagram, b'{"t": {"s": [1]}, "px": 1}', "expected a time"),
-        (first_datagram, b'{"t": 1, "px": "\xff\xfe"}', "expected a datagram of JSON"),
-        (first_datagram, b'{"t": 1, "\\ud800": 1}', "none of the fields"),
-        (first_datagram, b'{"t": 1, "px": 1, "py": 2}', "no field pz"),
-        (first_datagram, b'{"t": "soon", "px": 1}', "expected a time"),
-        (first_datagram, b'{"t": 1, "speed": 4}', "none of the fields"),
+        ("", "no message came before it ended; expected lines of JSON with t, px"),
+        (as_lines(flight()).splitlines()[0], "row came, which is no estimate yet"),
+        ("t,px,py\n1,2,3\n", "the first: b't,px,py'; expected a line of JSON"),
+        (b"\x00\x01\x02" * 50_000, "a line of more than 16384 bytes"),
+        (b"hello", "expected a line of JSON"),
+        (b"[1, 2]", "1; expected an object"),
+        (b"null", "null; expected an object"),
+        (b"[null]", "null; expected an object"),
+        (b"[]", "[]; expected an object"),
+        (b"3", "3; expected an object"),
+        (b'"x"', '"x"; expected an object'),
+        (b"NaN", "NaN; expected an object"),
+        (b"{}", "none of the fields"),
+        (b'{"t": NaN, "px": 1}', "nan; expected a time"),
+        (b'{"t": {"s": [1]}, "px": 1}', "expected a time"),
+        (b'{"t": 1, "px": "\xff\xfe"}', "expected a line of JSON"),
+        (b'{"t": 1, "\\ud800": 1}', "none of the fields"),
+        (b'{"t": 1, "px": 1, "py": 2}', "no field pz"),
+        (b'{"t": "soon", "px": 1}', "expected a time"),
+        (b'{"t": 1, "speed": 4}', "none of the fields"),
         (
-            first_datagram,
             b'{"t": 1, "omega1": "fast", "omega2": 1, "omega3": 1, "omega4": 1}',
             "expected a number",
         ),
-        (first_datagram, b"[" * 5000, "expected a datagram of JSON"),
+        (b'{"px":1,"py":1,"pz":1,"qw":2,"qx":0,"qy":0,"qz":0}', "length 2; exp"),
+        (b"[" * 5000, "expected a line of JSON"),
     ],
 )
-def test_what_is_no_table_and_no_datagram_is_refused(run, data, said):
-    assert said in run(data).failed[0]
+def test_what_is_no_json_is_refused(data, said):
+    assert said in run_text(data).failed[0]
 
 
 @pytest.mark.parametrize("data", [b"null", b"[]", b"hello", b'{"t": 1}', b"[" * 5000])
@@ -307,7 +305,7 @@ def test_a_source_that_says_nothing_and_a_second_one_at_its_address_end():
 def test_commands_beyond_their_range_are_no_commands():
     fields = FieldMap(load_map("cflib"), VEHICLE, "here")
     with pytest.raises(Malformed, match="expected 0 to 65535"):
-        fields.sample("row", {"timestamp": 1} | {f"motor.m{i}": 7e4 for i in range(1, 5)}, 0)
+        fields.sample({"timestamp": 1} | {f"motor.m{i}": 7e4 for i in range(1, 5)}, 0)
 
 
 def test_the_simulated_vehicle_feels_the_jet():

@@ -49,10 +49,7 @@ def test_the_words_say_what_to_set(scales, file, said):
 @pytest.mark.parametrize(("scales", "warned"), [((1.0, 2.3), True), ((1.0, 1.0), False)])
 def test_a_stream_warns_once_of_its_noise(monkeypatch, scales, warned):
     monkeypatch.setattr(WrenchEstimate, "noise_scales", shown(scales), raising=False)
-    live = Pipeline()
-    for sample in whole(flight()):
-        live.take([sample])
-        live.session.watch.look(sample.arrival)
+    live = Pipeline().take(whole(flight()))
     np.testing.assert_allclose(live.session.watch.noise_scales, scales)
     said = [line for line in live.tallies.news() if "noise" in line]
     assert len(said) == warned
@@ -67,7 +64,6 @@ def test_a_burst_of_noise_is_no_word(monkeypatch):
     for sample in whole(flight()):
         now[0] = 1e-9 * sample.stamp
         live.take([sample])
-        live.session.watch.look(sample.arrival)
     assert not live.tallies.news()
 
 
@@ -85,9 +81,6 @@ def test_noise_that_is_three_times_the_declared_is_found(times):
     flown, rng = dict(flight(20.0, "gentle")), np.random.default_rng(4)
     more = np.sqrt(times**2 - 1.0) * NOISE
     flown["position"] = flown["position"] + rng.normal(0.0, more, flown["position"].shape)
-    live = Pipeline()
-    for sample in whole(flown):
-        live.take([sample])
-        live.session.watch.look(sample.arrival)
+    live = Pipeline().take(whole(flown))
     assert live.session.watch.noise_scales[1] == pytest.approx(times, rel=0.2)
     assert any("Position noise is" in line for line in live.tallies.news()) == (times > 2.0)

@@ -1,15 +1,23 @@
 """The example scripts and the notebooks do what they say, each script in a short version."""
 
 import importlib
+import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.live.stream import flight, standard_input
+from tests.support.fake_vehicles import install_cflib, install_rclpy
 from tests.support.own_effects import joined
 from tests.support.paths import ROOT
+from windwrench.cli import app
 from windwrench.dynamics import effects as library
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.envs.recording import record_flight
+from windwrench.identification.logs.flight_log import FlightLog, write_log
 
 FOLDER = ROOT / "examples"
 
@@ -65,6 +73,57 @@ def test_an_effect_of_ones_own_is_found_with_its_coefficient(example, tmp_path, 
     assert found.effects[0].coefficients["k"] == pytest.approx(0.12, rel=0.08)
     assert found.after.force_rms < 0.8 * found.before.force_rms
     assert "tether: k = 0.1" in capsys.readouterr().out
+
+
+def test_a_coefficient_is_regressed_on_the_time_of_flights(example, tmp_path, capsys):
+    flights = tmp_path / "flights"
+    flights.mkdir()
+    for day in range(1, 5):
+        drag = EffectSetting("rotor_drag", dict.fromkeys(("kdx", "kdy"), (1.0 + 0.2 * day) * 1e-4))
+        flown = record_flight(load_vehicle("ardrone2"), (drag,), "circle", 12.0, day)
+        write_log(FlightLog(**flown, name=""), flights / f"2026-03-0{day}T1000.csv")
+    (flights / "notes.txt").write_text("no log\n", encoding="utf-8")
+    regress = example("drift_over_flights").main
+    slope, low, high = regress(flights, "ardrone2", "rotor_drag", "kdx")
+    assert slope == pytest.approx(0.2e-4, rel=0.1)
+    assert 0.0 < low < slope < high
+    said = capsys.readouterr().out
+    assert "notes.txt: left out: " in said
+    assert "kdx of rotor_drag: 2e-05 a day, 95 % [" in said
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(SystemExit, match="0 flights name rotor_drag"):
+        regress(empty, "ardrone2", "rotor_drag", "kdx")
+
+
+def estimated(capsys, *words):
+    """What live says of the lines that a script has printed."""
+    with standard_input(capsys.readouterr().out):
+        app(["live", "-", *words, "--json"], standalone_mode=False)
+    found = json.loads(capsys.readouterr().out)["result"]
+    found["counts"].pop("stops", None)  # of a busy machine
+    return found
+
+
+def test_a_crazyflies_log_is_estimated(example, monkeypatch, capsys):
+    install_cflib(monkeypatch, flight(6.0, "gentle", "crazyflie"))
+    example("live_crazyflie").main("radio://0/80/2M")
+    found = estimated(capsys, "--vehicle", "crazyflie", "--map", "cflib")
+    assert (found["estimates"], found["counts"], found["messages"]) == (601, {}, {"row": 601})
+    assert found["seconds"] == pytest.approx(6.0)
+    weight = 9.81 * 0.03
+    assert np.abs(found["force_mean_N"]).max() < 0.03 * weight  # its weak turbulence apart
+
+
+def test_topics_of_ros_2_are_estimated(example, monkeypatch, capsys):
+    install_rclpy(monkeypatch, flight())
+    example("live_ros2").main("/p", "/m")
+    found = estimated(capsys, "--vehicle", "ardrone2")
+    assert found["messages"] == {"motors": 1601, "pose": 1601}
+    assert found["counts"].keys() <= {"waiting"}
+    assert found["estimates"] >= 1599
+    difference = found["force_mean_N"] - flight()["force"].mean(axis=0)
+    assert np.abs(difference).max() < 0.1
 
 
 NOTEBOOKS = FOLDER / "notebooks"

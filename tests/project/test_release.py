@@ -4,7 +4,6 @@ form each, shown by a page that says what made it.
 
 import dataclasses
 import inspect
-import json
 import re
 import tomllib
 from importlib import import_module
@@ -30,56 +29,35 @@ from windwrench.estimator import (
     WrenchUKFBatch,
 )
 from windwrench.identification import FlightLog
-from windwrench.paper import ObserverTuning
+from windwrench.reproduction import ObserverTuning
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-CONDA_NAMES = {"mujoco": "mujoco-python", "matplotlib": "matplotlib-base"}
 
 
-def split(requirement):
-    name, bound = re.fullmatch(r"([\w.-]+)(>=[\d.]+)", requirement).groups()
-    return name.lower(), bound
-
-
-def test_codemeta_says_what_the_project_says():
-    data = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
-    assert data["name"] == PROJECT["name"]
-    assert data["version"] == windwrench.__version__
-    assert data["license"].endswith(f"/{PROJECT['license']}")
-    assert set(PROJECT["keywords"]) <= set(data["keywords"])
-    assert data["softwareRequirements"] == [split(r)[0] for r in PROJECT["dependencies"]]
-    assert PROJECT["requires-python"] in data["runtimePlatform"]
+def test_the_citation_says_what_the_project_says():
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    assert (cited["version"], cited["license"]) == (data["version"], PROJECT["license"])
-
-
-def test_the_conda_recipe_needs_what_the_project_needs():
-    text = (ROOT / "conda/meta.yaml").read_text(encoding="utf-8")
-    recipe = yaml.safe_load(re.sub(r"{%.*?%}|{{.*?}}", "x", text).replace("x\n\n", "\n", 1))
-    wanted = [" ".join((CONDA_NAMES.get(n, n), b)) for n, b in map(split, PROJECT["dependencies"])]
-    assert recipe["requirements"]["run"] == [f"python {PROJECT['requires-python']}", *wanted]
-    (build,) = tomllib.loads((ROOT / "pyproject.toml").read_text())["build-system"]["requires"]
-    assert " ".join(split(build)) in recipe["requirements"]["host"]
-    (script,) = recipe["build"]["entry_points"]
-    name, _, target = script.partition(" = ")
-    assert PROJECT["scripts"] == {name: target}
+    assert cited["license"] == PROJECT["license"]
+    assert cited["version"] == windwrench.__version__
 
 
 MOST = 5_400_000  # bytes, of all that git keeps of docs/ beside its films
 MOST_OF_FILMS = 3_000_000  # bytes, of these: a reader of README waits for them
 PICTURES = {".png", ".gif", ".jpg", ".webp", ".mp4", ".svg"}
-PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a section
-    "reproduction.md",
-    "leaderboard.md",
-    "speed.md",
-    "trust.md",
-    "identify.md",
-)
 MADE = re.compile(
-    r"^Made by `(?:windwrench|python -m studies\.)[^`]+`, "
+    r"^Made by `(?:windwrench|python -m evidence\.)[^`]+`, "
     r"windwrench \d[\w.]*, commits? ([0-9a-f, ]+)\.$",
     re.M,
 )
+
+
+KEPT = [  # commands and commits of the release page's table
+    (command, re.findall(r"[0-9a-f]{7,}", commits))
+    for command, commits in re.findall(
+        r"^\| \[.*? \| `(.+?)` \| [\d.]+ \| (.+?) \|$",
+        (ROOT / "docs/release.md").read_text(encoding="utf-8"),
+        re.M,
+    )
+]
 
 
 def git(*words):
@@ -126,29 +104,27 @@ def test_every_picture_and_data_file_is_used(tracked):
     unused = [
         path.relative_to(ROOT).as_posix()
         for path in tracked
-        if path.suffix not in (".md", ".py") and path not in linked
+        if path.suffix not in (".md", ".py", ".bib") and path not in linked
     ]
     assert not unused
 
 
-@pytest.mark.parametrize("name", PAGES_OF_COMMANDS)
-def test_a_page_says_the_commit_that_made_it(tracked, name):
-    found = MADE.findall((ROOT / "docs" / name).read_text(encoding="utf-8"))
-    assert found
+def test_pages_say_the_commits_that_made_them(tracked):
+    pages = [path for path in tracked if path.suffix == ".md"]
+    made = {path.name: MADE.findall(path.read_text(encoding="utf-8")) for path in pages}
+    assert {name for name, commits in made.items() if commits} >= {"reproduction.md", "trust.md"}
     if git("rev-parse", "--is-shallow-repository").strip() == "true":
         pytest.skip("a shallow clone does not have the commits")
-    for commit in {one for line in found for one in line.split(", ")}:
+    named = {one for found in made.values() for line in found for one in line.split(", ")}
+    for commit in named | {one for row in KEPT for one in row[1]}:
         git("merge-base", "--is-ancestor", commit, "HEAD")
 
 
-def test_every_page_with_a_command_s_line_is_listed(tracked):
-    pages = [path for path in tracked if path.suffix == ".md"]
-    made = {
-        path.relative_to(ROOT / "docs").as_posix()
-        for path in pages
-        if MADE.search(path.read_text(encoding="utf-8"))
-    }
-    assert made == set(PAGES_OF_COMMANDS)
+def test_kept_results_name_commits_that_have_their_code():
+    assert len(KEPT) > 15
+    for command, commits in KEPT:
+        for module in re.findall(r"python -m studies\.(\w+)", command):
+            assert git("ls-tree", commits[0], f"studies/{module}", f"studies/{module}.py"), command
 
 
 DOCUMENTED = (
@@ -204,7 +180,7 @@ def test_repr_is_short_and_says_what_it_is():
 
 @pytest.mark.parametrize(
     "package",
-    ["", ".controllers", ".dynamics", ".envs", ".estimator", ".identification", ".paper"],
+    ["", ".controllers", ".dynamics", ".envs", ".estimator", ".identification", ".reproduction"],
 )
 def test_a_prompt_shows_public_names_and_their_short_types(package):
     module = import_module(f"windwrench{package}")

@@ -2,6 +2,7 @@
 
 import json
 import os
+import subprocess
 import sys
 import sysconfig
 import venv
@@ -13,7 +14,7 @@ from tests.support.paths import ROOT
 from tests.support.programs import said as done
 from windwrench.cli import app
 
-CHECKOUT_ONLY = ("studies", "tests")
+CHECKOUT_ONLY = ("evidence", "reproduction", "tests")
 MOST_BYTES = 2_000_000  # of the wheel
 
 
@@ -99,7 +100,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
     assert not [
         name
         for name in wrapped
-        if name.startswith(("studies", "tests")) or "fuzz" in name or "trials" in name
+        if name.startswith(CHECKOUT_ONLY) or "fuzz" in name or "trials" in name
     ]
     entry = next(installed.glob("windwrench-*.dist-info")) / "entry_points.txt"
     assert "windwrench = windwrench.__main__:main" in entry.read_text()
@@ -107,6 +108,16 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
 
 def test_the_wheel_is_small(wheel):
     assert wheel.stat().st_size <= MOST_BYTES
+
+
+def test_the_paper_s_figures_need_a_checkout(empty, tmp_path):
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    words = [empty / "windwrench", "reproduce", "fig3"]
+    ended = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("error: reproduce: ")
+    assert "checkout" in ended.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from tests.fuzz.spoiling import LAUGHS
 from tests.support.paths import ROOT
@@ -289,7 +290,7 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
             parquet.write_table(
                 pyarrow.table(columns), path, compression=packing, use_dictionary=dictionary
             )
-            np.testing.assert_array_equal(read_log(path).t, columns["t"])
+            assert_array_equal(read_log(path).t, columns["t"])
     monkeypatch.setattr(tables, "LIMITS", replace(LIMITS, table_numbers=10_000))
     with pytest.raises(InputError, match="more than 10000 numbers in column"):
         read_log(path)
@@ -309,8 +310,8 @@ def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
         read_text(tmp_path, [f'"{line.replace(",", chr(34) + "," + chr(34))}"' for line in lines]),
         read_text(tmp_path, lines, "\r\n"),
     ):
-        np.testing.assert_array_equal(log.position, table[:, 1:4])
-        np.testing.assert_array_equal(log.t, table[:, 0])
+        assert_array_equal(log.position, table[:, 1:4])
+        assert_array_equal(log.t, table[:, 0])
     lines[777] = lines[777].replace(",", ",here", 1)
     with pytest.raises(InputError, match=r"column px, row 778 \(line 779\): 'here"):
         read_text(tmp_path, lines)

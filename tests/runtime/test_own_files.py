@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from tests.support.own_effects import HOSE, forget
-from windwrench.controllers.own_file import is_file_name
 from windwrench.dynamics import InputError, effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
 from windwrench.evaluation.tasks import make_pilot
 from windwrench.identification.report.words import effect_summary
+from windwrench.runtime.python_file import is_file_name
 
 LAWS = """
 import numpy as np

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
+from numpy.testing import assert_array_equal
 
 from windwrench.runtime.vector_lanes import WIDTH, LaneRecord, all_of, any_of, choose, corners
 
@@ -87,9 +88,9 @@ def test_each_lane_is_a_single_number(a, b):
     lanes["b"][0, 0], singles["b"][:, 0] = b, b
     work_at(lanes.ctypes.data)
     work_singly(singles)
-    np.testing.assert_array_equal(lanes["b"][0].T, singles["b"])
-    np.testing.assert_array_equal(lanes["out"][0, :11].T, singles["out"][:, :11])
-    np.testing.assert_array_equal(lanes["inner"]["more"][0].T, singles["inner"]["more"])
+    assert_array_equal(lanes["b"][0].T, singles["b"])
+    assert_array_equal(lanes["out"][0, :11].T, singles["out"][:, :11])
+    assert_array_equal(lanes["inner"]["more"][0].T, singles["inner"]["more"])
     large = [x > 5.0 for x in a]
     assert set(lanes["out"][0, 11]) == {2.0 if all(large) else float(any(large))}
 

@@ -8,7 +8,6 @@ from tests.support.paths import ROOT
 from windwrench.commands.tuning_file import load_tuning
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.envs.scenarios import SCENARIOS, find_scenario
-from windwrench.identification.fleet.manifest import read_manifest
 from windwrench.identification.logs.log_map import load_map
 from windwrench.identification.logs.readers.rosbag import given_map
 from windwrench.runtime.file_limits import LIMITS
@@ -23,7 +22,6 @@ LOADERS = {
     "topics": (given_map, "position: /a\nrotors: /b\nposition: /c\n", "position"),
     "tuning": (load_tuning, "force_walk: 1\nforce_walk: 2\n", "force_walk"),
     "training": (lambda path: load_config("sac", file=path), "steps: 1\nsteps: 2\n", "steps"),
-    "fleet": (read_manifest, "logs:\n- {log: a.csv, log: b.csv}\n", "log"),
 }
 
 

@@ -1,6 +1,7 @@
 """One flight as autopilots log it: it climbs, yaws and tilts, and its rotors speed up."""
 
 import numpy as np
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 FLIP = np.diag([1.0, -1.0, -1.0])  # our world and body seen from PX4's, each half a turn about x
@@ -34,15 +35,15 @@ def growth(t):
     return 1.0 + 0.1 * t
 
 
-def assert_motion(log, t, atol=1e-6):
-    """A log's valid rows are the flight at times t (N,)."""
+def assert_motion(log, t, atol=1e-6, turned=None):
+    """A log's valid rows are the flight at times t (N,), within ``atol`` m and ``turned`` rad."""
     position, turn = motion(t)
-    np.testing.assert_allclose(log.position[log.valid], position, atol=atol)
+    assert_allclose(log.position[log.valid], position, atol=atol)
     seen = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
-    assert (turn.inv() * seen).magnitude().max() < 10 * atol
+    assert (turn.inv() * seen).magnitude().max() < (turned or 10 * atol)
 
 
 def assert_inertial(log, t, atol=1e-3):
     gyro, force = inertial(t)
-    np.testing.assert_allclose(log.gyro, gyro, atol=atol)
-    np.testing.assert_allclose(log.accelerometer, force, atol=atol)
+    assert_allclose(log.gyro, gyro, atol=atol)
+    assert_allclose(log.accelerometer, force, atol=atol)

@@ -95,13 +95,11 @@ def policies():
 
 
 def write_bad_inputs(folder):
-    """Write every file into a folder, beside the folders ``fleet`` and ``nothing``."""
+    """Write every file into a folder, beside the empty folder ``nothing``."""
     found = forms("vehicle", "v") | forms("map", "m") | KEPT["files"] | logs() | policies()
     mine = "".join(f"{k}: {v}\n" for k, v in KEPT["vehicle"].items())
     found |= {"mine.yaml": mine, "v_deep.yaml": "[" * 200 + "]" * 200}
     for name, content in found.items():
         data = content.encode() if isinstance(content, str) else content
         (folder / name).write_bytes(data)
-    for name in ("fleet", "nothing"):
-        (folder / name).mkdir()
-    (folder / "fleet" / "flight.csv").write_text(table(), encoding="utf-8")
+    (folder / "nothing").mkdir()

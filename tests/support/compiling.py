@@ -10,23 +10,19 @@ import numpy as np
 import windwrench  # noqa: F401  registers the environments
 from tests.support.flown import VEHICLE, without_pose
 from tests.support.imu_flights import imu_flight
-from windwrench.estimator import WrenchEKF, ukf_lanes
+from windwrench.estimator import ukf_lanes
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
 from windwrench.identification.wrench_series import estimate_log
 
 
 def compile_environments():
-    """Step filters in lanes, the linearised filter, single environments and vectors of them.
+    """Step filters in lanes, single environments and vectors of them.
 
     What shares no code with ``compile_estimates``, which another process compiles meanwhile, comes
     first: the rest then finds on disk what that one has compiled.
     """
     ukf_lanes.step_address()
-    pose = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    estimator = WrenchEKF(VEHICLE)
-    estimator.reset(*pose)
-    estimator.step(np.full(4, 300.0), *pose)
     for name in ("FanTracking", "FanTracking2D", "WindHover"):
         step_one(name)
     for estimator in ("constant-gain", "ukf"):
@@ -36,7 +32,7 @@ def compile_environments():
 
 
 def step_one(name, **given):
-    env = gym.make(f"windwrench/{name}-v0", **given)
+    env = gym.make(f"windwrench/{name}-v1", **given)
     env.reset(seed=0)
     env.step(np.zeros(env.action_space.shape, dtype=np.float32))
     env.close()
@@ -44,7 +40,7 @@ def step_one(name, **given):
 
 def step_many(**given):
     envs = gym.make_vec(
-        "windwrench/FanTracking-v0",
+        "windwrench/FanTracking-v1",
         num_envs=9,
         vectorization_mode="vector_entry_point",
         **given,

@@ -8,17 +8,7 @@ import numpy as np
 
 from tests.support.autopilot_flight import FLIP, inertial, ned
 
-_CODES = {
-    "Q": "Q",
-    "f": "f",
-    "B": "B",
-    "H": "H",
-    "N": "16s",
-    "c": "h",
-    "L": "i",
-    "h": "h",
-    "C": "H",
-}
+_CODES = {"N": "16s", "c": "h", "L": "i", "C": "H"}  # letters other than those of ``struct``
 _FACTORS = {"c": 100.0, "C": 100.0, "L": 1e7}
 
 
@@ -31,7 +21,7 @@ def dataflash(messages):
     """
     out = [_format(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
     for number, (name, letters, columns) in enumerate(messages, 10):
-        layout = "<" + "".join(_CODES[letter] for letter in letters)
+        layout = "<" + "".join(_CODES.get(letter, letter) for letter in letters)
         length = 3 + struct.calcsize(layout)
         out.append(_format(number, length, name, letters, ",".join(columns)))
         for row in zip(*columns.values(), strict=True):

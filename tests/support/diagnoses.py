@@ -77,32 +77,3 @@ def made_diagnosis(*traces, **more):
         seconds=float(sum(trace.t[-1] - trace.t[0] for trace in traces)),
     )
     return replace(made, **more)
-
-
-def fleet_row(who, flight, *masses):
-    """A row of a fleet: a diagnosis that names an excess of mass for each value and deviation (kg),
-    with whether it is tentative and what it cannot be told from.
-    """
-    error = {"force_rms_N": 0.5, "torque_rms_Nm": 0.01}
-    effects = [
-        {
-            "name": "mass",
-            "coefficients": {"dm": value},
-            "std": {"dm": std},
-            "units": {"dm": "kg"},
-            "tentative": bool(doubt),
-            "indistinguishable_from": doubt[1] if doubt else [],
-        }
-        for value, std, *doubt in masses
-    ]
-    verdict = "explained" if effects else "nothing to explain"
-    named = {"id": who, "flight": flight, "status": "diagnosed", "verdict": verdict}
-    return named | {
-        "effects": effects,
-        "remainder": "none",
-        "headline": "The model explains these logs.",
-        "error": {"before": error, "after": {**error, "torque_rms_Nm": None}, "floor": error},
-        "notes": [],
-        "seconds": 15.0,
-        "vehicle": "ardrone2",
-    }

@@ -25,6 +25,17 @@ def recorded(
     return FlightLog(**columns, name="flight")
 
 
+def resting(t, **columns):
+    """Return the log of a vehicle at rest in the air, with some columns in place of its own."""
+    n = len(t)
+    own = {
+        "position": np.tile([0.0, 0.0, 1.0], (n, 1)),
+        "quaternion": np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
+        "rotor_speeds": np.full((n, 4), VEHICLE.hover_rate),
+    }
+    return FlightLog(t, **{**own, **columns})
+
+
 def without_pose(log, rows):
     """Return a log whose poses are lost in some rows: a slice, or a mask (N,)."""
     pose, valid = np.column_stack([log.position, log.quaternion]), log.valid.copy()

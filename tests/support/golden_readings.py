@@ -106,7 +106,7 @@ def _fields(guess):
     """Return the fields of a guessed map by their names, each with whether it is certain."""
     doubtful = {(r.section, r.field) for r in guess.doubts}
     return {
-        "/".join(key): (value if isinstance(value, str) else str(value), key not in doubtful)
+        "/".join(key): (str(value), key not in doubtful)
         for key, value in fields_of(guess.log_map).items()
     }
 
@@ -143,10 +143,8 @@ def _random(name):
     said = {"right": [], "right guess": [], "wrong guess": [], "wrong": []}
     true = {"/".join(key): value for key, value in fields_of(written.log_map).items()}
     for key in sorted(set(found) | set(true)):
-        value = true.get(key)
-        text = value if isinstance(value, str) else str(value)
-        is_right = key in found and found[key][0] == text
-        is_sure = key in found and found[key][1]
+        value, is_sure = found.get(key, (None, False))
+        is_right = value == str(true.get(key))
         said[f"{'right' if is_right else 'wrong'}{'' if is_sure else ' guess'}"].append(key)
     return {verdict: " ".join(fields) for verdict, fields in said.items() if fields}
 

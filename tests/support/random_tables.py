@@ -21,7 +21,7 @@ from windwrench.identification.logs.log_map import (
     Sensor,
     TimeColumn,
 )
-from windwrench.identification.logs.rotor_orders import ORDERS
+from windwrench.identification.logs.what_flew import ORDERS
 
 _TIMES = ("t", "time", "timestamp", "Time", "timestamp_{u}", "time ({u})", "Time [{u}]")
 _PLACES = ("{a}", "p{a}", "pos_{a}", "position.{a}", "mocap_{a}", "Position {A} [{u}]", "{a}_{u}")
@@ -129,13 +129,19 @@ def _distract(log, columns, rng, pick):
         columns["temperature"] = 30.0 + 0.01 * log.t
 
 
+def _add(columns, template, values, axes="xyz", unit=""):
+    """Add columns (N, k) under a template's names of axes or numbers; return the names."""
+    names = tuple(
+        template.format(a=a, A=a.capitalize(), i=i + 1, n=i, u=unit) for i, a in enumerate(axes)
+    )
+    columns |= dict(zip(names, values.T, strict=True))
+    return names
+
+
 def _pose(log, columns, world, body, pick):
     unit = pick(tuple(_LENGTH))
-    template = pick(_PLACES)
-    names = tuple(template.format(a=a, A=a.upper(), u=unit) for a in "xyz")
     position = log.position * world / _LENGTH[unit]
-    columns |= dict(zip(names, position.T, strict=True))
-    out = {"position": Columns(names, unit)}
+    out = {"position": Columns(_add(columns, pick(_PLACES), position, unit=unit), unit)}
     rotation = Rotation.from_matrix(
         world[:, None]
         * Rotation.from_quat(log.quaternion, scalar_first=True).as_matrix()
@@ -145,27 +151,16 @@ def _pose(log, columns, world, body, pick):
     if sense == "world_to_body":
         rotation = rotation.inv()
     if pick((True, True, False)):
-        q = rotation.as_quat(scalar_first=True)
         order = pick(("wxyz", "xyzw"))
-        if order == "xyzw":
-            q = q[:, [1, 2, 3, 0]]
-        if pick((True, True, False)):
-            template = pick(_QUATERNIONS)
-            names = tuple(template.format(a=a) for a in order)
-        else:
-            template = pick(_NUMBERED)
-            names = tuple(template.format(n=n) for n in range(4))
-        out["attitude"] = Attitude(names, order=order, sense=sense)
-        columns |= dict(zip(names, q.T, strict=True))
+        q = rotation.as_quat(scalar_first=order == "wxyz")
+        template = pick(_QUATERNIONS if pick((True, True, False)) else _NUMBERED)
+        out["attitude"] = Attitude(_add(columns, template, q, order), order=order, sense=sense)
         return out
     euler, unit = pick(("zyx", "zyx", "xyz")), pick(("deg", "rad"))
-    angles = rotation.as_euler(euler.upper())
-    by_axis = {axis: angles[:, i] for i, axis in enumerate(euler)}
-    template = pick(_ANGLES)
-    names = tuple(template.format(a=a, A=a.capitalize(), u=unit) for a in ("roll", "pitch", "yaw"))
+    angles = rotation.as_euler(euler.upper())[:, [euler.index(axis) for axis in "xyz"]]
+    angles *= 1.0 if unit == "rad" else 180.0 / np.pi
+    names = _add(columns, pick(_ANGLES), angles, ("roll", "pitch", "yaw"), unit)
     out["attitude"] = Attitude(names, euler=euler, unit=unit, sense=sense)
-    scale = 1.0 if unit == "rad" else 180.0 / np.pi
-    columns |= {name: scale * by_axis[axis] for name, axis in zip(names, "xyz", strict=True)}
     return out
 
 
@@ -176,9 +171,7 @@ def _imu(log, columns, body, axes, pick):
         ("gyro", _GYROS, log.gyro, {"rad/s": 1.0, "deg/s": np.pi / 180.0}),
     ):
         unit = pick(tuple(units))
-        template = pick(templates)
-        names = tuple(template.format(a=a, u=unit) for a in "xyz")
-        columns |= dict(zip(names, (values * body / units[unit]).T, strict=True))
+        names = _add(columns, pick(templates), values * body / units[unit], unit=unit)
         out[section] = Sensor(names, unit, body=axes)
     return out
 
@@ -193,17 +186,11 @@ def _motors(log, columns, pick):
         pairs = 7 if unit == "eRPM" else 1
         scale = _SPEED["rpm"] / pairs if unit == "eRPM" else _SPEED[unit]
         template = _SPEED_NAMES.get(unit, "") if pick((True, unit == "eRPM")) else ""
-        template = template or pick(_SPEEDS)
-        values = log.rotor_speeds[:, at] / scale
-        names = tuple(template.format(i=i + 1, n=i) for i in range(4))
-        made = Rotors(names, unit, order=order, pole_pairs=pairs)
-        columns |= dict(zip(names, values.T, strict=True))
-        return {"rotors": made}
+        names = _add(columns, template or pick(_SPEEDS), log.rotor_speeds[:, at] / scale, "1234")
+        return {"rotors": Rotors(names, unit, order=order, pole_pairs=pairs)}
     low, high = (1000.0, 2000.0) if kind == "us" else (0.0, 1.0)
-    values = low + (high - low) * log.command[:, at]
     template = pick(_PULSES if kind == "us" else _COMMANDS)
-    names = tuple(template.format(i=i + 1, n=i) for i in range(4))
-    columns |= dict(zip(names, values.T, strict=True))
+    names = _add(columns, template, low + (high - low) * log.command[:, at], "1234")
     return {"commands": Commands(names, kind, order=order, range=(low, high))}
 
 

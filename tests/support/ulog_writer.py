@@ -73,15 +73,16 @@ def _declare(key, column):
 
 
 def _flat(value):
-    return (
-        value.tolist()
-        if getattr(value, "shape", ())
-        else [value.item() if hasattr(value, "item") else value]
-    )
+    return np.ravel(value).tolist()
 
 
 def stamps(t):
     return np.round(1e6 * (t + 10.0)).astype(np.uint64)
+
+
+def by_axis(position):
+    """Return positions (N, 3) as the fields x, y and z."""
+    return dict(zip(("float x", "float y", "float z"), position.T, strict=True))
 
 
 def odometry(t, new=True):
@@ -93,12 +94,8 @@ def odometry(t, new=True):
             "float position": position,
             "float q": turn.as_quat(scalar_first=True),
         }
-    xyz = {f"float {axis}": position[:, i] for i, axis in enumerate("xyz")}
-    return (
-        head
-        | {"uint8_t local_frame": np.full(len(t), 0), "float q": turn.as_quat(scalar_first=True)}
-        | xyz
-    )
+    head |= {"uint8_t local_frame": np.full(len(t), 0), "float q": turn.as_quat(scalar_first=True)}
+    return head | by_axis(position)
 
 
 def esc(t, speeds=PX4, **functions):

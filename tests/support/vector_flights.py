@@ -14,12 +14,15 @@ NUMBERS = (
 
 def make(num_envs, plant="mujoco", task="FanTracking", **kwargs):
     return gym.make_vec(
-        f"windwrench/{task}-v0",
+        f"windwrench/{task}-v1",
         num_envs=num_envs,
         vectorization_mode="vector_entry_point",
-        plant=plant,
-        **kwargs,
+        **{"plant": plant, "normalize": False, **kwargs},
     )
+
+
+def make_single(task="FanTracking", **kwargs):
+    return gym.make(f"windwrench/{task}-v1", **{"normalize": False, **kwargs})
 
 
 def fly(envs, decisions, seed=3):

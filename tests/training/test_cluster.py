@@ -6,7 +6,6 @@ import os
 import signal
 import threading
 import time
-from itertools import product
 
 import numpy as np
 import pytest
@@ -14,16 +13,11 @@ import pytest
 from tests.runtime.test_workers import work
 from tests.training.tiny import TINY
 from windwrench.dynamics import InputError
-from windwrench.evaluation.benchmark import fly_all
+from windwrench.evaluation.benchmark import Request, fly_all
 from windwrench.runtime.workers import each, every
-from windwrench.training.sweep import jobs_of, run_job, run_jobs
-
-
-def test_a_sweep_is_every_value_with_every_seed():
-    jobs = jobs_of("sac", "base", range(2), TINY, ["learner.gamma=0.9|0.95", "net=[8]|[16]"])
-    said = [(job.config["learner"]["gamma"], job.config["net"], job.seed) for job in jobs]
-    assert said == list(product((0.9, 0.95), ([8], [16]), (0, 1)))
-    assert [job.name for job in jobs][1:3] == ["gamma-0.9-net-8-seed-1", "gamma-0.9-net-16-seed-0"]
+from windwrench.training.configuration import load_config
+from windwrench.training.run import read_progress
+from windwrench.training.train import train
 
 
 @pytest.fixture(scope="module")
@@ -36,36 +30,33 @@ def cluster():
 
 
 @pytest.mark.slow  # a task that is done again, and a run that goes on where it stopped, are quick
-def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster, tmp_path):
+def test_a_run_on_a_cluster_is_the_local_one_though_its_worker_is_killed(cluster, tmp_path):
     pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
-    jobs = jobs_of("sac", "base", range(2), TINY, [])
+    config = load_config("sac", TINY)
     process, killed = tmp_path / "process", []
 
-    def run_noted(job, folder):
-        if job.name == jobs[0].name:
-            process.write_text(str(os.getpid()))
-        return run_job(job, folder)
+    def run_noted(folder):
+        process.write_text(str(os.getpid()))
+        return train(config, "base", 0, folder)
 
     def kill_one():
         deadline = time.monotonic() + 300
         while not killed and time.monotonic() < deadline:
-            if (tmp_path / "there" / jobs[0].name / "checkpoint.pt").exists():
+            if (tmp_path / "there" / "checkpoint.pt").exists():
                 killed.append(int(process.read_text()))
                 os.kill(killed[0], signal.SIGKILL)
             time.sleep(0.02)
 
     killer = threading.Thread(target=kill_one)
     killer.start()
-    there = run_jobs(jobs, tmp_path / "there", cluster, run_noted)
+    ((there, _),) = every(run_noted, [tmp_path / "there"], cluster=cluster)
     killer.join()
     assert killed
     assert int(process.read_text()) != killed[0]  # another process went on
-    here = [run_job(job, tmp_path / "here") for job in jobs]
-    for name in ("run", "validation_rmse_m"):
-        assert [r[name] for r in there] == [r[name] for r in here]
-    for job, name in product(jobs, ("best.npz", "last.npz")):
-        ours, theirs = (tmp_path / place / job.name / name for place in ("here", "there"))
-        assert ours.read_bytes() == theirs.read_bytes()
+    here = train(config, "base", 0, tmp_path / "here").parent
+    assert read_progress(here).rmse_m == read_progress(there).rmse_m
+    for name in ("best.npz", "last.npz"):
+        assert (here / name).read_bytes() == (there / name).read_bytes()
 
 
 def refuse(task):
@@ -91,8 +82,8 @@ def test_a_task_that_fails_is_named(cluster):
 
 @pytest.mark.slow
 def test_flights_on_a_cluster_are_the_local_ones(cluster):
-    there = fly_all(["admittance"], ["base"], 4, seed=0, cluster=cluster)
-    here = fly_all(["admittance"], ["base"], 4, seed=0, jobs=1)
+    request = Request(("admittance",), ("base",), 4, 0)
+    there, here = fly_all(request, cluster=cluster), fly_all(request, jobs=1)
     assert list(there) == list(here)
     for key, flown in here.items():
         for a, b in zip(flown, there[key], strict=True):

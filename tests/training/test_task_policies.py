@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
 
@@ -14,12 +15,14 @@ from windwrench.controllers.wind_observation import WIND_PERIOD
 from windwrench.envs.lanes.vector import TaskLanes
 from windwrench.envs.plant import PlantSettings
 from windwrench.evaluation.tasks import TASKS
-from windwrench.training.belief_network import BeliefNetwork
 from windwrench.training.hindsight import AHEAD, LATE, MIX, WindLesson, lanes_of, mix_of
+from windwrench.training.linear_policy import MEMORY, LinearLaw
 from windwrench.training.run import validate
-from windwrench.training.task_policies import _card, sac, teach
+from windwrench.training.task_policies import _card, linear, teach
+from windwrench.training.taught_network import Sequences, TaughtNetwork
 
 HOVER = TASKS["WindHover"].environment
+MEMORIES = {"memory": list(MEMORY)}
 
 
 def test_lanes_tell_the_truth_of_the_single_environment():
@@ -31,13 +34,13 @@ def test_lanes_tell_the_truth_of_the_single_environment():
         lanes.step(np.tile(action, (3, 1)))
         *_, info = single.step(np.array(action))
     for name, values in lanes.truth().items():
-        np.testing.assert_allclose(values[1], info[name], rtol=1e-6, atol=1e-9)
+        assert_allclose(values[1], info[name], rtol=1e-6, atol=1e-9)
 
 
 def test_lanes_tell_how_late_their_answers_are():
     lanes = TaskLanes(3, task=HOVER, settings=PlantSettings(actuator_delay=0.01, pose_delay=0.015))
     lanes.reset(seed=0)
-    np.testing.assert_allclose(lanes.late(), 0.025)
+    assert_allclose(lanes.late(), 0.025)
     (delayed,) = lanes_of("WindHover", LATE, 8)
     delayed.reset(seed=0)
     assert len(set(delayed.late())) > 2
@@ -62,26 +65,54 @@ def test_hindsight_knows_what_came_beside_the_model(late):
         wanted.append(-(x[3] @ gain + np.einsum("kni,ki->n", came[3 : 3 + AHEAD], ahead)))
     lesson._states, lesson._commands = list(zip(*states, strict=True)), list(commands)
     best, counts = lesson.taught(np.ones((count + 1, 2), dtype=np.bool_))
-    np.testing.assert_allclose(best[3], np.transpose(wanted))
+    assert_allclose(best[3], np.transpose(wanted))
     assert counts.sum(axis=0).tolist() == [count - AHEAD + 1] * 2
 
 
 def test_a_policy_sees_what_its_network_saw_whitened():
     torch.manual_seed(0)
-    network, rng = BeliefNetwork(27, 3, "gru", 8, [5], "tanh"), np.random.default_rng(0)
+    network, rng = TaughtNetwork(27, 3, "gru", 8, [5], "tanh"), np.random.default_rng(0)
     mixed = np.diag(np.full(27, 0.01)) + 0.1 * rng.standard_normal((1, 27))
     seen = (rng.standard_normal((40, 6, 27)) @ mixed + 1.0).astype(np.float32)
     network.whiten(seen)
     turn, mean = (x.numpy() for x in network._white)
     white = (seen.reshape(-1, 27) - mean) @ turn
-    np.testing.assert_allclose(np.cov(white.T), np.eye(27), atol=0.1)
+    assert_allclose(np.cov(white.T), np.eye(27), atol=0.1)
     with torch.no_grad():
         said = network(torch.from_numpy(seen))[0].numpy()
     policy = TaskPolicy(
         _card("WindHover", "gru", MIX, 0, 0), network.policy_weights(np.eye(3, dtype=np.float32))
     )
     flown = [policy(frame * np.float32(HOVER.scales)) for frame in seen[:, 2]]
-    np.testing.assert_allclose(flown, said[:, 2], atol=1e-4)
+    assert_allclose(flown, said[:, 2], atol=1e-4)
+
+
+def test_a_linear_policy_learns_a_lagging_answer_and_flies_as_it_was_fitted():
+    """The answer is a low-pass of the position error, of four decisions."""
+    rng, law = np.random.default_rng(0), LinearLaw()
+    seen = rng.standard_normal((120, 8, 27)).astype(np.float32)
+    kept, truth = seen[0], []
+    for frames in seen:
+        kept = kept + 0.25 * (frames - kept)
+        truth.append(kept[:, :3])
+    ones = np.ones(seen.shape[:2], dtype=np.float32)
+    law.fit(Sequences(seen, np.array(truth), ones))
+    policy, state = (
+        TaskPolicy(_card("WindHover", "linear", MIX, 0, 0) | MEMORIES, law.weights()),
+        None,
+    )
+    for k, frames in enumerate(seen):
+        said, _, state = law(torch.from_numpy(frames[None]), state)
+        flown = policy(frames[2] * np.float32(HOVER.scales))
+        assert_allclose(flown, said[0, 2].numpy(), atol=1e-4)
+        assert_allclose(flown, truth[k][2], atol=0.05)
+
+
+@pytest.mark.slow
+def test_a_linear_law_is_fitted_in_the_wind():
+    policy = linear("WindHover", "calm", 0, rounds=2, episodes=8)
+    rmse, lost = validate(policy, HOVER("calm"), 2)
+    assert (rmse < 0.05, lost) == (True, 0)
 
 
 def test_a_mix_has_all_of_its_scenarios():
@@ -96,13 +127,5 @@ def test_a_taught_network_is_the_same_again(task):
     scenario = MIX if task == "WindHover" else "base"
     one, other = (teach(task, scenario, 0, rounds=2, episodes=16, epochs=1) for _ in range(2))
     for name, array in one.weights.items():
-        np.testing.assert_array_equal(array, other.weights[name])
+        assert_array_equal(array, other.weights[name])
     assert one.card["steps"] == 8000
-
-
-@pytest.mark.slow
-def test_sac_trains_in_the_wind():
-    pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
-    policy = sac("WindHover", 0, 1100)
-    assert policy.card["squash"]
-    assert np.isfinite(validate(policy, HOVER("base"), 2)[0])

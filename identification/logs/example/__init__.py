@@ -1,4 +1,4 @@
-"""A measured flight that comes with the kit, and what is known of it."""
+"""The kit's measured example flight, and its known effects."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +11,7 @@ from ....runtime.yaml_file import read_yaml
 
 @dataclass(frozen=True)
 class Known:
-    """Something that is known of the flight."""
+    """A known fact of the flight."""
 
     effects: list[str]  # names, any of which says it
     why: str  # it is known

@@ -1,16 +1,16 @@
-"""Readers of flight logs of other forms. Each states what it assumed, the thrust model above all,
+"""Readers of flight logs of other forms. Each states its assumptions, the thrust model above all,
 in the log's notes.
 
-A table needs no code: a file in ``identification/logs/maps/`` that says what its columns mean, and
-its name in ``TABLES``. A reader of another form is a file in this folder with a function
-``read(path, vehicle, piece)`` that returns a FlightLog, and a line in ``READERS``; of a table, it
-takes the open table. It decodes the file into named columns, each group with its clock; a map in
-``maps/recordings/`` says what they mean. The vehicle, which may be None, turns commands into rotor
-speeds where none were measured; of a file whose clock started anew or that holds several logs the
-part of the number ``piece`` is read, from 1, and the longest by default.
+A table needs no code: a map in ``identification/logs/maps/``, and its name in ``TABLES``. A reader
+of another form is a file in this folder and a line in ``READERS``. Its function ``read(path,
+vehicle, piece)`` returns a FlightLog; a reader of tables takes the open table. The function decodes
+the file into named columns, each group with its clock; a map in ``maps/recordings/`` states their
+meaning. The vehicle (or None) turns commands into rotor speeds where none were measured. ``piece``
+is the part to read, from 1, of a file with several logs or with restarts of the clock; default: the
+longest.
 
-Which reader a log needs is told from what is in it: the first bytes of a file, or the columns of a
-table. A file's name decides nothing but how a table is packed.
+A reader is chosen by the log's content: the first bytes of a file, or the columns of a table. A
+file's name decides nothing but how a table is packed.
 """
 
 import os
@@ -29,8 +29,8 @@ from ..mapped_log import map_table
 from ..table import SUFFIXES
 from . import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
 
-_HEAD = 4096  # bytes of a file that are looked at
-_LISTED = 8  # entries of a folder that a message lists
+_HEAD = 4096  # bytes at a file's start
+_LISTED = 8  # entries of a folder in a message
 _GZIP = b"\x1f\x8b"
 _MAVLINK = b"\xfe\xfd"  # one of these follows the eight bytes of a telemetry log's first time
 _BAG_FOLDER = ("metadata.yaml", ".db3", ".mcap")  # one of these is in a ROS 2 bag's folder
@@ -38,20 +38,18 @@ _BAG_FOLDER = ("metadata.yaml", ".db3", ".mcap")  # one of these is in a ROS 2 b
 
 @dataclass(frozen=True)
 class Reader:
-    """A reader: its name, its function, and the columns or the first bytes by which a log of its
-    form is known.
-    """
+    """A reader: name, function, and the columns or first bytes of its logs."""
 
     name: str
     what: str  # a log of its form, in words
-    # of a path, or of a table where there is a signature; of a vehicle, which may be None; and,
-    # where it takes one, of the option behind the name's colon
+    # function of a path (with a signature: of a table), of a vehicle or None, and, for some, of the
+    # option behind the name's colon
     read: Callable[..., FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
     begins: bytes = b""  # regular expression of a file's first bytes; empty: of a table
 
 
-# maps of tables that are known by their columns
+# maps of tables known by their columns
 TABLES = {
     "nanobench": "nanobench",
     "crazyswarm2": "crazyswarm2",
@@ -74,13 +72,13 @@ def find_reader(name: str) -> Reader:
     """Return the reader of a name, or of ``name:option`` with that option bound.
 
     Raises:
-        InputError: there is none, or it takes no option.
+        InputError: the name is unknown, or the reader takes no option.
     """
     name, colon, option = name.partition(":")
     if name in TABLES:
-        found = load_map(TABLES[name])
-        read = partial(map_table, log_map=found, reader=name)
-        reader = Reader(name, found.about, read, found.recognise)
+        log_map = load_map(TABLES[name])
+        read = partial(map_table, log_map=log_map, reader=name)
+        reader = Reader(name, log_map.about, read, log_map.recognise)
     elif name in READERS:
         reader = READERS[name]
     else:
@@ -98,13 +96,13 @@ def reader_by_content(path: Path) -> Reader | None:
     """Return the reader of a file or folder by its first bytes; None where no reader knows them.
 
     Raises:
-        InputError: it is a folder, but no ROS 2 bag's.
+        InputError: the path is a folder, but no ROS 2 bag's.
     """
-    if not os.path.isdir(path):  # False for a name that is too long
+    if not os.path.isdir(path):  # False for an overlong name
         try:
             head = _head(path)
         except InputError:
-            return None  # whoever reads it says what is wrong
+            return None  # reading the file states the error
         return next((r for r in READERS.values() if r.begins and re.match(r.begins, head)), None)
     try:
         names = sorted(entry.name for entry in path.iterdir())
@@ -125,15 +123,15 @@ def _head(path: Path) -> bytes:
 
 
 def binary_logs() -> str:
-    """Return the words for the files that are known by their first bytes."""
+    """Return the words for the files known by their first bytes."""
     return ", ".join(reader.what for reader in READERS.values() if reader.begins)
 
 
 def unknown_content(path: Path) -> InputError:
-    """Return the error for a file that no reader knows and that is no table by its name.
+    """Return the error for an unknown file without a table's name.
 
     Raises:
-        InputError: it cannot be read at all.
+        InputError: the file is unreadable.
     """
     head = _head(path)
     if head.startswith(_GZIP):
@@ -156,20 +154,20 @@ def unknown_content(path: Path) -> InputError:
 
 
 def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
-    """Return the reader whose columns a table has; None where it has those of none.
+    """Return the reader by a table's columns; None: no reader's.
 
     Raises:
-        InputError: it has those of several.
+        InputError: the columns fit several readers.
     """
-    found = [reader for reader in table_readers() if set(header).issuperset(reader.signature)]
-    if len(found) > 1:
+    readers = [reader for reader in table_readers() if set(header).issuperset(reader.signature)]
+    if len(readers) > 1:
         raise InputError(
-            f"{path}: its columns are those of {' and of '.join(r.what for r in found)}; expected "
-            f"one: choose by --reader {' or --reader '.join(r.name for r in found)}"
+            f"{path}: its columns are those of {' and of '.join(r.what for r in readers)}; "
+            f"expected one: choose by --reader {' or --reader '.join(r.name for r in readers)}"
         )
-    return found[0] if found else None
+    return readers[0] if readers else None
 
 
 def table_readers() -> list[Reader]:
-    """Return the readers of tables that are known by their columns."""
+    """Return the readers of tables known by their columns."""
     return [*map(find_reader, TABLES), READERS["betaflight_csv"]]

@@ -1,24 +1,22 @@
-"""ArduPilot logs (DataFlash, ``.BIN``): the map ``ardupilot`` says what their messages mean, their
+"""ArduPilot logs (DataFlash, ``.BIN``): the map ``ardupilot`` states the messages' meaning,
 parameters the rest.
 
-**Motors.** ESC telemetry where it was logged (ESC, rpm), else pulses (RCOU, us) of the outputs of
-motors 1 to 4 by SERVOn_FUNCTION, else of 1 to 4. MOT_PWM_MIN to MOT_PWM_MAX are 0 to 1. ArduPilot
-takes thrust as ``(1 - e) a + e a^2`` with e = MOT_THST_EXPO, where ``a`` is the command between
+**Motors.** ESC telemetry (ESC, rpm), if logged, else pulses (RCOU, us) of the outputs of motors 1
+to 4 by SERVOn_FUNCTION, else of 1 to 4. MOT_PWM_MIN to MOT_PWM_MAX are 0 to 1. ArduPilot takes
+thrust as ``(1 - e) a + e a^2`` with e = MOT_THST_EXPO, where ``a`` is the command between
 MOT_SPIN_MIN and MOT_SPIN_MAX. A vehicle with a motor curve turns commands into thrust by its own;
 one without gets ArduPilot's (``commanded_speeds``).
 
-**Order.** By FRAME_TYPE: X and H (1 front-right, 2 rear-left, 3 front-left, 4 rear-right), those of
-Betaflight, of DJI, and clockwise from front-right; X is assumed where the log does not say.
+**Order.** By FRAME_TYPE: X and H (1 front-right, 2 rear-left, 3 front-left, 4 rear-right),
+Betaflight's, DJI's, and clockwise from front-right. X is assumed where the log states none.
 
 **Form.** The log describes its own messages. Each begins with A3 95 and its type's number. Type
 128, FMT, states of a type its number, its length, its name, and the letters and names of its
-columns. pymavlink reads it, too: as Python objects, one by one, in 14 times the time, with a
-printed line for each byte that is damaged, and with 100 MB of disk. It opens 20 million empty
-messages in 161 s and 1.1 GB. Here compiled code goes through a file and notes the places of the
-messages, and the columns of those that are wanted are read at once, so that any file costs a
-bounded time.
-Ground stations turn such a log into text (``.log``): a message a line, its type's name first, FMT
-among them, and numbers in whole units.
+columns. pymavlink reads such logs, too: as Python objects, one by one, in 14 times the time, with a
+printed line for each damaged byte, and with 100 MB of disk. pymavlink opens 20 million empty
+messages in 161 s and 1.1 GB. Here compiled code notes the messages' places, and wanted columns are
+read at once: any file costs a bounded time. Ground stations turn such a log into text (``.log``): a
+message a line, its type's name first, FMT among them, and numbers in whole units.
 """
 
 import math
@@ -37,14 +35,22 @@ from ....runtime.compiled import compiled
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Samples, in_order
+from ..channels import ChannelGroup, in_order
 from ..flight_log import FlightLog
 from ..log_map import Commands, LogMap, shipped_map, stated
 from ..mapped_log import recording_of
-from ..rotor_orders import ORDERS, Order, order_words
 from ..streams import MOST_VOLTS, Stream
 from ..table import Array
-from ..what_flew import PLUS, UNSTATED, WhatFlew, order_by_places, slots_of_motors
+from ..what_flew import (
+    ORDERS,
+    PLUS,
+    UNSTATED,
+    Order,
+    WhatFlew,
+    order_by_places,
+    order_words,
+    slots_of_motors,
+)
 
 Bytes = NDArray[np.uint8]
 Parameters = Mapping[str, float]
@@ -64,9 +70,9 @@ _TEXTS = ("Name", "Message")  # columns, of PARM and MSG
 _HEAD = 3  # bytes of a message before its columns
 _FMT, _FMT_LENGTH = 128, 89
 _FORMAT = np.dtype("u1, u1, S4, S16, S64")  # number, length, name, letters and columns of a type
-_MOST_FORMATS = 100_000  # that are looked at
-# types of columns by their letters, those of ``struct`` among them; and what one unit is of
-# those that are no whole units
+_MOST_FORMATS = 100_000  # at most
+# types of columns by their letters, as of ``struct`` and further ones; and units of columns other
+# than 1
 _TYPES = {letter: f"<{letter}" for letter in "bBhHiIqQfd"}
 _TYPES |= {"a": "(32,)<i2", "g": "<f2", "n": "S4", "N": "S16", "Z": "S64", "M": "<B"}
 _TYPES |= {"c": "<h", "C": "<H", "e": "<i", "E": "<I", "L": "<i"}
@@ -103,7 +109,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     letter = next((x for x in ("Ch", "Chan") if pulses is not None and f"{x}1" in pulses), "C")
     log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
     volts = messages.get("CURR", {}).get("Volt")
-    if volts is not None and float(np.median(volts)) > MOST_VOLTS:
+    if volts is not None and np.median(volts) > MOST_VOLTS:
         messages["CURR"]["Volt"] = 0.01 * volts
         notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
@@ -126,9 +132,9 @@ def _times(messages: Messages) -> Array:
     return 1e-3 * messages.get("TimeMS", np.empty(0))
 
 
-def _samples(name: str, messages: Messages, columns: set[str]) -> Samples | None:
-    """Return some columns of a type's messages, of the first core, sensor or battery, places as
-    north, east, down in m from the first; None where there are less than two.
+def _samples(name: str, messages: Messages, columns: set[str]) -> ChannelGroup | None:
+    """Return some columns of a type's messages, of the first core, sensor or battery; None: less
+    than two messages. Places become north, east, down in m from the first.
     """
     for number in _NUMBERS:
         if number in messages:
@@ -137,13 +143,13 @@ def _samples(name: str, messages: Messages, columns: set[str]) -> Samples | None
     t = _times(messages)
     if len(t) < 2:
         return None
-    found = {name: messages[name] for name in messages if name in columns}
-    if set(_PLACE) <= set(found):
-        north, east, altitude = (found.pop(name) for name in _PLACE)  # degrees, and m
+    kept = {name: messages[name] for name in messages if name in columns}
+    if set(_PLACE) <= set(kept):
+        north, east, altitude = (kept.pop(name) for name in _PLACE)  # degrees, and m
         east = (east - east[0]) * np.cos(np.radians(north[0]))
-        found |= {"N": _EARTH * np.radians(north - north[0]), "E": _EARTH * np.radians(east)}
-        found["D"] = -altitude
-    return Samples(t, found, name)
+        kept |= {"N": _EARTH * np.radians(north - north[0]), "E": _EARTH * np.radians(east)}
+        kept["D"] = -altitude
+    return ChannelGroup(t, kept, name)
 
 
 def _texts(messages: Messages, column: str) -> list[str]:
@@ -151,7 +157,7 @@ def _texts(messages: Messages, column: str) -> list[str]:
 
 
 def _what_flew(parameters: Parameters, messages: Messages) -> WhatFlew:
-    """Return what a log states of its vehicle: by its texts, else by its parameters."""
+    """Return a log's statements on its vehicle, from texts, else from parameters."""
     known = stated("airframes")
     for text in _texts(messages, "Message"):
         for begin, airframe in known["ardupilot_text"].items():
@@ -170,12 +176,12 @@ def _what_flew(parameters: Parameters, messages: Messages) -> WhatFlew:
 
 
 def _functions(parameters: Parameters) -> list[int]:
-    """Return what each output does."""
+    """Return each output's function."""
     return [int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)]
 
 
 def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
-    """Return which motor each of the vehicle's rotors is, and the note that says whence.
+    """Return the motor of each of the vehicle's rotors, and a note on the source.
 
     Raises:
         InputError: the motors stand otherwise than the vehicle's rotors.
@@ -185,9 +191,12 @@ def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple
         order = ORDERS["ardupilot-x"]
         return order, f"quad x assumed, which the log does not state: {order_words(order)}"
     kind = int(parameters.get(name, 1))
-    if kind == _PLUS and (found := order_by_places(PLUS, vehicle)) is not None:
-        motors = ", ".join(map(str, found))
-        return found, f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}"
+    if kind == _PLUS and (motors_of_plus := order_by_places(PLUS, vehicle)) is not None:
+        motors = ", ".join(map(str, motors_of_plus))
+        return (
+            motors_of_plus,
+            f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}",
+        )
     known = stated("airframes")["ardupilot_order"]
     if kind not in known:
         what = f"{kind}, a plus," if kind == _PLUS else str(kind)
@@ -239,10 +248,8 @@ def _with_parameters(
     return replace(log_map, commands=commands).with_order(order), [*log_map.notes, note]
 
 
-def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[Samples], list[str]]:
-    """Return what the ESCs of motors 1 to 4 reported, at the times of the first of them, and
-    notes.
-    """
+def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[ChannelGroup], list[str]]:
+    """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC, and notes."""
     if not {"Instance", "RPM", "TimeUS"} <= set(messages):
         return [], []
     slots, which = slots_of_motors(_functions(parameters), _MOTOR1), messages["Instance"]
@@ -258,15 +265,14 @@ def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[Samples
     t = each[0].t
     columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)
-    return [Samples(t, columns, "ESC")], [
+    return [ChannelGroup(t, columns, "ESC")], [
         f"rotor speeds: measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took "
         "them"
     ]
 
 
 def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messages], int]:
-    """Return the messages of the types that are wanted and there, by the names of these, and how
-    many bytes belong to no message.
+    """Return the messages of the wanted types, by type, and the number of bytes outside messages.
 
     Raises:
         InputError: the file cannot be read, is no such log, or has more messages of a type than
@@ -280,7 +286,7 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
     places, kinds = np.empty(most, np.int32), np.empty(most, np.uint8)
     count, used = _walk(data, places, kinds)
     places, kinds = places[:count], kinds[:count]  # take memory as they were filled
-    found: dict[str, Messages] = {}
+    by_type: dict[str, Messages] = {}
     formats = places[kinds == _FMT][:_MOST_FORMATS]
     if not len(formats):
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
@@ -290,17 +296,17 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
         if len(of_kind):
             rows = _rows(data, of_kind, layout)
             with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-                found[name] = {
+                by_type[name] = {
                     column: x if x.dtype.kind == "S" else x.astype(np.float64) * unit
                     for column, unit in units.items()
                     if (x := rows[column]).ndim == 1  # no list of numbers
                 }
-    return found, len(data) - int(used)
+    return by_type, len(data) - int(used)
 
 
 def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, Messages]:
-    """Return the messages of the types that are wanted, of a log as text. The lines before the
-    first FMT, where old ones name the vehicle, count as MSG; lines that are cut are left out.
+    """Return the messages of the wanted types, of a log as text. The lines before the first FMT
+    count as MSG: old logs name the vehicle there. Cut lines are left out.
     """
     before, _, lines = content.partition(b"FMT,")
     names: dict[str, list[str]] = {}
@@ -315,40 +321,40 @@ def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, M
             values = rest.split(b",", len(names[name]) - 1)
             if len(values) == len(names[name]):
                 rows.setdefault(name, []).append(values)
-    found: dict[str, Messages] = {}
+    by_type: dict[str, Messages] = {}
     for name, messages in rows.items():
         check_count(f"{path}: {name}", len(messages), LIMITS.table_rows, "messages")
         columns = dict(zip(names[name], zip(*messages, strict=True), strict=True))
-        found[name] = {
+        by_type[name] = {
             column: np.char.strip(np.array(texts)) if column in _TEXTS else _numbers(texts)
             for column, texts in columns.items()
         }
-    said = found.get("MSG", {}).get("Message", np.empty(0, "S1"))
-    found["MSG"] = {"Message": np.array([*before.splitlines(), *said, b""])}
-    return found
+    said = by_type.get("MSG", {}).get("Message", np.empty(0, "S1"))
+    by_type["MSG"] = {"Message": np.array([*before.splitlines(), *said, b""])}
+    return by_type
 
 
 def _numbers(texts: Sequence[bytes]) -> NDArray[np.float64]:
-    """Return the numbers (N,) that texts are; NaN where one is none."""
-    found = np.full(len(texts), np.nan)
+    """Return texts as numbers (N,); NaN: not a number."""
+    numbers = np.full(len(texts), np.nan)
     for i, text in enumerate(texts):
         with suppress(ValueError):
-            found[i] = float(text)
-    return found
+            numbers[i] = float(text)
+    return numbers
 
 
 def _rows(data: Bytes, places: NDArray[np.int32], layout: np.dtype[Any]) -> NDArray[Any]:
-    """Return the messages (N,) that begin at places (N,), by their layout."""
+    """Return the messages (N,) at places (N,), by their layout."""
     return sliding_window_view(data[_HEAD:], layout.itemsize)[places].view(layout)[:, 0]
 
 
 def _layouts(
     formats: NDArray[Any], wanted: Collection[str]
 ) -> dict[int, tuple[str, np.dtype[Any], dict[str, float]]]:
-    """Return name, layout and units of the types that are wanted, by number; without those that
-    do not describe what they say.
+    """Return name, layout and units of the wanted types, by number; types with a wrong length are
+    left out.
     """
-    found = {}
+    layouts = {}
     for number, length, *texts in formats.tolist():
         name, letters, joined = (x.split(b"\0")[0].decode("ascii", "replace") for x in texts)
         columns = joined.split(",")
@@ -358,14 +364,14 @@ def _layouts(
         layout = np.dtype(list(zip(columns, map(_TYPES.__getitem__, letters), strict=True)))
         units = [_UNITS.get(letter, 1.0) for letter in letters]
         if layout.itemsize + _HEAD == length:
-            found[number] = name, layout, dict(zip(columns, units, strict=True))
-    return found
+            layouts[number] = name, layout, dict(zip(columns, units, strict=True))
+    return layouts
 
 
 @compiled
 def _walk(data: Bytes, places: NDArray[np.int32], kinds: Bytes) -> tuple[int, int]:
     """Go through all messages; note their places and types. Return how many they are, and how many
-    bytes they take. What is no message is passed byte by byte.
+    bytes they take. Other bytes are passed one by one.
     """
     lengths = np.zeros(256, np.int64)
     lengths[_FMT] = _FMT_LENGTH

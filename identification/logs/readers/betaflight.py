@@ -1,25 +1,24 @@
 """Blackboxes of Betaflight or INAV: as they are (``.bbl``, ``.bfl``, ``.txt``), and the tables of
-blackbox_decode. The map ``betaflight`` says what their fields mean, this module in which unit they
-are.
+blackbox_decode. The map ``betaflight`` states the fields' meaning, this module their units.
 
 * **Accelerometer.** Counts: ``acc_1G`` of the header is one g; without a header, the power of two
-  that is nearest to its length in the first half second, when a quadrotor stands (recording begins
-  when it is armed).
+  nearest to the length in the first half second. A quadrotor stands then: recording begins at
+  arming.
 * **Gyro.** Degrees per second, tenths of them where the header says ``blackbox_high_resolution``.
 * **Commands.** Between the two numbers of the header's ``motorOutput``; without one, 48 to 2047
-  (DShot) where a motor leaves 1000 to 2000, else those.
-* **Rotor speeds.** eRPM in hundreds: rpm is eRPM times 200 over the number of magnet poles, which
-  the header (``motor_poles``) or the reader's option says, else 14.
+  (DShot) where a motor leaves 1000 to 2000, else 1000 to 2000.
+* **Rotor speeds.** eRPM in hundreds: rpm is eRPM times 200 over the number of magnet poles, from
+  the header (``motor_poles``) or the reader's option, else 14.
 * **Voltage.** Hundredths of a volt.
 
-A table has the log's numbers without its headers, so what the headers would say is told from the
-numbers, and a note says how. A unit that a table's column states is taken.
+A table has the log's numbers without the headers: these are inferred from the numbers, with a note.
+A unit in a column's name is taken.
 
-A file may hold several logs, one for each time that the vehicle was armed: the longest is read, and
-a note says so. ``blackbox_frames`` decodes its frames. orangebox 0.5.0, the library for these logs,
-cannot: its encoding 10, which Betaflight's logs have, is not written, a log that was cut ends it by
-a TypeError, and of damaged ones it keeps frames that are wrong (398 of 400 where 369 are right). It
-serves the tests as a second opinion on whole logs without that encoding.
+A file may hold several logs, one for each arming: the longest is read, and a note says so.
+``blackbox_frames`` decodes its frames. orangebox 0.5.0, the library for these logs, cannot:
+encoding 10 of Betaflight's logs is not written, and a cut log ends in a TypeError. In damaged logs
+orangebox keeps wrong frames (398 of 400 where 369 are right). The tests use orangebox as a second
+opinion on whole logs without encoding 10.
 """
 
 import re
@@ -33,7 +32,7 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Samples, check_piece
+from ..channels import ChannelGroup, check_piece
 from ..flight_log import FlightLog
 from ..log_map import shipped_map
 from ..mapped_log import recording_of
@@ -44,15 +43,15 @@ from .blackbox_frames import ENCODINGS, FRAMES, PREDICTORS, Layout, decode
 BEGINS = b"H Product:Blackbox"
 SIGNATURE = ("time (us)", "motor[0]", "motor[3]")
 
-# what a stated unit is in the map's: g, degrees per second, volts
+# stated units in the map's: g, degrees per second, volts
 _UNITS = {"g": 1.0, "m/s2": 1.0 / 9.80665, "deg/s": 1.0, "rad/s": np.degrees(1.0)}
 _UNITS |= {"V": 1.0, "mV": 1e-3}
-_POLES = 14  # of most motors of 5 inch quadrotors
-_STANDING = 0.5  # s after arming in which a vehicle stands
+_POLES = 14  # on most motors of 5 inch quadrotors
+_STANDING = 0.5  # s after arming without motion
 _RADIANS = 1e-5  # a gyro's scale below is in rad/us
 _ONE_G = 2.0 ** np.arange(8, 15)  # counts
 _DSHOT, _PWM = (48.0, 2047.0), (1000.0, 2000.0)
-_MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of vehicles that are no quadrotors
+_MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of other vehicles than quadrotors
 WHAT = "a blackbox of Betaflight or INAV"
 _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
 
@@ -60,8 +59,8 @@ _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
 def read(
     path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
 ) -> FlightLog:
-    """Read a blackbox: the longest log in it, or that of the number ``piece``, from 1; ``option``:
-    number of the motors' magnet poles, for eRPM.
+    """Read a blackbox: the longest log in the file, or number ``piece``, from 1; ``option``: number
+    of the motors' magnet poles, for eRPM.
 
     Raises:
         InputError: the file cannot be read, has no such log, is no blackbox, is damaged from its
@@ -97,7 +96,7 @@ def read(
     where = np.array([names.index(name) for name in keep], dtype=np.int64)
     frames = np.frombuffer(data[: ends[chosen]], np.uint8)
     most = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
-    rows = np.empty((most + 1, len(keep)), np.int64)  # takes memory as it is filled
+    rows = np.empty((most + 1, len(keep)), np.int64)  # memory is taken as filled
     count, lost = decode(frames, begin, layout, where, rows)
     check_count(path, count, most, "frames")
     if count < 2:
@@ -149,7 +148,7 @@ def _log(
     notes: list[str],
     piece: int | None = None,
 ) -> FlightLog:
-    """Return the log of a blackbox's fields (N,), of which those ``stated`` are in the map's units.
+    """Return the log of a blackbox's fields (N,); the ``stated`` ones are in the map's units.
 
     Raises:
         InputError: no motors, or no gyro and accelerometer.
@@ -179,19 +178,19 @@ def _log(
         for name in groups[kind]:
             fields[name] = (fields[name] - (low if kind == "motor" else 0.0)) * scale
     for name in ("vbatLatest", "vbat"):
-        if name in stated and (volts := float(np.median(fields[name]))) > MOST_VOLTS:
+        if name in stated and (volts := np.median(fields[name])) > MOST_VOLTS:
             fields[name] = 0.1 * fields[name]
             said.append(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
-    samples = [Samples(t, fields)]
+    samples = [ChannelGroup(t, fields)]
     return recording_of(path, samples, log_map, reader, said, piece).log(vehicle)
 
 
 def _gyro_scale(headers: Mapping[str, str]) -> float:
-    """Return what one count of the gyro is in deg/s: the bits of a number in the header, of degrees
-    per second, or of radians per microsecond in Baseflight's.
+    """Return the gyro's count in deg/s: the bits of a number in the header, of degrees per second,
+    or of radians per microsecond in Baseflight's.
     """
     fine = 0.1 if headers.get("blackbox_high_resolution") == "1" else 1.0
     try:
@@ -232,8 +231,8 @@ def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple
 
 
 def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
-    """Return the number of the motors' magnet poles, and whence it is known: by the reader's option
-    or the header.
+    """Return the number of the motors' magnet poles, and its source: the reader's option or the
+    header.
 
     Raises:
         InputError: the option is none.
@@ -255,7 +254,7 @@ def _one_g(t: Array, force: list[Array], headers: Mapping[str, str]) -> tuple[fl
     if stated := whole_number(headers.get("acc_1G", ""), 1, 10**6):
         return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
     length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
-    middle = float(np.nanmedian(length)) if np.isfinite(length).any() else 0.0
+    middle = np.nanmedian(length) if np.isfinite(length).any() else 0.0
     counts = float(_ONE_G[np.argmin(np.abs(np.log2(np.maximum(middle, 1.0) / _ONE_G)))])
     return counts, (
         f"accelerometer: {counts:g} counts taken as 1 g, from its {middle:.4g} in the first "
@@ -264,17 +263,17 @@ def _one_g(t: Array, force: list[Array], headers: Mapping[str, str]) -> tuple[fl
 
 
 def whole_number(text: str, least: int, most: int) -> int | None:
-    """Return the whole number that a header states; None where it is none between two limits."""
+    """Return a header's whole number; None: no whole number between two limits."""
     if not text.lstrip("-").isdecimal() or len(text) > 10:
         return None
     return int(text) if least <= int(text) <= most else None
 
 
 def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
-    """Return what the headers say of the frames.
+    """Return the frames' layout from the headers.
 
     Raises:
-        InputError: they contradict themselves, or name what is not known.
+        InputError: the headers contradict themselves, or name something unknown.
     """
     check_count(path, len(names), LIMITS.log_fields, "fields")
     predictors = _frame_lists(path, headers, "predictor", PREDICTORS)
@@ -294,8 +293,8 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
 
     def number(text: str, default: int) -> int:
-        found = whole_number(text, -999_999_999, 999_999_999)
-        return default if found is None else found
+        stated = whole_number(text, -999_999_999, 999_999_999)
+        return default if stated is None else stated
 
     top, _, bottom = headers.get("P interval", "1/1").rpartition("/")
     every = headers.get("I interval", "32")
@@ -319,7 +318,7 @@ def _frame_lists(
     """Return the predictors or the encodings of each kind of frame.
 
     Raises:
-        InputError: one is none that is known.
+        InputError: a predictor or encoding is unknown.
     """
     lists = []
     for letter in FRAMES:

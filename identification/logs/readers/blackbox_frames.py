@@ -1,11 +1,11 @@
 """The frames of a blackbox of Betaflight, INAV or Cleanflight, decoded by compiled code.
 
-A frame is a letter and the fields that the header lists for it, each coded as the header says (its
-*encoding*) and counted from what could be foreseen of it (its *predictor*), after the description
-of the format in Betaflight's and Cleanflight's documentation ("Blackbox logging internals"). ``I``
-frames stand alone, ``P`` frames build on the two main frames before them, ``S``, ``G``, ``H`` (slow
-fields, GPS) and ``E`` (events) stand between and are passed over. What cannot be decoded is passed
-byte by byte, and what follows counts from the next ``I`` frame.
+A frame is a letter and the header's fields for this letter. The header states each field's
+*encoding*, and its *predictor*: the number to which the field is added. Betaflight's and
+Cleanflight's documentation describes the format ("Blackbox logging internals"). ``I`` frames stand
+alone, ``P`` frames build on the two main frames before them. ``S``, ``G``, ``H`` (slow fields, GPS)
+and ``E`` (events) are passed over. Undecodable bytes are passed one by one, and ``P`` frames count
+again after the next ``I`` frame.
 """
 
 from typing import NamedTuple
@@ -21,9 +21,9 @@ Bytes = NDArray[np.uint8]
 ENCODINGS = (0, 1, 3, 6, 7, 8, 9, 10)
 PREDICTORS = (*range(12), 256)
 LONGEST = 1024  # bytes of a frame
-_TOO_DAMAGED = 1_000_000  # frames that cannot be decoded, after which a log is given up
+_TOO_DAMAGED = 1_000_000  # undecodable frames, at most, in a log
 FRAMES = "IPSGH"
-_EVENT = len(FRAMES)  # kind of what begins with E
+_EVENT = len(FRAMES)  # kind of an event, E
 _KINDS = np.full(256, -1)  # of frames, by their letters
 _KINDS[[ord(letter) for letter in FRAMES + "E"]] = np.arange(_EVENT + 1)
 # three fields together, by the first two bits: further bytes, lowest bits, widths in bits
@@ -32,7 +32,7 @@ _VARIABLE = np.array([[0, 4, 2, 0, 2, 2, 2], [1, 9, 4, 0, 5, 5, 4], [2, 14, 7, 0
 
 
 class Layout(NamedTuple):
-    """What a header says of the frames; I and P frames have the same fields."""
+    """A header's statements on the frames; I and P frames have the same fields."""
 
     encodings: Ints  # (5, F) of I, P, S, G and H frames
     predictors: Ints  # (5, F)
@@ -50,7 +50,7 @@ def _signed(value: int, bits: int) -> int:
 
 @compiled
 def _byte(data: Bytes, at: Ints) -> int:
-    """Return the next byte; behind the end 0, and the place goes on, so that it shows."""
+    """Return the next byte; behind the end 0, and the place goes on, as a mark."""
     place = at[0]
     at[0] = place + 1
     return int(data[place]) if place < len(data) else 0
@@ -98,7 +98,7 @@ def _three(data: Bytes, at: Ints, out: Ints, layouts: Ints) -> None:
 def _four(data: Bytes, at: Ints, out: Ints) -> None:
     """Read four fields of 0, 4, 8 or 16 bits, packed by half bytes."""
     selector = _byte(data, at)
-    is_left, held = False, 0  # is half a byte left over, and the byte that it is of
+    is_left, held = False, 0  # whether half a byte is left over, and its byte
     for i in range(4):
         halves = (1 << ((selector >> (2 * i)) & 3)) >> 1
         out[i] = 0
@@ -118,7 +118,7 @@ def _fields(data: Bytes, at: Ints, encodings: Ints, count: int, out: Ints) -> No
     i = 0
     while i < count and at[0] <= len(data):
         encoding, size = encodings[i], 1
-        group[0] = 0  # where nothing was written
+        group[0] = 0  # default
         if encoding == 0:
             group[0] = _signed_vb(data, at)
         elif encoding == 1:
@@ -158,7 +158,7 @@ def _passed_over(before: int, intervals: Ints) -> int:
 def _predict(
     out: Ints, before: Ints, older: Ints, count: int, predictors: Ints, layout: Layout
 ) -> None:
-    """Add to the fields (F,) of a main frame what could be foreseen of them."""
+    """Add the predictions to the fields (F,) of a main frame."""
     for i in range(count):
         kind = predictors[i]
         if kind == 1:
@@ -179,7 +179,7 @@ def _predict(
 
 @compiled
 def _event(data: Bytes, at: Ints) -> int:
-    """Pass over an event; return 0, 1 at the log's end, 2 where it is of an unknown kind."""
+    """Pass over an event; return 0, 1 at the log's end, 2 for an unknown kind."""
     kind = _byte(data, at)
     if kind == 0 or kind == 15 or kind == 40:  # beep, disarmed, sensor failure
         _unsigned_vb(data, at)
@@ -203,10 +203,10 @@ def decode(data: Bytes, begin: int, layout: Layout, keep: Ints, rows: Ints) -> t
     """Decode the main frames of a log.
 
     Args:
-        data: the file, or what of it belongs to one log.
-        begin: where its frames begin.
-        layout: of the frames.
-        keep: (K,) fields that are wanted.
+        data: the file up to the log's end.
+        begin: the frames' first byte.
+        layout: the frames' layout.
+        keep: (K,) wanted fields.
         rows: (N, K) receives them; no more than N frames are decoded.
 
     Returns:
@@ -234,7 +234,7 @@ def decode(data: Bytes, begin: int, layout: Layout, keep: Ints, rows: Ints) -> t
             lost += 1
             based = False
             place += 1
-            # the next letter that may begin a frame
+            # the next letter of a frame
             while place < len(data) and _KINDS[data[place]] < 0:
                 place += 1
             continue

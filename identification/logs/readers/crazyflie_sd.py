@@ -1,18 +1,18 @@
-"""Logs that a Crazyflie's micro-SD deck writes (``usdlog``): binary, of events.
+"""Logs of a Crazyflie's micro-SD deck (``usdlog``): binary, of events.
 
 The format (Bitcraze's documentation of the deck, versions 1 and 2), little-endian: the byte 0xBC;
-the version and the number of event types, 16 bits each; of each type its number (16 bits), its
-name, its number of variables (16 bits) and their names, each with the letter of its type in
-brackets as in Python's ``struct`` (``acc.x(f)``), all texts ended by a zero byte. Then the events:
-number, time (version 1: 32 bits of milliseconds, version 2: 64 bits of microseconds), variables.
-The last four bytes are a CRC-32 of all before them.
+the version and the number of event types, 16 bits each. Each type has its number (16 bits), its
+name, its number of variables (16 bits) and their names. A variable's name ends in the letter of its
+type as in Python's ``struct``, in brackets (``acc.x(f)``). All texts end in a zero byte. Then the
+events: number, time (version 1: 32 bits of milliseconds, version 2: 64 bits of microseconds),
+variables. The last four bytes are a CRC-32 of all before them.
 
 Before 2021 (firmware's ``tools/usdlog`` of 2018) all variables were sampled together: the number of
-columns (one byte) and their names, each with its letter in brackets and a comma (``acc.x(f),``), of
-which the first is ``tick``, 32 bits of milliseconds; then blocks of a count (one byte) and as many
-rows. The header and each block end in a CRC-32, inverted.
+columns (one byte) and their names, each with its letter in brackets and a comma (``acc.x(f),``).
+The first is ``tick``, 32 bits of milliseconds. Then blocks of a count (one byte) and as many rows.
+The header and each block end in a CRC-32, inverted.
 
-The map ``cflib`` says what the variables become.
+The map ``cflib`` states the variables' meaning.
 """
 
 import re
@@ -29,15 +29,15 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import Samples
+from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..log_map import load_map
 from ..mapped_log import chosen, recording_of
 
-_FIRST = b"tick(I),"  # of the columns of a log before 2021
+_FIRST = b"tick(I),"  # first column of a log before 2021
 BEGINS = rb"\xbc[\x01\x02]\0|[\x02-\xff]tick\(I\),"
 
-Layout = np.dtype[Any]  # of one event: its number, time and variables
+Layout = np.dtype[Any]  # an event's number, time and variables
 
 WHAT = "a Crazyflie's SD-card log"
 _START = re.compile(rb"\xbc([\x01\x02])\0(..)", re.DOTALL)
@@ -60,10 +60,10 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     data = read_bytes(path, WHAT, LIMITS.binary_log)
     if data[1:].startswith(_FIRST):
         version, (rows, end) = 1, _rows(path, data)
-        found, notes = [rows], [f"{WHAT}, of firmware before 2021"]
+        runs, notes = [rows], [f"{WHAT}, of firmware before 2021"]
     else:
         version, kinds, begin = _header(path, data)
-        found, end = _events(path, data, kinds, begin)
+        runs, end = _events(path, data, kinds, begin)
         notes = [f"{WHAT}, version {version}"]
     # behind the last event stands nothing, or the checksum (CRC-32) of all before
     if data[end:] not in (b"", zlib.crc32(data[:end]).to_bytes(4, "little")):
@@ -71,14 +71,14 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             f"the file is damaged or was cut {end} bytes from its start ({len(data) - end} bytes "
             "are left); what stands before was used"
         )
-    events: list[Samples] = []
-    for rows in found:
+    events: list[ChannelGroup] = []
+    for rows in runs:
         if len(rows) < 2:
             continue
         t = _TIMES[version][1] * rows["time"].astype(np.float64)
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
             columns = {name: rows[name].astype(np.float64) for name in (rows.dtype.names or ())[2:]}
-        events.append(Samples(t, columns))
+        events.append(ChannelGroup(t, columns))
     if not events:
         raise InputError(f"{path}: no event twice; expected at least two samples")
     first = min(float(samples.t[0]) for samples in events)
@@ -86,7 +86,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     log_map = load_map("cflib")
     there, _ = chosen(events, log_map)
     if there.position is None and (there.gyro is None or there.accelerometer is None):
-        # as CrazyPAD's logs: rows of motor commands, which compare flights
+        # as CrazyPAD's logs: rows of motor commands, for comparing flights
         log_map = replace(there, rows="whole", gyro=None, accelerometer=None)
         notes.append(
             "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
@@ -105,11 +105,11 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
 
     def next_part(pattern: re.Pattern[bytes], expected: str) -> tuple[bytes, ...]:
         nonlocal place
-        found = pattern.match(data, place)
-        if found is None:
+        match = pattern.match(data, place)
+        if match is None:
             raise InputError(f"{path}: byte {place} of its header: expected {expected}")
-        place = found.end()
-        return found.groups()
+        place = match.end()
+        return match.groups()
 
     first, count = next_part(_START, "bc, the version 1 or 2, and the number of events")
     version = first[0]
@@ -134,19 +134,18 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
 
 
 def _rows(path: Path, data: bytes) -> tuple[NDArray[Any], int]:
-    """Return the rows of a log before 2021, as events, and the place of the first byte that is
-    none.
+    """Return the rows of a log before 2021, as events, and the place of the first byte behind.
 
     Raises:
         InputError: the header is cut or says something else.
     """
     fields, place = [("event", "V0"), ("time", "<u4")], 1 + len(_FIRST)
     for _ in range(data[0] - 1):
-        found = _COLUMN.match(data, place)
-        if found is None:
+        match = _COLUMN.match(data, place)
+        if match is None:
             raise InputError(f"{path}: byte {place} of its header: expected {_VARIABLES}")
-        place = found.end()
-        fields.append((found[1].decode("ascii", "replace").strip(), f"<{found[2].decode()}"))
+        place = match.end()
+        fields.append((match[1].decode("ascii", "replace").strip(), f"<{match[2].decode()}"))
     names = [name for name, _ in fields]
     if len(set(names)) < len(names):
         raise InputError(f"{path}: a variable stands in its header twice; expected each once")
@@ -166,7 +165,7 @@ def _rows(path: Path, data: bytes) -> tuple[NDArray[Any], int]:
 def _events(
     path: Path, data: bytes, kinds: Mapping[int, Layout], begin: int
 ) -> tuple[list[NDArray[Any]], int]:
-    """Return the events of each type, and the place of the first byte that is none."""
+    """Return the events of each type, and the place of the first byte behind."""
     runs: dict[int, list[NDArray[Any]]] = {number: [] for number in kinds}
     place, count, numbers = begin, 0, 0
     while place + 2 <= len(data):

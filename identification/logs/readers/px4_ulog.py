@@ -1,18 +1,18 @@
-"""PX4 logs (``.ulg``), decoded by pyulog: the map ``px4`` says what their topics mean, parameters
-what flew, which motor is which rotor, which output drives it, and in what range.
+"""PX4 logs (``.ulg``), decoded by pyulog: the map ``px4`` states the topics' meaning; parameters
+state the vehicle, and each rotor's motor, output and range.
 
-**Times.** Those of ``timestamp_sample`` where a topic has them. Angles and velocities that a
-``vehicle_imu`` gained over a time become rates in the middle of that time.
+**Times.** ``timestamp_sample`` where a topic has one. A ``vehicle_imu``'s gains of angle and
+velocity become rates in the middle of their time.
 
 **Rotors.** Rotor speeds of ``esc_status`` where ESCs report them; commands, 0 to 1, of
-``actuator_motors``, else of ``actuator_outputs``. Where there are commands alone, a vehicle with a
+``actuator_motors``, else of ``actuator_outputs``. For commands alone, a vehicle with a
 ``motor_curve`` turns them into thrust. One without gets relative thrusts (``commanded_speeds``):
-``actuator_motors`` itself (PX4 inverts its curve after it), or ``f x^2 + (1 - f) x`` of an output
-x, with f the parameter THR_MDL_FAC.
+``actuator_motors`` itself (PX4 inverts its curve later), or ``f x^2 + (1 - f) x`` of an output x,
+with f the parameter THR_MDL_FAC.
 
 **Damage.** Some bytes of a ULog may stand for many objects: pyulog writes topics out field by field
-for every subscription, with arrays and topics within topics, and makes an object of every
-parameter, piece of information, text and dropout. Both are counted before they are made.
+for every subscription, with arrays and topics within topics. Every parameter, piece of information,
+text and dropout becomes an object. Both are counted before they are made.
 """
 
 import io
@@ -32,14 +32,13 @@ from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
-from ..channels import Samples
+from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..log_map import shipped_map, stated
 from ..mapped_log import recording_of
-from ..rotor_orders import ORDERS, Order
 from ..streams import Recording
 from ..table import Array, one_line
-from ..what_flew import PLUS, QUADROTOR, WhatFlew, order_by_places, slots_of_motors
+from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
 Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
 Parameters = Mapping[str, float]
@@ -47,7 +46,7 @@ Parameters = Mapping[str, float]
 BEGINS = rb"ULog\x01\x12\x35"
 WHAT = "a PX4 log (ULog)"
 _FILTER, _STATUS = "vehicle_local_position", "vehicle_status"
-_SENSORS = (  # field of an inertial sensor, and that of what it gained over a time
+_SENSORS = (  # field of an inertial sensor, and field of its gain over a time
     ("gyro_rad", "delta_angle"),
     ("accelerometer_m_s2", "delta_velocity"),
 )
@@ -63,16 +62,16 @@ _DSHOT = (0.0, 1999.0)
 _UAVCAN = (0.0, 8191.0)
 _DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
 _LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed or not
-_ABOVE_PULSES = 1.1  # of the longest pulse, which no pulse reaches
+_ABOVE_PULSES = 1.1  # times the longest pulse: no pulse is longer
 
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """The outputs of motors 1 to 4, and what of them is 0 and 1."""
+    """The outputs of motors 1 to 4, and their values for commands 0 and 1."""
 
     slots: list[int]  # from 0
-    low: Array  # (4,) what is 0
-    high: Array  # (4,) what is 1
+    low: Array  # (4,) values of command 0
+    high: Array  # (4,) values of command 1
     words: str  # protocol and range
 
 
@@ -96,9 +95,9 @@ def channels(
 
     Args:
         path: the file.
-        vehicle: whose rotors the motors are; None: one in each quadrant.
-        has_ranges: pulses are 0 to 1 in the range that parameters state; False: from 1000 to 2000
-            us, for what finds the thrust of idling rotors itself.
+        vehicle: the vehicle, for its rotors' places; None: one in each quadrant.
+        has_ranges: pulses are 0 to 1 in the parameters' range; False: from 1000 to 2000 us, for a
+            fit of the thrust of idling rotors.
         piece: as of ``read``.
 
     Raises:
@@ -150,8 +149,8 @@ def channels(
 
 
 def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bool]:
-    """Return the instances of each topic that the map names, as mappings from field to column; the
-    parameters as they were when the log began; and whether the file is damaged.
+    """Return the topics of the map, the parameters at the log's start, and whether the file is
+    damaged. A topic's instances are mappings from field to column.
 
     Raises:
         InputError: pyulog is missing, the file is no ULog, or larger than ``FileLimits`` allows.
@@ -187,9 +186,9 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bo
     return topics, parameters, is_damaged
 
 
-def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
-    """Yield the columns of a topic's instance, as the map names them: none, where it is not in use;
-    two groups of an inertial sensor whose gyro and accelerometer have times of their own.
+def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[ChannelGroup]:
+    """Yield the columns of a topic's instance, as the map names them: none of an unused topic; two
+    groups of an inertial sensor, for the times of gyro and accelerometer.
     """
     published = fields["timestamp"]
     sampled = fields.get("timestamp_sample", published)
@@ -202,14 +201,14 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[Samples]:
     columns = {name: x for name, x in fields.items() if "timestamp" not in name}
     if topic == "actuator_outputs":
         columns = shares_of_outputs(columns, outputs)
-    yield Samples(t, unified(topic, columns), topic)
+    yield ChannelGroup(t, unified(topic, columns), topic)
 
 
 def unified(topic: str, fields: Fields) -> dict[str, Array]:
-    """Return a topic's columns as the map names them; none, where it is not in use."""
+    """Return a topic's columns by the map's names; none of an unused topic."""
     columns = dict(fields)
     if topic == "esc_status":
-        # the ESCs of motors 1 to 4: by the function that each states, if all do
+        # the ESCs of motors 1 to 4: found by their functions, if all are stated
         functions = [f"esc[{i}].actuator_function" for i in range(_ESCS)]
         named = [int(columns[name][-1]) if name in columns else -1 for name in functions]
         reported = [f"esc[{i}].esc_rpm" for i in slots_of_motors(named, _MOTOR1) or range(4)]
@@ -217,7 +216,7 @@ def unified(topic: str, fields: Fields) -> dict[str, Array]:
             return {}
         return {f"esc[{i}].esc_rpm": columns[name] for i, name in enumerate(reported)}
     if topic == "actuator_motors":
-        # NaN stands for a motor that is off
+        # NaN: a motor is off
         columns = {n: np.clip(np.nan_to_num(x, nan=0.0), 0.0, 1.0) for n, x in columns.items()}
         is_used = any(np.any(columns.get(f"control[{i}]", 0.0) > 0.0) for i in range(4))
         return columns if is_used else {}
@@ -225,8 +224,8 @@ def unified(topic: str, fields: Fields) -> dict[str, Array]:
         there = columns["connected"] != 0.0
         columns["voltage_v"] = np.where(there, columns["voltage_v"], np.nan)
     elif topic.endswith("_odometry"):
-        # in NED or in FRD fixed to the earth, both of which have z down: 1 and 2 since PX4 1.14,
-        # 0 and 1 before
+        # in NED or in FRD fixed to the earth, both with z down: 1 and 2 since PX4 1.14, 0 and 1
+        # before
         known = (1, 2) if "pose_frame" in columns else (0, 1)
         frame = columns.get("pose_frame", columns.get("local_frame", np.zeros(1)))
         if "x" in columns:  # before PX4 1.14
@@ -240,29 +239,27 @@ def unified(topic: str, fields: Fields) -> dict[str, Array]:
     return columns
 
 
-def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> Samples:
+def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> ChannelGroup:
     """Return a gyro or an accelerometer at its own times, as far as the topic has it."""
     source = field if topic == "sensor_combined" else gained
     names = {f"{field}[{i}]": f"{source}[{i}]" for i in range(3)}
-    found = {name: fields[stored] for name, stored in names.items() if stored in fields}
+    axes = {name: fields[stored] for name, stored in names.items() if stored in fields}
     if source == gained and f"{gained}_dt" in fields:
         span = _MICROSECOND * fields[f"{gained}_dt"]
-        found = {n: column / np.where(span > 0.0, span, np.nan) for n, column in found.items()}
+        axes = {n: column / np.where(span > 0.0, span, np.nan) for n, column in axes.items()}
         t = t - 0.5 * span
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
     if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
         t = t + _MICROSECOND * late
-    return Samples(t, found, topic)
+    return ChannelGroup(t, axes, topic)
 
 
 class TooMuchError(Exception):
-    """Ends the parser: it takes all usual errors for damage and goes on."""
+    """Ends the parser: after all usual errors the parser goes on."""
 
 
 def counting(parser: Any) -> Any:
-    """Return pyulog's class ``ULog`` as one that raises TooMuchError where a file has more than
-    ``FileLimits`` allows.
-    """
+    """Return pyulog's class ``ULog``, with a TooMuchError beyond ``FileLimits``."""
     counts: Counter[str] = Counter()
 
     def count(what: str, most: int, more: int = 1) -> None:
@@ -272,7 +269,7 @@ def counting(parser: Any) -> Any:
 
     class AddLogged(parser._MessageAddLogged):  # type: ignore[misc]
         def _parse_format(self, message_formats: Mapping[str, Any]) -> None:
-            # one that has none takes its place, too
+            # an empty one takes its place, too
             more = 1 + _fields(self.message_name, message_formats, {}, 0)
             count("fields of its topics", LIMITS.ulog_fields, more)
             super()._parse_format(message_formats)
@@ -302,7 +299,7 @@ def counting(parser: Any) -> Any:
 
 
 def _fields(name: str, formats: Mapping[str, Any], known: dict[str, int], depth: int) -> int:
-    """Return how many fields a topic has once its arrays and the topics in it are written out."""
+    """Return the number of a topic's fields, with its arrays and inner topics written out."""
     if depth > _DEEPEST:
         raise TooMuchError(f"topic {name[:100]!r} lies more than {_DEEPEST} deep in others")
     if name not in known:
@@ -314,11 +311,11 @@ def _fields(name: str, formats: Mapping[str, Any], known: dict[str, int], depth:
 
 
 def what_flew(parameters: Parameters, statuses: Sequence[Fields]) -> WhatFlew:
-    """Return what a log states of its vehicle.
+    """Return a log's statements on its vehicle.
 
     Args:
         parameters: as the log begins.
-        statuses: of the topic vehicle_status.
+        statuses: instances of vehicle_status.
     """
     known = stated("airframes")
     count, frame, kind, start = (
@@ -339,8 +336,8 @@ def what_flew(parameters: Parameters, statuses: Sequence[Fields]) -> WhatFlew:
 
 
 def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
-    """Return PX4's motor of each of the vehicle's rotors, and the note that says whence: by the
-    positions CA_ROTORn_PX and PY or the airframe's, else as on PX4's quad x.
+    """Return PX4's motor of each of the vehicle's rotors, and a note on the source: the positions
+    CA_ROTORn_PX and PY, the airframe's, else PX4's quad x.
 
     Raises:
         InputError: the motors stand otherwise than the vehicle's rotors, by default one in each
@@ -369,28 +366,28 @@ def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> 
 
 
 def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Outputs:
-    """Return which outputs the motors are, and what of them is 0 and 1: shares as they are; of
-    DShot and UAVCAN, which the parameters state or no pulse can be, the protocol's range; of pulses
-    each output's own parameter, the bank's, or PX4's default.
+    """Return the motors' outputs, and their values for commands 0 and 1. Shares count as they are.
+    DShot and UAVCAN, by parameters or by numbers beyond pulses, have the protocol's range. Pulses
+    have each output's own parameter, the bank's, or PX4's default.
 
     Args:
         path: the file, for errors.
         sent: the instances of actuator_outputs.
-        parameters: of the vehicle.
+        parameters: the vehicle's parameters.
 
     Raises:
         InputError: a range of pulses is none, or the outputs fit no protocol.
     """
     bank, slots = "MAIN", [0, 1, 2, 3]
-    for name, prefix in reversed(_BANKS.items()):  # of several the first
+    for name, prefix in reversed(_BANKS.items()):  # the first of several
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
-        if found := slots_of_motors(functions, _MOTOR1):
-            bank, slots = name, found
+        if of_bank := slots_of_motors(functions, _MOTOR1):
+            bank, slots = name, of_bank
     each = (_of_motors(fields, slots) for fields in sent)
     motors = next((motors for motors in each if motors is not None), np.zeros((0, 4)))
-    most = float(np.nanmax(motors)) if np.isfinite(motors).any() else 0.0
-    turning = motors[motors > 0.5 * most]  # not what stops them
-    usual = float(np.median(turning)) if turning.size else _LEAST_PULSE
+    most = np.nanmax(motors) if np.isfinite(motors).any() else 0.0
+    turning = motors[motors > 0.5 * most]  # not the stop command
+    usual = np.median(turning) if turning.size else _LEAST_PULSE
 
     def pulses(end: str, default: float) -> Array:
         """Return one end (4,) of the outputs' ranges of pulses, us."""
@@ -399,8 +396,8 @@ def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Ou
         return np.array([next((x for x in one if x > 0.0), default) for one in given])
 
     lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
-    # a bus for sensors alone leaves the motors to pulses, which stay long when they stand still
-    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and bool(np.any(motors < _LEAST_PULSE))
+    # with a bus for sensors alone the motors have pulses, long ones at rest, too
+    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and np.any(motors < _LEAST_PULSE)
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
     is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
     if 0.0 < most <= _LARGEST_SHARE:
@@ -428,8 +425,8 @@ def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Ou
 
 
 def shares_of_outputs(columns: Fields, outputs: Outputs) -> dict[str, Array]:
-    """Return what was sent to each output (N,) as 0 to 1, of those that are no motors' in the
-    motors' range; nothing, where a motor's never changes.
+    """Return each output's values (N,) as 0 to 1, other outputs' in the motors' range; nothing if a
+    motor's output never changes.
     """
     if _of_motors(columns, outputs.slots) is None:
         return {}
@@ -444,8 +441,8 @@ def shares_of_outputs(columns: Fields, outputs: Outputs) -> dict[str, Array]:
 
 
 def _of_motors(columns: Fields, slots: Sequence[int]) -> Array | None:
-    """Return what was sent to the outputs of the motors (N, 4); None where one of them is not there
-    or never changes: that of a servo, or of a bank that is not in use.
+    """Return the values of the motors' outputs (N, 4). None: one is missing or never changes, as of
+    a servo, or of an unused bank.
     """
     names = [f"output[{slot}]" for slot in slots]
     if not set(names) <= set(columns):

@@ -1,6 +1,6 @@
-"""Which topics of a bag, or of a live source, hold the sections of a log map, by the rules that
-``rosbag`` states; and their messages as columns: numbers by the paths of their fields, such as
-``pose.position.x``, ``data[0]`` or ``esc[0].esc_rpm``.
+"""Topics of a bag for the sections of a log map, by the rules of ``rosbag``; and their messages as
+columns: numbers by the paths of their fields, such as ``pose.position.x``, ``data[0]`` or
+``esc[0].esc_rpm``.
 """
 
 import re
@@ -18,14 +18,14 @@ from ..table import Array
 from .px4_ulog import unified
 
 SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerometer", "gyro")
-# sections that stand in the messages of another, where a map does not say in which
+# sections in the messages of another, without a topic of their own
 BESIDE = {"attitude": "position", "gyro": "accelerometer"}
 MOTORS = ("rotors", "commands")
 _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
 _PX4 = "px4_msgs/msg/"
-_SHOWN = 30  # fields that an error lists
+_SHOWN = 30  # fields in an error
 
 
 def map_of(
@@ -34,25 +34,25 @@ def map_of(
     """Return the log map of topics, and notes.
 
     Args:
-        types: of the topics' messages, by their names.
-        given: what a map file says; a section's topic and columns may be left out.
-        source: the bag or the live source, for errors.
+        types: types of the topics' messages, by topic.
+        given: content of a map file; a section's topic and columns may be left out.
+        source: the bag, for errors.
         where: the map file, for errors.
 
     Raises:
-        InputError: the map says something that is not known; a section that is needed is missing or
-            ambiguous; or a topic cannot hold its section.
+        InputError: the map has an unknown field; a needed section is missing or ambiguous; or a
+            topic cannot hold its section.
     """
-    found: dict[str, Any] = {}
+    sections: dict[str, Any] = {}
     refused: dict[str, str] = {}
     notes: list[str] = []
     for section in SECTIONS:
         said = given.get(section) or {}
         said = {"topic": said} if isinstance(said, str) else said
         if not isinstance(said, Mapping):  # parse_map takes alternatives as they stand
-            found[section] = said
+            sections[section] = said
             continue
-        beside = _topic_of(found.get(BESIDE.get(section, "")))
+        beside = _topic_of(sections.get(BESIDE.get(section, "")))
         topic, why = _topic_of(said) or beside, ""
         try:
             if topic is None and (said or section not in BESIDE):
@@ -66,24 +66,24 @@ def map_of(
                 raise InputError(f"{source}: {refused[section]}") from error
             continue
         own = {key: given[key] for key in ("body",) if key in usual and key in given}
-        found[section] = {**usual, **own, **said, "topic": topic}
+        sections[section] = {**usual, **own, **said, "topic": topic}
         if topic != beside:
             notes.append(f"{section}: topic {topic} ({types[topic]}){why}")
         if "order" in usual and not {"order", "columns"} & {*said}:
             notes.append(f"{section}: motors as on {usual['order']}, which the bag does not state")
     lacks = []
-    if not {*MOTORS, "wrench"} & {*found, *given}:
+    if not {*MOTORS, "wrench"} & {*sections, *given}:
         lacks.append("rotors")
     # an ambiguous pose is no reason to go on without one
-    if "position" not in found and ("gyro" not in found or "position" in refused):
+    if "position" not in sections and ("gyro" not in sections or "position" in refused):
         lacks.append("position")
     for section in lacks[:1]:
         why = refused.get(section) or f"{section}: {_missing(types, section, where)}"
         raise InputError(f"{source}: {why}")
-    is_ned = types.get(_topic_of(found.get("position")) or "") in stated("ros")["ned"]
+    is_ned = types.get(_topic_of(sections.get("position")) or "") in stated("ros")["ned"]
     clock: dict[str, Any] = {"time": {"column": "stamp", "unit": "ns"}}
     clock |= {"world": "ned", "body": "frd"} if is_ned else {}
-    log_map = parse_map({**clock, **given, **found}, where)
+    log_map = parse_map({**clock, **given, **sections}, where)
     sensed = {part.body for part in (log_map.accelerometer, log_map.gyro) if part is not None}
     frames = [f"world {log_map.world}, body {log_map.body}", *sorted(sensed - {"", log_map.body})]
     notes.append(f"frames: {', inertial sensors '.join(frames)}")
@@ -91,7 +91,7 @@ def map_of(
 
 
 def _topic_of(section: object) -> str | None:
-    """Return the topic that a section states."""
+    """Return a section's topic."""
     topic = section.get("topic") if isinstance(section, Mapping) else None
     return None if topic is None else str(topic)
 
@@ -99,7 +99,7 @@ def _topic_of(section: object) -> str | None:
 def _usual(
     types: Mapping[str, str], section: str, said: Mapping[str, Any], topic: str, where: str
 ) -> dict[str, Any]:
-    """Return what messages of a topic say of a section without a map.
+    """Return a section of a topic's messages by their type alone.
 
     Raises:
         InputError: the topic is not there, cannot hold the section, or has no unit.
@@ -126,11 +126,11 @@ def _usual(
 def _chosen(
     types: Mapping[str, str], section: str, said: Mapping[str, Any], where: str
 ) -> tuple[str | None, str]:
-    """Return the topic of a section, the only one that may hold it or that which its name tells,
-    and how it was chosen; None: there is none.
+    """Return the topic of a section, the only possible one or the one by name, and a note on the
+    choice; None: there is none.
 
     Raises:
-        InputError: several may hold it.
+        InputError: several topics are possible.
     """
 
     def named_by(topic: str, words: str) -> bool:
@@ -141,46 +141,46 @@ def _chosen(
     if section in ("position", "rotors"):
         flown = [topic for topic in several if not named_by(topic, "setpoint_words")]
         several = flown or (several if section == "rotors" else [])
-    found = several
-    if section == "position" and len(found) > 1:
+    usable = several
+    if section == "position" and len(usable) > 1:
         measured = [topic for topic in several if named_by(topic, "measured_words")]
-        found = measured if len(measured) == 1 else several
-    elif section in ("accelerometer", "gyro") and len(found) > 1:
-        found = [topic for topic in several if not topic.endswith("_raw")] or several
-    if len(found) > 1:
+        usable = measured if len(measured) == 1 else several
+    elif section in ("accelerometer", "gyro") and len(usable) > 1:
+        usable = [topic for topic in several if not topic.endswith("_raw")] or several
+    if len(usable) > 1:
         raise InputError(
-            f"{len(found)} topics could be it ({', '.join(found)}); expected one: name it in "
-            f"{where}, such as {section}: {{topic: {found[0]}}}"
+            f"{len(usable)} topics could be it ({', '.join(usable)}); expected one: name it in "
+            f"{where}, such as {section}: {{topic: {usable[0]}}}"
         )
-    others = [topic for topic in several if topic not in found]
+    others = [topic for topic in several if topic not in usable]
     why = f", chosen by its name before {', '.join(others)}; a map says another" if others else ""
-    return (found[0] if found else None), why
+    return (usable[0] if usable else None), why
 
 
 def _missing(types: Mapping[str, str], section: str, where: str) -> str:
-    """Return what is wrong with topics without rotor speeds and commands, or without a pose and
-    inertial sensors.
+    """Return words on topics without rotor speeds and commands, or without a pose and inertial
+    sensors.
     """
     topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
     names = MOTORS if section == "rotors" else (section,)
     known = dict.fromkeys(kind for name in names for kind in stated("ros")[name])
     arrays = sorted(topic for topic, kind in types.items() if kind in stated("ros")["arrays"])
     left_out = sorted(topic for topic, kind in types.items() if kind in known)
-    found = "no topic of a type that fits"
-    found = f"no topic but set-points by their names ({', '.join(left_out)})" if left_out else found
+    seen = "no topic of a type that fits"
+    seen = f"no topic but set-points by their names ({', '.join(left_out)})" if left_out else seen
     wanted = f"one of {' or '.join(known)}, or its topic and columns in {where}"
     if section == "rotors" and arrays:
-        found = f"{', '.join(arrays)} could be it, but a multi-array states no unit"
+        seen = f"{', '.join(arrays)} could be it, but a multi-array states no unit"
         wanted = (
             f"in {where} the line rotors: {{topic: {arrays[0]}, unit: rad/s}} (or rpm, Hz), or "
         )
         wanted += f"commands: {{topic: {arrays[0]}, unit: us}} (or normalised)"
-    return f"{found}; expected {wanted}. The topics: {topics}"
+    return f"{seen}; expected {wanted}. The topics: {topics}"
 
 
 def definitions() -> list[dict[str, str]]:
-    """Return the definitions of the types that rosbags does not know, in several variants: the
-    newest of each comes first.
+    """Return definitions for rosbags' unknown types, in several variants: the newest of each comes
+    first.
     """
     known: dict[str, list[str]] = stated("ros")["definitions"]
     return [
@@ -190,9 +190,7 @@ def definitions() -> list[dict[str, str]]:
 
 
 def stamp(message: Any) -> int:
-    """Return when a message's sample was taken, in ns of whatever clock its sender has; 0: it does
-    not say.
-    """
+    """Return the time of a message's sample, in ns of its sender's clock; 0: unknown."""
     header = getattr(message, "header", None)
     if header is not None:
         return min(int(header.stamp.sec) * _SECOND + int(header.stamp.nanosec), _LATEST - 1)
@@ -200,8 +198,8 @@ def stamp(message: Any) -> int:
     return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
 
 
-class Fields:
-    """The numbers in a topic's messages that a map asks for; of an array all that it holds.
+class MessageFields:
+    """The numbers of a map in a topic's messages; whole arrays.
 
     Args:
         where: the topic, for errors.
@@ -218,16 +216,17 @@ class Fields:
         """Return the numbers (K,) of a message.
 
         Raises:
-            InputError: it has more than ``FileLimits.log_fields``, or less than the first one.
+            InputError: the message has more than ``FileLimits.log_fields``, or less than the first
+                one.
         """
         if not self._names:
-            found = list(islice(_paths(message), LIMITS.log_fields + 1))
-            check_count(self.where, len(found), LIMITS.log_fields, "fields of a message")
+            paths = list(islice(_paths(message), LIMITS.log_fields + 1))
+            check_count(self.where, len(paths), LIMITS.log_fields, "fields of a message")
             arrays = set(map(array_of, self._wanted))
             is_px4 = self._kind.startswith(_PX4)
-            if not is_px4 and not set(self._wanted) <= set(found):
-                raise self._lack(self._wanted, found)
-            self._names = [name for name in found if is_px4 or array_of(name) in arrays]
+            if not is_px4 and not set(self._wanted) <= set(paths):
+                raise self._lack(self._wanted, paths)
+            self._names = [name for name in paths if is_px4 or array_of(name) in arrays]
             self._getters = [_getter(name) for name in self._names]
         try:
             return [float(get(message)) for get in self._getters]
@@ -239,26 +238,26 @@ class Fields:
         """Return the columns (N,) of messages' numbers (N, K), by name.
 
         Raises:
-            InputError: one that is wanted is not among them.
+            InputError: a wanted column is missing.
         """
-        found = dict(zip(self._names, rows.T, strict=True))
+        columns_by_name = dict(zip(self._names, rows.T, strict=True))
         if self._kind.startswith(_PX4):
             name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._kind.removeprefix(_PX4)).lower()
-            found = unified(name, found)
-        if not set(self._wanted) <= set(found):
-            raise self._lack(self._wanted, list(found))
-        return found
+            columns_by_name = unified(name, columns_by_name)
+        if not set(self._wanted) <= set(columns_by_name):
+            raise self._lack(self._wanted, list(columns_by_name))
+        return columns_by_name
 
-    def _lack(self, wanted: Collection[str], found: Collection[str]) -> InputError:
-        missing = [name for name in wanted if name not in found]
+    def _lack(self, wanted: Collection[str], names: Collection[str]) -> InputError:
+        missing = [name for name in wanted if name not in names]
         return InputError(
             f"{self.where}: no field {', '.join(missing)} in its {self._kind}; found "
-            f"{', '.join(islice(found, _SHOWN)) or 'no number'}"
+            f"{', '.join(islice(names, _SHOWN)) or 'no number'}"
         )
 
 
 def array_of(path: str) -> str:
-    """Return a field's path without the numbers of its elements: what all elements share."""
+    """Return a field's path without the numbers of its elements: the same for all elements."""
     return re.sub(r"\[\d+\]", "[]", path)
 
 
@@ -271,9 +270,8 @@ def _paths(value: Any, path: str = "") -> Iterator[str]:
     elif hasattr(value, "__len__"):
         for i, item in enumerate(value):
             yield from _paths(item, f"{path}[{i}]")
-    else:  # a message, of rosbags or of rclpy
-        names = getattr(value, "__dataclass_fields__", None) or value.get_fields_and_field_types()
-        for name in names:
+    else:  # a message
+        for name in value.__dataclass_fields__:
             yield from _paths(getattr(value, name), f"{path}.{name}" if path else name)
 
 

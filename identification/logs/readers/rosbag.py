@@ -1,8 +1,8 @@
 """ROS 1 and ROS 2 bags (``.bag``, ``.db3``, ``.mcap`` or a ROS 2 bag's folder), read with rosbags; no ROS is needed.
 
-Which topic is what, a log map may say (``log_map``): ``NAME.topics.yaml`` beside the bag ``NAME.bag`` (or folder ``NAME``), or the
-file given as ``--map`` or as the reader's option, ``rosbag:FILE.yaml``. A section names its topic, and where the type of its messages
-does not say them, its columns, which are fields of a message::
+A log map may name topics (``log_map``): ``NAME.topics.yaml`` beside the bag ``NAME.bag`` (or folder ``NAME``), or the file given as
+``--map`` or as the reader's option, ``rosbag:FILE.yaml``. A section names its topic, and, for types without known columns, its
+columns, as fields of a message::
 
     position: {topic: /vicon/drone}                # and attitude, where nothing else is said
     rotors: {topic: /motors, unit: rad/s, order: px4-x}
@@ -10,23 +10,21 @@ does not say them, its columns, which are fields of a message::
     battery: {topic: /battery}
     accelerometer: {topic: /imu, body: frd}        # and gyro; where body axes are forward, right, down
 
-``/topic`` alone stands for ``{topic: /topic}``. Of what the map does not name:
+``/topic`` alone stands for ``{topic: /topic}``. Rules for sections without a topic:
 
-1. topics whose names say that they are set-points (setpoint, reference, command ...) are not taken for a pose or for rotor speeds;
-2. the bag's only topic of a type that fits is taken;
-3. of several poses, the one that motion capture or a ground truth names itself (vicon, vrpn, mocap, optitrack ...) is taken, and
-   of several inertial sensors or others that which no other name extends by ``_raw``; a note says so;
-4. where that leaves several, the bag is refused and they are listed.
+1. topics named as set-points (setpoint, reference, command ...) are not taken for a pose or for rotor speeds;
+2. the bag's only topic of a fitting type is taken;
+3. among several poses, a name of motion capture or ground truth (vicon, vrpn, mocap, optitrack ...) wins; among several inertial
+   sensors or others, a name without ``_raw``. A note says so;
+4. with several topics left, the bag is refused, and the topics are listed.
 
-Which types hold what, and in which frame, unit and order, says ``maps/recordings/ros.yaml``; a multi-array of std_msgs holds rotor
-speeds or commands where a ``unit`` is given. Without a pose, an inertial sensor must be there. Of sensor_msgs/Imu the attitude is
-not read.
+``maps/recordings/ros.yaml`` states the types' sections, frames, units and orders. A multi-array of std_msgs holds rotor speeds or
+commands, if a ``unit`` is given. Without a pose, an inertial sensor must be there. The attitude of sensor_msgs/Imu is not read.
 
-A sample's time is its header's (of PX4's types its ``timestamp_sample`` or ``timestamp``), where that runs within a second of the
-bag's clock, else the time it was recorded.
-Messages are decoded by rosbags' own definitions and those in ``maps/recordings/ros.yaml``, never by those in the bag,
-so that nothing in a file decides what code runs; a bag whose definitions differ is refused. A few kilobytes may unpack to any size, so
-what is packed is unpacked up to a limit.
+A sample's time is its header's (``timestamp_sample`` or ``timestamp`` of PX4's types), if within a second of the bag's clock, else the
+time of recording. Messages are decoded by definitions of rosbags and of ``maps/recordings/ros.yaml``, never by the bag's: no file
+chooses the code that runs. A bag with different definitions is refused. A few kilobytes may unpack to any size, so unpacking has a
+limit.
 """  # noqa: E501
 
 import bz2
@@ -51,11 +49,11 @@ from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ....runtime.yaml_file import read_yaml
-from ..channels import Samples
+from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
 from ..table import Array, one_line
-from .ros_topics import Fields, definitions, map_of, stamp
+from .ros_topics import MessageFields, definitions, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -77,12 +75,12 @@ _WHOLE = re.compile(r"compression_mode:\s*['\"]?(file|message)", re.IGNORECASE)
 def read(
     path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
 ) -> FlightLog:
-    """Read a bag; ``option`` is the path of a map, the default ``NAME.topics.yaml`` beside the bag
-    if it is there.
+    """Read a bag; ``option`` is the path of a map, by default ``NAME.topics.yaml`` beside the bag,
+    if any.
 
     Raises:
-        InputError: rosbags is missing, the bag or the map cannot be read, a topic is missing,
-            ambiguous or of another type, or a message cannot be used.
+        InputError: rosbags is missing, the bag or the map is unreadable, a message cannot be used,
+            or a topic is missing, ambiguous or of another type.
     """
     named = path if path.name.strip(".") else Path(os.path.abspath(path))  # "." has no name
     stem = named.name if os.path.isdir(path) else named.stem
@@ -95,13 +93,13 @@ def read(
         for topic in sorted(log_map.topics - {""}):
             held = {name: part for name, part in log_map.sections.items() if part.topic == topic}
             wanted = dict.fromkeys(name for part in held.values() for name in part.named)
-            fields = Fields(f"{path}: topic {topic}", types[topic], wanted)
+            fields = MessageFields(f"{path}: topic {topic}", types[topic], wanted)
             try:
                 times, columns, doubt = _decoded_topic(fields, messages(topic))
             except InputError as error:
                 if held.keys() & {*given, "position", "rotors"}:
                     raise
-                notes.append(f"no {', '.join(held)}: {error}")  # nobody asked for it
+                notes.append(f"no {', '.join(held)}: {error}")  # the map did not ask for it
                 left_out: dict[str, Any] = dict.fromkeys(held)
                 log_map = replace(log_map, **left_out)
                 continue
@@ -111,22 +109,22 @@ def read(
         raise InputError(f"{path}: {notes[-1]}")
     origin = min(int(times[0]) for times, _, _ in decoded)
     recorded = [
-        Samples(_NANOSECOND * (times - origin).astype(float), columns, name)
+        ChannelGroup(_NANOSECOND * (times - origin).astype(float), columns, name)
         for times, columns, name in decoded
     ]
     return recording_of(path, recorded, log_map, "rosbag", notes, piece).log(vehicle)
 
 
 def _bag_in(path: Path) -> Path:
-    """Return what of a path is read: of a folder without metadata its only file.
+    """Return the bag's path: the only file of a folder without metadata, else the path itself.
 
     Raises:
         InputError: the folder has no metadata, and several files of bags or none.
     """
     if not os.path.isdir(path) or os.path.lexists(path / "metadata.yaml"):
         return path
-    found = sorted(path.iterdir())
-    files = [x for x in found if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
+    entries = sorted(path.iterdir())
+    files = [x for x in entries if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
     if len(files) != 1:
         raise InputError(
             f"{path}: no metadata.yaml, and {len(files)} .db3 or .mcap files; expected "
@@ -136,18 +134,18 @@ def _bag_in(path: Path) -> Path:
 
 
 def given_map(file: Path) -> Mapping[str, Any]:
-    """Return what a map file of topics says.
+    """Return the content of a map file of topics.
 
     Raises:
-        InputError: it cannot be read, or is none.
+        InputError: the file is unreadable, or no map.
     """
-    found = read_yaml(file, "a map file")
-    if not isinstance(found, Mapping):
+    content = read_yaml(file, "a map file")
+    if not isinstance(content, Mapping):
         raise InputError(
             f"{file}: expected a mapping of position, rotors and so on to topics, got "
-            f"{type(found).__name__}"
+            f"{type(content).__name__}"
         )
-    return found
+    return content
 
 
 @contextmanager
@@ -206,8 +204,8 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
 
 
 def _same(connection: Any, store: Any, ros1: bool) -> bool:
-    """Return whether a topic was recorded with the definition of its type that will decode it, as
-    far as the bag says.
+    """Return whether a topic was recorded with a store's definition of its type, by the bag's
+    digest.
     """
     digest = connection.digest or ""
     if ros1:
@@ -217,7 +215,7 @@ def _same(connection: Any, store: Any, ros1: bool) -> bool:
 
 
 def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
-    """Return a message, decoded by the first of the definitions that it fits; the others are
+    """Return a message, decoded by the first fitting definition; the definitions before are
     dropped.
     """
     while True:
@@ -230,13 +228,12 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 
 def _decoded_topic(
-    fields: Fields, messages: Iterator[tuple[int, Any]]
+    fields: MessageFields, messages: Iterator[tuple[int, Any]]
 ) -> tuple[NDArray[np.int64], dict[str, Array], str]:
-    """Return times (N,) in ns and columns (N,) of a topic by name, and what is wrong with its time
-    stamps.
+    """Return times (N,) in ns and columns (N,) of a topic by name, and a doubt on its time stamps.
 
     Raises:
-        InputError: it has no message or too many, or one that cannot be used.
+        InputError: the topic has no message, too many, or an unusable one.
     """
     recorded, stamped, values = array("q"), array("q"), array("d")
     for index, (received, message) in enumerate(messages):
@@ -256,9 +253,9 @@ def _decoded_topic(
 
 
 def _at_most(make: Callable[[], Any], spent: list[int]) -> Callable[..., bytes]:
-    """Return the decompression of ``make()``'s kind, which refuses what unpacks to more than
-    ``LARGEST`` bytes, or to more than a bag may with all its chunks, of which ``spent`` keeps the
-    count: an index may name the same chunk over and over.
+    """Return a decompression of ``make()``'s kind with limits: ``LARGEST`` bytes of a chunk, and a
+    bag's limit on all chunks. ``spent`` keeps the count, since an index may name the same chunk
+    over and over.
     """
 
     def unpack(data: bytes, *_: object) -> bytes:
@@ -279,8 +276,8 @@ def _at_most(make: Callable[[], Any], spent: list[int]) -> Callable[..., bytes]:
 
 @contextmanager
 def limited_unpacking() -> Iterator[None]:
-    """Have rosbags unpack no chunk to more than ``LARGEST`` bytes, and no more of them and of their
-    index than ``FileLimits`` allows, while the block lasts.
+    """Limit rosbags' unpacking within the block: a chunk to ``LARGEST`` bytes, all chunks and their
+    index by ``FileLimits``.
     """
     import lz4.frame
     from rosbags.rosbag1 import reader
@@ -317,8 +314,8 @@ def check_bag_files(path: Path) -> None:
     """Check the files of a ROS 2 bag, a file or a folder, before a library opens them by name.
 
     Raises:
-        InputError: one is no regular file, or a database that computes what it holds; or the files
-            or messages are packed one by one, so that what they unpack to cannot be limited.
+        InputError: one is no regular file, or a database with computed columns. Or files or
+            messages are packed one by one, without a limit on unpacking.
     """
     is_folder = os.path.isdir(path)
     folder = path if is_folder else path.parent
@@ -335,14 +332,14 @@ def check_bag_files(path: Path) -> None:
         if file.suffix.lower() != ".db3":
             continue
         # a view or a computed column of a few bytes of SQL may give any number of rows of any size
-        found = []
-        with suppress(sqlite3.Error):  # the reader says what is wrong with it
+        tables = []
+        with suppress(sqlite3.Error):  # the reader states the error
             uri = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:
                 query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
-                found = database.execute(query).fetchmany(_TABLES)
-        for name, kind, sql in found:
-            if kind == "view" or _COMPUTED.search(sql or "") or len(found) == _TABLES:
+                tables = database.execute(query).fetchmany(_TABLES)
+        for name, kind, sql in tables:
+            if kind == "view" or _COMPUTED.search(sql or "") or len(tables) == _TABLES:
                 raise InputError(
                     f"{file}: its {kind} {name!r} is computed; expected a ROS 2 bag, whose tables "
                     "hold what was recorded"

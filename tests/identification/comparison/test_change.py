@@ -78,19 +78,18 @@ def test_a_session_ends_where_the_battery_was_changed():
 def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
     """Of 60 pairs each: the spread of the difference is what its deviation says."""
     rng = np.random.default_rng(8)
-    for shared in (True, False):
+    for day in ("mon", "tue"):
         scores = []
         for _ in range(60):
             *before, first, second = drawn(rng, 5)
-            if not shared:
+            if day == "tue":
                 first, second = drawn(rng, 2)
-            names = "mon", "mon" if shared else "tue"
-            before = [replace(trim, session=names[0]) for trim in before]
-            found = difference([replace(x, session=names[1]) for x in (first, second)], before)
+            before = [replace(trim, session="mon") for trim in before]
+            found = difference([replace(x, session=day) for x in (first, second)], before)
             share = np.exp(found.log)
             size = np.sqrt(share @ found.variance)
             scores.append(share @ found.mean / size)
-            assert np.all(size < 2.5 * np.array(FLIGHT_STD)) == shared
+            assert np.all(size < 2.5 * np.array(FLIGHT_STD)) == (day == "mon")
         assert 0.8 < np.sqrt(np.mean(np.square(scores))) < 1.2
 
 
@@ -113,13 +112,9 @@ def test_what_is_no_rotors_change_is_told_from_one(place, moved):
 @pytest.mark.parametrize("rotor", range(4))
 def test_a_weak_rotor_and_a_weight_are_named_at_their_place(rotor):
     rng = np.random.default_rng(2)
-    left, front = ((1, 1), (1, -1), (-1, -1), (-1, 1))[rotor]
-    weak = 0.08 * MIX[:, rotor] * [1, 1, 1, 0] + [0, 0, 0, 0.08]
-    weight = 0.1 * np.array([left, front, 0, 1])
-    places = []
-    for moved in (weak, weight):
-        for _ in range(8):
-            places.append(compare(drawn(rng, 3, moved), drawn(rng, 3)))
+    left, front = MIX[:2, rotor]
+    weak, weight = 0.08 * MIX[:, rotor], 0.1 * np.array([left, front, 0, 1])
+    places = [compare(drawn(rng, 3, x), drawn(rng, 3)) for x in [weak] * 8 + [weight] * 8]
     assert np.mean([c.place == ROTORS[rotor] for c in places]) > 0.8
     assert not any(c.sure and c.place != ROTORS[rotor] for c in places)
 
@@ -148,11 +143,9 @@ def test_simulated_changes_are_named_without_a_true_model(effects, place, tmp_pa
 def test_another_battery_voltage_makes_the_total_less_certain():
     rng = np.random.default_rng(7)
     after, before = drawn(rng, 3, (0.0, 0.0, 0.0, 0.13)), drawn(rng, 3)
-    low, high = (
-        [replace(trim, voltage=volts) for trim in group]
-        for group, volts in ((after, 10.5), (before, 12.0))
-    )
     assert compare(after, before).places["all rotors"] > 0.8
+    low = [replace(trim, voltage=10.5) for trim in after]
+    high = [replace(trim, voltage=12.0) for trim in before]
     assert compare(low, high).places["all rotors"] < 0.7
 
 
@@ -160,12 +153,17 @@ def test_another_battery_voltage_makes_the_total_less_certain():
 def test_a_measured_weight_is_named_from_the_requests_alone(tmp_path):
     """The shipped pieces of three flights, by the command."""
     folder = excerpt("crazypad")
-    normal = [str(path) for path in sorted(folder.glob("normal*.csv.gz"))]
-    weight = str(folder / "add_weight_W3_near_M3__E9_log00.csv.gz")
-    options = ["--reader", "crazypad", "--out", str(tmp_path)]
-    result = CliRunner().invoke(app, ["compare", *options, weight, "--against", *normal])
-    assert result.exit_code == 0, result.output
-    found = json.loads((tmp_path / "change.json").read_text(encoding="utf-8"))
+    normal = sorted(folder.glob("normal*.csv.gz"))
+    weight = folder / "add_weight_W3_near_M3__E9_log00.csv.gz"
+
+    def compared(*words):
+        options = ["--reader", "crazypad", "--out", str(tmp_path)]
+        result = CliRunner().invoke(app, ["compare", *options, *map(str, words)])
+        assert result.exit_code == 0, result.output
+        change = json.loads((tmp_path / "change.json").read_text(encoding="utf-8"))
+        return change, "".join(result.output.splitlines())
+
+    found, _ = compared(weight, "--against", *normal)
     assert found["place"] == ROTORS[1]
     assert (len(found["after"]), len(found["before"])) == (1, len(normal))
     # as flights of two sessions, by the folders of links to them
@@ -174,9 +172,6 @@ def test_a_measured_weight_is_named_from_the_requests_alone(tmp_path):
         (tmp_path / day).mkdir()
         paths.append(tmp_path / day / "log.csv.gz")
         paths[-1].symlink_to(log)
-    after, before = map(str, paths)
-    words = ["compare", "--by-folder", after, "--against", before, *options]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 0, result.output
-    assert f"session {tmp_path}/tue: 0 after, 1 before" in "".join(result.output.splitlines())
-    assert json.loads((tmp_path / "change.json").read_text("utf-8"))["place"] == NOWHERE
+    found, said = compared("--by-folder", paths[0], "--against", paths[1])
+    assert f"session {tmp_path}/tue: 0 after, 1 before" in said
+    assert found["place"] == NOWHERE

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import data_file
-from tests.support.flown import without_pose
+from tests.support.flown import settings, without_pose
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
+from windwrench.evidence.trials.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.regression import Flights, held_out
+from windwrench.identification.diagnosis.regression import RegressedFlights, held_out
 from windwrench.identification.diagnosis.settings import DiagnosisSettings
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.sensor_noise import sensor_noise, with_noise
-from windwrench.studies.trials.practice_flights import fly_practice, practise
 
 VEHICLE = load_vehicle("ardrone2")
 
@@ -35,8 +35,10 @@ def named(found):
     return [e.name for e in found.effects]
 
 
-def test_nothing_is_named_where_nothing_was_added():
-    found = diagnose([fly()], VEHICLE)
+@pytest.mark.parametrize("effects", [{}, {"rotor_drag": {"kdx": 1.2e-4, "kdy": 0.9e-4}}])
+def test_nothing_is_named_where_the_model_lacks_nothing(effects):
+    (log,) = [fly(name, **values) for name, values in effects.items()] or [fly()]
+    found = diagnose([log], VEHICLE.with_effects(*settings(effects)))
     assert named(found) == []
     assert found.verdict == "nothing to explain"
     assert found.remainder == "none"
@@ -106,13 +108,6 @@ def test_an_effect_that_is_declared_wrongly_or_in_part_is_corrected(
         assert abs(error) < (0.05 * abs(value) or 3.0 * effect.std[key])
     (amended,) = found.amended.effects
     assert {key: amended.coefficients[key] for key in effect.coefficients} == effect.coefficients
-
-
-def test_what_is_declared_rightly_is_not_named():
-    drag = {"kdx": 1.2e-4, "kdy": 0.9e-4}
-    vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", drag))
-    found = diagnose([fly("rotor_drag", "excite", **drag)], vehicle)
-    assert found.verdict == "nothing to explain"
 
 
 HOVER = pytest.mark.xfail(
@@ -305,7 +300,7 @@ def test_no_flight_keeps_step_with_what_is_held_out():
     for period in range(2, 14):
         share = np.bincount(number % period, held) / np.bincount(number % period)
         assert np.all((share > 0.05) & (share < 0.5)), period
-    flights = Flights([fly()], VEHICLE)
+    flights = RegressedFlights([fly()], VEHICLE)
     assert np.array_equal(flights.fit_rows, flights.block % 4 != held_out(flights.block))
 
 
@@ -327,11 +322,10 @@ def test_the_error_is_that_of_test_logs_where_they_are_given():
 
 def test_sensor_noise_is_read_off_the_log():
     log, rng = fly(), np.random.default_rng(0)
-    vehicle = VEHICLE
-    noise = sensor_noise(log, vehicle)
+    noise = sensor_noise(log, VEHICLE)
     assert noise.position == pytest.approx(0.001, rel=0.05)
     assert noise.attitude == pytest.approx(0.005, rel=0.05)
-    louder = sensor_noise(with_noise(log, noise, rng), vehicle)
+    louder = sensor_noise(with_noise(log, noise, rng), VEHICLE)
     assert louder.position == pytest.approx(math.sqrt(2) * noise.position, rel=0.05)
 
 

@@ -9,14 +9,14 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import Need, needing
+from windwrench.evidence.trials.logged_poses import FILTERS
+from windwrench.evidence.trials.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import UNSTATED_THRUST_STD
-from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.residuals import transient_disturbances
 from windwrench.identification.report.headline import headline
 from windwrench.identification.report.words import remainder_sentence
-from windwrench.studies.trials.logged_poses import FILTERS
-from windwrench.studies.trials.practice_flights import fly_practice, practise
 
 VEHICLE = load_vehicle("ardrone2")
 
@@ -101,7 +101,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
 @pytest.mark.parametrize("turbulence", [0.0, 1.0, 4.0])
 def test_gusts_of_a_steady_strength_are_no_pushes(turbulence):
     log = fly_practice(VEHICLE, seconds=40.0, seed=5, turbulence=turbulence)
-    assert transient_disturbances(Flights([log], VEHICLE), {}) == []
+    assert transient_disturbances(RegressedFlights([log], VEHICLE), {}) == []
 
 
 def test_it_is_said_in_which_log_the_push_was():
@@ -110,7 +110,7 @@ def test_it_is_said_in_which_log_the_push_was():
     # what moves it in the log alone: an acceleration that no rotor has made
     moved = np.cumsum(np.cumsum(force / VEHICLE.mass)) * calm.period**2
     pushed = replace(calm, name="pushed", position=calm.position + np.outer(moved, [1.0, 0.0, 0.0]))
-    (push,) = transient_disturbances(Flights([calm, pushed], VEHICLE), {})
+    (push,) = transient_disturbances(RegressedFlights([calm, pushed], VEHICLE), {})
     assert (push.log, push.channel) == ("pushed", "Fx")
     assert push.t == pytest.approx(12.25, abs=0.1)
     assert push.peak == pytest.approx(0.1 * VEHICLE.weight, rel=0.3)

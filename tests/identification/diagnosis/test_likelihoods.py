@@ -21,7 +21,7 @@ from windwrench.identification.diagnosis.evidence import (
     set_evidence,
     tempering,
 )
-from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_noise import RowNoise, fitted_noise
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
@@ -175,7 +175,7 @@ def test_a_short_flight_names_nothing_surely():
 
 
 def test_the_accelerometer_is_read_beside_the_pose():
-    rows = Rows(Flights([flown(seconds=40.0, imu=True)], VEHICLE), {})
+    rows = Rows(RegressedFlights([flown(seconds=40.0, imu=True)], VEHICLE), {})
     assert rows.channels == 6
     left = rows.residual({})[rows.fit]
     # its bias is in its channels, and only there; the gust is in both

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.support.flown import VEHICLE
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.diagnosis.diagnosing import diagnose
-from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_nuisances import THRUST_STD, row_nuisances
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
@@ -64,7 +64,7 @@ def hover(load, seed):
 def test_thrust_at_a_command_is_a_nuisance_by_its_differences_between_flights():
     """A column that is nearly thrust_scale's own would with it stand for a lag or a drag."""
     logs = [hover(0.0, seed) for seed in range(2)]
-    one, two = (row_nuisances(Rows(Flights(x, STATED), {})) for x in (logs[:1], logs))
+    one, two = (row_nuisances(Rows(RegressedFlights(x, STATED), {})) for x in (logs[:1], logs))
     assert not one["thrust 0"].any()
     assert np.abs(two["thrust 0"]).max() > 0.4 * THRUST_STD * STATED.gravity
     np.testing.assert_allclose(two["thrust 0"], -two["thrust 1"], atol=1e-12)

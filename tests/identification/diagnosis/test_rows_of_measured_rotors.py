@@ -5,22 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.flown import VEHICLE, resting
 from tests.support.imu_flights import imu_flight, pose_removed
-from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.evidence.trials.logged_poses import FILTERS
+from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.priors import NUISANCE
 from windwrench.identification.diagnosis.ranking import rank_by_rows
-from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.diagnosis.worth import worth
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
-from windwrench.studies.trials.logged_poses import FILTERS
-from windwrench.studies.trials.practice_flights import fly_practice
 
-VEHICLE = load_vehicle("ardrone2")
 LIBRARY = ["com_offset", "rate_damping", "thrust_scale", "rotor_efficiency", "constant_torque"]
 OFFSET = EffectSetting("com_offset", {"cx": 0.01, "cy": 0.0, "cz": 0.0})
 WEAK = EffectSetting("rotor_efficiency", {"e1": 0.0, "e2": -0.06, "e3": 0.0, "e4": 0.0})
@@ -28,7 +26,7 @@ WEAK = EffectSetting("rotor_efficiency", {"e1": 0.0, "e2": -0.06, "e3": 0.0, "e4
 
 @pytest.fixture(scope="module")
 def offset():
-    return Flights(
+    return RegressedFlights(
         [FILTERS["causal 5 Hz"](fly_practice(VEHICLE, (OFFSET,), "excite", 20.0, 1), VEHICLE)],
         VEHICLE,
     )
@@ -36,7 +34,7 @@ def offset():
 
 @pytest.fixture(scope="module")
 def weak():
-    return Flights([pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=20.0))], VEHICLE)
+    return RegressedFlights([pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=20.0))], VEHICLE)
 
 
 @pytest.mark.parametrize("trajectory", ["hover", "excite"])
@@ -57,8 +55,8 @@ def test_a_still_flight_without_noise_is_diagnosed(turns):
     rng, count = np.random.default_rng(0), 3001
     place = [0.0, 0.0, 1.0] + 1e-9 * rng.standard_normal((count, 3))
     attitude = [1.0, 0.0, 0.0, 0.0] + turns * rng.standard_normal((count, 4))
-    speeds = np.full((count, 4), VEHICLE.hover_rate)
-    found = diagnose([FlightLog(0.005 * np.arange(count), place, attitude, speeds)], VEHICLE)
+    log = resting(0.005 * np.arange(count), position=place, quaternion=attitude)
+    found = diagnose([log], VEHICLE)
     assert not any(not e.tentative for e in found.effects)
 
 
@@ -102,7 +100,7 @@ def test_a_weak_rotor_is_found_by_an_imu_alone(weak):
 def test_a_bias_hides_steady_forces_along_the_body():
     """In a calm hover they show by little else, and torques do not look like a bias."""
     log = pose_removed(imu_flight(VEHICLE, seconds=15.0, trajectory="gentle"))
-    flights = Flights([log], VEHICLE)
+    flights = RegressedFlights([log], VEHICLE)
     found = rank_by_rows(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {})
     assert found.ranking.sets[0].effects == ()
     biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
@@ -119,13 +117,11 @@ def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
     is far from one.
     """
     rows = Rows(weak, {})
-    size = np.zeros((len(rows.t), rows.channels))
+    ones = np.tile((-1.0) ** np.arange(len(rows.t))[:, None], rows.channels)  # deviation of one
     for name, (signal, channels) in followers(rows).items():
         spread = signal[rows.fit].std()
         calm, rough = (
-            answered(rows, {name: (signal, channels)}, x * spread * size_like(size))[
-                f"answer by {name}"
-            ]
+            answered(rows, {name: (signal, channels)}, x * spread * ones)[f"answer by {name}"]
             for x in (0.1, 1.0)
         )
         moved = signal - signal[rows.fit].mean()
@@ -146,17 +142,12 @@ def test_a_disturbance_that_thrust_answers_by_its_change_counts_as_one(weak):
     assert left.std() < 0.1 * y.std()
 
 
-def size_like(x):
-    """Return alternating rows of the shape of ``x`` with a standard deviation of one."""
-    return np.where(np.arange(len(x))[:, None] % 2 == 0, 1.0, -1.0) * np.ones_like(x)
-
-
 def test_what_a_few_positions_add():
     """Drag is identifiable beside ten positions a second, and not by the IMU alone; effects on the
     pose itself are in neither.
     """
     log = imu_flight(VEHICLE, seconds=15.0, trajectory="fast")
-    alone, placed = (Flights([pose_removed(log, n)], VEHICLE) for n in (0, 20))
+    alone, placed = (RegressedFlights([pose_removed(log, n)], VEHICLE) for n in (0, 20))
     pose_effects = {"world_tilt", "marker_offset", "clock_offset", "attitude_gain"}
     assert pose_effects <= alone.needs_pose & placed.needs_pose
     assert {"rotor_drag", "wind", "fan_jet"} <= alone.needs_pose
@@ -167,4 +158,4 @@ def test_what_a_few_positions_add():
 def test_a_pose_and_an_imu_are_not_mixed():
     log = imu_flight(VEHICLE, seconds=5.0)
     with pytest.raises(InputError, match="expected the IMU in all of them"):
-        Flights([pose_removed(log), replace(log, gyro=None, accelerometer=None)], VEHICLE)
+        RegressedFlights([pose_removed(log), replace(log, gyro=None, accelerometer=None)], VEHICLE)

@@ -8,22 +8,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.support.flown import VEHICLE, recorded, settings
+from tests.support.flown import VEHICLE, recorded, resting, settings
 from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis.advice import composites
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
 from windwrench.identification.diagnosis.priors import prior_size
 from windwrench.identification.diagnosis.ranking import rank, starts_of
-from windwrench.identification.diagnosis.regression import Flights
+from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.starting_points import starting_points
 from windwrench.identification.diagnosis.traces import ORDER, carrying_channels
 from windwrench.identification.diagnosis.turning_delay import turning_delay
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
-from windwrench.studies.trials.practice_flights import fly_practice
 
 CASES = {
     "constant_torque": ({"tx": 0.01, "ty": 0.01, "tz": 0.0}, {"attitude"}, {"rotor speeds"}),
@@ -37,7 +36,7 @@ CASES = {
 def test_channels_are_those_of_the_trace_and_of_the_model(effect):
     coefficients, carried, others = CASES[effect]
     log = recorded(seconds=12.0, **{effect: coefficients})
-    found = carrying_channels(Flights([log], VEHICLE), {effect: coefficients}, effect)
+    found = carrying_channels(RegressedFlights([log], VEHICLE), {effect: coefficients}, effect)
     assert carried <= set(found)
     assert not others & set(found)
     assert list(found) == [channel for channel in ORDER if channel in found]
@@ -73,7 +72,7 @@ def test_of_many_starts_those_are_tried_that_resemble_the_flight(tmp_path):
     (tmp_path / "hose.py").write_text(HOSE.replace("# more", STARTS))
     with joined(tmp_path):
         hose = EffectSetting("hose", {"a": 0.3, "w": 5.0})
-        flights = Flights([fly_practice(VEHICLE, (hose,), "hover", 15.0, seed=1)], VEHICLE)
+        flights = RegressedFlights([fly_practice(VEHICLE, (hose,), "hover", 15.0, seed=1)], VEHICLE)
         starts = starting_points("hose", flights, flights.residual({}), {})
     assert len(starts) < 10
     assert abs(starts[0]["w"] - 5.0) < 0.19
@@ -81,7 +80,7 @@ def test_of_many_starts_those_are_tried_that_resemble_the_flight(tmp_path):
 
 @pytest.mark.parametrize("beside", [[], ["rotor_drag"]])
 def test_a_wind_may_act_on_another_drag_alone(beside):
-    flights = Flights([recorded(seconds=12.0)], VEHICLE)
+    flights = RegressedFlights([recorded(seconds=12.0)], VEHICLE)
     starts = starting_points("wind", flights, flights.residual({}), {}, beside)
     assert any(start["cd"] == 0.0 for start in starts) == bool(beside)
 
@@ -89,26 +88,16 @@ def test_a_wind_may_act_on_another_drag_alone(beside):
 def test_an_effect_may_start_in_the_place_of_another():
     """A force that is known already leaves nothing of the wind that would explain it."""
     force = {"constant_force": {"fx": 0.3, "fy": 0.0, "fz": 0.0}}
-    flights = Flights([recorded(seconds=12.0, **force)], VEHICLE)
+    flights = RegressedFlights([recorded(seconds=12.0, **force)], VEHICLE)
     found = starts_of(flights, ["wind"], force, {}).values()
     assert any(start["wx"] > 3.0 * abs(start["wy"]) for start in found)
 
 
-def still(seconds=10.0, rate=200.0, speeds=None):
-    n = round(seconds * rate) + 1
-    return FlightLog(
-        np.arange(n) / rate,
-        np.tile([0.0, 0.0, 1.0], (n, 1)),
-        np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
-        np.full((n, 4), VEHICLE.hover_rate) if speeds is None else speeds,
-    )
-
-
 def test_only_the_time_in_the_air_counts():
-    log = still(20.0)
+    log = resting(np.arange(4001) / 200.0)
     speeds = log.rotor_speeds.copy()
     speeds[(log.t < 4.0) | (log.t > 15.0)] *= 0.3
-    found = in_flight_by_thrust(still(20.0, speeds=speeds), VEHICLE)
+    found = in_flight_by_thrust(replace(log, rotor_speeds=speeds), VEHICLE)
     # taking off and landing last beyond
     assert found.t[0] == pytest.approx(4.0 + TAKE_OFF, abs=0.5)
     assert found.t[-1] == pytest.approx(15.0 - TAKE_OFF, abs=0.5)
@@ -165,8 +154,10 @@ def unevenly_lagging(commanded):
 def test_a_lag_that_is_uneven_leaves_no_mass():
     """The mass is that of a fit to the rotor speeds themselves, which are smoothed here."""
     library = ["motor_lag", "mass"]
-    known = rank(Flights([unevenly_lagging(commanded=False)], VEHICLE), library).ranking.sets[0]
-    found = rank(Flights([unevenly_lagging(commanded=True)], VEHICLE), library)
+    known = rank(
+        RegressedFlights([unevenly_lagging(commanded=False)], VEHICLE), library
+    ).ranking.sets[0]
+    found = rank(RegressedFlights([unevenly_lagging(commanded=True)], VEHICLE), library)
     assert found.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.006)
     apart, _ = found.posterior.nuisances()[LAG_ASYMMETRY]
     assert 0.5 * APART < apart < 1.5 * APART

@@ -6,7 +6,9 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
+from tests.support.outcomes import refused
 from windwrench.identification.logs.log_map import parse_map
 from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.tables import open_table
@@ -56,8 +58,8 @@ def test_columns_of_arrays_and_lists_are_read_by_a_map(tmp_path, name):
     log = map_table(open_table(saved(tmp_path / name)), parse_map(MAP, "map"))
     rows = slice(COUNT - len(log.t), None)  # an empty list is a sample that is not there
     assert len(log.t) >= COUNT - 1
-    np.testing.assert_allclose(log.position, PLACE[rows])
-    np.testing.assert_allclose(log.rotor_speeds * 30.0 / np.pi, RPM[rows])
+    assert_allclose(log.position, PLACE[rows])
+    assert_allclose(log.rotor_speeds * 30.0 / np.pi, RPM[rows])
 
 
 def test_arrays_of_other_lengths_are_left_out_with_a_note(tmp_path):
@@ -76,7 +78,7 @@ def test_arrays_of_other_lengths_are_left_out_with_a_note(tmp_path):
 def test_a_matlab_file_that_cannot_be_read_says_what_to_do(tmp_path, monkeypatch, data, expected):
     monkeypatch.setattr("windwrench.identification.logs.tables.find_spec", lambda _: None)
     (tmp_path / "a.mat").write_bytes(data)
-    with pytest.raises(InputError, match=expected):
+    with refused(expected):
         open_table(tmp_path / "a.mat")
 
 
@@ -97,5 +99,5 @@ def test_a_spoiled_matlab_file_is_refused_or_read(tmp_path, seed):
 def test_a_reader_that_ends_its_process_ends_in_one_line(tmp_path, monkeypatch):
     path = saved(tmp_path / "a.mat")
     monkeypatch.setattr(sys, "executable", shutil.which("false"))
-    with pytest.raises(InputError, match=r"a\.mat: cannot be read as .*: a spoiled MATLAB file"):
+    with refused(r"a\.mat: cannot be read as .*: a spoiled MATLAB file"):
         open_table(path)

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.support.dataflash_writer import dataflash, imu, parm, rcou
-from windwrench.dynamics import InputError
-from windwrench.identification.logs.channels import CLOCK, Samples, in_order, on_one_clock
+from tests.support.outcomes import noted, refused
+from windwrench.identification.logs.channels import ROLLOVER, ChannelGroup, in_order, on_one_clock
 from windwrench.identification.logs.reading import read_log
 
 T = 0.02 * np.arange(600)
@@ -48,9 +49,9 @@ def test_rows_that_were_written_late_are_sorted_in():
 
 
 def test_a_clock_of_32_bits_goes_on_after_its_rollover():
-    t = np.mod(T + CLOCK.rollover - 5.0, CLOCK.rollover)
-    (found,), notes = on_one_clock("log", [Samples(t, {"x": T})])
-    np.testing.assert_allclose(np.diff(found.t), 0.02, atol=1e-9)
+    t = np.mod(T + ROLLOVER - 5.0, ROLLOVER)
+    (found,), notes = on_one_clock("log", [ChannelGroup(t, {"x": T})])
+    assert_allclose(np.diff(found.t), 0.02, atol=1e-9)
     assert any("rolled over" in note for note in notes)
 
 
@@ -72,10 +73,10 @@ def test_of_two_boots_the_longest_is_read_or_the_one_that_is_asked_for(tmp_path)
     path.write_bytes(boots())
     log = read_log(path)
     assert len(log.t) == 400
-    assert any("2 pieces of 3.98, 7.98 s; the longest, piece 2, was read" in x for x in log.notes)
+    assert noted(log, "2 pieces of 3.98, 7.98 s; the longest, piece 2, was read")
     first = read_log(path, piece=1)
     assert len(first.t) == 200
     assert first.command.mean() < log.command.mean() - 0.04
-    assert any("piece 1, was read" in note for note in first.notes)
-    with pytest.raises(InputError, match=r"two\.BIN: piece 3: it has 2; expected 1 to 2"):
+    assert noted(first, "piece 1, was read")
+    with refused(r"two\.BIN: piece 3: it has 2; expected 1 to 2"):
         read_log(path, piece=3)

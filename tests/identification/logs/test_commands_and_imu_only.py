@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from numpy.testing import assert_allclose
 
+from tests.support.outcomes import noted, refused
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.diagnosis.commanded_rotors import thrust_is_assumed
@@ -12,7 +13,6 @@ from windwrench.identification.logs.commanded_speeds import with_commanded_speed
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.runtime.errors import InputError
 
 
 def curved():
@@ -47,10 +47,10 @@ def test_a_motor_curve_turns_commands_into_rotor_speeds(tmp_path):
     log = read_log(path, vehicle=vehicle)
     assert log.commanded
     assert not thrust_is_assumed([log], vehicle)
-    assert any("motor curve" in note for note in log.notes)
+    assert noted(log, "motor curve")
     u = np.array([0.5, 0.6, 0.7, 0.8])
     thrust = (0.02 * u + 0.10 * u**2) * (3.8 / 4.0) ** 2
-    np.testing.assert_allclose(vehicle.k * log.rotor_speeds[0] ** 2, thrust, rtol=1e-12)
+    assert_allclose(vehicle.k * log.rotor_speeds[0] ** 2, thrust, rtol=1e-12)
 
 
 def test_commands_without_a_curve_are_refused_where_thrust_is_needed():
@@ -58,7 +58,7 @@ def test_commands_without_a_curve_are_refused_where_thrust_is_needed():
     log = inertial_log(
         position=np.zeros((200, 3)), quaternion=np.tile([1.0, 0.0, 0.0, 0.0], (200, 1))
     )
-    with pytest.raises(InputError, match="motor_curve"):
+    with refused("motor_curve"):
         screen_log(log, load_vehicle("crazyflie"))
 
 
@@ -79,7 +79,7 @@ def test_the_scale_of_commands_counts_the_dips_between_high_thrusts():
     )
     read = with_commanded_speeds(log, vehicle)
     full = vehicle.k[0] * np.square(read.rotor_speeds[:, 0] / command[:, 0])
-    np.testing.assert_allclose(full, 3.0, rtol=0.01)  # N of a motor at full command
+    assert_allclose(full, 3.0, rtol=0.01)  # N of a motor at full command
 
 
 def test_without_pose_and_curve_the_accelerometer_sets_the_scale(tmp_path):
@@ -95,5 +95,5 @@ def test_without_pose_and_curve_the_accelerometer_sets_the_scale(tmp_path):
     log = read_log(path, vehicle=vehicle)
     assert log.commanded
     full = vehicle.k * np.square(log.rotor_speeds / command)
-    np.testing.assert_allclose(full, 2.5, rtol=1e-9)  # N of a motor at full command
-    assert any("Mass or a factor on thrust cannot be found" in note for note in log.notes)
+    assert_allclose(full, 2.5, rtol=1e-9)  # N of a motor at full command
+    assert noted(log, "Mass or a factor on thrust cannot be found")

@@ -1,7 +1,7 @@
 """Every measured file, and a small file of each form, gives the flight log that it gave before."""
 
-import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.support.data_paths import DATA
 from tests.support.golden_logs import load_golden, recorded
@@ -39,6 +39,6 @@ def test_a_file_gives_the_flight_log_that_was_recorded(case):
             assert here[key] == summary[key], f"{name}: {key}"
         if "numbers" in summary:
             scale = abs(summary["numbers"][1])
-            np.testing.assert_allclose(
+            assert_allclose(
                 here["numbers"], summary["numbers"], RELATIVE, RELATIVE * scale, err_msg=name
             )

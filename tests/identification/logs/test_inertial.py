@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from tests.support.hostile_conventions import scaled
+from tests.support.outcomes import noted
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.inertial import check_inertial
@@ -62,7 +65,7 @@ def test_an_acceleration_in_world_axes_is_turned_into_body_axes(gravity):
     world = turn.apply(log.accelerometer) - [0.0, 0.0, 9.81 - gravity]
     checked, notes = check_inertial(replace(log, accelerometer=world))
     assert "in world axes" in notes[0]
-    np.testing.assert_allclose(checked.accelerometer, log.accelerometer, atol=1e-9)
+    assert_allclose(checked.accelerometer, log.accelerometer, atol=1e-9)
 
 
 WRONG = {
@@ -90,19 +93,19 @@ WRONG = {
 def test_wrong_sensors_are_left_out(tmp_path, sensor, words, factor):
     log = flight()
     other = "gyro" if sensor == "accelerometer" else "accelerometer"
-    write_log(replace(log, **{sensor: factor * getattr(log, sensor)}), tmp_path / "flight.csv")
+    write_log(scaled(log, **{sensor: factor}), tmp_path / "flight.csv")
     with pytest.warns(UserWarning, match=f"{words}.*They were left out"):
         read = read_log(tmp_path / "flight.csv", vehicle=VEHICLE)
     assert getattr(read, sensor) is None
-    np.testing.assert_array_equal(getattr(read, other), getattr(log, other))
-    assert any("left out" in note for note in read.notes)
+    assert_array_equal(getattr(read, other), getattr(log, other))
+    assert noted(read, "left out")
 
 
 @pytest.mark.parametrize("sensor", ["gyro", "accelerometer"])
 def test_units_are_told_in_a_short_hover(sensor):
     log = flight(1.0, moving=0.0, bias=0.01)
     factor = {"gyro": 180 / np.pi, "accelerometer": 1 / 9.81}[sensor]
-    (note,) = check_inertial(replace(log, **{sensor: factor * getattr(log, sensor)}))[1]
+    (note,) = check_inertial(scaled(log, **{sensor: factor}))[1]
     assert {"gyro": "degrees per second", "accelerometer": "look like g"}[sensor] in note
 
 
@@ -134,6 +137,6 @@ def test_a_sensor_faster_than_the_pose_has_rows_of_its_own(tmp_path):
     write_log(log, tmp_path / "flight.csv")
     read = read_log(tmp_path / "flight.csv", vehicle=VEHICLE)
     assert read.notes == ()  # no pose was lost between two poses
-    np.testing.assert_array_equal(read.gyro, log.gyro)
+    assert_array_equal(read.gyro, log.gyro)
     thinned = with_rows(read, every)
-    np.testing.assert_array_equal(thinned.accelerometer, log.accelerometer[every])
+    assert_array_equal(thinned.accelerometer, log.accelerometer[every])

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from windwrench.identification.logs.readings import DECLARED, log_readings, rotations
@@ -25,9 +26,7 @@ def test_the_advice_of_a_sentence_makes_the_pose_that_the_reading_means(first):
     for reading in POSES[first : first + 10]:
         position, quaternion = rng.standard_normal(3), rng.standard_normal(4)
         columns = dict(zip(("px", "py", "pz"), position, strict=True))
-        np.testing.assert_allclose(
-            taken(reading, "position", columns), reading.frames.position @ position
-        )
+        assert_allclose(taken(reading, "position", columns), reading.frames.position @ position)
         columns = dict(zip(("qw", "qx", "qy", "qz"), quaternion, strict=True))
         made = Rotation.from_quat(taken(reading, "quaternion", columns), scalar_first=True)
         meant = rotations(quaternion[None], reading)[1][0]

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.support.data_paths import DATA
+from tests.support.outcomes import noted, refused
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.readers import (
     READERS,
@@ -51,7 +53,7 @@ def test_a_missing_package_is_named(tmp_path, monkeypatch, name, begins, package
     (tmp_path / name).write_bytes(begins)
     monkeypatch.setitem(sys.modules, package, None)
     words = rf"{name}: {package} is not installed; pip install 'windwrench\[{extra}\]'"
-    with pytest.raises(InputError, match=words):
+    with refused(words):
         read_log(tmp_path / name)
 
 
@@ -63,7 +65,7 @@ def test_the_folder_of_a_bag_is_known_by_what_is_in_it(tmp_path, entry):
 
 def test_a_table_that_fits_two_readers_is_refused():
     header = [*find_reader("racer").signature, *find_reader("nanobench").signature]
-    with pytest.raises(InputError, match="--reader nanobench or --reader racer"):
+    with refused("--reader nanobench or --reader racer"):
         reader_by_columns(Path("a.csv"), header)
 
 
@@ -81,6 +83,6 @@ def test_a_table_whose_guess_leaves_no_doubt_is_read_at_once(tmp_path):
     }
     write_csv(columns, tmp_path / "theirs.csv")
     read = read_log(tmp_path / "theirs.csv", vehicle=vehicle)
-    assert any("guessed without a doubt" in note for note in read.notes)
-    np.testing.assert_allclose(read.position, log.position, atol=1e-9)
-    np.testing.assert_allclose(read.rotor_speeds, log.rotor_speeds, atol=1e-6)
+    assert noted(read, "guessed without a doubt")
+    assert_allclose(read.position, log.position, atol=1e-9)
+    assert_allclose(read.rotor_speeds, log.rotor_speeds, atol=1e-6)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from tests.support.programs import said
 from windwrench.identification.logs.flight_log import REQUIRED
@@ -43,7 +44,7 @@ def test_a_layout_is_found(opened, name, text, header, first):
     table = opened(text, name)
     assert " ".join(table.header) == header
     values = table.read(list(table.header))
-    np.testing.assert_array_equal([column[0] for column in values.values()], first)
+    assert_array_equal([column[0] for column in values.values()], first)
     assert table.rows == 2
 
 
@@ -66,8 +67,8 @@ def test_rows_with_few_numbers_at_the_start_are_rows(opened):
     table = opened("t,x,y,z,m\n" + late + "".join(f"{k},1,2,3,{k}\n" for k in range(20, 60)))
     assert (table.header, table.rows, table.notes) == (("t", "x", "y", "z", "m"), 60, ())
     values = table.read(["m", "x"])
-    np.testing.assert_array_equal(values["m"], np.arange(60))
-    np.testing.assert_array_equal(np.isnan(values["x"]), np.arange(60) < 20)
+    assert_array_equal(values["m"], np.arange(60))
+    assert_array_equal(np.isnan(values["x"]), np.arange(60) < 20)
 
 
 def test_latin_letters_of_an_old_encoding_are_read(opened):

@@ -9,9 +9,11 @@ import pytest
 from scipy.signal import butter, sosfilt, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from tests.support.flown import VEHICLE, recorded
+from tests.support.flown import VEHICLE, recorded, resting
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle, preset_names
 from windwrench.dynamics.effects import compile_effects
+from windwrench.evidence.trials.logged_poses import FILTERS
+from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.inertial_fusion import Readings, fuse
 from windwrench.identification.motion.inertial_signals import inertial_signals
@@ -25,8 +27,6 @@ from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.sensor_noise import noisy_logs
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import high_pass, lagged, low_pass, robust_std
-from windwrench.studies.trials.logged_poses import FILTERS
-from windwrench.studies.trials.practice_flights import fly_practice
 
 AMENDED = VEHICLE.with_effects(
     EffectSetting("mass", {"dm": 0.05}),
@@ -101,9 +101,7 @@ def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
 
 def still_log(rate, seconds=20.0, **channels):
     """A log of a vehicle at rest in the air, without any noise."""
-    n = round(rate * seconds)
-    attitude, speeds = np.tile([1.0, 0, 0, 0], (n, 1)), np.full((n, 4), VEHICLE.hover_rate)
-    return FlightLog(np.arange(n) / rate, np.zeros((n, 3)), attitude, speeds, **channels)
+    return resting(np.arange(round(rate * seconds)) / rate, **channels)
 
 
 @pytest.mark.parametrize(("lost", "pieces"), [(2, 1), (4, 2)])
@@ -206,13 +204,7 @@ def test_channels_are_asked_one_by_one(log):
 
 
 def test_a_log_that_is_short_or_still_says_nothing():
-    n = 300
-    still = FlightLog(
-        np.arange(n) / 100.0,
-        np.zeros((n, 3)),
-        np.tile([1.0, 0, 0, 0], (n, 1)),
-        np.full((n, 4), 400.0),
-    )
+    still = still_log(100.0, 3.0)
     assert noise_spectra(still) == []
     assert filtering_notes(still) == ()
 

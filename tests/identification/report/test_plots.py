@@ -30,6 +30,9 @@ UPLOT = {
 }
 
 
+FACTORS = {"N": 1.0, "Nm": 1.0, "mN": 1e3, "mNm": 1e3}
+
+
 def unpacked(series):
     integers = np.frombuffer(base64.b64decode(series["data"]), "<i2")
     return series["scale"] * integers
@@ -48,28 +51,28 @@ def test_a_flight_of_a_minute_is_carried_whole():
     time = page_plots(made_diagnosis(trace)).data["time"]
     assert time["effects"] == ["rotor_drag", "wind"]
     for i, channel in enumerate(time["channels"]):
-        factor = {"N": 1.0, "Nm": 1.0, "mN": 1e3, "mNm": 1e3}[channel["unit"]]
+        factor = FACTORS[channel["unit"]]
         assert np.abs(times(channel, time["pieces"]) - trace.t).max() < 1e-4
-        for name, x in (("before", trace.before), ("after", trace.after)):
+        series = [channel["before"], channel["after"], *channel["parts"]]
+        truth = [trace.before, trace.after, *(trace.parts[name] for name in time["effects"])]
+        for packed, x in zip(series, truth, strict=True):
             x = factor * x[:, i]
-            assert np.abs(unpacked(channel[name]) - x).max() <= 1e-4 * np.abs(x).max()
-        for name, part in zip(time["effects"], channel["parts"], strict=True):
-            x = factor * trace.parts[name][:, i]
-            assert (part is None) == (not x.any())
-            assert part is None or np.abs(unpacked(part) - x).max() <= 1e-4 * np.abs(x).max()
+            assert (packed is None) == (not x.any())
+            assert packed is None or np.abs(unpacked(packed) - x).max() <= 1e-4 * np.abs(x).max()
+
+
+SPIKES = (("before", 12_345, 0, 7.0), ("before", 100_001, 4, -8.0), ("after", 170_000, 2, 9.0))
 
 
 def test_a_spike_of_any_channel_stays():
     trace = made_trace(seconds=900.0, rate=200.0)
-    before, after = trace.before.copy(), trace.after.copy()
-    before[12_345, 0], before[100_001, 4], after[170_000, 2] = 7.0, -8.0, 9.0
-    trace = replace(trace, before=before, after=after)
-    channels = [plot.packed for plot in page_plots(made_diagnosis(trace)).time]
-    assert unpacked(channels[0]["before"]).max() == pytest.approx(7.0, rel=1e-4)
-    assert unpacked(channels[4]["before"]).min() * {"Nm": 1, "mNm": 1e-3}[
-        channels[4]["unit"]
-    ] == pytest.approx(-8.0, rel=1e-4)
-    assert unpacked(channels[2]["after"]).max() == pytest.approx(9.0, rel=1e-4)
+    for side, row, i, size in SPIKES:
+        getattr(trace, side)[row, i] = size
+    plots = page_plots(made_diagnosis(trace)).time
+    for side, _, i, size in SPIKES:
+        channel = plots[i].packed
+        drawn = FACTORS[channel["unit"]] * size
+        assert np.abs(unpacked(channel[side]) - drawn).min() <= 1e-4 * abs(drawn)
     kept = telling_samples(trace, 0, 150)
     assert 12_345 in kept
     assert (kept[0], kept[-1]) == (0, len(trace.t) - 1)
@@ -132,17 +135,11 @@ def test_the_library_is_as_it_was_published():
 
 def test_a_torque_that_the_logs_do_not_tell_is_not_drawn():
     trace = made_trace()
-    silent = {"before": trace.before.copy(), "after": trace.after.copy()}
-    for x in silent.values():
-        x[:, 3:] = 0.0
-    made = made_diagnosis(replace(trace, **silent))
-    drawn = page_plots(made).data
-    assert [channel["key"] for channel in drawn["time"]["channels"]] == [
-        "time-Fx",
-        "time-Fy",
-        "time-Fz",
-    ]
-    assert [spectrum["key"] for spectrum in drawn["frequency"]] == ["frequency-force"]
+    trace.before[:, 3:] = trace.after[:, 3:] = 0.0
+    made = made_diagnosis(trace)
+    plots = page_plots(made)
+    keys = [plot.packed["key"] for plot in (*plots.time, *plots.frequency)]
+    assert keys == ["time-Fx", "time-Fy", "time-Fz", "frequency-force"]
     torque = error_table(made)[1]
     assert (torque["before"], torque["after"], torque["floor"]) == ("–", "–", "")
     page = report_page(made, "command")

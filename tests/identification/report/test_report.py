@@ -37,9 +37,8 @@ def diagnosis():
     made = made_diagnosis(trace)
     (drag,) = made.effects
     unit = "N/(rad/s m/s)"
-    drag = replace(
-        drag, coefficients=DRAG, std={"kdx": 3e-6, "kdy": 4e-6}, units=dict.fromkeys(DRAG, unit)
-    )
+    std, units = {"kdx": 3e-6, "kdy": 4e-6}, dict.fromkeys(DRAG, unit)
+    drag = replace(drag, coefficients=DRAG, std=std, units=units)
     return replace(
         made,
         remainder="random",
@@ -132,19 +131,10 @@ def test_the_numbers(reports):
     assert " ".join(list(data)[:7]) == first
     assert (data["verdict"], data["remainder"]) == ("explained", "random")
     (effect,) = data["effects"]
-    assert " ".join(effect) == (
-        "name coefficients std units tentative indistinguishable_from evidence channels probability"
-    )
-    assert effect["name"] == "rotor_drag"
-    assert effect["coefficients"] == DRAG
+    assert (effect["name"], effect["coefficients"]) == ("rotor_drag", DRAG)
     error = data["error"]
     assert set(error) == {"held_out_segments", "before", "after", "floor"}
     assert error["held_out_segments"] == [pytest.approx(s[1:]) for s in diagnosis.held_out_segments]
-    assert (
-        set(error["before"])
-        == set(error["after"])
-        == {"force_rms_N", "torque_rms_Nm", "nis_without_wrench_state", "rollout_1s_position_rms_m"}
-    )
     assert error["before"]["force_rms_N"] == pytest.approx(diagnosis.before.force_rms, rel=1e-5)
     assert error["after"]["rollout_1s_position_rms_m"] is None
     assert error["floor"] == {"force_rms_N": 0.0123, "torque_rms_Nm": 0.00094}
@@ -194,13 +184,12 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.tags, self.ids, self.words = [], [], []
+        self.tags, self.words = [], []
         self.feed(text)
         self.text = " ".join(" ".join(self.words).split())
 
     def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
-        self.ids += [value for name, value in attrs if name == "id"]
 
     def handle_data(self, data):
         self.words.append(data)
@@ -215,7 +204,8 @@ def test_the_page_stands_alone(reports):
         for _, attrs in page.tags:
             for name in ("src", "href"):
                 assert (attrs.get(name) or "#").startswith(("#", "data:"))
-        assert len(page.ids) == len(set(page.ids))
+        ids = [attrs["id"] for _, attrs in page.tags if "id" in attrs]
+        assert len(ids) == len(set(ids))
 
 
 def test_the_page_says_it(reports):
@@ -239,19 +229,10 @@ def test_the_page_says_it(reports):
 
 
 def test_nothing_to_draw(diagnosis, tmp_path):
-    bare = replace(
-        diagnosis,
-        verdict="nothing to explain",
-        remainder="none",
-        effects=(),
-        traces=(),
-        signatures=(),
-        candidates=(),
-        advice=(),
-        notes=(),
-        held_out_segments=(),
-        after=diagnosis.before,
-    )
+    empty = ("effects", "traces", "signatures", "candidates", "advice", "notes")
+    nothing = dict.fromkeys((*empty, "held_out_segments"), ())
+    nothing |= {"verdict": "nothing to explain", "remainder": "none", "after": diagnosis.before}
+    bare = replace(diagnosis, **nothing)
     page = Page(write_report(bare, tmp_path)[1].read_text("utf-8"))
     assert "The model explains these logs" in page.text
     assert "script" not in {tag for tag, _ in page.tags}

@@ -59,21 +59,21 @@ def test_each_effect_has_a_plain_name_and_a_quantity():
     assert len(set(titles)) == len(titles)
     assert all(len(words) < 30 and "_" not in words for words in titles)
     for name in effects.names():
-        for coefficient in effects.get(name).coefficients:
-            found = amount(named(name, **{coefficient.name: 1.0}), coefficient.name, VEHICLE)
+        for coefficient in (c.name for c in effects.get(name).coefficients):
+            found = amount(named(name, **{coefficient: 1.0}), coefficient, VEHICLE)
             assert "rad/s m/s" not in found.unit
             assert found.value > 0.0
 
 
 def test_a_steady_force_is_told_before_what_looks_random():
     """0.6 N along x beside a disturbance, of which no effect was named."""
-    steady, calm = (made_trace(seconds=40.0, effects=(), seed=2) for _ in range(2))
-    steady.after[:, 0] += 0.6
-    found = made_diagnosis(steady, verdict="unexplained", remainder="random", effects=())
+    trace = made_trace(seconds=40.0, effects=(), seed=2)
+    found = made_diagnosis(trace, verdict="unexplained", remainder="random", effects=())
+    trace.after[:] -= np.mean(trace.after, axis=0)
+    trace.after[:, 0] += 0.6
     assert headline(found).startswith("On average a force of 0.6")
     assert "N along x acts that the model lacks" in headline(found)
-    calm.after[:] -= np.mean(calm.after, axis=0)
-    found = made_diagnosis(calm, verdict="unexplained", remainder="random", effects=())
+    trace.after[:, 0] -= 0.6
     assert steady_wrench(found) == ""
     assert headline(found).startswith("The model's error looks random")
 

@@ -42,26 +42,10 @@ def inertial_flights(seeds, seconds=15.0, lag=0.05, rate=250):
     for i in range(n):
         speed = FULL * command[i] + keep * (speed - FULL * command[i])
         torque = K * speed**2 @ mixing - damping * (omega - rest)
-        x, y, z = (moments * omega).T
-        turn = np.array(
-            [
-                omega[:, 1] * z - omega[:, 2] * y,
-                omega[:, 2] * x - omega[:, 0] * z,
-                omega[:, 0] * y - omega[:, 1] * x,
-            ]
-        ).T
-        omega = omega + dt * (torque - turn) / moments
+        omega = omega + dt * (torque - np.cross(omega, moments * omega)) / moments
         speeds[i], rates[i] = speed, omega
-    return [
-        _log(
-            rng,
-            t[fine - 1 :: fine],
-            command[fine - 1 :: fine, j],
-            speeds[fine - 1 :: fine, j],
-            rates[fine - 1 :: fine, j],
-        )
-        for j, rng in enumerate(rngs)
-    ]
+    each = (np.moveaxis(x[fine - 1 :: fine], 1, 0) for x in (command, speeds, rates))
+    return [_log(rng, t[fine - 1 :: fine], *x) for rng, *x in zip(rngs, *each, strict=True)]
 
 
 def _log(rng, t, command, speeds, rates):
@@ -70,14 +54,5 @@ def _log(rng, t, command, speeds, rates):
     accelerometer[:, 2] += K * np.square(speeds).sum(axis=1) / MASS
     gyro = rates + 0.005 * rng.standard_normal((m, 3)) + rng.normal(0, 0.01, 3)
     nothing = np.full((m, 4), np.nan)
-    log = FlightLog(
-        t,
-        nothing[:, :3],
-        nothing,
-        nothing,
-        accelerometer=accelerometer,
-        gyro=gyro,
-        command=command,
-        name="inertial",
-    )
-    return log, speeds
+    measured = {"accelerometer": accelerometer, "gyro": gyro, "command": command}
+    return FlightLog(t, nothing[:, :3], nothing, nothing, **measured, name="inertial"), speeds

@@ -22,35 +22,43 @@ from tests.identification.vehicle_fit.flown import (
     inertial_flights,
 )
 from tests.support.alike import assert_alike
+from tests.support.data_paths import data_file
 from tests.support.flown import recorded
-from tests.support.golden_identification import GOLDEN, made, vehicles
+from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, vehicles
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.vehicle import EffectSetting, MotorCurve
+from windwrench.dynamics.vehicle import EffectSetting, ModelStatus, MotorCurve
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
+from windwrench.identification.causal_states import causal_states
+from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
+from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.identification.prediction import PredictionErrors
+from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
 from windwrench.identification.vehicle_fit.columns import Drive
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
+from windwrench.identification.vehicle_fit.held_out import judged
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.parameters import first_model
-from windwrench.identification.vehicle_fit.report import explained
+from windwrench.identification.vehicle_fit.report import explained, use_of
 from windwrench.identification.vehicle_fit.result import IDENTIFIED, Estimate
+from windwrench.identification.vehicle_fit.solve import nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
+GIVEN = parse_geometry(str(ARM))
+HOVER = np.sqrt(MASS * 9.81 / (4 * K)) / FULL  # command
+
+
+def of_crazyflie(logs):
+    return identify(logs, CRAZYFLIE.mass, parse_geometry(str(CRAZYFLIE.arm_l)))
+
 
 @pytest.fixture(scope="module")
-def crazyflie():
-    return load_vehicle("crazyflie")
-
-
-@pytest.fixture(scope="module")
-def commanded(crazyflie):
+def commanded():
     lag = {"motor_lag": {"tau": 0.06}}
-    return [recorded(t, 15.0, vehicle=crazyflie, **lag) for t in ("excite", "shake", "yaw")]
+    return [recorded(t, 15.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "shake", "yaw")]
 
 
 @pytest.fixture(scope="module")
@@ -71,12 +79,12 @@ def test_results_are_those_kept():
     assert_alike(json.loads(json.dumps(made())), json.loads(GOLDEN.read_text(encoding="utf-8")))
 
 
-def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
-    found = identify(commanded, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
-    check(found, "k", crazyflie.k[0], 0.05)
-    check(found, "p", crazyflie.p[0], 0.05)
-    for i, name in enumerate(("Jxx", "Jyy", "Jzz")):
-        check(found, name, crazyflie.inertia[i, i], 0.05)
+def test_commanded_speeds_show_the_vehicle_and_its_lag(commanded):
+    found = of_crazyflie(commanded)
+    check(found, "k", CRAZYFLIE.k[0], 0.05)
+    check(found, "p", CRAZYFLIE.p[0], 0.05)
+    for name, moment in zip(("Jxx", "Jyy", "Jzz"), np.diag(CRAZYFLIE.inertia), strict=True):
+        check(found, name, moment, 0.05)
     check(found, "motor_lag", 0.06, 0.10)
     again = parse_vehicle(dump_vehicle(found.vehicle))
     assert [e.name for e in again.effects] == ["motor_lag"]
@@ -90,13 +98,13 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(crazyflie, commanded):
         assert (errors.model[:, -1] < 0.3 * errors.still[:, -1]).all()
 
 
-def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie):
+def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from():
     """Its file states the step of the speeds and no fastest one: 255 steps are no limit."""
     step = 3.490658
-    log = recorded("shake", 15.0, vehicle=crazyflie)
+    log = recorded("shake", 15.0, vehicle=CRAZYFLIE)
     log = replace(log, rotor_speeds=step * np.round(log.rotor_speeds / step))
     assert np.median(log.rotor_speeds) > 1.5 * 255 * step
-    found = identify([log], crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
+    found = of_crazyflie([log])
     again = parse_vehicle(dump_vehicle(found.vehicle))
     assert again.omega_lsb == pytest.approx(step)
     assert not any("reads" in note for note in screen_log(log, again)[1])
@@ -104,17 +112,17 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from(crazyflie)
     assert np.abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
 
 
-def test_noise_of_rotor_speeds_is_no_torque(crazyflie):
+def test_noise_of_rotor_speeds_is_no_torque():
     """Of 2 % of the speed, which makes more torque than the flight: inertia came out double."""
     rng = np.random.default_rng(4)
-    logs = [recorded(name, 40.0, vehicle=crazyflie) for name in ("excite", "shake")]
-    shaken = [1.0 + 0.02 * rng.standard_normal(log.rotor_speeds.shape) for log in logs]
-    logs = [
-        replace(log, rotor_speeds=log.rotor_speeds * x) for log, x in zip(logs, shaken, strict=True)
-    ]
-    found = identify(logs, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
-    check(found, "Jxx", crazyflie.inertia[0, 0], 0.05)
-    check(found, "Jyy", crazyflie.inertia[1, 1], 0.05)
+
+    def shaken(log):
+        return 1.0 + 0.02 * rng.standard_normal(log.rotor_speeds.shape)
+
+    logs = [recorded(name, 40.0, vehicle=CRAZYFLIE) for name in ("excite", "shake")]
+    found = of_crazyflie([replace(x, rotor_speeds=x.rotor_speeds * shaken(x)) for x in logs])
+    check(found, "Jxx", CRAZYFLIE.inertia[0, 0], 0.05)
+    check(found, "Jyy", CRAZYFLIE.inertia[1, 1], 0.05)
 
 
 def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
@@ -128,9 +136,9 @@ def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
     check(found, "translational_lift kh", 3.4e-3, 0.1)
 
 
-def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
-    hover = [recorded("hover", 12.0, vehicle=crazyflie)]
-    found = identify(hover, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
+def test_a_hover_does_not_show_what_it_does_not_excite():
+    hover = [recorded("hover", 12.0, vehicle=CRAZYFLIE)]
+    found = of_crazyflie(hover)
     assert found.estimates["Jzz"].status == "assumed"
     assert found.estimates["motor_lag"].status == "not identifiable"
     assert any("Yaw at" in line for line in found.advice)
@@ -140,8 +148,7 @@ def test_a_hover_does_not_show_what_it_does_not_excite(crazyflie):
 def test_an_imu_and_commands_are_enough():
     found = vehicles()["imu and commands"]
     assert found.sources.force == "accelerometer"
-    hover = np.sqrt(MASS * 9.81 / (4 * K)) / FULL
-    check(found, "hover command", hover, 0.05)
+    check(found, "hover command", HOVER, 0.05)
     check(found, "thrust(0.5)", K * (0.5 * FULL) ** 2, 0.05)
     check(found, "Jxx", INERTIA[0, 0], 0.05)
     check(found, "Jyy", INERTIA[1, 1], 0.05)
@@ -150,7 +157,7 @@ def test_an_imu_and_commands_are_enough():
     assert found.estimates["drag"].status == "not identifiable"
     vehicle = parse_vehicle(dump_vehicle(found.vehicle))
     assert vehicle.motor_curve is not None
-    thrust = vehicle.commanded_thrust(np.full((1, 4), hover))
+    thrust = vehicle.commanded_thrust(np.full((1, 4), HOVER))
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
 
 
@@ -158,12 +165,11 @@ def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
     log, _ = inertial[0]
     volts = np.linspace(4.2, 3.5, len(log.t))
     used = replace(log, voltage=volts, command=log.command * (volts[:, None] / 3.85) ** -0.6)
-    found = identify([used], MASS, parse_geometry(str(ARM)))
+    found = identify([used], MASS, GIVEN)
     check(found, "voltage_exponent", 1.2, 0.15)
-    hover = np.sqrt(MASS * 9.81 / (4 * K)) / FULL
     empty, full = (e for e in found.estimates.values() if e.name.startswith("hover command at"))
     for volt, known in ((3.535, empty), (4.165, full)):
-        assert known.low < hover * (volt / 3.85) ** -0.6 < known.high
+        assert known.low < HOVER * (volt / 3.85) ** -0.6 < known.high
     assert found.vehicle.motor_curve.voltage_exponent == found.estimates["voltage_exponent"].value
 
 
@@ -193,20 +199,28 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(inertial):
     held = []
     for log, speeds in inertial:
         log = replace(log, rotor_speeds=speeds, command=None)
-        found = identify([log], MASS, parse_geometry(str(ARM)))
+        found = identify([log], MASS, GIVEN)
         for name, truth in (("k", K), ("Jxx", INERTIA[0, 0]), ("Jyy", INERTIA[1, 1])):
             held.append(found.estimates[name].low <= truth <= found.estimates[name].high)
     assert sum(held) >= 20  # of 24; 95 % intervals miss more than 4 once in 170 times
 
 
-def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(crazyflie, commanded, monkeypatch):
+def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monkeypatch):
     """As where the flight loop answers what nothing measures: 17 against .7 rad/s was a warning."""
-    lost = PredictionErrors(9, np.array([0.5]), np.full((4, 1), 2.0), np.full((4, 1), 1.0))
-    where = "windwrench.identification.vehicle_fit.identify.predicted"
-    monkeypatch.setattr(where, lambda *_: {"held_out_blocks": lost})
+    lost, kept = (
+        PredictionErrors(9, np.array([0.5]), np.full((4, 1), off), np.full((4, 1), 1.0))
+        for off in (2.0, 1.0)
+    )
+    where = "windwrench.identification.vehicle_fit.held_out.errors_of_models"
+    monkeypatch.setattr(where, lambda *_, **__: [lost, kept, kept, lost])
     logs = commanded[:2]
-    found = identify(logs, crazyflie.mass, parse_geometry(str(crazyflie.arm_l)))
-    check(found, "k", crazyflie.k[0], 0.05)
+    found = of_crazyflie(logs)
+    check(found, "k", CRAZYFLIE.k[0], 0.05)
+    status = parse_vehicle(dump_vehicle(found.vehicle)).status
+    assert (status.force, status.torque) == ("identified", "refuted")
+    assert status.coefficients["k"] == "identified"
+    assert status.coefficients["Jxx"] == "assumed"
+    assert "unchanged body rate" in use_of(found)
     for name in ("Jxx", "Jyy", "Jzz", "p/k", "p", "com x", "com y", "flapping_moment kflap"):
         assert found.estimates[name].status in ("assumed", "not identifiable")
         assert "(2 against 1 rad/s after 0.5 s)" in found.estimates[name].how
@@ -216,44 +230,110 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(crazyflie, comm
     with pytest.raises(
         InputError, match=r"2 against 1 rad/s.*no arm is given; expected --geometry"
     ):
-        identify(logs, crazyflie.mass, parse_geometry(None))
+        identify(logs, CRAZYFLIE.mass, parse_geometry(None))
+
+
+def of(position, velocity, attitude, rate):
+    model = np.array([[position], [velocity], [attitude], [rate]])
+    return PredictionErrors(9, np.array([0.5]), model, np.ones((4, 1)))
+
+
+@pytest.mark.parametrize(
+    ("whole", "keeps_rate", "simplest", "status", "further"),
+    [
+        ((0.2, 0.2, 0.2, 0.2), (0.5, 0.5, 1, 1), (0.5, 0.5, 1, 1), "identified identified", True),
+        ((0.2, 0.2, 0.2, 9.0), (0.5, 0.5, 1, 1), (0.5, 0.5, 1, 1), "identified refuted", True),
+        ((0.6, 0.6, 0.5, 0.5), (0.5, 0.5, 1, 1), (0.5, 0.5, 1, 1), "identified refuted", True),
+        ((3.0, 3.0, 3.0, 3.0), (0.9, 0.9, 1, 1), (0.5, 0.5, 1, 1), "identified refuted", False),
+        ((3.0, 3.0, 3.0, 3.0), (2.0, 2.0, 1, 1), (2.0, 2.0, 1, 1), "refuted refuted", True),
+    ],
+)
+def test_the_simplest_model_that_is_not_worse_stands(whole, keeps_rate, simplest, status, further):
+    models = [of(*whole), of(*keeps_rate), of(*simplest), of(1.0, 1.0, *whole[2:])]
+    tested = judged({"held_out_blocks": models})
+    assert f"{tested.status.force} {tested.status.torque}" == status
+    assert tested.further == further
+    assert not tested.errors["held_out_blocks"].worse
+
+
+def test_a_vehicle_that_is_refuted_keeps_its_motion(commanded):
+    log, status = commanded[0], ModelStatus("refuted", "refuted")
+    path = predict(log, replace(CRAZYFLIE, status=status), every=200)
+    state = causal_states(log, CRAZYFLIE)[path.start]
+    ahead = path.period * np.arange(1, path.velocity.shape[1] + 1)[:, None]
+    assert path.velocity == pytest.approx(
+        np.broadcast_to(state[:, None, 7:10], path.velocity.shape)
+    )
+    assert path.position == pytest.approx(state[:, None, :3] + ahead * state[:, None, 7:10])
+    still = np.broadcast_to(state[:, None, 10:], path.velocity.shape)
+    assert path.angular_velocity == pytest.approx(still, abs=1e-4)
+
+
+def test_commands_are_read_by_the_curve_of_the_vehicle_that_predicts(inertial):
+    """Rotor speeds of a preset's curve stayed in the log: 3 m off after .5 s."""
+    log, speeds = inertial[0]
+    curve = MotorCurve((0.0, 0.0, K * FULL**2))
+    vehicle = replace(CRAZYFLIE, k=np.full(4, K), motor_curve=curve)
+    other = replace(log, rotor_speeds=0.5 * speeds, commanded=True)
+    again = with_commanded_speeds(other, vehicle)
+    assert again.rotor_speeds == pytest.approx(FULL * log.command)
+    measured = replace(log, rotor_speeds=speeds)
+    assert with_commanded_speeds(measured, vehicle) is measured
+
+
+def test_an_inertia_that_no_body_has_moves_to_the_nearest(commanded):
+    fit = of_crazyflie(commanded[:2]).fit
+    flat = fit.theta.copy()
+    flat[fit.model.free.index("Jz")] += 0.4
+    body, size = nearest_body(replace(fit, theta=flat))
+    values = body.values
+    assert values["Jz"] == pytest.approx(0.995 * (values["Jx"] + values["Jy"]))
+    assert size > 3.0
+    same, none = nearest_body(body)
+    assert none == 0.0
+    assert same.values == values
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("same_motor_four_times.csv.gz", "motors 1 and 2 are equal in every row"),
+        ("px4_gz_rads_as_rpm.ulg", r"thrust coefficient 1\.99 .* expected 0\.002 to 0\.1"),
+        ("ardupilot_rpm_tenth.bin", r"thrust coefficient 2\.18 .* expected 0\.002 to 0\.1"),
+        ("px4_one_esc_low.ulg", "medians of the four motors' rotor speeds are 390, 395, 393, 70.7"),
+    ],
+)
+def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):
+    log = data_file(f"hard_logs/{name}")
+    with pytest.raises(InputError, match=line):
+        identify([read_log(log)], 1.5, parse_geometry("0.17"))
 
 
 def test_rotors_in_another_order_are_refused(inertial):
     log, _ = inertial[0]
     wrong = replace(log, command=log.command[:, [3, 2, 1, 0]])
     with pytest.raises(InputError, match="roll turns against"):
-        identify([wrong], MASS, parse_geometry(str(ARM)))
+        identify([wrong], MASS, GIVEN)
 
 
 def test_turning_is_compared_with_torque_at_its_own_delay():
     """60 ms of 4 to 7 Hz are more than a quarter of a turn: at no delay all looks opposed."""
     rng, period, late = np.random.default_rng(3), 0.01, 6
-    n, hover = 3000, np.sqrt(MASS * 9.81 / (4 * K))
+    n = 3000
     band = butter(2, [8.0 * period, 14.0 * period], btype="bandpass", output="sos")
     turn = sosfiltfilt(band, rng.standard_normal((n, 3)), axis=0) * [3.0, 3.0, 1.0]
     mixing = np.array([Y, -X, -REACH * SPIN])
-    square = hover**2 + np.linalg.pinv(mixing) @ (INERTIA @ np.roll(turn, -late, axis=0).T) / K
-    square = np.maximum(square.T, 0.0)
-    still, force = np.zeros((n, 3)), np.zeros((n, 3))
+    torque = INERTIA @ np.roll(turn, -late, axis=0).T
+    square = np.maximum((FULL * HOVER) ** 2 + (np.linalg.pinv(mixing) @ torque / K).T, 0.0)
+    still, force = np.zeros((2, n, 3))
     force[:, 2] = K / MASS * square.sum(axis=1)
-    piece = MotionPiece(
-        0,
-        period * np.arange(n),
-        period,
-        force,
-        turn,
-        period * np.cumsum(turn, axis=0),
-        still,
-        np.sqrt(square),
-        None,
-        None,
-    )
-    drive = Drive(parse_geometry(str(ARM)).positions, SPIN)
+    t, rate = period * np.arange(n), period * np.cumsum(turn, axis=0)
+    piece = MotionPiece(0, t, period, force, turn, rate, still, np.sqrt(square), None, None)
+    drive = Drive(GIVEN.positions, SPIN)
     sources = Sources("accelerometer", "gyro", "rotor speeds", True)
-    model, start, _, turned = first_model([piece], sources, drive, MASS, ("delay",))
+    model, start, usual = first_model([piece], sources, drive, MASS, ("delay",))
     values = model.values(start)
-    assert not turned
+    assert usual.spin is SPIN
     assert values["Jx"] == pytest.approx(INERTIA[0, 0], rel=0.2)
     assert values["Jy"] == pytest.approx(INERTIA[1, 1], rel=0.2)
 
@@ -267,7 +347,7 @@ def test_rotors_that_turn_the_other_way_are_recognised(inertial):
         rotor_speeds=speeds[:, [3, 0, 1, 2]],
         gyro=np.column_stack([-log.gyro[:, 1], log.gyro[:, 0], log.gyro[:, 2]]),
     )
-    found = identify([turned], MASS, parse_geometry(str(ARM)))
+    found = identify([turned], MASS, GIVEN)
     assert found.vehicle.spin.tolist() == [1.0, -1.0, 1.0, -1.0]
     assert any("opposite" in note for note in found.notes)
     check(found, "Jxx", INERTIA[1, 1], 0.05)
@@ -276,7 +356,7 @@ def test_rotors_that_turn_the_other_way_are_recognised(inertial):
 @pytest.mark.parametrize("window", [(5.0, 5.5), (100.0, 200.0)])
 def test_a_part_that_is_too_short_is_refused(inertial, window):
     with pytest.raises(InputError, match="no piece of 3 s"):
-        identify([inertial[0][0]], MASS, parse_geometry(str(ARM)), [window])
+        identify([inertial[0][0]], MASS, GIVEN, [window])
 
 
 LAG = Estimate("motor_lag", 0.05, 0.04, 0.06, "s", IDENTIFIED, "")
@@ -284,8 +364,7 @@ LAG = Estimate("motor_lag", 0.05, 0.04, 0.06, "s", IDENTIFIED, "")
 
 def found(*effects, curve=None, lag=LAG, commands=False):
     """Return as much of a result as exports read."""
-    vehicle = load_vehicle("crazyflie").with_effects(*effects)
-    vehicle = vehicle.__class__(**{**vehicle.__dict__, "motor_curve": curve})
+    vehicle = replace(CRAZYFLIE.with_effects(*effects), motor_curve=curve)
     fit = SimpleNamespace(drive=SimpleNamespace(commands=commands))
     return SimpleNamespace(vehicle=vehicle, estimates={lag.name: lag}, fit=fit)
 
@@ -325,11 +404,12 @@ def test_rotorpy_makes_the_same_forces_and_torques():
     names = {"np": np}
     exec(EXPORTS["rotorpy"](it), names)
     p, v = names["quad_params"], it.vehicle
-    thrust = v.k * np.array([1500.0, 1600.0, 1700.0, 1800.0]) ** 2
+    speeds = np.array([1500.0, 1600.0, 1700.0, 1800.0])
+    thrust = v.k * speeds**2
     place = np.array(list(p["rotor_pos"].values()))
     torque = np.cross(place, np.column_stack([0 * thrust, 0 * thrust, thrust])).sum(axis=0)
     torque[2] += p["k_m"] / p["k_eta"] * p["rotor_directions"] @ thrust
-    want = v.rotor_wrench(np.array([1500.0, 1600.0, 1700.0, 1800.0]))
+    want = v.rotor_wrench(speeds)
     assert [p["k_eta"] / v.k[0] * thrust.sum(), *torque] == pytest.approx(want, rel=1e-4)
     assert p["tau_m"] == 0.05
     assert p["k_d"] == pytest.approx(2.5e-6)

@@ -89,9 +89,12 @@ class CompiledFilter:
     def _array(self, values):
         return None if values is None else (self._number * len(values))(*map(float, values))
 
+    def _call(self, function, *arrays):
+        return int(function(self.memory, *map(self._array, arrays)))
+
     def reset(self, position, quaternion):
         """Call ww_init."""
-        return int(self.c.ww_init(self.memory, self._array(position), self._array(quaternion)))
+        return self._call(self.c.ww_init, position, quaternion)
 
     def predict(self, rotor_speeds, dt, voltage=None):
         """Call ww_predict, and before it ww_set_voltage where a voltage is given."""
@@ -101,15 +104,11 @@ class CompiledFilter:
 
     def correct(self, position, quaternion):
         """Call ww_correct_pose."""
-        return int(
-            self.c.ww_correct_pose(self.memory, self._array(position), self._array(quaternion))
-        )
+        return self._call(self.c.ww_correct_pose, position, quaternion)
 
     def correct_imu(self, gyro, accelerometer):
         """Call ww_correct_imu."""
-        return int(
-            self.c.ww_correct_imu(self.memory, self._array(gyro), self._array(accelerometer))
-        )
+        return self._call(self.c.ww_correct_imu, gyro, accelerometer)
 
     def policy(self, estimate):
         """Call ww_policy."""

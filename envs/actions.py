@@ -1,0 +1,123 @@
+"""What an agent commands: the five actions, and their numbers in the flight loop's units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..controllers.flight import (
+    ATTITUDE,
+    BESIDE,
+    LEAST_THRUST,
+    OF_SETPOINT,
+    RATES,
+    ROTORS,
+    FlightGains,
+)
+from ..dynamics.motion import Array
+from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import compiled
+from ..runtime.errors import unknown_name
+from .state import Episodes, Flags
+
+ACTIONS = ("velocity", "acceleration", "attitude", "rates", "rotors")
+LARGEST = {"velocity": 1.0, "acceleration": 4.0}  # m/s and m/s2
+UNITS = {"velocity": "m/s", "acceleration": "m/s2"}
+
+
+@dataclass(frozen=True, eq=False)
+class Action:
+    """An action of ``size`` numbers from -1 to 1. ``hover + below * a`` is the command for a < 0,
+    ``hover + above * a`` for the rest.
+    """
+
+    name: str
+    kind: int  # of ``controllers.flight.steer``
+    moves: bool  # whether commands are velocities of the set point
+    places: np.ndarray  # (size,) indices of the commands in the set point, or in the loop's action
+    hover: Array  # (size,) commands of the action 0
+    below: Array
+    above: Array
+
+    @property
+    def size(self) -> int:
+        """Number of commands."""
+        return len(self.places)
+
+    @property
+    def follows(self) -> bool:
+        """Whether commands are beside a flight to the reference."""
+        return self.kind == BESIDE and not self.moves
+
+
+def make_action(
+    name: str,
+    vehicle: Vehicle,
+    axes: tuple[int, ...],
+    follows: bool,
+    largest: float | None = None,
+    gains: FlightGains | None = None,
+) -> Action:
+    """Return an action by its name.
+
+    * ``"velocity"``: of the set point, along ``axes`` of the world, to 1 m/s;
+    * ``"acceleration"``: to 4 m/s2 along ``axes``, beside the flight loop's own where there is a
+      reference, and of the set point where there is none;
+    * ``"attitude"``: roll and pitch to the flight loop's limit of tilt (0.5 rad), yaw rate to the
+      loop's answer to 1 rad (2 rad/s), and thrust of 0.3 to 1.7 times the weight;
+    * ``"rates"``: angular velocities, body, to the loop's answer to an axis at a right angle
+      (6.1 rad/s) and to 1 rad of yaw (2 rad/s), and thrust;
+    * ``"rotors"``: four rotor speeds; -1: none, 0: hover, 1: the largest.
+
+    Args:
+        name: one of ``ACTIONS``.
+        vehicle: the declared one.
+        axes: of the world.
+        follows: whether the flight loop follows a reference.
+        largest: m/s or m/s2; default: as above.
+        gains: the flight loop's.
+
+    Raises:
+        InputError: an unknown name.
+    """
+    if name not in ACTIONS:
+        raise unknown_name("action", str(name), ACTIONS, "action")
+    if name in LARGEST:
+        size = np.full(len(axes), LARGEST[name] if largest is None else largest)
+        moves = name == "velocity"
+        kind = BESIDE if moves or follows else OF_SETPOINT
+        places = np.array(axes) + (3 if moves else 0)
+        return Action(name, kind, moves, places, np.zeros(len(axes)), size, size)
+    gains, g = gains or FlightGains(), vehicle.gravity
+    if name == "rotors":
+        hover = np.full(4, vehicle.hover_rate)
+        fastest = vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * hover[0]
+        return Action(name, ROTORS, False, np.arange(4), hover, hover, fastest - hover)
+    turn, yaw_rate = gains.attitude / gains.rate, gains.yaw / gains.yaw_rate
+    first = gains.tilt_limit if name == "attitude" else turn
+    size = np.array([first, first, yaw_rate, (1.0 - LEAST_THRUST) * g])
+    kind, hover = ATTITUDE if name == "attitude" else RATES, np.array([0.0, 0.0, 0.0, g])
+    return Action(name, kind, False, np.arange(4), hover, size, size)
+
+
+@compiled
+def take(
+    wanted: Array, which: Flags, scale: float, hover: Array, below: Array, above: Array, e: Episodes
+) -> bool:
+    """Write actions (n, size) over ``scale``, within -1 to 1, and their commands into the episodes
+    ``which`` (n,); return whether all numbers are finite. Nothing is written otherwise.
+    """
+    for n in range(wanted.shape[0]):
+        for i in range(wanted.shape[1]):
+            if not math.isfinite(wanted[n, i]):
+                return False
+    for n in range(wanted.shape[0]):
+        if which[n]:
+            e.decisions[n] += 1
+            for i in range(wanted.shape[1]):
+                action = min(max(wanted[n, i] / scale, -1.0), 1.0)
+                e.last_actions[n, i], e.actions[n, i] = e.actions[n, i], action
+                e.commands[n, i] = hover[i] + (below[i] if action < 0.0 else above[i]) * action
+    return True

@@ -1,0 +1,368 @@
+"""A task's definition: arguments and spaces, and the functions of the state of n worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..controllers.briefing import Briefing
+from ..controllers.flight import FlightGains
+from ..dynamics.effects import check_setting
+from ..dynamics.motion import Array
+from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
+from ..dynamics.vehicle_file import load_vehicle
+from ..estimator.tuning import UKFTuning
+from ..runtime.errors import InputError, unknown_name
+from .actions import UNITS, make_action
+from .closed_loop import ESTIMATORS, ClosedLoop, Stage
+from .display import modes_shown, need_display
+from .fan import Fan
+from .observations import FELT, as_numbers, bounds, parts
+from .plant import TICK, PlantSettings
+from .references import along
+from .scenarios import Drawn, find_scenario
+from .state import REFERENCE_SIZE, Episodes, Flags, Frame, Start, State
+from .wind import Sum, Wind
+from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_winds
+
+EPISODE_SECONDS = 20.0
+LOST_OFFSET = 2.5  # m, of the vehicle from where it should be
+TRACKING_WIDTH = 0.1  # m, error at which the tracking reward is a half
+# m/s2, standard deviation of the accelerometer's noise a tick, and of its bias
+ACCELEROMETER = (0.15, 0.05)
+
+
+class TaskDefinition:
+    """Arguments and functions of a task, without its flight: see ``windwrench.envs.Task``."""
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012
+    name: ClassVar[str] = "Task"
+    scenarios: ClassVar[Mapping[str, Any]] = WIND_SCENARIOS
+    action: str = "acceleration"
+    observation: str = "wrench"
+    decision_hz: float = 25.0
+    episode_s: float = EPISODE_SECONDS
+    normalize: bool = True
+    largest_action: Any = None  # m/s or m/s2; None: as of ``make_action``
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2)  # of velocities and accelerations
+    follows: ClassVar[bool] = True  # whether accelerations are beside a flight to the reference
+    model_in_loop: bool = True
+    accelerometer: ClassVar[tuple[float, float] | None] = ACCELEROMETER
+    label: ClassVar[str] = "trajectory"  # entry of ``info`` with the name of the episode's draw
+    draws: ClassVar[int] = 20  # at most, until an episode begins with the vehicle not lost
+    mixes: ClassVar[bool] = False  # whether episodes differ in what lanes share
+    limits: Any = None  # (k,) largest sizes of the observation's numbers
+    scales: Any = None  # (k,) their divisors, with ``normalize``
+    fan: Fan
+    action_space: gym.Space[Frame]
+    observation_space: gym.Space[Frame]
+
+    def __init__(
+        self,
+        scenario: Any = "base",
+        render_mode: str | None = None,
+        vehicle: str | Vehicle = "ardrone2",
+        effects: Sequence[EffectSetting] = (),
+        truth: str | Vehicle | None = None,
+        settings: PlantSettings | None = None,
+        estimator: str = "ukf",
+        normalize: bool | None = None,
+        width: int = 640,
+        height: int = 480,
+        stages: Sequence[Stage] = (),
+        *,
+        action: str | None = None,
+        observation: str | None = None,
+        decision_hz: float | None = None,
+        episode_s: float | None = None,
+        winds: Sequence[Wind] | None = None,
+        model_in_loop: bool | None = None,
+        gains: FlightGains | None = None,
+    ) -> None:
+        name = self.name
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(
+                f"{name}: render_mode must be human, rgb_array or None, got {render_mode!r}"
+            )
+        if render_mode == "human":
+            need_display()
+        if not isinstance(normalize, bool | np.bool_ | None):
+            raise InputError(f"{name}: normalize must be True or False, got {normalize!r}")
+        if estimator not in ESTIMATORS:
+            raise unknown_name("estimator", estimator, ESTIMATORS)
+        if isinstance(scenario, str):
+            scenario = find_scenario(scenario, self.scenarios)
+        self.scenario = scenario
+        self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
+        # an amended vehicle must not bring its effects into the world a second time
+        true = self.vehicle if truth is None else truth
+        self.truth = true if isinstance(true, Vehicle) else load_vehicle(true)
+        self.effects = tuple(check_setting(e, f"{name}: effects") for e in effects)
+        self.settings, self.estimator, self.stages = settings, estimator, tuple(stages)
+        self.render_mode, self.width, self.height = render_mode, width, height
+        given = {
+            "normalize": normalize,
+            "action": action,
+            "observation": observation,
+            "decision_hz": decision_hz,
+            "episode_s": episode_s,
+            "model_in_loop": model_in_loop,
+        }
+        for field, value in given.items():
+            if value is not None:
+                setattr(self, field, value)
+        self.chosen = None if observation == "own" else observation
+        if (
+            observation is None
+            and type(self).observation == "own"
+            and self.action != type(self).action
+        ):
+            self.chosen = self.observation = "wrench"  # the task's own holds its own action
+        if self.chosen is None:
+            self.observation = type(self).observation
+        self.winds = None if winds is None else Sum(*winds, where=f"{name}: winds").winds
+        self.gains = gains
+        self.fan = Fan(speed=0.0, height=HEIGHT).sized(self.truth)
+        self.drawn: dict[str, float] = {}  # factors of an episode, where the scenario varies
+        self.decision_ticks = _ticks(name, self.decision_hz)
+        self.max_decisions = round(self.episode_s / (TICK * self.decision_ticks))
+        fps = int(1.0 / (TICK * self.decision_ticks) + 0.5)
+        shown = {"render_modes": modes_shown(self.metadata), "render_fps": fps}
+        self.metadata = {**self.metadata, **shown}
+        self._make_spaces()
+
+    def _make_spaces(self) -> None:
+        """Make the spaces of actions and observations."""
+        largest = self.largest_action if self.action == type(self).action else None
+        self.flown = make_action(
+            self.action, self.vehicle, self.axes, self.follows, largest, self.gains
+        )
+        self.action_size = self.flown.size
+        # in SI units where a velocity or an acceleration is not normalised
+        in_si = not self.normalize and self.action in UNITS
+        self.action_unit = UNITS[self.action] if in_si else "units of the largest"
+        self.action_scale = float(self.flown.above[0]) if in_si else 1.0
+        most = self.action_scale
+        self.action_space = gym.spaces.Box(-most, most, (self.action_size,), np.float32)
+        blank = State(Episodes.zeros(1, self.action_size), [np.random.default_rng(0)])
+        blank.rows[:, [3, 22]] = 1.0  # quaternions of no turn
+        with np.errstate(all="ignore"):
+            size = np.shape(self.see(blank))[1]
+        limits, scales = self.bounds()
+        kept = as_numbers([np.inf] * size if limits is None else limits)
+        divisors = as_numbers([1.0] * size if scales is None or not self.normalize else scales)
+        if kept.shape != (size,) or divisors.shape != (size,):
+            raise InputError(
+                f"{self.name}: limits and scales must be {size} numbers, as observe returns; got "
+                f"{len(kept)} and {len(divisors)}"
+            )
+        self.kept, self.divisors, bound = kept, divisors, kept / divisors
+        self.observation_space = gym.spaces.Box(-bound, bound, (size,), np.float32)
+
+    def bounds(self) -> tuple[Sequence[float] | None, Sequence[float] | None]:
+        """Return largest sizes and scales of the observation's numbers; None: any, and 1."""
+        if self.chosen is None:
+            mro = type(self).__mro__
+            sees, states = (
+                next(i for i, each in enumerate(mro) if name in vars(each))
+                for name in ("observe", "limits")
+            )
+            if sees < states:  # limits are those of another observation
+                return None, None
+            if self.limits is not None or sees < mro.index(TaskDefinition):
+                return self.limits, self.scales
+        return bounds(self.observation, self.vehicle, self.action_size)
+
+    def see(self, s: State) -> ArrayLike:
+        """Return what the agent observes, (n, k) in SI units: as ``observe`` has it, unless the
+        argument ``observation`` chose another.
+        """
+        if self.chosen is None:
+            return self.observe(s)
+        return np.concatenate(parts(self.chosen, s), axis=1)
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        if cls.name == "Task":  # a task of one's own is called as its class
+            cls.name = cls.__name__
+
+    @classmethod
+    def decisions(cls) -> int:
+        """Return the number of decisions of an episode with the class's own ``decision_hz``."""
+        return round(cls.episode_s * cls.decision_hz)
+
+    # ---- the functions of a task -----------------------------------------------------------
+
+    def start(self, rng: np.random.Generator, n: int) -> Start | tuple[Any, ...]:
+        """Return the starts of n episodes, drawn from ``rng``: a ``Start``, or its parts in order.
+
+        Each world has a generator of its own, so n is 1 in flight: an episode depends on its seed
+        alone. Here: hover at one point in the scenario's winds.
+        """
+        poses = np.tile([*START, np.pi], (n, 1))
+        return Start(poses, winds=[self.draw_winds(rng) for _ in range(n)])
+
+    def observe(self, s: State) -> ArrayLike:
+        """Return the observations (n, k) in SI units; here those of the class's ``observation``.
+
+        Numbers are limited to ``limits`` (k,), 0 where they are not finite, and divided by
+        ``scales`` (k,) with ``normalize``.
+        """
+        return np.concatenate(parts(self.observation, s), axis=1)
+
+    def reward_terms(self, s: State) -> dict[str, Any]:
+        """Return the terms of the reward, (n,) each, by name.
+
+        The reward is their sum in this order; ``info`` has each as ``reward_NAME``.
+        """
+        ratio = s.distance / TRACKING_WIDTH
+        return {"tracking": 1.0 / (1.0 + ratio * ratio)}
+
+    def is_lost(self, s: State) -> Flags:
+        """Return whether each vehicle is lost (n,), which terminates its episode.
+
+        Here: 2.5 m from the reference, on the floor, tilted by 70 degrees, or not finite.
+        """
+        lost: Flags = ~(s.flying & (s.position[:, 2] > 0.0) & (s.distance <= LOST_OFFSET))
+        return lost
+
+    def info(self, s: State) -> dict[str, Any]:
+        """Return entries of ``info``, arrays (n, ...): the truth behind the observation.
+
+        Beside them stand the terms of the reward, ``lost``, ``observation`` and ``command`` in SI
+        units, and the name of what was drawn.
+        """
+        return {
+            "time": s.time,
+            "error": s.distance,
+            "position": s.position,
+            "reference": s.reference[:, :3],
+            "wind": s.wind,
+            "force": s.force,
+            "torque": s.torque,
+        }
+
+    # ---- what a task is flown with ---------------------------------------------------------
+
+    def draw_winds(self, rng: np.random.Generator) -> list[Any]:
+        """Draw the scenario's winds of an episode."""
+        return list(draw_winds(self.scenario, rng, self.episode_s))
+
+    @property
+    def declared(self) -> Vehicle:
+        """The declared vehicle, with the scenario's measurement of the pose."""
+        scenario = self.scenario
+        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
+        return replace(self.vehicle, mocap=mocap)
+
+    @property
+    def tuning(self) -> UKFTuning:
+        """The filter's tuning."""
+        return UKFTuning.for_vehicle(self.declared, TICK, self.scenario.rise_time)
+
+    def briefing(self) -> Briefing:
+        """Return a designed controller's knowledge before its flight: no draws of an episode, no
+        undeclared effects.
+        """
+        return Briefing(self.vehicle)
+
+    def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
+        """Return the closed loop of a true vehicle and the undeclared effects; the filter knows the
+        declared vehicle.
+        """
+        declared = self.declared
+        drawn: dict[str, Any] = {
+            n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__
+        }
+        own = {
+            "accelerometer": ACCELEROMETER if self.observation in FELT else self.accelerometer,
+            "gains": self.gains,
+            "model_in_loop": bool(self.model_in_loop),
+        }
+        return ClosedLoop(
+            declared,
+            replace(vehicle, mocap=declared.mocap, effects=(*vehicle.effects, *self.effects)),
+            self.tuning,
+            fan,
+            replace(self.settings or PlantSettings.for_vehicle(self.truth), **drawn),
+            drawn=self.render_mode is not None,
+            estimator=self.estimator,
+            kind=self.flown.kind,
+            stages=self.stages,
+            **{**own, **given},
+        )
+
+    def draw_loop(self, rng: np.random.Generator, kept: dict[Any, ClosedLoop]) -> ClosedLoop:
+        """Return the closed loop of a world's episode, drawn where the scenario varies; elsewhere
+        the one that the world has ``kept``.
+        """
+        if not self.scenario.varied:
+            self.drawn = {}
+            if self.scenario not in kept:
+                kept[self.scenario] = self.make_loop(self.truth, self.fan)
+            return kept[self.scenario]
+        fan, truth, drawn = self.fan, self.truth, self.scenario.variation.draw(rng)
+        self.drawn = drawn
+        fan = replace(
+            fan,
+            speed=fan.speed * drawn.get("fan_speed", 1.0),
+            rotor_drag=fan.rotor_drag * drawn["rotor_drag"],
+            hull_area=fan.hull_area * drawn["hull_area"],
+        )
+        mass, inertia = truth.mass * drawn["mass"], truth.inertia * drawn["inertia"]
+        return self.make_loop(replace(truth, mass=mass, inertia=inertia), fan)
+
+    def draw_start(self, rng: np.random.Generator) -> Start:
+        """Return one world's start, of checked shapes.
+
+        Raises:
+            InputError: an array has another shape, or is not finite.
+        """
+        start = Start(*self.start(rng, 1))
+        poses = self._checked(start.poses, (1, 3), (1, 4), what="poses")
+        pose = np.zeros(4)
+        pose[: poses.shape[1]] = poses[0]
+        if start.references is None:
+            row = np.zeros((1, REFERENCE_SIZE))
+            row[0, :3], row[0, 9] = pose[:3], pose[3]
+        else:
+            given = start.references
+            row = self._checked(given, (1, 0, REFERENCE_SIZE), (1, 0, 3), what="references")[0]
+            row = along(row, float(pose[3])) if row.shape[1] == 3 else row
+        path = np.array([[0.0, self.fan.height]])
+        if start.paths is not None:
+            path = self._checked(start.paths, (1, 0, 2), what="paths")[0]
+        winds = self.winds if self.winds is not None else [*start.winds, ()][0]
+        return Start(pose, row, winds, path, [*start.labels, ""][0])
+
+    def _checked(self, given: Any, *shapes: tuple[int, ...], what: str) -> Array:
+        values = np.asarray(given, dtype=np.float64)
+        fits = any(
+            values.ndim == len(shape)
+            and all(size in (0, own) for size, own in zip(shape, values.shape, strict=True))
+            for shape in shapes
+        )
+        if not fits or not values.size or not np.all(np.isfinite(values)):
+            wanted = " or ".join(str(shape).replace("0", "k") for shape in shapes)
+            raise InputError(
+                f"{self.name}: start: {what} must be finite numbers, shape {wanted} for n = 1; "
+                f"got shape {values.shape}"
+            )
+        return values
+
+
+def _ticks(task: str, decision_hz: float) -> int:
+    """Return the ticks of a decision."""
+    hz = decision_hz if isinstance(decision_hz, int | float) and decision_hz > 0 else 0.0
+    ticks = 1.0 / (TICK * hz) if hz else 0.0
+    if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
+        raise InputError(
+            f"{task}: decision_hz must be 200 Hz over a whole number (200, 100, 50, 40, 25, 12.5), "
+            f"got {decision_hz!r}"
+        )
+    return round(ticks)

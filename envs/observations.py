@@ -1,0 +1,79 @@
+"""What an agent observes on every task: pose and twist, the felt wrench, the accelerometer."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.motion import Array
+from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import compiled
+from ..runtime.errors import unknown_name
+from .state import Frame, State
+
+OBSERVATIONS = ("pose", "wrench", "imu", "all")
+FELT = ("imu", "all")  # need an accelerometer
+# largest size and scale of three numbers each
+_POSE = [(5.0, 0.5), (10.0, 1.0), (2.0, 0.3), (40.0, 2.0)]  # m, m/s, rad, rad/s
+_IMU = [(40.0, 10.0)] * 2  # m/s2
+_WRENCH = [(2.0, 0.2), (2.0, 0.05)]  # weights, and weights times the arm
+
+
+def parts(name: str, s: State) -> list[Array]:
+    """Return the arrays (n, .) of an observation; all but the last have three columns.
+
+    * ``"pose"``: position and velocity of the reference less the estimate's (m, m/s), attitude
+      error (rad) and angular velocity (rad/s, body), and the last action;
+    * ``"wrench"``: before the last action the external force (N) and torque (Nm);
+    * ``"imu"``: there the specific force (m/s2) of the accelerometer, and of the rotors by the
+      declared model;
+    * ``"all"``: wrench, and then these.
+    """
+    e, r = s.estimate, s.reference
+    seen = [r[:, :3] - e.position, r[:, 3:6] - e.velocity, e.attitude_error, e.angular_velocity]
+    if name in ("wrench", "all"):
+        seen += [e.force, e.torque]
+    if name in FELT:
+        seen += [s.specific_force, s.specific_thrust]
+    return [*seen, s.action]
+
+
+def bounds(name: str, vehicle: Vehicle, actions: int) -> tuple[list[float], list[float]]:
+    """Return largest sizes and scales of an observation's numbers.
+
+    Raises:
+        InputError: an unknown name.
+    """
+    if name not in OBSERVATIONS:
+        raise unknown_name("observation", str(name), OBSERVATIONS, "observation")
+    rows = list(_POSE)
+    if name in ("wrench", "all"):
+        for (limit, scale), unit in zip(
+            _WRENCH, (vehicle.weight, vehicle.weight * vehicle.arm_l), strict=True
+        ):
+            rows.append((limit * unit, scale * unit))
+    if name in FELT:
+        rows += _IMU
+    limits, scales = ([row[i] for row in rows for _ in range(3)] for i in (0, 1))
+    return limits + [1.0] * actions, scales + [1.0] * actions
+
+
+@compiled
+def limit(
+    seen: Array, limits: NDArray[np.float32], scales: NDArray[np.float32], si: Frame, out: Frame
+) -> None:
+    """Write frames (n, k) within ``limits`` (k,) as they are into ``si`` and over ``scales`` (k,)
+    into ``out``; 0 where a number is not finite.
+    """
+    for n in range(seen.shape[0]):
+        for i in range(seen.shape[1]):
+            value = np.float32(seen[n, i])
+            if not np.isfinite(value):
+                value = np.float32(0.0)
+            si[n, i] = min(max(value, -limits[i]), limits[i])
+            out[n, i] = si[n, i] / scales[i]
+
+
+def as_numbers(values: Sequence[float]) -> NDArray[np.float32]:
+    """Return numbers in single precision."""
+    return np.array(values, dtype=np.float32)

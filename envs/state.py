@@ -1,0 +1,253 @@
+"""The state of n worlds as arrays with n rows: what a task's functions are given."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.compiled import compiled, compiled_without_gil
+from .fan import STATIONS
+from .plant import TICK
+
+Frame = NDArray[np.float32]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+FASTEST = 200.0  # m/s and rad/s, beyond any vehicle
+UPRIGHT = 0.34  # cosine of 70 degrees
+REFERENCE_SIZE = 10  # position, velocity, acceleration, yaw
+
+
+class Start(NamedTuple):
+    """The starts of n episodes.
+
+    Attributes:
+        poses: (n, 4) position (m) and yaw (rad) of the vehicle in hover, or (n, 3): yaw 0.
+        references: (n, k, 10) position, velocity, acceleration and yaw, a row a tick of 5 ms, or
+            (n, k, 3) positions, at the start's yaw. None: the start's pose.
+        winds: n lists of winds; none: still air.
+        paths: (n, m, 2) m, y and height of the fan's axis, a row a tick; None: no fan moves.
+        labels: n names of what was drawn, for ``info``.
+    """
+
+    poses: Any
+    references: Any = None
+    winds: Sequence[Any] = ()
+    paths: Any = None
+    labels: Sequence[str] = ()
+
+
+class Episodes(NamedTuple):
+    """Episodes side by side, a row each."""
+
+    ticks: NDArray[np.int64]  # (n,) since the start; below zero while the filter settles
+    decisions: NDArray[np.int64]  # (n,) likewise
+    paths: Array  # (n, m, 2) m, y and height of the fan's axis, a row a tick
+    references: Array  # (n, k, 10), a row a tick
+    commands: Array  # (n, actions) as the flight loop takes them
+    actions: Array  # (n, actions) as the agent gave them, -1 to 1
+    last_actions: Array  # (n, actions)
+    broken: Flags  # (n,) whether the physics started over on its own
+
+    @classmethod
+    def zeros(cls, count: int, actions: int) -> "Episodes":
+        """Return ``count`` episodes before they begin."""
+        ticks, decisions = np.zeros((2, count), dtype=np.int64)
+        commands, now, last = np.zeros((3, count, actions))
+        paths, references = np.zeros((count, 1, 2)), np.zeros((count, 1, REFERENCE_SIZE))
+        broken = np.zeros(count, dtype=np.bool_)
+        return cls(ticks, decisions, paths, references, commands, now, last, broken)
+
+
+class Motion(NamedTuple):
+    """Vehicles side by side: vehicle i in row ``i // lanes`` and lane ``i % lanes``."""
+
+    position: Array  # (rows, 7, lanes) m, and quaternion
+    velocity: Array  # (rows, 6, lanes) m/s, world, and rad/s, body
+    wrench: Array  # (rows, 6, lanes) N and Nm, world, the true external one
+    state: Array  # (rows, 20, lanes) as the filter estimates it
+    covariance: Array  # (rows, 18, 18, lanes) of the estimate
+    specific: Array  # (rows, 3, lanes) m/s2, as of ``ClosedLoop``
+    thrust: Array  # (rows, 3, lanes) m/s2, likewise
+    air: Array  # (rows, STATIONS, 3, lanes) m/s, of the winds at the stations
+
+
+# columns of a world's row, in the order of ``gather``
+_TRUE = {"position": 3, "quaternion": 4, "velocity": 3, "angular_velocity": 3} | {
+    "force": 3,
+    "torque": 3,
+}
+_ESTIMATED = {"position": 3, "quaternion": 4, "velocity": 3, "angular_velocity": 3} | {
+    "torque": 3,
+    "force": 3,
+    "last": 1,
+    "std_torque": 3,
+    "std_force": 3,
+    "attitude_error": 3,
+}
+_BESIDE = {"specific_force": 3, "specific_thrust": 3, "wind": 3, "reference": REFERENCE_SIZE} | {
+    "fan": 2,
+    "fan_velocity": 2,
+    "distance": 1,
+    "time": 1,
+    "change": 1,
+}
+_FIRST = sum(_TRUE.values())  # column of the estimate
+_STD = _FIRST + 20
+_REST = _FIRST + sum(_ESTIMATED.values())
+_SIZE = _REST + sum(_BESIDE.values())
+
+
+def _lay(target: object, rows: Array, first: int, fields: dict[str, int]) -> None:
+    for name, size in fields.items():
+        setattr(target, name, rows[:, first : first + size] if size > 1 else rows[:, first])
+        first += size
+
+
+class WorldEstimates:
+    """The filter's estimate of n worlds.
+
+    Attributes:
+        position: (n, 3) m, world.
+        quaternion: (n, 4) body to world, scalar first.
+        velocity: (n, 3) m/s, world.
+        angular_velocity: (n, 3) rad/s, body.
+        force: (n, 3) N, world, external; ``std_force`` its standard deviation.
+        torque: (n, 3) Nm, world, likewise; ``std_torque``.
+        attitude_error: (n, 3) rad for small angles: twice the vector part of the quaternion from
+            upright at the reference's yaw, in these axes, to the estimate.
+    """
+
+    position: Array
+    quaternion: Array
+    velocity: Array
+    angular_velocity: Array
+    force: Array
+    torque: Array
+    std_force: Array
+    std_torque: Array
+    attitude_error: Array
+
+
+class State:
+    """The state of n worlds after a decision. Arrays are views: the next decision overwrites them.
+
+    Attributes:
+        position: (n, 3) m, world, true; ``quaternion`` (n, 4) body to world, ``velocity`` (n, 3)
+            m/s, world, and ``angular_velocity`` (n, 3) rad/s, body, likewise.
+        force: (n, 3) N, world, true and external; ``torque`` (n, 3) Nm.
+        estimate: ``WorldEstimates``.
+        reference: (n, 10) position, velocity, acceleration (world) and yaw.
+        distance: (n,) m, of the true position from the reference's.
+        action: (n, k) of this decision, -1 to 1; ``last_action`` that before.
+        change: (n,) sum of the squares of ``action - last_action``.
+        command: (n, k) the action in the flight loop's units.
+        specific_force: (n, 3) m/s2, world, by an accelerometer, mean over the decision; zero
+            where the task has none. ``specific_thrust``: the rotors' part by the declared model.
+        wind: (n, 3) m/s, world, mean over the vehicle's stations.
+        fan: (n, 2) m, y and height of the fan's axis; ``fan_velocity`` m/s.
+        time: (n,) s since the start; ``decision`` (n,) their number.
+        flying: (n,) whether finite, upright to 70 degrees, and no faster than a vehicle.
+        rng: n generators, each of its own world.
+        memory: a task's own arrays from one decision to the next.
+    """
+
+    position: Array
+    quaternion: Array
+    velocity: Array
+    angular_velocity: Array
+    force: Array
+    torque: Array
+    specific_force: Array
+    specific_thrust: Array
+    wind: Array
+    reference: Array
+    fan: Array
+    fan_velocity: Array
+    distance: Array
+    time: Array
+    change: Array
+
+    def __init__(self, episodes: Episodes, rng: list[np.random.Generator]) -> None:
+        count = len(episodes.ticks)
+        self.rows, self.flying = np.zeros((count, _SIZE)), np.ones(count, dtype=np.bool_)
+        self.rng, self.memory = rng, dict[str, Any]()
+        self.bind(episodes)
+
+    def bind(self, episodes: Episodes) -> None:
+        """Lay the fields over the rows, and those of the episodes beside them."""
+        self.estimate = WorldEstimates()
+        _lay(self, self.rows, 0, _TRUE)
+        _lay(self.estimate, self.rows, _FIRST, _ESTIMATED)
+        _lay(self, self.rows, _REST, _BESIDE)
+        self.action, self.last_action = episodes.actions, episodes.last_actions
+        self.command, self.decision = episodes.commands, episodes.decisions
+
+    def first(self, name: str, now: Array) -> Array:
+        """Return values (n, ...) as they were at each episode's start, kept under a name."""
+        kept = self.memory.setdefault(name, np.zeros_like(now))
+        begins = self.decision == 0
+        kept[begins] = now[begins]
+        found: Array = kept
+        return found
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: self.__dict__[name] for name in ("rows", "flying", "rng", "memory")}
+
+
+@compiled
+def is_healthy(state: Array, qvel: Array) -> bool:
+    """Return whether an estimate (20,) is finite and each velocity (6,) a vehicle's."""
+    healthy = math.isfinite(state[:19].sum())
+    for velocity in qvel:
+        healthy = healthy and abs(velocity) < FASTEST
+    return healthy
+
+
+@compiled_without_gil
+def gather(
+    begin: int, end: int, shift: int, motion: Motion, episodes: Episodes, rows: Array, flying: Flags
+) -> None:
+    """Write the rows of worlds ``begin`` to ``end - 1``; world n moves as vehicle ``n - shift``."""
+    lanes = motion.state.shape[2]
+    for n in range(begin, end):
+        b, lane = (n - shift) // lanes, (n - shift) % lanes
+        row, estimate = rows[n], rows[n, _FIRST:_STD]
+        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
+        row[0:7], row[7:13], row[13:19] = p, v, motion.wrench[b, :, lane]
+        estimate[:] = motion.state[b, :, lane]
+        for i in range(6):
+            row[_STD + i] = math.sqrt(motion.covariance[b, 12 + i, 12 + i, lane])
+        k = min(max(episodes.ticks[n], 0), episodes.references.shape[1] - 1)
+        reference = episodes.references[n, k]
+        w, q = estimate[3:7], row[_STD + 6 : _STD + 9]
+        c, s = math.cos(0.5 * reference[9]), math.sin(0.5 * reference[9])
+        turned = 2.0 if c * w[0] + s * w[3] >= 0.0 else -2.0
+        q[0] = turned * (c * w[1] + s * w[2])
+        q[1] = turned * (c * w[2] - s * w[1])
+        q[2] = turned * (c * w[3] - s * w[0])
+        square, rest = 0.0, row[_REST:]
+        for i in range(3):
+            rest[i], rest[3 + i] = motion.specific[b, i, lane], motion.thrust[b, i, lane]
+            wind = 0.0
+            for station in range(STATIONS):
+                wind += motion.air[b, station, i, lane]
+            rest[6 + i] = wind / STATIONS
+            square += (p[i] - reference[i]) * (p[i] - reference[i])
+        rest[9:19] = reference
+        path = episodes.paths[n]
+        k = min(max(episodes.ticks[n], 0), len(path) - 1)
+        for i in range(2):
+            rest[19 + i] = path[max(k - 1, 0), i]
+            rest[21 + i] = (path[k, i] - rest[19 + i]) / TICK
+        rest[23], rest[24] = math.sqrt(square), episodes.ticks[n] * TICK
+        upright = 1.0 - 2.0 * (p[4] * p[4] + p[5] * p[5]) >= UPRIGHT
+        change = 0.0
+        for i in range(episodes.actions.shape[1]):
+            more = episodes.actions[n, i] - episodes.last_actions[n, i]
+            change += more * more
+        rest[25] = change
+        # in this form a number that is not finite counts as lost
+        flying[n] = not episodes.broken[n] and upright and is_healthy(estimate, v)

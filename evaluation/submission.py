@@ -1,0 +1,115 @@
+"""One file a submission: the referee's seed, every episode's figures, the code behind them, and a
+hash over the results.
+"""
+
+import hashlib
+import json
+import os
+import platform
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..runtime.page_files import write_text
+from ..runtime.provenance import commit, package_versions
+from .benchmark import Request, Results
+from .leaderboard import SETTLED, Standing, figures, ranking_figures
+from .statistics import (
+    hierarchical_draws,
+    interquartile_mean,
+    interval_of,
+    probability_of_improvement,
+)
+from .tables import rows_of
+from .tasks import task_of
+
+_FIGURES = ("rmse_settled", "rmse_transient", "total_reward", "lost", "uses_truth")
+
+
+def over_all(rows: Sequence[Standing], results: Results) -> list[dict[str, Any]]:
+    """Return each controller over all scenarios: the interquartile mean of its episodes' scores,
+    and its probability of improvement over the rival, with 95 % intervals.
+
+    A score is 0 at the mean of ``hover`` in its scenario, and 1 at the oracle's. Definitions are
+    rliable's; the bootstrap is stratified by scenario, over policies and episodes.
+    """
+    known, found = task_of(rows[0].task), []
+    policies = {row.controller: row.policies for row in rows}
+    worlds = list(dict.fromkeys(row.scenario for row in rows))
+    for name in policies:
+        kin = [one for one, _ in results if one.rpartition("-")[0] == name]
+        own = list(dict.fromkeys(kin)) if policies[name] > 1 else [name]
+        scores, better = [], []
+        for world in worlds:
+            laws = {name: own} | {law: [law] for law in known.references(())}
+            flown = {law: [results[each, world] for each in some] for law, some in laws.items()}
+            by, ranked = ranking_figures(flown)
+            start, end = ranked["hover"].mean(), ranked.get("oracle", np.array(np.nan)).mean()
+            scores.append((start - ranked[name]) / (start - end))
+            better.append((-ranked[name], -ranked[known.rival]))
+        strata = [each.shape[1] for each in scores]
+        x, y = (np.hstack(part) for part in zip(*better, strict=True))
+        draws = hierarchical_draws(probability_of_improvement, x, y, strata=strata)
+        row = {
+            "controller": name,
+            "improvement_over_rival": float(probability_of_improvement(x, y)),
+            "improvement_ci95": interval_of(draws),
+        }
+        if by == SETTLED and np.isfinite(scores[0]).all():
+            score = np.hstack(scores)
+            draws = hierarchical_draws(interquartile_mean, score, strata=strata)
+            row |= {"iqm_score": float(interquartile_mean(score)), "iqm_ci95": interval_of(draws)}
+        found.append(row)
+    return found
+
+
+def results_hash(data: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a submission's request, rows and flights, as canonical JSON."""
+    kept = {key: data[key] for key in ("request", "rows", "over_all", "flights")}
+    text = json.dumps(kept, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_submission(
+    request: Request, rows: Sequence[Standing], results: Results, folder: Path
+) -> Path:
+    """Write ``submission.json``, at once or not at all; return its path."""
+    flights = [
+        {
+            "controller": name,
+            "scenario": scenario,
+            "seeds": [episode.seed for episode in flown],
+            **{
+                key: [None if value != value else value for value in figures([flown], key)[0]]
+                for key in _FIGURES
+            },
+        }
+        for (name, scenario), flown in results.items()
+    ]
+    named = (*request.controllers, *request.scenarios, request.task, request.reward or "")
+    files = {re.sub(r"(\.(?:py|ya?ml)):.*", r"\1", name) for name in named}
+    data: dict[str, Any] = {
+        "windwrench": __version__,
+        "commit": commit(),
+        "python": platform.python_version(),
+        "packages": package_versions(),
+        "files": {
+            name: hashlib.sha256(Path(name).read_bytes()).hexdigest()
+            for name in sorted({*files, *request.imports})
+            if os.path.isfile(name)
+        },
+        "request": asdict(request),
+        "rows": rows_of(rows),
+        "over_all": over_all(rows, results),
+        "flights": flights,
+    }
+    path = folder / "submission.json"
+    data = json.loads(json.dumps({**data, "sha256": ""}))
+    data["sha256"] = results_hash(data)
+    write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", path)
+    return path

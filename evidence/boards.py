@@ -1,0 +1,39 @@
+"""The leaderboard's page, whose tables are kept results of ``windwrench benchmark``."""
+
+import math
+from dataclasses import fields
+from typing import Any
+
+from windwrench.evaluation.leaderboard import Standing
+from windwrench.evaluation.tables import markdown, summary
+from windwrench.evidence.kept_results import kept
+
+TASKS = ("WindHover", "FanTracking")
+
+
+def page() -> dict[str, Any]:
+    """Return what the page shows: each board with its command, and the ranking by rewards."""
+    rewards = kept("results/board/rewards.json")
+    boards = {task: _board(kept(f"results/board/{task}.json.gz")) for task in TASKS}
+    return {"boards": boards, "rewards": rewards["rewards"], "laws": rewards["laws"]}
+
+
+def _board(submission: dict[str, Any]) -> dict[str, str]:
+    rows = [standing(row) for row in submission["rows"]]
+    asked = submission["request"]
+    command = (
+        f"windwrench benchmark --task {asked['task']} --scenarios {','.join(asked['scenarios'])} "
+        f"--controllers {','.join(asked['controllers'])} --seed {asked['seed']}"
+    )
+    return {"command": command, "table": f"{summary(rows)}\n{markdown(rows)}"}
+
+
+def standing(row: dict[str, Any]) -> Standing:
+    """Return a row of a leaderboard from its file: null is not a number, but for a p-value."""
+    values: dict[str, Any] = {
+        field.name: math.nan
+        if row[field.name] is None and field.name != "p_over_best"
+        else row[field.name]
+        for field in fields(Standing)
+    }
+    return Standing(**values)

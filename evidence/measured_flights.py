@@ -1,0 +1,508 @@
+"""The diagnosis on flights that others have measured.
+
+NanoBench logs hold PWM, battery voltage and motion capture. Crazyswarm2 logs of slung payloads hold
+commanded thrust. CrazyPAD logs hold motor requests of a vehicle with a weight or a cut propeller.
+ULogs hold a motor that is commanded to fail.
+
+Every NanoBench fold is one call of ``diagnose`` on some flights, judged on flights left out of this
+fit. The diagnosis of commanded flights was developed on these very flights, which the page says.
+Flights in a fan wall are in ``fan_wall``.
+Forces are stated as accelerations by the declared mass, through a 4 Hz low-pass with zero phase,
+over the time in the air.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from windwrench import __version__
+from windwrench.dynamics.effects import get
+from windwrench.dynamics.vehicle import EffectSetting, Vehicle
+from windwrench.dynamics.vehicle_file import load_vehicle
+from windwrench.evidence.fan_wall import fan_wall
+from windwrench.evidence.kept_results import DOCS, kept
+from windwrench.evidence.runner import start
+from windwrench.identification.comparison.change import NOWHERE, Change
+from windwrench.identification.comparison.change import compare as compare_sets
+from windwrench.identification.comparison.fault_channels import read_channels
+from windwrench.identification.comparison.fault_detection import find_fault
+from windwrench.identification.comparison.trim import Trim, carrying, trim_of, trim_of_log
+from windwrench.identification.comparison.words import fault_data
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.diagnosis.commanded_rotors import in_flight
+from windwrench.identification.diagnosis.regression import RegressedFlights
+from windwrench.identification.findings import Diagnosis
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.tables import open_table
+from windwrench.identification.motion.residual import residual_wrench
+from windwrench.identification.motion.sensing_effects import undo_log_sensing
+from windwrench.identification.motion.signals import Signals, log_signals
+from windwrench.identification.motion.smoothing import low_pass
+from windwrench.runtime.drawing import AFTER, BEFORE, new_figure, styled
+from windwrench.runtime.errors import InputError
+from windwrench.runtime.page_files import write_json, write_png
+from windwrench.runtime.provenance import commit
+
+Array = NDArray[np.float64]
+
+RESULTS = "real-flights/real_flights.json"  # below docs/
+CUTOFF_HZ = 4.0
+_EDGE = 0.6  # s at either end, where filters start
+_DAY = 86400.0  # s
+PAYLOAD = 0.005  # kg, weighed by those who flew it
+CABLE = 0.5  # m
+CARRIER = 0.0369  # kg, the vehicle without its payload
+NO_PAYLOAD = (
+    (("146",), 0.033),
+    (("160", "165"), 0.032),
+    (("170", "172", "176", "178"), 0.032),
+    (("100", "130", "140"), 0.0375),
+)
+WITH_PAYLOAD = (("202",), ("201", "202", "204"), ("201",), ("204",))
+# CrazyPAD's motors: m1 front-right, m2 rear-right, m3 rear-left, m4 front-left
+PLACES = {
+    "M1": "rotor 4 (front-right)",
+    "M2": "rotor 3 (rear-right)",
+    "M3": "rotor 2 (rear-left)",
+    "M4": "rotor 1 (front-left)",
+    "M1_M2": "right",
+    "M2_M3": "rear",
+    "M3_M4": "left",
+    "M1_M4": "front",
+}
+
+
+def motion(log: FlightLog, vehicle: Vehicle) -> Signals:
+    """Return the signals of the longest piece of a log in the air, with the vehicle's sensing
+    effects undone.
+    """
+    pieces = log_signals(undo_log_sensing(in_flight(log, vehicle), vehicle))
+    return max(pieces, key=lambda s: len(s.t))
+
+
+def slow(x: Array, period: float) -> Array:
+    """Return signals (n, ...) behind the low-pass, without the edges."""
+    edge = round(_EDGE / period)
+    return low_pass(x, CUTOFF_HZ, period)[edge:-edge]
+
+
+def acceleration_residual(log: FlightLog, vehicle: Vehicle, mass: float) -> Array:
+    """Return the residual force (n, 3) by ``mass`` in m/s2, world, slow."""
+    s = motion(log, vehicle)
+    return slow(residual_wrench(s, vehicle)[:, :3] / mass, s.period)
+
+
+def constant_thrust(log: FlightLog, vehicle: Vehicle) -> Array:
+    """Return what (n, 3) m/s2 is left if thrust is taken to be the weight all the time."""
+    s = motion(log, replace(vehicle, effects=()))
+    up = np.array([0.0, 0.0, vehicle.gravity])
+    return slow(s.acceleration + up - vehicle.gravity * s.rotation[:, :, 2], s.period)
+
+
+def level(x: Array) -> list[float]:
+    """Return the RMS per axis."""
+    return [float(v) for v in np.sqrt(np.mean(np.square(x), axis=0))]
+
+
+def spread(x: Array) -> list[float]:
+    """Return the standard deviation per axis."""
+    return [float(v) for v in x.std(axis=0)]
+
+
+def compare(log: FlightLog, diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return how far a test flight is from the declared vehicle and from the amended one."""
+    found: dict[str, Any] = {"flight": log.name, "drag_N_per_mps": linear_drag(diagnosis)}
+    mass = diagnosis.declared.mass
+    for when, vehicle in (("before", diagnosis.declared), ("after", diagnosis.amended)):
+        x = acceleration_residual(log, vehicle, mass)
+        found |= {f"{when}_rms": level(x), f"{when}_std": spread(x)}
+        found[f"norm_{when}"] = float(np.sqrt(np.mean(np.sum(x**2, axis=1))))
+    return found | {"constant_thrust_std": spread(constant_thrust(log, diagnosis.declared))}
+
+
+def linear_drag(diagnosis: Diagnosis) -> list[float]:
+    """Return the linear drag along body x and y in N per m/s, of all named drags together; rotor
+    drag at the rotor speeds of hover.
+    """
+    total, rate = np.zeros(2), 4.0 * diagnosis.declared.hover_rate
+    for e in diagnosis.effects:
+        if e.name == "body_drag":
+            total += [e.coefficients["dx"], e.coefficients["dy"]]
+        if e.name == "rotor_drag":
+            total += [rate * e.coefficients["kdx"], rate * e.coefficients["kdy"]]
+    return [float(x) for x in total]
+
+
+def imu_check(path: Path, log: FlightLog, diagnosis: Diagnosis) -> dict[str, float]:
+    """Return how the model's vertical specific force agrees with the accelerometer of a flight that
+    no fit saw (m/s2).
+    """
+    table = open_table(path).read(["t", "imu_acc_z"])
+    s = motion(log, replace(diagnosis.declared, effects=()))
+    measured = 9.81 * np.interp(s.t, table["t"] - table["t"][0], table["imu_acc_z"])
+    up = np.array([0.0, 0.0, diagnosis.declared.gravity])
+    felt = s.acceleration + up
+    amended = replace(
+        diagnosis.amended,
+        effects=tuple(e for e in diagnosis.amended.effects if get(e.name).kind != "sensing"),
+    )
+    model = felt - residual_wrench(s, amended)[:, :3] / amended.mass
+
+    def along(x: Array) -> Array:
+        return slow(np.einsum("ni,ni->n", x, s.rotation[:, :, 2]), s.period)
+
+    imu = slow(measured, s.period)
+    return {
+        "model_std": float((imu - along(model)).std()),
+        "motion_capture_std": float((imu - along(felt)).std()),
+        "constant_std": float(imu.std()),
+    }
+
+
+def names_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return the named effects as plain data."""
+    return [
+        {
+            "name": e.name,
+            "coefficients": dict(e.coefficients),
+            "std": dict(e.std),
+            "tentative": e.tentative,
+            "indistinguishable_from": list(e.indistinguishable_from),
+        }
+        for e in diagnosis.effects
+    ]
+
+
+def payload_vehicle(mass: float) -> Vehicle:
+    """Return a Crazyflie of this mass whose file states a cable of 0.5 m and leaves load and
+    damping open.
+    """
+    return replace(
+        load_vehicle("crazyflie"),
+        mass=mass,
+        effects=(EffectSetting("slung_payload", {"l": CABLE}),),
+    )
+
+
+def swing(log: FlightLog, diagnosis: Diagnosis) -> dict[str, list[float]] | None:
+    """Return how strongly the cable pulls sideways (standard deviation, N, x and y): by the model,
+    and by the payload's track.
+    """
+    found = next((e for e in diagnosis.effects if e.name == "slung_payload"), None)
+    if found is None or "payload_position" not in log.extra:
+        return None
+    bare = replace(diagnosis.declared, effects=())
+    flights = RegressedFlights([log], bare)
+    setting = {e.name: dict(e.coefficients) for e in diagnosis.amended.effects}
+    law = flights.residual(
+        {k: v for k, v in setting.items() if k != "slung_payload"}
+    ) - flights.residual(setting)
+    s = motion(log, bare)
+    track = np.column_stack([np.interp(s.t, log.t, x) for x in log.extra["payload_position"].T])
+    smooth = low_pass(track, CUTOFF_HZ, s.period)
+    pull = -PAYLOAD * np.gradient(np.gradient(smooth, s.period, axis=0), s.period, axis=0)
+    edge = round(_EDGE / s.period)
+    return {"law_std": spread(law[:, :2]), "tracked_std": spread(pull[edge:-edge, :2])}
+
+
+def truth_of(name: str) -> str:
+    """Return the place that a CrazyPAD file's name tells.
+
+    Raises:
+        InputError: it tells none.
+    """
+    condition = name.split("__")[0]
+    if condition.startswith("normal"):
+        return NOWHERE
+    words = condition.removeprefix("cut_propeller_").split("near_")[-1].split("_")
+    motors = "_".join(word for word in words if word in ("M1", "M2", "M3", "M4"))
+    if motors not in PLACES:
+        raise InputError(f"{name}: its name tells no place; expected M1 to M4, or two neighbours")
+    return PLACES[motors]
+
+
+def crazypad(folder: Path) -> list[dict[str, Any]]:
+    """Compare every flight with the other normal flights of the same vehicle."""
+    vehicle = load_vehicle("crazyflie")
+    trims = {
+        path.name: trim_of_log(read_log(path, "crazypad"), vehicle)
+        for path in sorted(folder.glob("*.csv.gz"))
+    }
+    return _each_compared(trims)
+
+
+def crazypad_cards(folder: Path) -> list[dict[str, Any]]:
+    """Compare every flight of vehicle E8 in CrazyPAD's ``data/motor_data`` with all other normal
+    ones; tape on a propeller is left out, of which nobody knows what it should do.
+    """
+    trims = {}
+    for path in sorted(folder.glob("*/E8_log*")):
+        if not path.parent.name.startswith("tape"):
+            log = read_log(path, "crazyflie_sd")
+            assert log.command is not None
+            steady = carrying(log.t, log.command.sum(axis=1))
+            name = f"{path.parent.name}__{path.name}"
+            trims[name] = trim_of(name, log.t, log.command, steady, log.voltage)
+    return _each_compared(trims)
+
+
+def _each_compared(trims: Mapping[str, Trim]) -> list[dict[str, Any]]:
+    """Return the answer on each flight, against all other normal ones of the same vehicle."""
+    rows = []
+    for name, trim in trims.items():
+        which = name.split("__")[1].split("_")[0]
+        normal = [
+            other
+            for file, other in trims.items()
+            if file.startswith("normal") and f"__{which}_" in file and file != name
+        ]
+        if normal:
+            rows.append(_compared(name, compare_sets([trim], normal)))
+    return rows
+
+
+def _compared(name: str, change: Change) -> dict[str, Any]:
+    """Return the answer of a comparison, beside the truth."""
+    truth = truth_of(name)
+    if_changed = max((p for p in change.places if p != NOWHERE), key=change.places.__getitem__)
+    return {
+        "flight": name.removesuffix(".csv.gz"),
+        "truth": truth,
+        "place": change.place,
+        "probability": change.places[change.place],
+        "if_changed": if_changed,
+        "changed": 1.0 - change.places[NOWHERE],
+        "sure": change.sure,
+        "difference": change.difference.tolist(),
+        "right": change.place == truth,
+        "right_if_changed": truth == NOWHERE or if_changed == truth,
+        "sure_and_wrong": change.sure and change.place != truth,
+    }
+
+
+def motor_faults(folder: Path) -> list[dict[str, Any]]:
+    """Search each ULog, and read from it what was commanded to fail, and when."""
+    return [
+        fault_data(find_fault(read_channels(path)[0]))
+        | {"log": path.name, "commanded": commanded_fault(path)}
+        for path in sorted(folder.glob("*.ulg"))
+    ]
+
+
+def commanded_fault(path: Path) -> dict[str, Any] | None:
+    """Return the motors that a log's topic ``rfly_ctrl_lxl`` commands to fail, what is left of
+    them, and the interval (s) in which the command came: the topic's last sample without it and the
+    first with it. None where the log has none.
+    """
+    from pyulog import ULog
+
+    topics = ULog(str(path), ["rfly_ctrl_lxl"]).data_list
+    for topic in topics:
+        fields = topic.data
+        on = np.flatnonzero(fields["mode"] != 0)
+        if on.size and on[0] > 0:
+            k = int(on[0])
+            left = {f"PX4 motor {i + 1}": float(fields[f"controls[{i}]"][k]) for i in range(4)}
+            return {
+                "motors": {name: share for name, share in left.items() if share < 1.0},
+                "between_s": [1e-6 * float(fields["timestamp"][j]) for j in (k - 1, k)],
+            }
+    return None
+
+
+@styled()
+def _picture(kept: Mapping[str, tuple[FlightLog, Diagnosis]], path: Path) -> None:
+    figure = new_figure(1.6 * len(kept))
+    panels = figure.subplots(len(kept), 3, sharex="col", squeeze=False)
+    for row, (name, (log, diagnosis)) in zip(panels, kept.items(), strict=True):
+        mass = diagnosis.declared.mass
+        before, after = (
+            acceleration_residual(log, v, mass) for v in (diagnosis.declared, diagnosis.amended)
+        )
+        for i, (panel, axis) in enumerate(zip(row, "xyz", strict=True)):
+            for x, colour, words in ((before, BEFORE, "declared"), (after, AFTER, "amended")):
+                panel.plot(
+                    np.arange(len(x)) / 100.0,
+                    x[:, i] - x[:, i].mean() * (i < 2),
+                    color=colour,
+                    lw=0.8,
+                    label=words,
+                )
+            panel.set_title(f"{name.split('_')[0]}, {axis}" + (", mean removed" if i < 2 else ""))
+    panels[0, 2].legend(loc="center")
+    figure.supylabel("residual (m/s2)")
+    figure.supxlabel("time in the air (s)")
+    write_png(figure, path)
+
+
+def nanobench(folder: Path, picture: Path) -> list[dict[str, Any]]:
+    """Return the folds of the NanoBench flights of a folder, and draw them.
+
+    Raises:
+        InputError: there are fewer than three flights.
+    """
+    vehicle, paths = load_vehicle("crazyflie"), sorted(folder.glob("*.csv"))
+    if len(paths) < 3:
+        raise InputError(
+            f"{folder}: {len(paths)} CSV file(s); expected at least three NanoBench flights"
+        )
+    logs = {p.stem: read_log(p, "nanobench", vehicle) for p in paths}
+    days = {p.stem: open_table(p).read(["t"])["t"][0] // _DAY for p in paths}
+    folds: list[dict[str, Any]] = []
+    drawn: dict[str, tuple[FlightLog, Diagnosis]] = {}
+    for path in paths:
+        test, log = path.stem, logs[path.stem]
+        groups = {"all others": [n for n in logs if n != test]}
+        same = [n for n in groups["all others"] if days[n] == days[test]]
+        if 2 <= len(same) < len(groups["all others"]):
+            groups["the same day"] = same
+        for words, names in groups.items():
+            print(f"NanoBench: {test} from {words}", flush=True)
+            diagnosis = diagnose([logs[n] for n in names], vehicle, [log])
+            folds.append(
+                {
+                    "fitted_on": words,
+                    "flights": names,
+                    **compare(log, diagnosis),
+                    "effects": names_of(diagnosis),
+                    "verdict": diagnosis.verdict,
+                    "remainder": diagnosis.remainder,
+                    "imu": imu_check(path, log, diagnosis),
+                }
+            )
+            drawn[test] = log, diagnosis
+    _picture(drawn, picture)
+    return folds
+
+
+def slung_payload(folder: Path) -> list[dict[str, Any]]:
+    """Return what is found on the groups of crazyswarm2 logs that are in a folder."""
+    groups: list[tuple[Sequence[str], float, bool]] = [
+        (numbers, CARRIER, True) for numbers in WITH_PAYLOAD
+    ]
+    groups += [(numbers, mass, False) for numbers, mass in NO_PAYLOAD]
+    loads = []
+    for numbers, mass, loaded in groups:
+        if not all((folder / f"log{n}.csv").exists() for n in numbers):
+            continue
+        print(f"slung payload: {', '.join(numbers)}", flush=True)
+        carrier = payload_vehicle(mass)
+        logs = [read_log(folder / f"log{n}.csv", "crazyswarm2", carrier) for n in numbers]
+        diagnosis = diagnose(logs, carrier)
+        loads.append(
+            {
+                "logs": list(numbers),
+                "payload": loaded,
+                "mass": mass,
+                "effects": names_of(diagnosis),
+                "swing": {log.name: swing(log, diagnosis) for log in logs},
+            }
+        )
+    return loads
+
+
+def pooled(folds: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the vertical residual of folds (m/s2), and by how many times residuals fall."""
+
+    def fell(before: str, after: str, axis: int) -> float:
+        a, b = (np.sqrt(np.mean([f[key][axis] ** 2 for f in folds])) for key in (before, after))
+        return float(a / b)
+
+    return {
+        "fitted_on": folds[0]["fitted_on"],
+        "vertical": float(np.sqrt(np.mean([f["after_rms"][2] ** 2 for f in folds]))),
+        "vertical_fell": fell("before_rms", "after_rms", 2),
+        "fell": [fell("before_std", "after_std", i) for i in range(2)],
+        "against_constant": [fell("constant_thrust_std", "after_std", i) for i in range(3)],
+    }
+
+
+def unmet(fold: Mapping[str, Any]) -> list[str]:
+    """Return which of the bounds that the diagnosis aims at a fold misses, in words."""
+    named = {e["name"]: e["coefficients"] for e in fold["effects"]}
+    delay = next(
+        (
+            next(iter(named[n].values()))
+            for n in ("motor_lag", "latency", "clock_offset")
+            if n in named
+        ),
+        0.0,
+    )
+    drag, before, after = fold["drag_N_per_mps"], fold["before_std"], fold["after_std"]
+    bounds = {
+        "vertical at most 0.18 m/s2": fold["after_rms"][2] <= 0.18,
+        "vertical down 5 times": fold["before_rms"][2] >= 5 * fold["after_rms"][2],
+        "vertical below constant thrust": after[2] < fold["constant_thrust_std"][2],
+        "x down 1.9 times": before[0] >= 1.9 * after[0],
+        "y down 4 times": before[1] >= 4.0 * after[1],
+        "all three axes down 4 times": fold["norm_before"] >= 4 * fold["norm_after"],
+        "battery_sag named": "battery_sag" in named,
+        "drag of 0.0095 to 0.012 N per m/s": all(0.0095 <= d <= 0.012 for d in drag),
+        "delay of 30 to 55 ms": 0.030 <= delay <= 0.055,
+    }
+    return [words for words, met in bounds.items() if not met]
+
+
+def shown() -> dict[str, Any]:
+    """Return the kept results, and what the page says of them beside."""
+    result: dict[str, Any] = kept(RESULTS)
+    folds = [fold | {"unmet": unmet(fold)} for fold in result["nanobench"]]
+    groups = dict.fromkeys(fold["fitted_on"] for fold in folds)
+    names = [effect for fold in folds for effect in fold["effects"]]
+    return result | {
+        "nanobench": folds,
+        "names": names,
+        "tentative": [effect for effect in names if effect["tentative"]],
+        "pooled": [pooled([f for f in folds if f["fitted_on"] == words]) for words in groups],
+        "slung_payload": [
+            load
+            | {"load": next((e for e in load["effects"] if e["name"] == "slung_payload"), None)}
+            for load in result["slung_payload"]
+        ],
+        "truth": {"payload_g": 1000 * PAYLOAD, "cable_m": CABLE},
+        "nowhere": NOWHERE,
+    }
+
+
+def study(
+    data: Annotated[
+        Path,
+        typer.Option(
+            help="Data folder that holds nanobench/, crazyswarm2_payload/csv/, crazypad/ and "
+            "motor_faults/."
+        ),
+    ] = Path("../shared/data"),
+    pad: Annotated[
+        Path | None,
+        typer.Option(help="Folder data/motor_data of CrazyPAD; without it, as they were kept."),
+    ] = None,
+    wall: Annotated[
+        Path | None,
+        typer.Option(help="Folder data/experiment of Neural-Fly; without it, as they were kept."),
+    ] = None,
+) -> None:
+    """Diagnose measured flights, test each on flights left out of its fit, and keep the results."""
+    code = commit()  # before the diagnoses: the code that makes them
+    result = {
+        "version": __version__,
+        "commit": code,
+        "cutoff_hz": CUTOFF_HZ,
+        "nanobench": nanobench(data / "nanobench", (DOCS / RESULTS).with_name("nanobench.png")),
+        "slung_payload": slung_payload(data / "crazyswarm2_payload" / "csv"),
+        "fan_wall": fan_wall(wall) if wall else kept(RESULTS)["fan_wall"],
+        "crazypad": crazypad(data / "crazypad"),
+        "crazypad_cards": crazypad_cards(pad) if pad else kept(RESULTS)["crazypad_cards"],
+        "motor_faults": motor_faults(data / "motor_faults"),
+    }
+    write_json(result, DOCS / RESULTS, allow_nan=True)
+    print(DOCS / RESULTS)
+
+
+if __name__ == "__main__":
+    start(study)

@@ -1,0 +1,147 @@
+"""From a flight through a wind to an admittance law: the profile, the jet in it, and the design."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from ..controllers.briefing import FilterNoise
+from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
+from ..dynamics.vehicle import Vehicle
+from ..estimator import UKFTuning
+from ..runtime.errors import InputError
+from .jet_design import (
+    FollowingLoop,
+    JetShape,
+    design_admittance,
+    fastest_followed,
+    following_loop,
+    no_jet,
+    shape_of,
+)
+from .logs.flight_log import FlightLog
+from .logs.table import Array
+from .wind_profile import WindProfile, wind_profile
+from .wrench_series import estimate_log
+
+RISE_TIME = 0.45  # s, of the filter in the tasks
+_ROWS = 100  # decisions of a flight in the jet, at least
+_SLOW = 6.0  # s, over which a place is the flight's way
+
+
+@dataclass(frozen=True, eq=False)
+class ProfiledJet:
+    """A flight's profile and the law for it; ``why`` says why there is none.
+
+    Attributes:
+        profile: along the line of the law.
+        others: along the flight's other lines.
+        why: empty where there is a law.
+        shape: of the torque's profile.
+        law: ``design_admittance``, with 95 % intervals from the profile's draws.
+        notes: on the log.
+    """
+
+    profile: WindProfile
+    others: tuple[WindProfile, ...]
+    why: str
+    shape: JetShape | None
+    law: dict[str, Any] | None
+    notes: tuple[str, ...]
+
+
+def profile_log(
+    log: FlightLog,
+    vehicle: Vehicle,
+    axis: float | None = None,
+    line: float | None = None,
+    rise_time: float = RISE_TIME,
+    speed: float | None = None,
+    report: Callable[[float], None] | None = None,
+) -> ProfiledJet:
+    """Return force and torque over the place of a flight, and the admittance law for them.
+
+    Args:
+        log: hovers on a line or grid, or slow sweeps, through a steady wind.
+        vehicle: as declared.
+        axis: rad, direction of the line from the world's x; default: found.
+        line: m along the wind, of the line where the flight has several.
+        rise_time: s, of the wrench filter that the law will fly with.
+        speed: m/s, the largest of the fans behind which the gain has the least offset; default:
+            half of the fastest that any gain follows.
+        report: called now and then with the finished share.
+
+    Raises:
+        InputError: the log does not suit ``estimate_log``, or is too short or too narrow for a
+            profile.
+    """
+    series = estimate_log(log, vehicle, report=report, smooth=True)
+    try:
+        profile = wind_profile(series, axis, line)
+    except InputError as error:
+        raise InputError(f"{log.source or log.name}: {error}") from error
+    others = []
+    for beside in profile.lines[profile.lines != profile.beside].tolist():
+        with suppress(InputError):  # too short a line
+            others.append(wind_profile(series, profile.direction, beside))
+    found = partial(ProfiledJet, profile, tuple(others), notes=series.notes)
+    std = (profile.high - profile.wrench)[5] / 1.96
+    why, shape = no_jet(profile.place, profile.torque, std), None
+    if not why:
+        shape = shape_of(profile.place, profile.torque)
+    if shape is None:
+        return found(why, None, None)
+
+    def loop(rise: float, noise: Array | None = None) -> FollowingLoop:
+        tuning = UKFTuning.for_vehicle(vehicle, log.period, rise)
+        noise_of = FilterNoise.of(tuning, log.period)
+        return following_loop(float(vehicle.inertia[2, 2]), noise_of, noise)
+
+    noise = _noise(log, vehicle, profile, shape.edges, rise_time, loop(rise_time))
+    if len(noise) < _ROWS:
+        return found(f"only {DECISION_PERIOD * len(noise):.0f} s lie in the jet", shape, None)
+    flying = loop(rise_time, noise)
+    law = design_admittance(flying, loop, profile.place, profile.torque, shape, speed)
+    if law is None:
+        return found("the torque's noise lets no gain follow a fan", shape, None)
+    drawn = []
+    for torque in profile.torque_draws:
+        if one := shape_of(profile.place, torque):
+            bound = min(law["gain"] * one.weaker, MAX_COMMAND)
+            gain = np.array([law["gain"]])
+            drawn.append((bound, fastest_followed(flying, profile.place, torque, one, gain)[0]))
+    ends = np.quantile(drawn, (0.025, 0.975), axis=0).T.tolist()
+    names = "bound_ci95_m_s", "fastest_fan_ci95_m_s"
+    return found("", shape, law | dict(zip(names, ends, strict=True)))
+
+
+def _noise(
+    log: FlightLog,
+    vehicle: Vehicle,
+    profile: WindProfile,
+    edges: tuple[float, float],
+    rise_time: float,
+    loop: FollowingLoop,
+) -> Array:
+    """Return the noise (k, 2) of a flight within the ``edges`` (m) of a jet, a row a decision: of
+    the torque about z that the vehicle's own filter shows (Nm), and of the place (m).
+    """
+    series = estimate_log(log, vehicle, UKFTuning.for_vehicle(vehicle, log.period, rise_time))
+    t = np.arange(log.t[0] + 4.0 * rise_time, log.t[-1], DECISION_PERIOD)
+    rows = np.searchsorted(log.t, t)
+    place = profile.along(series.position)[rows]
+    true = np.interp(place, profile.place, profile.torque)
+    error, expected = np.zeros(3), true.copy()
+    for k, change in enumerate(np.diff(true, prepend=true[:1])):
+        error = loop.keep @ error + loop.enter * change
+        expected[k] -= error[2]
+    way = uniform_filter1d(place, round(_SLOW / DECISION_PERIOD), mode="nearest")
+    noise = np.column_stack([series.torque[rows, 2] - expected, place - way])
+    inside = noise[(place > edges[0]) & (place < edges[1]) & np.isfinite(noise).all(axis=1)]
+    return np.asarray(inside - inside.mean(axis=0)) if len(inside) else inside

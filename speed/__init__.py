@@ -1,1 +1,0 @@
-"""How fast the kit is, measured beside its peers; run by ``windwrench speed``."""

@@ -1,0 +1,119 @@
+"""Every page that is made of kept results says what they say; figures in prose are those of
+results, and probabilities those of kept flights.
+"""
+
+import json
+from dataclasses import asdict
+
+import pytest
+
+from tests.support.paths import ROOT
+from windwrench.evidence import pages as rendering
+from windwrench.evidence import quotes as quoting
+from windwrench.evidence.kept_results import kept
+from windwrench.evidence.pages import missing_sources
+from windwrench.evidence.probabilities.__main__ import plan, plan_of_other_logs
+from windwrench.evidence.probabilities.calibration import RESULTS, flights_of
+from windwrench.evidence.probabilities.fitting import fit
+from windwrench.evidence.probabilities.flights import KINDS, WAYS_TO_LOG
+from windwrench.identification.diagnosis.settings import DIAGNOSIS
+from windwrench.identification.diagnosis.unknown import UNKNOWN
+
+QUOTES, NOT_RESULTS = quoting.read_quotes()
+
+
+@pytest.mark.parametrize("name", rendering.PAGES)
+def test_a_page_holds_what_its_results_say(name):
+    assert rendering.differing_lines(name) == []
+
+
+def test_a_number_that_is_changed_on_a_page_is_seen(tmp_path, monkeypatch):
+    text = (rendering.DOCS / "tasks.md").read_text(encoding="utf-8")
+    row = next(line for line in text.splitlines() if line.startswith("|") and "0." in line)
+    changed = row.replace("0.", "1.", 1)
+    (tmp_path / "tasks.md").write_text(text.replace(row, changed, 1), encoding="utf-8")
+    monkeypatch.setattr(rendering, "DOCS", tmp_path)
+    assert rendering.differing_lines("tasks") == [f"-{row}", f"+{changed}"]
+
+
+def test_figures_in_prose_are_those_of_their_results():
+    assert quoting.wrong_quotes(QUOTES) == []
+    assert QUOTES
+
+
+@pytest.mark.parametrize("page", NOT_RESULTS)
+def test_every_number_in_prose_has_a_source(page):
+    assert quoting.unknown_numbers(page, QUOTES, NOT_RESULTS[page]) == []
+
+
+def test_an_exception_that_is_not_needed_goes():
+    for page, passages in NOT_RESULTS.items():
+        text = quoting.prose((ROOT / page).read_text(encoding="utf-8"))
+        assert [passage for passage in passages if passage not in text] == []
+
+
+def test_a_figure_without_a_source_and_a_wrong_one_are_seen():
+    page, said = QUOTES[0].page, QUOTES[0].says
+    text = (ROOT / page).read_text(encoding="utf-8") + "\nIt is 17 % better.\n"
+    found = quoting.unknown_numbers(page, QUOTES, NOT_RESULTS[page], text)
+    assert len(found) == 1
+    assert "It is 17 % better." in found[0]
+    wrong = quoting.Quote(page, said + " of 1000", ())
+    assert quoting.wrong_quotes([wrong]) == [f"{page}: expected {wrong.says!r}"]
+
+
+def test_a_quote_of_a_row_that_is_not_there_is_refused(tmp_path):
+    value = {"from": "docs/results/leaderboard.json", "where": {"controller": "none"}, "key": "x"}
+    listed = {
+        "quotes": {"README.md": [{"says": "{}", "values": [value]}]},
+        "not results": {},
+    }
+    path = tmp_path / "quotes.yaml"
+    path.write_text(json.dumps(listed), encoding="utf-8")
+    with pytest.raises(LookupError, match="0 rows with"):
+        quoting.read_quotes(path)
+
+
+def test_modules_that_pages_name_are_there():
+    assert missing_sources() == []
+
+
+def test_what_is_gone_is_seen(tmp_path, monkeypatch):
+    text = "".join(
+        f"`python -m evidence.{name}`, `evidence/{name}.py`" for name in ("pages", "gone")
+    )
+    (tmp_path / "page.md").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(rendering, "DOCS", tmp_path)
+    assert missing_sources() == ["page.md names evidence.gone", "page.md names evidence/gone.py"]
+
+
+def test_the_rule_of_a_sure_name_is_that_of_the_code():
+    """A report shows a probability times that of nothing unknown: 0.95 x 0.75 at the least."""
+    text = (rendering.DOCS / "diagnosis.md").read_text(encoding="utf-8")
+    rule = " ".join(text.split()).replace(" %", "%")
+    least, most = DIAGNOSIS.least_sure_probability, DIAGNOSIS.most_unknown
+    assert f"its probability is {least:.0%} or more if nothing" in rule
+    assert f"they show {least * (1.0 - most):.0%} or more" in rule
+    assert f"has a probability of {most:.0%} at most" in rule
+    assert f"the flight has {DIAGNOSIS.least_seconds:g} s" in rule
+
+
+def test_the_weights_in_use_are_those_of_the_kept_flights():
+    found = fit(flights_of(kept(RESULTS["first"])))
+    for name, value in asdict(UNKNOWN).items():
+        assert getattr(found, name) == pytest.approx(value, abs=0.02), name
+
+
+def test_a_run_has_flights_of_both_and_none_twice():
+    tasks = plan(20, 20, 0, 3, "other.py")
+    assert len(set(tasks)) == len(tasks)
+    assert {t[1] for t in tasks if t[0] == "own"} >= {"single", "pair", "nothing", "left out"}
+    assert {t[1] for t in tasks if t[0] == "other.py"} == {"catalogue", "left out"}
+
+
+def test_other_logs_are_of_all_ways_and_none_is_flown_twice():
+    tasks = plan_of_other_logs(20, 0, 1000, "other.py")
+    assert len(set(tasks)) == len(tasks) == 60
+    assert {t[3] for t in tasks} == set(WAYS_TO_LOG[1:])
+    assert {t[3] for t in tasks if t[0] == "other.py"} == {"filtered"}
+    assert {t[1] for t in tasks if t[0] == "own"} == set(KINDS)

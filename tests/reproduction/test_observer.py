@@ -1,0 +1,103 @@
+"""The nonlinear observer: exact where it should be, unmoved by what carries no information."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support.flights import PERIOD, fly, yawing_flight
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.reproduction import NonlinearObserver
+
+VEHICLE = load_vehicle("ardrone2")
+FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])  # of yawing_flight
+
+
+def loaded_hover(observer, steps, force, torque):
+    """Hover tilted so that the rotors balance a force and a torque (world); return forces and
+    torques (steps, 3).
+    """
+    lift = np.array([0.0, 0.0, VEHICLE.weight]) - force
+    axis = np.cross([0.0, 0.0, 1.0], lift)
+    sine = np.linalg.norm(axis) / np.linalg.norm(lift)
+    attitude = Rotation.from_rotvec(axis / max(np.linalg.norm(axis), 1e-12) * np.arcsin(sine))
+    rotors = VEHICLE.rotor_speeds(np.linalg.norm(lift), -attitude.inv().apply(torque))
+    pose = [0, 0, 1], attitude.as_quat(scalar_first=True)
+    observer.reset(*pose)
+    estimates = [observer.step(rotors, *pose) for _ in range(steps)]
+    return (
+        np.array([e.force for e in estimates]),
+        np.array([e.torque for e in estimates]),
+        estimates[-1],
+    )
+
+
+def errors_along(flight, missing=()):
+    """Return force, torque, position, velocity and body-rate errors (steps, 15)."""
+    true = {"force": [FORCE], "torque": [TORQUE], "position": flight["true_x"][1:]}
+    true |= {"velocity": flight["velocity"][1:], "angular_velocity": flight["omega"][1:]}
+    found = fly(NonlinearObserver(VEHICLE), flight, missing)
+    return np.hstack([np.array([getattr(e, n) for e in found]) - x for n, x in true.items()])
+
+
+def test_steady_state_is_exact_after_a_rise_of_a_second():
+    force, torque = np.array([0.4, -0.3, 0.5]), np.array([0.02, -0.01, 0.015])
+    forces, torques, e = loaded_hover(NonlinearObserver(VEHICLE), 3000, force, torque)
+    np.testing.assert_allclose(forces[-1], force, atol=1e-9)
+    np.testing.assert_allclose(torques[-1], torque, atol=1e-9)
+    np.testing.assert_allclose(e.position, [0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(e.velocity, 0, atol=1e-9)
+    np.testing.assert_allclose(e.angular_velocity, 0, atol=1e-9)
+    assert np.isnan(e.nis)
+    for signal in (forces[:, 2], torques[:, 0], torques[:, 2]):
+        rise = PERIOD * (
+            np.argmax(signal > 0.9 * signal[-1]) - np.argmax(signal > 0.1 * signal[-1])
+        )
+        assert rise == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_yawing_flight_is_no_wrench():
+    flight = yawing_flight(VEHICLE, 2501, sigma_position=0.0, sigma_attitude=0.0, substeps=6)
+    clean = errors_along(flight)[1200:]
+    bounds = np.repeat([2e-3, 5e-5, 1e-3, 1e-3], 3)
+    np.testing.assert_array_less(np.abs(clean[:, :12]).max(axis=0), bounds)
+    flight = yawing_flight(VEHICLE, 2501, seed=2, substeps=3)
+    errors = errors_along(flight)
+    noisy = np.sqrt(np.mean(errors[1200:] ** 2, axis=0))
+    np.testing.assert_array_less(noisy[:12], np.repeat([6e-3, 0.6e-3, 1e-3, 0.01], 3))
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], 2501)
+    flipped = flight | {"quaternion": signs[:, None] * flight["quaternion"]}
+    np.testing.assert_array_equal(errors_along(flipped), errors)
+
+
+def test_missing_measurements_leave_the_wrench_where_it_was():
+    flight = yawing_flight(VEHICLE, 2501, seed=1, substeps=3)
+    random = set(np.random.default_rng(3).choice(2501, 1250, replace=False))
+    errors = errors_along(flight, random)[1200:]
+    assert np.sqrt(np.mean(errors[:, :3] ** 2)) < 8e-3
+    assert np.sqrt(np.mean(errors[:, 3:6] ** 2)) < 1e-3
+    # half a second blind, then the pose again
+    errors = errors_along(flight, range(1500, 1600))
+    assert np.abs(errors[1499:1598, :3] - errors[1498, :3]).max() < 1e-12
+    assert np.abs(errors[1499:1598, 6:9]).max() < 0.05
+    assert np.abs(errors[1599:, :3]).max() < 0.15
+    assert np.abs(errors[1599:, 3:6]).max() < 5e-3
+    assert np.abs(errors[-100:, :3]).max() < 0.03
+
+
+def test_declared_effects_are_not_a_wrench():
+    drag = EffectSetting("rotor_drag", {"kdx": 3e-4, "kdy": 3e-4})
+    offset = EffectSetting("com_offset", {"cx": 0.01, "cy": -0.006, "cz": 0.0})
+    force = {}
+    for vehicle in (VEHICLE, VEHICLE.with_effects(drag, offset)):
+        observer = NonlinearObserver(vehicle)
+        observer.reset([0, 0, 1], [1, 0, 0, 0], None, [1.0, 0, 0])
+        speeds = np.full(4, VEHICLE.hover_rate)
+        for k in range(1, 2001):
+            e = observer.step(speeds, [k * PERIOD, 0, 1], [1, 0, 0, 0])
+        force[vehicle is VEHICLE] = np.concatenate([e.force, e.torque])
+    pull = 3e-4 * 4 * VEHICLE.hover_rate
+    torque = VEHICLE.weight * np.array([-0.006, -0.01])
+    np.testing.assert_allclose(force[True], 0.0, atol=1e-6)
+    # the wrench that cancels drag and the offset thrust in a steady translation
+    np.testing.assert_allclose(force[False][0], pull, rtol=1e-6)
+    np.testing.assert_allclose(np.abs(force[False][3:5]), np.abs(torque), rtol=1e-6)

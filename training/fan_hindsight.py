@@ -1,0 +1,130 @@
+"""The commands of a law with knowledge of the future: the teacher of ``FanTracking``.
+
+Once flown, the fan's motion is known. The oracle's regulator with preview (``controllers.preview``)
+gives the best command of each decision in view of the fan's coming places. The mean of these
+commands, given the observations so far, is the best causal command (certainty equivalence): a
+recurrent network fitted to them learns this mean. Two more quantities are taught, for the network's
+memory alone: the fan's offset and its velocity.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..controllers.axis_models import PLACE, SET_POINT, tilting
+from ..controllers.features import Features, History
+from ..controllers.flight import FlightGains
+from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
+from ..controllers.preview import Oracle, lasting, preview
+from ..envs.fan_tracking import FanTrackingEnv
+from ..envs.lanes.vector import TaskLanes
+
+Array = NDArray[np.float64]
+Frames = NDArray[np.float32]
+
+AHEAD = 24  # decisions, of which a command knows the fan's places
+_COUNTS = 10  # of them the vehicle must have flown for a command to count
+_LEAD = 2.0  # 1/s, gain of the law with sight of the fan that flies the first round
+_VELOCITY = 3  # decisions, over which the fan's velocity is taught
+_ALONG_Y = 1
+# of nineteen episodes so many fly in each scenario
+MIX = {"base": 4, "fast": 3, "varied": 4, "far": 4} | dict.fromkeys(
+    ("static", "noisy", "gusty", "slow-filter"), 1
+)
+FEATURES = Features(("torque_z", "force_x", "force_y", "velocity_y", "command", "path_y"), 3)
+
+
+def fan_lanes(episodes: int) -> list[TaskLanes]:
+    """Return environments for about so many episodes in the mix of scenarios."""
+    total = sum(MIX.values())
+    return [
+        TaskLanes(max(1, episodes * n // total), task=FanTrackingEnv, scenario=name)
+        for name, n in MIX.items()
+    ]
+
+
+class FanHindsight:
+    """FanTracking: scaled frames, and the command that hindsight holds best.
+
+    A law with sight of the fan flies the first round.
+    """
+
+    decisions, period, largest = FanTrackingEnv.decisions(), DECISION_PERIOD, MAX_COMMAND
+
+    def __init__(self, limit: float = 2.5) -> None:
+        """Take a limit on what is taught, in largest commands. A fan far away on an unknown side
+        needs a mean of commands far beyond 1.
+        """
+        oracle = Oracle()
+        self._limit = limit * self.largest
+        model = Oracle.steps(oracle.vehicle)[_ALONG_Y]
+        self._gain, self._ahead = preview(*model, oracle.effort, AHEAD)
+
+    def begin(self, envs: TaskLanes, leads: bool) -> None:
+        """Start an episode in each of ``envs``."""
+        self._envs = envs
+        self._history: History | None = None
+        self._set_point: Array | None = None
+        self._flown: list[tuple[Array, ...]] = []
+
+    def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
+        """Return frames (n, quantities), and the commands (n, 1) of the law with sight."""
+        frames = FEATURES.frames(observations)
+        if self._history is None:
+            self._history = History(FEATURES, len(frames))
+            self._history.restart(frames, list(range(len(frames))))
+        else:
+            self._history.push(frames)
+        fan, own = infos["fan_y"], infos["y"]
+        self._set_point = _moved(self._set_point, own, infos["command"][:, 0])
+        self._flown.append((self._own(infos), _felt(infos), fan.copy()))
+        wanted = infos["fan_velocity"] + _LEAD * (fan - own)
+        return self._history.flat(), wanted[:, None]
+
+    def _own(self, infos: dict[str, Any]) -> Array:
+        """Return the states (n, 7) of the vehicles along y."""
+        truth = self._envs.truth()
+        assert self._set_point is not None
+        up, y = truth["up"], _ALONG_Y
+        turning, turned = tilting(truth["rate"])[y], tilting(truth["angular_acceleration"])[y]
+        middle = up[:, y] / up[:, 2], turning, turned, truth["integral"][:, y]
+        return np.column_stack([infos["y"], truth["velocity"][:, y], *middle, self._set_point])
+
+    def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the best command, the fan's offset (m) and its velocity (m/s), (decisions, n, 3),
+        and weights (decisions, n).
+        """
+        own, felt, fan = (np.array(each) for each in zip(*self._flown, strict=True))
+        now = np.arange(self.decisions)
+        later = np.minimum(now[:, None] + np.arange(AHEAD + 1), self.decisions)
+        off = own[:-1].copy()
+        off[..., [PLACE, SET_POINT]] -= fan[:-1, :, None]
+        moves = np.diff(fan[later], axis=1)  # (decisions, AHEAD, n)
+        rests = lasting(np.ones(1), AHEAD, self.period)[:, 0] @ self._ahead[:, :-1]
+        best = -(off @ self._gain + felt[:-1] @ rests)
+        best -= np.einsum("kan,a->kn", moves, self._ahead[:, -1])
+        velocity = moves[:, :_VELOCITY].mean(axis=1) / self.period
+        best = np.clip(best, -self._limit, self._limit)
+        truth = np.stack([best, -off[..., PLACE], velocity], axis=-1)
+        return truth, kept[np.minimum(now + _COUNTS, self.decisions)] & (
+            now + _COUNTS <= self.decisions
+        )[:, None]
+
+
+def _felt(infos: dict[str, Any]) -> Array:
+    """Return the true force and tilting torque (n, 2) along y."""
+    return np.column_stack([infos["force"][:, _ALONG_Y], tilting(infos["torque"])[_ALONG_Y]])
+
+
+def _moved(set_point: Array | None, own: Array, commands: Array) -> Array:
+    """Return the set points (n,) m after a decision at ``commands`` (n,) m/s; it waits where it
+    would run too far ahead (``controllers.flight.move_setpoint``).
+    """
+    if set_point is None:
+        return own.copy()
+    step = DECISION_PERIOD * commands
+    ahead = set_point + step - own
+    return np.where((np.abs(ahead) <= FlightGains.leash) | (ahead * step <= 0.0), step, 0.0) + (
+        set_point
+    )
