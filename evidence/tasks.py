@@ -9,10 +9,12 @@ TASKS = ("WindHover", "WindTrajectory", "FanTracking2D")
 
 def page() -> dict[str, Any]:
     """Return what the page shows: rows of each task, and rows by controller and scenario."""
+    felt, unfelt = kept("results/tasks/unfelt.json")
     tasks = {task: shown(kept(f"results/tasks/{task}.json.gz")) for task in TASKS}
     return {
         "tasks": tasks,
-        "unfelt": kept("results/tasks/unfelt.json")[1],
+        "felt": felt,
+        "unfelt": unfelt,
         "hover": _by_name(tasks["WindHover"]),
         "trajectory": _by_name(tasks["WindTrajectory"]),
         "fan": _by_name(tasks["FanTracking2D"]),
