@@ -4,7 +4,7 @@ import sys
 
 sys.path.insert(0, "installation")
 
-from build_core import BuildCore, extensions  # noqa: E402
-from setuptools import setup  # noqa: E402
+from build_core import BuildCore, extensions
+from setuptools import setup
 
 setup(ext_modules=extensions(), cmdclass={"build_ext": BuildCore})

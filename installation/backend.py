@@ -1,5 +1,7 @@
 """PEP 517: setuptools, with ``ziglang`` among the requirements where there is no compiler."""
 
+import sys
+
 from compilers import ZIG, system_compiler
 from setuptools import build_meta
 from setuptools.build_meta import (
@@ -21,6 +23,8 @@ __all__ = [
     "prepare_metadata_for_build_editable",
     "prepare_metadata_for_build_wheel",
 ]
+# setuptools leaves the script that runs, by this name, out of the wheel
+sys.argv[0] = "setup.py"
 Settings = dict[str, str | list[str] | None] | None
 
 

@@ -22,18 +22,18 @@ from setuptools.command.build_ext import build_ext
 from sources import BUILT, ROOT, digest
 
 # names of the extensions, worst first, and flags of GCC, Clang and zig
+AVX2 = ["-mavx2", "-mfma"]
 SETS = {
     "baseline": [],
-    "avx2": ["-mavx2", "-mfma"],
-    "avx512": "-mavx2 -mfma -mavx512f -mavx512dq -mavx512bw -mavx512vl".split(),
+    "avx2": AVX2,
+    "avx512": [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512bw", "-mavx512vl"],
 }
+COMMON = ["-std=c++17", "-fPIC", "-fvisibility=hidden", "-DNDEBUG"]
 # no contraction to fused operations: results are the same to the bit in all sets
-FLAGS = (
-    "-std=c++17 -O3 -ffp-contract=off -fno-math-errno -fPIC -fvisibility=hidden -DNDEBUG".split()
-)
-WARNINGS = "-Wall -Wextra".split()
+EXACT = "-ffp-contract=off"
+FLAGS = [*COMMON, "-O3", EXACT, "-fno-math-errno", "-Wall", "-Wextra"]
 # of nanobind itself, whose speed is that of a call
-NANOBIND_FLAGS = "-std=c++17 -O2 -fPIC -fvisibility=hidden -fno-strict-aliasing -DNDEBUG".split()
+NANOBIND_FLAGS = [*COMMON, "-O2", "-fno-strict-aliasing"]
 BINDING = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("core/binding/*.cpp"))
 
 
@@ -75,7 +75,7 @@ class BuildCore(build_ext):
         includes.append(str(found / "ext/robin_map/include"))
         system = [word for path in includes for word in ("-isystem", path)]
         # of flags of the user's own, all but the contraction count
-        own = [*shlex.split(os.environ.get("CXXFLAGS", "")), "-ffp-contract=off"]
+        own = [*shlex.split(os.environ.get("CXXFLAGS", "")), EXACT]
         own += shlex.split(os.environ.get("ARCHFLAGS", ""))
         folder = ROOT / "build/core" / str(sysconfig.get_config_var("SOABI"))
         objects = Objects(words, folder, version("nanobind"))
@@ -89,7 +89,7 @@ class BuildCore(build_ext):
             parts = []
             for extension in self.extensions:
                 name = extension.name.rpartition(".")[2]
-                flags = [*FLAGS, *WARNINGS, *SETS[name], f"-DWINDWRENCH_MODULE={name}"]
+                flags = [*FLAGS, *SETS[name], f"-DWINDWRENCH_MODULE={name}"]
                 flags += [f'-DWINDWRENCH_INSTRUCTION_SET="{name}"', *system, *own]
                 parts += [
                     (extension, pool.submit(objects.compiled, Path(source), name, flags))

@@ -4,7 +4,6 @@ The binding states them; a test compares the file with what the built core says.
 """
 
 import subprocess
-import sys
 import sysconfig
 from pathlib import Path
 
@@ -13,18 +12,19 @@ STUB = ROOT / "_core/__init__.pyi"
 
 
 def stub() -> str:
-    """Return the stub of the baseline, as ruff formats it."""
+    """Return the stub of the baseline, as ruff fixes and formats it."""
     from nanobind.stubgen import StubGen
 
     import windwrench._core.baseline as core
 
     written = StubGen(core)
     written.put(core)
-    ruff = Path(sysconfig.get_path("scripts")) / "ruff"
-    words = [str(ruff), "format", "--stdin-filename", str(STUB), "-"]
     text = written.get().replace("windwrench._core.baseline", "windwrench._core")
-    ended = subprocess.run(words, input=text, capture_output=True, text=True)
-    return ended.stdout
+    ruff = str(Path(sysconfig.get_path("scripts")) / "ruff")
+    for words in ("check --fix-only --unsafe-fixes --quiet", "format"):
+        words = [ruff, *words.split(), "--stdin-filename", str(STUB), "-"]
+        text = subprocess.run(words, input=text, capture_output=True, text=True).stdout
+    return text
 
 
 if __name__ == "__main__":
