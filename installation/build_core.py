@@ -74,9 +74,9 @@ class BuildCore(build_ext):
         includes = [sysconfig.get_path("include"), nanobind.include_dir()]
         includes.append(str(found / "ext/robin_map/include"))
         system = [word for path in includes for word in ("-isystem", path)]
-        # of flags of the user's own, all but the contraction count
-        own = [*shlex.split(os.environ.get("CXXFLAGS", "")), EXACT]
-        own += shlex.split(os.environ.get("ARCHFLAGS", ""))
+        # flags of the user's own hold for the core; but contraction stays off
+        machine = shlex.split(os.environ.get("ARCHFLAGS", ""))
+        own = [*shlex.split(os.environ.get("CXXFLAGS", "")), EXACT, *machine]
         folder = ROOT / "build/core" / str(sysconfig.get_config_var("SOABI"))
         objects = Objects(words, folder, version("nanobind"))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -84,7 +84,7 @@ class BuildCore(build_ext):
                 objects.compiled,
                 Path(nanobind.source_dir()) / "nb_combined.cpp",
                 "nanobind",
-                [*NANOBIND_FLAGS, *system, *own],
+                [*NANOBIND_FLAGS, *system, *machine],
             )
             parts = []
             for extension in self.extensions:

@@ -15,6 +15,7 @@ PACKAGE = "windwrench"
 
 # from the ground up; rooms of one floor do not know each other
 FLOORS = (
+    {"_core"},
     {"runtime"},
     {"dynamics"},
     {"estimator", "controllers"},
@@ -44,7 +45,7 @@ STOREYS = (
 STOREY = {room: height for height, rooms in enumerate(STOREYS) for room in rooms}
 TORCH = {"torch", "stable_baselines3", "sb3_contrib"}
 MUJOCO_FREE = {"runtime", "dynamics", "estimator", "controllers", "identification"}
-NOT_ROOMS = {"tests", "docs", "examples", "build", "results", "site"}
+NOT_ROOMS = {"tests", "docs", "examples", "build", "results", "site", "installation", "setup"}
 
 
 def sources(root=ROOT):

@@ -1,0 +1,48 @@
+"""The build of the core that an import takes."""
+
+import os
+import subprocess
+import sys
+from importlib.machinery import EXTENSION_SUFFIXES
+
+import pytest
+
+from tests.support.programs import said
+from windwrench import _core
+
+SAY = "from windwrench import _core; print(_core.instruction_set())"
+
+
+def with_core(name):
+    return {"env": os.environ | {"WINDWRENCH_CORE": name}, "capture_output": True, "text": True}
+
+
+@pytest.mark.parametrize(
+    ("flags", "chosen"),
+    [
+        ("fpu sse2", "baseline"),
+        ("fpu sse2 avx avx2", "baseline"),
+        ("fma avx2", "avx2"),
+        ("fma avx2 avx512f", "avx2"),
+        ("fma avx2 avx512f avx512dq avx512bw avx512vl", "avx512"),
+    ],
+)
+def test_the_processor_s_flags_choose(tmp_path, flags, chosen):
+    for name in ("avx512", "avx2", "baseline"):
+        (tmp_path / (name + EXTENSION_SUFFIXES[0])).touch()
+    assert _core._chosen(_core._found(f"flags : {flags}", tmp_path), "") == chosen
+    with pytest.raises(ImportError, match=r"no compiled core in .*: expected `pip install \.`"):
+        _core._chosen(_core._found(flags, tmp_path / "elsewhere"), "")
+
+
+@pytest.mark.parametrize("name", _core._found(_core._flags()))
+def test_each_build_can_be_forced(name):
+    assert said(sys.executable, "-c", SAY, **with_core(name)).strip() == name
+
+
+def test_a_build_that_cannot_run_is_refused_in_one_line():
+    ended = subprocess.run([sys.executable, "-c", SAY], **with_core("sse9"))
+    assert ended.returncode == 1
+    last = ended.stderr.strip().splitlines()[-1]
+    assert last.startswith("ImportError: WINDWRENCH_CORE: 'sse9': expected one of ")
+    assert last.endswith("baseline here")
