@@ -15,8 +15,10 @@ WORKERS ?= auto
 PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --max-worker-restart 0
 COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=88
 # folders that neither diagnose, train, draw, nor start programs
-FAST = tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \
+FAST = tests/core tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \
 	tests/runtime tests/evaluation/test_statistics.py tests/project/test_structure.py
+
+CORE = $(shell find core -name '*.[ch]pp')
 
 # all but the marked slow: some 15 minutes on two cores, and nearly all lines
 test: $(VENV)/.tested
@@ -47,11 +49,13 @@ coverage-all: $(VENV)/.tested
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
+	$(BIN)/clang-format --dry-run --Werror $(CORE)
 	$(BIN)/python .ci/counters.py
 
 format: $(VENV)/.tested
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $(CORE)
 
 # the package as a user has it, outside the checkout
 .PHONY: $(VENV)/built
@@ -62,6 +66,7 @@ $(VENV)/built: $(VENV)/.tested
 # evidence and reproduction, which no wheel holds, beside the package
 types: $(VENV)/built
 	cp -r evidence reproduction $(VENV)/built/windwrench/
+	cd installation && MYPYPATH=. $(abspath $(BIN))/mypy --explicit-package-bases --config-file $(CURDIR)/pyproject.toml *.py
 	cd $(VENV)/built && MYPYPATH=. $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml -p windwrench
 
 docs: $(VENV)/built
@@ -99,5 +104,5 @@ foreign: $(VENV)/.tested
 	done
 
 clean:
-	rm -rf $(VENV) $(VENV)-* build dist results site *.egg-info
+	rm -rf $(VENV) $(VENV)-* build dist results site *.egg-info _core/*.so _core/built.*
 	find . -name '*.nb[ic]' -delete

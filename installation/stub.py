@@ -5,7 +5,10 @@ The binding states them; a test compares the file with what the built core says.
 
 import subprocess
 import sysconfig
+from importlib import import_module
 from pathlib import Path
+
+from nanobind.stubgen import StubGen
 
 ROOT = Path(__file__).resolve().parent.parent
 STUB = ROOT / "_core/__init__.pyi"
@@ -13,16 +16,13 @@ STUB = ROOT / "_core/__init__.pyi"
 
 def stub() -> str:
     """Return the stub of the baseline, as ruff fixes and formats it."""
-    from nanobind.stubgen import StubGen
-
-    import windwrench._core.baseline as core
-
+    core = import_module("windwrench._core.baseline")
     written = StubGen(core)
     written.put(core)
-    text = written.get().replace("windwrench._core.baseline", "windwrench._core")
+    text: str = written.get().replace("windwrench._core.baseline", "windwrench._core")
     ruff = str(Path(sysconfig.get_path("scripts")) / "ruff")
-    for words in ("check --fix-only --unsafe-fixes --quiet", "format"):
-        words = [ruff, *words.split(), "--stdin-filename", str(STUB), "-"]
+    for action in (["check", "--fix-only", "--unsafe-fixes", "--quiet"], ["format"]):
+        words = [ruff, *action, "--stdin-filename", str(STUB), "-"]
         text = subprocess.run(words, input=text, capture_output=True, text=True).stdout
     return text
 
