@@ -29,9 +29,11 @@ SETS = {
     "avx512": [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512bw", "-mavx512vl"],
 }
 COMMON = ["-std=c++17", "-fPIC", "-fvisibility=hidden", "-DNDEBUG"]
-# no contraction to fused operations: results are the same to the bit in all sets
-EXACT = "-ffp-contract=off"
-FLAGS = [*COMMON, "-O3", EXACT, "-fno-math-errno", "-Wall", "-Wextra"]
+# Results are the same to the bit in all sets: no contraction to fused operations, which GCC's
+# pass over straight-line code makes in spite of the first flag
+EXACT = ["-ffp-contract=off", "-fno-tree-slp-vectorize"]
+FAST = ["-O3", "-fno-math-errno", "-fno-trapping-math"]
+FLAGS = [*COMMON, *FAST, *EXACT, "-Wall", "-Wextra", "-Wno-psabi"]
 # of nanobind itself, whose speed is that of a call
 NANOBIND_FLAGS = [*COMMON, "-O2", "-fno-strict-aliasing"]
 BINDING = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("core/binding/*.cpp"))
@@ -76,7 +78,7 @@ class BuildCore(build_ext):
         system = [word for path in includes for word in ("-isystem", path)]
         # flags of the user's own hold for the core; but contraction stays off
         machine = shlex.split(os.environ.get("ARCHFLAGS", ""))
-        own = [*shlex.split(os.environ.get("CXXFLAGS", "")), EXACT, *machine]
+        own = [*shlex.split(os.environ.get("CXXFLAGS", "")), *EXACT, *machine]
         folder = ROOT / "build/core" / str(sysconfig.get_config_var("SOABI"))
         objects = Objects(words, folder, version("nanobind"))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
