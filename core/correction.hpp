@@ -83,13 +83,13 @@ void take_in(const Settings<Single<T>> &s, const Innovation<T> &n, Belief<T> &f,
   fold(before, mean, f.x);
 }
 
-// Take in what was measured of a pose (7): position m, quaternion; unless it is not to be believed
+// Take in what was measured of a pose (7): position m, quaternion; unless it is not to be believed.
+// Leaves its innovation in n
 template <class T, class A>
 void correct(const Settings<Single<T>> &s, Belief<T> &f, const T *pose, A with_position,
-             A with_attitude) {
+             A with_attitude, Innovation<T> &n) {
   using S = Single<T>;
   Poses<T> &m = f.poses;
-  Innovation<T> n;
   innovate(s, f, pose, with_position, with_attitude, n);
   A measured = with_position | with_attitude, both = with_position & with_attitude;
   const Poses<T> poses = m;  // as they were: what a lane is judged from
@@ -124,8 +124,9 @@ void correct(const Settings<Single<T>> &s, Belief<T> &f, const T *pose, A with_p
         aside[i].excess[0] = excess[0][i], aside[i].excess[1] = excess[1][i];
         aside[i].status = status[i];
         S its[7];
+        Innovation<S> own;
         for (int k = 0; k < 7; k++) its[k] = pose[k][i];
-        correct(s, aside[i], its, with_position[i] != 0, with_attitude[i] != 0);
+        correct(s, aside[i], its, with_position[i] != 0, with_attitude[i] != 0, own);
       }
   }
   f.status = choose(measured, T{} + S(verdict), f.status);

@@ -70,16 +70,17 @@ void predict(Filter<S> &f, const S *speeds, S dt, S voltage, Prediction<S> &w) {
 }
 
 // Correct with the checked parts of a sample: (29)-(37)
-template <class S> void correct_parts(Filter<S> &f, const S *sample, int parts) {
+template <class S>
+void correct_parts(Filter<S> &f, const S *sample, int parts, Innovation<S> &n) {
   if (parts)
     correct(f.settings, f.belief, sample + 4, (parts & POSITION_PART) != 0,
-            (parts & ATTITUDE_PART) != 0);
+            (parts & ATTITUDE_PART) != 0, n);
 }
 
 // Predict over dt s if that is positive, then correct with the parts of f.z that were measured.
 // Returns the parts that could be used, or -1, with the filter as it was, if the quaternion is no
-// rotation
-template <class S> int step(Filter<S> &f, int parts, S dt, S voltage) {
+// rotation; leaves the innovation in n
+template <class S> int step(Filter<S> &f, int parts, S dt, S voltage, Innovation<S> &n) {
   int usable = check_sample(f.settings, f.belief, f.z, parts);
   if (usable < 0) return usable;
   const S *sample = true_sample(f, usable, dt);
@@ -87,7 +88,7 @@ template <class S> int step(Filter<S> &f, int parts, S dt, S voltage) {
     Prediction<S> w;
     predict(f, sample, dt, voltage, w);
   }
-  correct_parts(f, sample, usable);
+  correct_parts(f, sample, usable, n);
   return usable;
 }
 
@@ -107,7 +108,8 @@ template <class T> void step_lanes(const Filter<Single<T>> &of, Belief<T> &f, T 
   rotor_wrench(of.vehicle.body, z, rotors);
   carry(of.vehicle.body, s, rotors, s.period, f, w);
   after_prediction(s, s.period, f);
-  correct(s, f, z + 4, finite(z[4] + z[5] + z[6]), finite(z[7] + z[8] + z[9] + z[10]));
+  Innovation<T> n;
+  correct(s, f, z + 4, finite(z[4] + z[5] + z[6]), finite(z[7] + z[8] + z[9] + z[10]), n);
 }
 
 }  // namespace windwrench

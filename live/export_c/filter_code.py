@@ -54,7 +54,13 @@ _KEPT = {
     **{name: FILTER[name] for name in fields_between("x", "last_speeds")},
     **{
         name: FILTER[name]
-        for name in ("z", "acceleration", "rotation", "centre_rotation", *fields_between("S", "rows"))
+        for name in (
+            "z",
+            "acceleration",
+            "rotation",
+            "centre_rotation",
+            *fields_between("S", "rows"),
+        )
     },
 }
 # fields declared in templates

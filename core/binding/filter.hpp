@@ -1,0 +1,5 @@
+// What the module of an instruction set takes in.
+#pragma once
+#include <nanobind/nanobind.h>
+
+void bind_filter(nanobind::module_ &m);
