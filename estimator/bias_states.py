@@ -24,6 +24,7 @@ import numpy as np
 from ..runtime.compiled import Record, compiled
 from .estimate import Array
 from .filter_record import AGREEING, BIASES
+from .recovery import largest_nis
 from .tuning import UKFTuning
 
 _FARTHEST = 1e6  # largest NIS for which a linear correction means anything, gate or not
@@ -43,9 +44,7 @@ def load_imu(f: np.void, tuning: UKFTuning, gate: float | None) -> None:
     imu["bound"][:3], imu["bound"][3:] = tuning.gyro_bias_bound, tuning.accelerometer_bias_bound
     imu["gate"] = _FARTHEST
     if gate is not None:
-        from scipy.stats import chi2
-
-        imu["gate"] = chi2.ppf(gate, (3, 6, 3 * (AGREEING - 1)))
+        imu["gate"] = largest_nis(gate, 3, 6, 3 * (AGREEING - 1))
 
 
 @compiled

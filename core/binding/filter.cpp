@@ -61,16 +61,15 @@ struct Call {
 enum { GYRO = 4, ACCELEROMETER = 8 };  // beside the parts of a pose
 constexpr int NUMBERS = 30;            // of an estimate, without its covariance
 
-void write_estimate(const Filter<double> &f, double *numbers, double *std, double *loads) {
+// an estimate's numbers (30), and its variances (18), widened by refused and unlikely poses
+void write_estimate(const Filter<double> &f, double *numbers, double *variances) {
   const Belief<double> &b = f.belief;
   const double rest[10] = {b.status,   b.restarts, b.excess[0], b.excess[1], b.model[0],
                            b.model[1], b.model[2], b.model[3],  b.model[4],  b.model[5]};
   for (int i = 0; i < STATE; i++) numbers[i] = b.x[i];
   for (int i = STATE; i < NUMBERS; i++) numbers[i] = rest[i - STATE];
-  for (int i = 0; i < N; i++) std[i] = b.P[i][i];
-  if (is_doubted(b.poses)) add_doubt(f.settings, b, std);
-  for (int i = 0; i < N; i++) std[i] = root(std[i]);
-  for (int i = 0; i < 21; i++) loads[i] = b.load[i / 3][i % 3];
+  for (int i = 0; i < N; i++) variances[i] = b.P[i][i];
+  if (is_doubted(b.poses)) add_doubt(f.settings, b, variances);
 }
 
 std::size_t make_calls(std::uintptr_t address, Array<const std::uint8_t, nb::shape<-1>> calls,
@@ -96,9 +95,26 @@ std::size_t make_calls(std::uintptr_t address, Array<const std::uint8_t, nb::sha
       innovations->data()[12 * row + i] = n.y[i];
       innovations->data()[12 * row + 6 + i] = n.L[i][i];
     }
-    write_estimate(f, numbers.data() + std::int64_t(numbers.shape(1)) * row, std.data() + N * row, loads.data() + 21 * row);
+    double *deviations = std.data() + N * row;
+    write_estimate(f, numbers.data() + std::int64_t(numbers.shape(1)) * row, deviations);
+    for (int i = 0; i < N; i++) deviations[i] = root(deviations[i]);
+    for (int i = 0; i < 21; i++) loads.data()[21 * row + i] = f.belief.load[i / 3][i % 3];
   }
   return count;
+}
+
+void step_many(std::uintptr_t address, std::size_t stride, Array<const double, nb::shape<-1, 11>> z,
+               int parts, double dt, Array<const double, nb::shape<-1>> voltage,
+               Array<double, nb::shape<-1, NUMBERS>> numbers,
+               Array<double, nb::shape<-1, N>> variances) {
+  nb::gil_scoped_release others_run;
+  for (std::size_t n = 0; n < z.shape(0); n++) {
+    Filter<double> &f = filter_at(address + n * stride);
+    Innovation<double> innovation;
+    for (int i = 0; i < 11; i++) f.z[i] = z.data()[11 * n + i];
+    step(f, parts, dt, voltage.data()[n], innovation);
+    write_estimate(f, numbers.data() + NUMBERS * n, variances.data() + N * n);
+  }
 }
 
 }  // namespace
@@ -120,6 +136,11 @@ void bind_filter(nb::module_ &m) {
         "Correct with the measured parts of z (6,): gyro, rad/s, and accelerometer, m/s2, body.");
   m.def("add_doubt", &add_doubt_at, "address"_a, "variances"_a,
         "Widen an estimate's variances (18,) by refused and unlikely poses, in place.");
+  m.def("step_many", &step_many, "address"_a, "stride"_a, "z"_a, "parts"_a, "dt"_a, "voltage"_a,
+        "numbers"_a, "variances"_a,
+        "Step filters one after the other, the first at an address and each so many bytes after the\n"
+        "last: samples (n, 11), dt in s, voltage (n,) V; estimates (n, 30) and variances (n, 18),\n"
+        "written.");
   m.def("make_calls", &make_calls, "address"_a, "calls"_a, "rows"_a, "numbers"_a, "std"_a, "loads"_a,
         "innovations"_a.none() = nb::none(),
         "Make calls of a filter, bytes of the record CALL (n,), and write the results into the row of\n"

@@ -2,4 +2,5 @@
 #pragma once
 #include <nanobind/nanobind.h>
 
+void bind_batch(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
