@@ -19,16 +19,12 @@ state no cross terms are missing, before or after the pose of the moment (Bar-Sh
 Kirubarajan, 2001, section 8.2.1).
 """
 
-import math
-
 import numpy as np
 
-from ..dynamics.effects.base import STEP
 from ..runtime.compiled import Record, compiled
-from .covariance import carry_rows, divide, divide_transposed, root_of
-from .error_state import error_from
-from .estimate import NIS, Array
-from .filter_record import AGREEING, BIASES, COMPANIONS, N
+from .estimate import Array
+from .filter_record import AGREEING, BIASES
+from .recovery import largest_nis
 from .tuning import UKFTuning
 
 _FARTHEST = 1e6  # largest NIS for which a linear correction means anything, gate or not
@@ -48,46 +44,7 @@ def load_imu(f: np.void, tuning: UKFTuning, gate: float | None) -> None:
     imu["bound"][:3], imu["bound"][3:] = tuning.gyro_bias_bound, tuning.accelerometer_bias_bound
     imu["gate"] = _FARTHEST
     if gate is not None:
-        from scipy.stats import chi2
-
-        imu["gate"] = chi2.ppf(gate, (3, 6, 3 * (AGREEING - 1)))
-    forget_biases(f)
-
-
-@compiled
-def forget_biases(f: Record) -> None:
-    """Give the biases their prior, and forget the step before with its rotors. A start does so. A
-    restart at a pose does, too: the contradicted poses have gone into the biases.
-    """
-    imu = f.imu
-    imu.known, imu.in_row = 0, 0
-    imu.doubt[:] = -1.0
-    imu.mean[:], imu.rest[:], imu.regression[:] = 0.0, 0.0, 0.0
-    # a bias is in its sensor from the first sample on; the noise of a step, from the first step on
-    imu.sensitivity[:], imu.bias_covariance[:] = 0.0, 0.0
-    for i in range(BIASES):
-        imu.rest[i, i], imu.rest[BIASES + i, BIASES + i] = imu.prior[i], 1.0
-        imu.bias_covariance[i, i], imu.sensitivity[i, i] = imu.prior[i], 1.0
-
-
-@compiled
-def reset_imu(record: Record) -> None:
-    """Start without an inertial measurement."""
-    forget_biases(record[0])
-    record[0].imu.refused = 0
-
-
-@compiled
-def begin_imu(record: Record) -> None:
-    """Start to carry biases with a filter that had none so far. The correlation of the last step's
-    noise with the error state is known if nothing was corrected since. Otherwise an accelerometer
-    counts from the next step on.
-    """
-    f = record[0]
-    reset_imu(record)
-    f.imu.used = 1
-    if f.time > 0.0 and math.isnan(f.x[NIS]):
-        carry_companions(f, f.rotors[STEP], np.zeros((N, BIASES)))
+        imu["gate"] = largest_nis(gate, 3, 6, 3 * (AGREEING - 1))
 
 
 @compiled
@@ -111,102 +68,12 @@ def restore_bias_prior(f: Record, first: int) -> None:
         imu.rest[i, i], imu.bias_covariance[i, i] = imu.prior[i], imu.prior[i]
 
 
-@compiled
-def cross_covariance(f: Record, columns: int) -> Array:
-    """Return the covariance (18, n) of the error state with the first n companions, P T."""
-    cross: Array = f.P @ np.ascontiguousarray(f.imu.regression[:, :columns])
-    return cross
-
-
-@compiled
-def split(f: Record, cross: Array, joint: Array) -> None:
-    """Write regression and rest of the companions, from their covariance with the error state,
-    ``cross`` (18, 12), and among themselves, ``joint`` (12, 12).
-    """
-    P, imu = f.P, f.imu
-    imu.bias_covariance[:] = joint[:BIASES, :BIASES]
-    # a forgotten number is correlated with nothing
-    for i in range(N):
-        if np.count_nonzero(P[i]) <= 1:
-            cross[i] = 0.0
-    root = root_of(P)
-    whitened = divide(root, cross)
-    imu.rest[:] = joint - whitened.T @ whitened
-    rest = root_of(imu.rest)
-    for i in range(COMPANIONS):
-        if not rest[i, i] * rest[i, i] > _BLIND * joint[i, i]:
-            # the filter's covariance was bounded since (of an unknown attitude), and no longer
-            # belongs to these cross covariances
-            imu.rest[:], imu.regression[:] = joint, 0.0
-            return
-    divide_transposed(root, whitened)
-    imu.regression[:] = whitened
-
-
-@compiled
-def carry_companions(f: Record, dt: float, cross: Array) -> None:
-    """Take a step of ``dt`` s: the biases walk, and the step has a noise of its own.
-
-    ``cross`` (18, 6): covariance of the error state after the step with the biases before.
-    """
-    imu, joint = f.imu, np.eye(COMPANIONS)
-    joint[:BIASES, :BIASES] = imu.bias_covariance
-    for i in range(BIASES):
-        joint[i, i] += dt / f.period * imu.walk[i]
-        imu.sensitivity[i, i] = 1.0
-    imu.mean[BIASES:] = 0.0
-    # the accelerations of the noise, in body axes: velocity is rows 9-11
-    turned = f.centre_rotation.T @ np.ascontiguousarray(f.B[:, 9:12].T)
-    imu.sensitivity[3:, BIASES:] = turned / dt
-    # one standard deviation of each input, as ``add_noise`` leaves them
-    all_cross = np.empty((N, COMPANIONS))
-    all_cross[:, :BIASES], all_cross[:, BIASES:] = cross, f.B.T
-    split(f, all_cross, joint)
-    imu.known = 1
-    for s in range(2):
-        if imu.doubt[s] >= 0.0:
-            imu.doubt[s] += dt
-
-
-@compiled
-def carry_with_points(f: Record, dt: float, cross: Array) -> Array:
-    """Return ``cross`` (18, n), covariance of the error state with a constant, carried over the
-    last unscented prediction.
-
-    A constant beside the state is a further row of the root. In columns drawn as pairs of points
-    its entries go with half the difference of the pair. The others go with the linear part of the
-    model.
-    """
-    S, pairs = f.S, 6 if f.wrench_count == 0 else 12
-    rows, rest, out = np.empty((pairs, cross.shape[1])), cross.copy(), np.empty_like(cross)
-    for j in range(pairs):
-        for m in range(rows.shape[1]):
-            rows[j, m] = rest[j, m] / S[j, j]
-            for i in range(j, N):
-                rest[i, m] -= S[j, i] * rows[j, m]
-    rest[6:pairs] = 0.0
-    carry_rows(f, dt, rest[6:], out)
-    out += f.H[:pairs].T @ rows
-    return out
-
-
-@compiled
-def correct_companions(f: Record, before: Array) -> None:
-    """Move the companions with a pose's correction of the error state; ``before`` (20,): the state
-    before the correction.
-    """
-    imu, error = f.imu, np.empty(N)
-    error_from(f.x, before, error)
-    imu.mean[:] += imu.regression.T @ error
-    bound_biases(f)
-    biases = np.ascontiguousarray(imu.regression[:, :BIASES])
-    imu.bias_covariance[:] = imu.rest[:BIASES, :BIASES] + biases.T @ (f.P @ biases)
-
-
 def joint_covariance(f: np.void) -> Array:
     """Return the covariance (24, 24) of the error state and the biases of gyro and
     accelerometer.
     """
-    imu, cross = f["imu"], cross_covariance(f, BIASES)
-    biases = imu["regression"][:, :BIASES].T @ cross + imu["rest"][:BIASES, :BIASES]
+    imu = f["imu"]
+    regression = imu["regression"][:, :BIASES]
+    cross = f["P"] @ regression
+    biases = regression.T @ cross + imu["rest"][:BIASES, :BIASES]
     return np.block([[f["P"], cross], [cross.T, biases]])

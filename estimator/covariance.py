@@ -233,14 +233,6 @@ def carry_linear_part(f: Record, dt: float) -> None:
     _linear_rows(f, dt, Z[:, 3:], P[:, 3:], N - 3)
 
 
-@compiled_for_vectors
-def carry_rows(f: Record, dt: float, rows: Array, out: Array) -> None:
-    """Apply the linear part of the model to ``rows`` (12, n), (x, v, torque, force): ``out`` (18,
-    n).
-    """
-    _linear_rows(f, dt, rows, out, rows.shape[1])
-
-
 @compiled
 def carry_by_jacobian(P: Array, A: Array, G: Array) -> None:
     """Replace P (18, 18) by ``F P F' = P + A P + (A P)' + A P A'``. ``A`` (12, 18) has the rows of

@@ -77,12 +77,13 @@ FILTER = np.dtype(
         ("uncertain", "f8", (FACTORS,)),  # of the vehicle
         ("kappa", "f8"),
         ("period", "f8"),
-        # the step in progress
         # rotor speeds, position and quaternion, for a step that is called from elsewhere
         ("z", "f8", (11,)),
+        ("centre_rotation", "f8", (3, 3)),  # attitude at the start of the last step
+        ("imu", IMU),
+        # the step in progress
         ("acceleration", "f8", (6,)),
         ("rotation", "f8", (3, 3)),  # of the sigma point in hand
-        ("centre_rotation", "f8", (3, 3)),
         ("S", "f8", (12, N)),  # columns of the root of P, one a row
         ("M", "f8", (12, 12)),
         ("Z", "f8", (12, N)),
@@ -123,7 +124,6 @@ FILTER = np.dtype(
         ("near", "f8"),  # s for which the covariance has been near that
         ("settle", "f8"),  # s for which it must have been
         ("hover", "f8", (6, N)),  # derivatives of the accelerations at hover by the error state
-        ("imu", IMU),
     ]
 )
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to the estimate

@@ -20,11 +20,10 @@ from ..dynamics.model import apply_effects
 from ..dynamics.motion import accelerations
 from ..dynamics.rotation import quaternion_to_matrix
 from ..runtime.compiled import Record, compiled
-from .bias_states import bound_biases, cross_covariance, restore_bias_prior, split
+from .bias_states import restore_bias_prior
 from .covariance import divide, root_of
-from .error_state import displace, fold, symmetrise
 from .estimate import NIS, Array
-from .filter_record import AGREEING, COMPANIONS, N
+from .filter_record import AGREEING
 
 # s of nothing but refusals after which a sensor's bias is no longer believed: longer than the burst
 # of vibration of a touch-down
@@ -46,59 +45,6 @@ def expected_imu(f: Record, x: Array, out: Array) -> None:
     for i in range(3):
         out[i] = x[10 + i]
         out[3 + i] = R[0, i] * a[0] + R[1, i] * a[1] + R[2, i] * (a[2] + f.body.gravity)
-
-
-@compiled
-def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> None:
-    """Correct with the measured parts of ``z`` (6,), gyro and accelerometer, unless the gate
-    refuses them: (29)-(37) with the 37 sigma points of the error state; biases and noise are linear
-    in it.
-    """
-    f = record[0]
-    x, imu = f.x, f.imu
-    x[NIS] = math.nan
-    first, last = 0 if gyro else 3, 6 if accelerometer and imu.known > 0 else 3
-    if first >= last:
-        return
-    C, T = imu.sensitivity, imu.regression
-    root = root_of(f.P)
-    covariance, innovation, pairs = _innovation(f, z, root, T.T @ root)
-    # of the error state and of the companions with what is measured
-    cross = root @ pairs
-    companions = T.T @ cross + imu.rest @ C.T
-    covariance += C @ imu.rest @ C.T
-    covariance += np.diag(f.imu_noise)
-    innovation -= C @ imu.mean
-    x[NIS] = _nis(covariance, innovation, first, last)
-    first, last = _believed(f, covariance, innovation, first, last)
-    if first < last:
-        _correct(f, covariance, innovation, cross, companions, first, last)
-
-
-@compiled
-def _innovation(f: Record, z: Array, root: Array, turned: Array) -> tuple[Array, Array, Array]:
-    """Return the error state's part of the innovation's covariance (6, 6), the innovation (6,)
-    without the companions' mean, and the scaled half differences (18, 6) of pairs.
-
-    ``turned`` (12, 18): the companions along each column of the root.
-    """
-    x, C = f.x, f.imu.sensitivity
-    spread, weight = math.sqrt(N + f.kappa), 0.5 / (N + f.kappa)  # (28)
-    centre, plus, minus = np.empty(6), np.empty((N, 6)), np.empty((N, 6))
-    expected_imu(f, x, centre)
-    columns = root.T.copy()
-    for j in range(N):
-        displace(x, columns[j], spread, f.rho, f.q, f.point)
-        expected_imu(f, f.point, plus[j])
-        displace(x, columns[j], -spread, f.rho, f.q, f.point)
-        expected_imu(f, f.point, minus[j])
-    half, second = 0.5 * (plus - minus) / spread, plus + minus - 2.0 * centre
-    pairs = half + turned.T @ C.T
-    mean = weight * np.sum(second, axis=0)
-    # with a pair of deviations p and m: pp' + mm' = ((p - m)(p - m)' + (p + m)(p + m)') / 2, and
-    # 2 weight spread^2 = 1
-    S = pairs.T @ pairs + 0.5 * weight * (second.T @ second) - np.outer(mean, mean)
-    return S, z - centre - mean, pairs
 
 
 @compiled
@@ -164,32 +110,3 @@ def _is_push(f: Record, covariance: Array, innovation: Array) -> bool:
     whitened = divide(root_of(covariance[3:6, 3:6]), apart)
     agreed: bool = np.sum(whitened * whitened) <= imu.gate[2]
     return agreed
-
-
-@compiled
-def _correct(
-    f: Record,
-    covariance: Array,
-    innovation: Array,
-    cross: Array,
-    companions: Array,
-    first: int,
-    last: int,
-) -> None:
-    """Update error state and companions with rows ``first`` to ``last`` of the innovation."""
-    x, P, imu = f.x, f.P, f.imu
-    root = root_of(covariance[first:last, first:last])
-    W = divide(root, np.ascontiguousarray(cross[:, first:last].T))
-    V = divide(root, np.ascontiguousarray(companions[:, first:last].T))
-    y = divide(root, innovation[first:last].reshape(-1, 1))
-    covariances = cross_covariance(f, COMPANIONS)
-    T = imu.regression
-    joint = T.T @ covariances + imu.rest - V.T @ V
-    covariances -= W.T @ V
-    P -= W.T @ W
-    symmetrise(P)
-    f.centre[:NIS] = x[:NIS]
-    fold(f, f.centre, (W.T @ y)[:, 0])
-    imu.mean[:] += (V.T @ y)[:, 0]
-    bound_biases(f)
-    split(f, covariances, joint)

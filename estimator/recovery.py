@@ -159,6 +159,15 @@ class Recovery:
         check_positive(self)
 
 
+def largest_nis(gate: float, *numbers: int) -> Array:
+    """Return the NIS that is exceeded with a chance of ``1 - gate``, of so many numbers each: the
+    quantile of chi squared, without the second that SciPy's statistics take to import.
+    """
+    from scipy.special import gammaincinv
+
+    return np.asarray(2.0 * gammaincinv(0.5 * np.array(numbers), gate))
+
+
 def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: Recovery) -> None:
     """Write a filter's gate (a probability or None) and recovery into its record, which has its
     period and kappa.
@@ -167,9 +176,7 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     # largest NIS that is taken in unseen, of three numbers and of six
     record["alarm"] = given.jump_at**2
     if gate is not None:
-        from scipy.stats import chi2
-
-        record["alarm"] = chi2.ppf(gate, (3, 6))
+        record["alarm"] = largest_nis(gate, 3, 6)
     record["gated"] = gate is not None
     record["restart_at"] = given.restart_at**2
     record["patience"], record["give_up"] = given.patience, given.give_up

@@ -147,13 +147,3 @@ def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
             sample[7:11] = f.x[3:7]
         rewrite_sample(f, dt, parts + 4 if dt > 0.0 else parts, -1.0)
     return sample
-
-
-@compiled
-def undo_first_pose(record: Record) -> None:
-    """Bring the pose of a new estimate to what it was before the declared sensing effects."""
-    f = record[0]
-    if f.sensing_count > 0:
-        f.sample[4:11] = f.x[0:7]
-        rewrite_sample(f, 0.0, 3, -1.0)
-        f.x[0:7] = f.sample[4:11]

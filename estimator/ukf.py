@@ -22,29 +22,19 @@ from copy import deepcopy
 from typing import Any, Self
 
 import numpy as np
-from numba import carray
 from numpy.typing import ArrayLike, NDArray
 
+from .. import _core
 from ..dynamics.effects import compile_effects
 from ..dynamics.model import lay_addresses, reset_model, without_addresses
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from ..runtime.addresses import STEP, address_of, pointer_to
+from ..runtime.addresses import STEP, address_of
 from ..runtime.arguments import real_numbers
 from ..runtime.compiled import Record, compiled, compiled_inline
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column, lanes_by
-from .bias_states import (
-    begin_imu,
-    carry_companions,
-    carry_with_points,
-    correct_companions,
-    cross_covariance,
-    forget_biases,
-    joint_covariance,
-    load_imu,
-    reset_imu,
-)
+from .bias_states import joint_covariance, load_imu
 from .covariance import (
     add_noise,
     add_pairs,
@@ -82,7 +72,6 @@ from .filter_record import (
     move,
     propagate,
 )
-from .imu import take_in_imu
 from .model_uncertainty import follow_loads
 from .recovery import (
     BELIEVING,
@@ -93,7 +82,7 @@ from .recovery import (
     doubted_variance,
     pose_noise,
 )
-from .sample import Sample, check_sample, undo_first_pose, undo_sensing
+from .sample import Sample, check_sample, undo_sensing
 from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
 
@@ -317,39 +306,6 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     return usable
 
 
-@compiled
-def _step_at(address: int, parts: int, dt: float, voltage: float) -> int:
-    f = carray(pointer_to(address), 1, FILTER)[0]
-    return step(f, f.z, parts, dt, voltage)
-
-
-@compiled
-def step_with_biases(f: Record, parts: int, dt: float, voltage: float) -> int:
-    """Step like ``step`` with the sample in ``f.z``, and with the biases of an IMU."""
-    usable: int = check_sample(f, f.z, parts)
-    if usable >= 0:
-        sample = undo_sensing(f, f.z, usable, dt)
-        if dt > 0.0:
-            cross, restarts = cross_covariance(f, BIASES), f.restarts
-            predict(f, sample[0:4], dt, voltage)
-            carry_companions(f, dt, carry_with_points(f, dt, cross))
-            if f.restarts > restarts:
-                forget_biases(f)
-        x, restarts = f.x.copy(), f.restarts
-        correct_parts(f, sample, usable)
-        if f.restarts > restarts:
-            forget_biases(f)
-        else:
-            correct_companions(f, x)
-    return usable
-
-
-@compiled
-def _step_with_biases_at(address: int, parts: int, dt: float, voltage: float) -> int:
-    f = carray(pointer_to(address), 1, FILTER)[0]
-    return step_with_biases(f, parts, dt, voltage)
-
-
 _POSES = FILTER.fields["poses"][1]  # type: ignore[index]  # where their memory begins
 _STRAINED = 0.01  # of a variance: less is not told
 
@@ -385,35 +341,23 @@ def write_numbers(f: Record, out: Array) -> None:
     out[STATUS], out[RESTARTS] = f.status, f.restarts
 
 
-@compiled
 def make_calls(
-    record: Record, calls: np.ndarray, rows: np.ndarray, numbers: Array, std: Array, loads: Array
+    record: np.ndarray,
+    calls: np.ndarray,
+    rows: NDArray[np.int64],
+    numbers: Array,
+    std: Array,
+    loads: Array,
+    innovations: Array | None = None,
 ) -> int:
     """Make calls (n,) of an unscented filter, and write the results into the row of each. Results
     are numbers (N, 30) and standard deviations (N, 18) of an estimate, and the loads of the
-    vehicle's uncertainty (N, 7, 3). Return the number of calls up to a quaternion that is no
-    rotation.
+    vehicle's uncertainty (N, 7, 3). ``innovations`` (N, 12): of the last measured pose whitened,
+    and the diagonal of the root of its covariance. Return the number of calls up to a quaternion
+    that is no rotation.
     """
-    f = record[0]
-    for k, row in enumerate(rows):
-        call, used = calls[k], 0
-        f.z[:] = call.z
-        gyro, accelerometer = call.parts & IMU_PARTS[0] != 0, call.parts & IMU_PARTS[1] != 0
-        if gyro or accelerometer:
-            if f.imu.used == 0:
-                begin_imu(record)
-            take_in_imu(record, f.z[:6], gyro, accelerometer)
-        elif f.imu.used > 0:
-            used = step_with_biases(f, call.parts, call.dt, call.voltage)
-        else:
-            used = step(f, f.z, call.parts, call.dt, call.voltage)
-        if used < 0:
-            return k
-        write_numbers(f, numbers[row])
-        write_variances(f, std[row])
-        loads[row] = f.load
-        std[row] = np.sqrt(std[row])
-    return len(calls)
+    given = np.ascontiguousarray(calls).view(np.uint8)
+    return _core.make_calls(record.ctypes.data, given, rows, numbers, std, loads, innovations)
 
 
 class WrenchUKF:
@@ -443,9 +387,8 @@ class WrenchUKF:
         InputError: period or gate out of range.
     """
 
-    # compiled functions of the record's address, which may also be called by their own address
-    _step_at = staticmethod(_step_at)
-    _step_with_biases_at = staticmethod(_step_with_biases_at)
+    # a function of the record's address, compiled here, in place of the core's step
+    _step_at: Any = None
     _no_imu = ""  # why a kind of filter takes no inertial measurements
 
     def __init__(
@@ -474,6 +417,7 @@ class WrenchUKF:
         self.recovery = Recovery() if recovery is None else recovery
         self.record = filter_record(vehicle, self.tuning, self.period, gate, self.recovery)
         load_imu(self.record[0], self.tuning, gate)
+        _core.forget_biases(self.record.ctypes.data)
         self._voltage = vehicle.voltage_ref
         self._bind()
         self._prepare()
@@ -564,9 +508,8 @@ class WrenchUKF:
                 raise InputError("reset: covariance must be positive definite")
         f = self.record[0]
         f["x"], f["P"] = x, P
-        reset_imu(self.record)
         reset_model(f)
-        undo_first_pose(self.record)
+        _core.start(self._address)
         for name in (*fields_between("status", "model"), "poses", "load"):
             f[name] = 0.0
         f["predicted"] = np.diag(f["P"])[12:]
@@ -585,7 +528,9 @@ class WrenchUKF:
         """
         if self.record[0]["imu"]["used"]:
             raise InputError("step_address: a filter that was given an IMU steps in Python only")
-        return address_of(self._step_at.py_func)  # type: ignore[attr-defined]
+        if self._step_at is None:
+            return _core.STEP_ADDRESS
+        return address_of(self._step_at.py_func)
 
     @property
     def memory(self) -> tuple[NDArray[np.uint8], ...]:
@@ -644,7 +589,9 @@ class WrenchUKF:
         """
         numbers, doubts = self._now.copy(), self._doubts
         if doubts[0] > BELIEVING or doubts[1] > _STRAINED or doubts[2] > 0.0:
-            _add_doubt(self.record, numbers[_VARIANCES])
+            variances = numbers[_VARIANCES].copy()
+            _core.add_doubt(self._address, variances)
+            numbers[_VARIANCES] = variances
         return WrenchEstimate(numbers)
 
     def step(
@@ -708,20 +655,16 @@ class WrenchUKF:
         ):
             if value is not None:
                 z[where] = _finite(f"correct_imu: {name}", value, 3)
-        if not self.record[0]["imu"]["used"]:
-            begin_imu(self.record)
-            self._call = None
-        take_in_imu(self.record, z, gyro is not None, accelerometer is not None)
+        _core.take_in_imu(self._address, z, gyro is not None, accelerometer is not None)
         return self.estimate
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         call = self._call
         if call is None:
-            biases = self.record[0]["imu"]["used"]
-            step: Any = self._step_with_biases_at if biases else self._step_at
             if not self.record[0]["x"][3:7].any():
                 raise InputError(f"{type(self).__name__}: call reset before a step")
-            call = self._call = step.compile(STEP.args)
+            own = self._step_at
+            call = self._call = _core.step if own is None else own.compile(STEP.args)
         if call(self._address, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
         return self.estimate

@@ -7,18 +7,16 @@ that a few hundred filters stay in a core's cache.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import types
 
 from ..dynamics.motion import rotor_wrench
 from ..dynamics.rotation import quaternion_to_matrix
-from ..runtime.addresses import address_of, call_at, numbers_at
-from ..runtime.compiled import Record, compiled, compiled_without_gil
+from ..runtime.addresses import address_of, numbers_at
+from ..runtime.compiled import Record, compiled
 from ..runtime.vector_lanes import WIDTH, LaneRecord, choose
-from .estimate import WITHOUT_COVARIANCE, Array
-from .filter_record import FILTER, N, fields_between
+from .filter_record import FILTER, fields_between
 from .recovery import MEMORY
 from .ukf import carry, correct, write_variances
 
@@ -27,7 +25,10 @@ _KEPT = fields_between("x", "last_speeds")
 _MEMORY = {"poses": LaneRecord(MEMORY, MEMORY.names or ())}
 _WORK = LaneRecord(
     FILTER,
-    (*_KEPT, "rotor_wrench", *fields_between("z", "innovation")),
+    (
+        *(*_KEPT, "rotor_wrench", "z", "centre_rotation"),
+        *fields_between("acceleration", "innovation"),
+    ),
     ("body", "effect_wrench", *fields_between("gated", "period")),
     _MEMORY,
 )
@@ -86,34 +87,6 @@ def put_down(kept: int, work: int) -> None:
     numbers_at(kept, (_NUMBERS,))[:] = numbers_at(work, (_NUMBERS,))
 
 
-@compiled_without_gil
-def _step_blocks(
-    step: int,
-    work: int,
-    work_z: Array,
-    work_variances: Array,
-    blocks: int,
-    numbers: Array,
-    z: Array,
-    out: Array,
-    variances: Array,
-) -> None:
-    count = len(z)
-    for b in range(len(numbers)):
-        take_up(blocks + b * BLOCK_SIZE, work)
-        for lane in range(WIDTH):
-            n = min(WIDTH * b + lane, count - 1)  # lanes to spare do what the last filter does
-            for i in range(11):
-                work_z[i, lane] = z[n, i]
-        call_at(step, work)
-        put_down(blocks + b * BLOCK_SIZE, work)
-        for lane in range(min(WIDTH, count - WIDTH * b)):
-            for i in range(N):
-                variances[WIDTH * b + lane, i] = work_variances[i, lane]
-            for i in range(WITHOUT_COVARIANCE):
-                out[WIDTH * b + lane, i] = numbers[b, i, lane]
-
-
 def new_work(record: np.ndarray) -> np.ndarray:
     """Return the memory (1,) of a block in hand, of filters like the one in ``record`` (1,)."""
     work = _WORK.zeros(1)
@@ -124,49 +97,3 @@ def new_work(record: np.ndarray) -> np.ndarray:
 def write_lanes(blocks: np.ndarray, block: int, lanes: slice, record: np.ndarray) -> None:
     """Let filters in some lanes of a block stand where the one in ``record`` (1,) stands."""
     _BLOCK.write(blocks, block, lanes, record[0])
-
-
-class Blocks:
-    """Memory of ``count`` filters side by side, all like the one in ``record`` (1,), and their
-    step.
-    """
-
-    def __init__(self, record: np.ndarray, count: int) -> None:
-        self.count = count
-        self._blocks = new_blocks(-(-count // WIDTH))
-        self._work = new_work(record)
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(
-            state, _blocks=_BLOCK.like(state["_blocks"]), _work=_WORK.like(state["_work"])
-        )
-
-    def put(self, n: int, record: np.ndarray) -> None:
-        """Let filter ``n`` stand where the one in ``record`` stands, and with the last the lanes to
-        spare.
-        """
-        lanes = slice(n % WIDTH, None if n == self.count - 1 else n % WIDTH + 1)
-        write_lanes(self._blocks, n // WIDTH, lanes, record)
-
-    def step(
-        self, z: Array, _parts: int, _dt: float, _voltage: Array, out: Array, variances: Array
-    ) -> None:
-        """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 28) and
-        variances of the error states (n, 18), written.
-        """
-        _step_blocks(
-            step_address(),
-            self._work.ctypes.data,
-            self._work["z"][0],
-            self._work["S"][0, 0],
-            self._blocks.ctypes.data,
-            columns(self._blocks)[:, _FIRST : _FIRST + WITHOUT_COVARIANCE],
-            z,
-            out,
-            variances,
-        )
-
-    @property
-    def covariance(self) -> Array:
-        """Covariances (n, 18, 18), of noise alone."""
-        return np.concatenate(list(np.moveaxis(self._blocks["P"], -1, 1)))[: self.count]

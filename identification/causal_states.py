@@ -22,7 +22,7 @@ from ..estimator.estimate import WITHOUT_COVARIANCE
 from ..estimator.model_uncertainty import LOAD
 from ..estimator.tuning import PERIOD
 from ..estimator.ukf import default_covariance, make_calls
-from ..runtime.compiled import Record, compiled
+from ..runtime.compiled import compiled
 from .logs.flight_log import FlightLog
 from .logs.table import Array
 from .motion.sensing_effects import delay_of
@@ -70,8 +70,9 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
     begin = np.searchsorted(to, np.append(rows, count))
     states, best = np.full((count, STATE), np.nan), np.full(count, -np.inf)
     states[first] = np.concatenate([log.position[first], log.quaternion[first], np.zeros(6)])
-    scratch = np.empty((1, WITHOUT_COVARIANCE)), np.empty((1, 18)), np.zeros((1, *LOAD))
-    same = np.zeros(int(np.diff(begin).max(initial=0)), dtype=np.intp)
+    each = np.arange(len(calls))
+    numbers, innovations = np.empty((len(calls), WITHOUT_COVARIANCE)), np.empty((len(calls), 12))
+    others = np.empty((len(calls), 18)), np.empty((len(calls), *LOAD))
     for ukf in filters:
         covariance = default_covariance(vehicle, ukf.tuning)
         for where, deviation in (
@@ -80,7 +81,15 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
         ):
             np.fill_diagonal(covariance[where, where], deviation**2)
         ukf.reset(log.position[first], log.quaternion[first], covariance)
-        _filter(ukf.record, calls, begin, same, *scratch, states[first + 1 :], best[first + 1 :])
+        make_calls(ukf.record, calls, each, numbers, *others, innovations)
+        _choose(
+            begin[1:] - 1,
+            calls["parts"] == 3,
+            numbers,
+            innovations,
+            states[first + 1 :],
+            best[first + 1 :],
+        )
     return states
 
 
@@ -96,35 +105,31 @@ def scaled_tuning(usual: UKFTuning, white: float, force: float, torque: float) -
 
 
 @compiled
-def _filter(
-    record: Record,
-    calls: np.ndarray,
-    begin: np.ndarray,
-    same: np.ndarray,
+def _choose(
+    last: np.ndarray,
+    posed: np.ndarray,
     numbers: Array,
-    std: Array,
-    loads: Array,
+    innovations: Array,
     states: Array,
     best: Array,
 ) -> None:
-    """Make the calls of each row. Write the state (n, STATE) after them, and the log-likelihood
-    (n,) of the poses so far, where this is larger than of the filters before.
+    """Write the state (n, STATE) after the ``last`` call of each row, and the log-likelihood (n,)
+    of the poses so far, where this is larger than of the filters before.
 
     Translation and rotation have a scale of their own.
     """
-    f = record[0]
     total, scales, squares = 0.0, np.ones(2), np.zeros(2)
     seen = 0.0
     for k in range(len(states)):
-        a, b = begin[k], begin[k + 1]
-        make_calls(record, calls[a:b], same[: b - a], numbers, std, loads)
-        if calls[b - 1]["parts"] == 3:
+        call = last[k]
+        if posed[call]:
+            white, root = innovations[call, :6], innovations[call, 6:]
             seen += 3.0
             for part in range(2):
                 nis, spread = 0.0, 1.5 * math.log(scales[part])
                 for i in range(3 * part, 3 * part + 3):
-                    nis += f.innovation[i] ** 2
-                    spread += math.log(f.L[i, i])
+                    nis += white[i] ** 2
+                    spread += math.log(root[i])
                 far = nis / (_TAIL * scales[part])
                 total -= spread + 0.5 * (_TAIL + 3.0) * math.log1p(far)
                 squares[part] += nis * (_TAIL + 3.0) / (_TAIL * (1.0 + far))
@@ -132,4 +137,4 @@ def _filter(
         if total > best[k]:
             best[k] = total
             for i in range(len(states[k])):
-                states[k, i] = f.x[i]
+                states[k, i] = numbers[call, i]

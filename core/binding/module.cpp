@@ -1,6 +1,8 @@
 // The module of one instruction set. `windwrench._core` chooses one when it is imported.
 #include <nanobind/nanobind.h>
 
+#include "filter.hpp"
+
 namespace nb = nanobind;
 
 NB_MODULE(WINDWRENCH_MODULE, m) {
@@ -8,4 +10,6 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
   m.def(
       "instruction_set", [] { return WINDWRENCH_INSTRUCTION_SET; },
       "Return the instruction set that the core was built for: baseline, avx2 or avx512.");
+  bind_batch(m);
+  bind_filter(m);
 }

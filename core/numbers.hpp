@@ -1,0 +1,78 @@
+// Numbers of the core: double, float, or lanes of either, one register of a processor's vector unit.
+//
+// A formula is written once for all of them. A comparison of lanes has an answer for each lane, so
+// code for all numbers takes `choose`, `any` and `all` in place of `if`. Each operation rounds like
+// that of single numbers: a lane equals a single filter to the bit.
+#pragma once
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+namespace windwrench {
+
+template <class S, int LANES> struct Register {
+  typedef S type __attribute__((vector_size(LANES * sizeof(S))));
+};
+template <class S, int LANES> using Lanes = typename Register<S, LANES>::type;
+
+template <class T> constexpr bool is_single = std::is_arithmetic<T>::value;
+
+template <class T, bool SINGLE> struct Parts {
+  using type = T;
+};
+template <class T> struct Parts<T, false> {
+  using type = std::remove_reference_t<decltype(std::declval<T &>()[0])>;
+};
+template <class T> using Single = typename Parts<T, is_single<T>>::type;  // the number of one lane
+template <class T> using Answer = decltype(std::declval<T>() < std::declval<T>());
+template <class T> constexpr int lanes_of = sizeof(T) / sizeof(Single<T>);
+
+// one lane of a number, to be read or written
+template <class T> inline decltype(auto) lane(T &a, int i) {
+  if constexpr (is_single<std::remove_const_t<T>>) {
+    return (a);
+  } else {
+    return (a[i]);
+  }
+}
+
+template <class T> inline T choose(bool c, T a, T b) { return c ? a : b; }
+template <class C, class T> inline T choose(C c, T a, T b) { return c ? a : b; }
+
+// whether a condition holds in any lane, or in all
+template <class C> inline bool any(C c) {
+  bool found = false;
+  for (int i = 0; i < lanes_of<C>; i++) found |= lane(c, i) != 0;
+  return found;
+}
+template <class C> inline bool all(C c) { return !any(c == C{}); }
+inline bool opposite(bool c) { return !c; }
+template <class C> inline C opposite(C c) {
+  static_assert(!std::is_arithmetic<C>::value, "of lanes, or a bool");
+  return ~c;
+}
+template <class T> inline Answer<T> finite(T a) { return a - a == T{}; }
+
+// the larger and the smaller of two; the first where one is no number
+template <class T> inline T larger(T a, T b) { return choose(b > a, b, a); }
+template <class T> inline T smaller(T a, T b) { return choose(b < a, b, a); }
+template <class T> inline T absolute(T a) { return choose(a < T{}, -a, a); }
+
+template <class T, class F> inline T lane_by_lane(T a, F function) {
+  T result;
+  for (int i = 0; i < lanes_of<T>; i++) lane(result, i) = function(lane(a, i));
+  return result;
+}
+template <class T> inline T root(T a) {
+  return lane_by_lane(a, [](Single<T> one) { return std::sqrt(one); });
+}
+template <class T> inline T sine(T a) {
+  return lane_by_lane(a, [](Single<T> one) { return std::sin(one); });
+}
+template <class T> inline T cosine(T a) {
+  return lane_by_lane(a, [](Single<T> one) { return std::cos(one); });
+}
+
+}  // namespace windwrench
