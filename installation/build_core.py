@@ -13,6 +13,7 @@ import subprocess
 import sys
 import sysconfig
 from concurrent.futures import ThreadPoolExecutor
+from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.metadata import version
 from pathlib import Path
 
@@ -61,10 +62,12 @@ class BuildCore(build_ext):
     """Compile and link the extensions with one compiler, as many objects at once as cores."""
 
     def run(self) -> None:
-        """Build, and note in a checkout of what sources."""
+        """Build, and note in a checkout of what sources; sets that are not built anew leave it."""
         built_of = digest()
         super().run()
         if self.inplace:
+            for name in {*SETS} - {*sets()}:
+                (ROOT / "_core" / (name + EXTENSION_SUFFIXES[0])).unlink(missing_ok=True)
             BUILT.write_text(built_of)
 
     def build_extensions(self) -> None:

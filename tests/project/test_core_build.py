@@ -22,9 +22,9 @@ needs_compiler = pytest.mark.skipif(
 
 
 def before(folder):
-    """The environment in which Python finds the checkout in a folder first, and builds one set."""
+    """The environment in which Python finds what is in a folder first."""
     path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
-    return os.environ | {"WINDWRENCH_CORE": "baseline", "PYTHONPATH": path}
+    return os.environ | {"PYTHONPATH": path}
 
 
 def imported(checkout, what):
@@ -100,7 +100,7 @@ def test_the_core_s_tests_pass_under_sanitizers(tmp_path):
     checkout = tmp_path / "windwrench"
     copied(checkout, objects=True)
     flags = "-O1 -g -UNDEBUG -fsanitize=address,undefined -fno-sanitize-recover=all"
-    environment = before(tmp_path) | {"CXXFLAGS": flags}
+    environment = before(tmp_path) | {"CXXFLAGS": flags, "WINDWRENCH_CORE": "baseline"}
     build = ("setup.py", "--quiet", "build_ext", "--inplace")
     said(sys.executable, *build, cwd=checkout, env=environment)
     environment |= {"LD_PRELOAD": library, "ASAN_OPTIONS": "detect_leaks=0"}
