@@ -73,6 +73,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
         "py.typed",
         "cli.py",
         "_core/__init__.pyi",
+        "core/ukf.hpp",
         "_core/baseline" + sysconfig.get_config_var("EXT_SUFFIX"),
         "envs/quadrotor.xml",
         "dynamics/vehicles/ardrone2.yaml",
