@@ -220,6 +220,12 @@ class _Guessing:
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
+            for name in named_alone(self.free, "time"):
+                x = self.data.get(name.column, np.zeros(0))
+                if len(x) > 1 and np.mean(np.diff(x) == 0.0) > 0.9:
+                    why = f"column {name.column} is {x[0]:g} in nearly every row: a program that "
+                    why += "wrote the table left out its digits; expected a time in each row"
+                    break
             lack("time", "time", why, "column")
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
