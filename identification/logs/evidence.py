@@ -77,7 +77,7 @@ _CERTAIN_LEAD = 3.4  # log-likelihood ratio over the next best: 30 to 1
 TURNING_RATE = 0.06
 _G = 9.81
 # roll and pitch of rotors 1 to 4, whatever the vehicle
-_SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
+SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 
 def likelihood(left: Sequence[float]) -> float:
@@ -152,6 +152,7 @@ class Evidence:
         gyro: (N, 3) rad/s, in the kit's body axes, without an attitude.
         along: (N,) m/s2, specific force along the body's z axis, without a pose.
         vehicle: as declared; ``thrusts`` are squared rotor speeds then. None: unknown.
+        sides: (2, 4) roll and pitch of the kit's rotors, without a vehicle.
     """
 
     def __init__(
@@ -163,10 +164,11 @@ class Evidence:
         gyro: Array | None = None,
         along: Array | None = None,
         vehicle: Vehicle | None = None,
+        sides: Array = SIDES,
     ) -> None:
         self._t, self._position, self._attitude = t, position, attitude
         self._gyro, self._along = gyro, along
-        self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), _SIDES
+        self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), sides
         self._gains = _TORQUE_GAIN, (0.0, np.inf)  # gains of thrust and of torques
         if vehicle is not None:
             self._k, self._inertia, self._mixing = vehicle.k, vehicle.inertia, vehicle.mixing[1:]

@@ -145,16 +145,18 @@ def motor_doubts(log: FlightLog) -> list[str]:
     doubts = [
         f"{what} of motors {i + 1} and {j + 1} are equal in every row; expected four motors"
         for i, j in combinations(range(4), 2)
-        if np.array_equal(motors[:, i], motors[:, j])
+        if np.array_equal(motors[:, i], motors[:, j]) and np.ptp(motors[:, i]) > 0.0
     ][:1]
     medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
     listed = ", ".join(f"{x:.3g}" for x in medians)
+    if not measured:
+        return doubts
     if medians.max() > MAGNITUDES.uneven * medians.min():
         doubts.append(
-            f"medians of the four motors' {what} in flight are {listed}; expected a ratio of at "
-            f"most {MAGNITUDES.uneven:g}"
+            f"medians of the four rotor speeds in flight are {listed} rad/s; expected a ratio of "
+            f"at most {MAGNITUDES.uneven:g}"
         )
-    elif measured and medians.max() < MAGNITUDES.slow:
+    elif medians.max() < MAGNITUDES.slow:
         doubts.append(
             f"medians of the four rotor speeds in flight are {listed} rad/s; expected at least "
             f"{MAGNITUDES.slow:g}: no rotor carries a drone at less. Check the unit"

@@ -198,18 +198,13 @@ def stamp(message: Any) -> int:
     return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
 
 
-def empty_sections(
-    first: tuple[int, Any] | None, held: Mapping[str, Columns], kind: str
-) -> list[str]:
-    """Return the motors' sections without fields in the first message of a topic of a type, beside
-    a section with fields.
+def empty_motors(first: tuple[int, Any] | None, held: Mapping[str, Columns]) -> list[str]:
+    """Return rotors or commands, whichever the first message of their topic leaves empty beside the
+    other.
     """
-    motors = [name for name in MOTORS if name in held]
-    if first is None or len(motors) < 2 or kind.startswith(_PX4):
-        return []
-    paths = set(_paths(first[1]))
-    empty = [name for name in motors if not paths.issuperset(held[name].named)]
-    return empty if len(empty) < len(motors) else []
+    paths = set(_paths(first[1])) if first else set()
+    empty = [name for name in MOTORS if not paths.issuperset(held[name].named)]
+    return empty if len(empty) < len(MOTORS) else []
 
 
 class MessageFields:
