@@ -1,13 +1,17 @@
 """Logs of kinds that were read wrongly, with their right readings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from tests.support.data_paths import data_file
 
+from tests.support.data_paths import data_file
 from windwrench.dynamics import load_vehicle
+from windwrench.identification.logs.flight_log import with_rows
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
+from windwrench.identification.logs.sensor_clock import on_one_clock
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
@@ -49,3 +53,20 @@ def test_body_axes_turned_about_z_are_named():
     log = read_log(data_file("hard_logs/ned_quaternion_swapped.csv.gz"), vehicle=vehicle)
     with pytest.raises(InputError, match=r"right, forward, up.* take 0\.7071 \(qw - qz, qx \+ qy"):
         screen_log(log, vehicle)
+
+
+@pytest.mark.parametrize("rows", [-30, -16, -3, 3, 6, 30])
+@pytest.mark.parametrize("whose", ["IMU", "pose"])
+def test_a_late_clock_is_found_and_mended(whose, rows):
+    log = read_log(data_file("hard_logs/imu_clock_late.csv.gz"), vehicle=load_vehicle("ardrone2"))
+    assert any("the IMU is 0.119 s late" in note for note in log.notes)  # 0.12 s, and mended
+    log = with_rows(log, np.isfinite(log.gyro[:, 0]))
+    names = ["gyro", "accelerometer"] if whose == "IMU" else ["position", "quaternion"]
+    late = replace(log, **{name: np.roll(getattr(log, name), rows, axis=0) for name in names})
+    mended, notes = on_one_clock(late, load_vehicle("ardrone2"))
+    said = float(notes[0].split(" s ")[0].split()[-1]) * (1 if f"{whose} is" in notes[0] else 0)
+    assert said == pytest.approx(abs(rows) * log.period, abs=0.003)
+    inside = slice(60, -60)
+    for name in names:
+        off = getattr(mended, name)[inside] - getattr(log, name)[inside]
+        assert np.median(np.abs(off)) < 0.02 * np.ptp(getattr(log, name)[inside])
