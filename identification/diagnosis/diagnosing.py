@@ -34,6 +34,7 @@ from ..logs.flight_log import FlightLog
 from ..logs.screening import LEAST_SECONDS, screen_log
 from ..logs.table import Array
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
+from ..motion.pose_clock import on_pose_clock
 from ..motion.smoothing import CUTOFFS, mean_square
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
@@ -94,6 +95,7 @@ def diagnose(
     if not logs:
         raise InputError("diagnose: no log was given; expected at least one")
     report("looking at the logs")
+    logs, test = ([on_pose_clock(log) for log in some] for some in (logs, test))
     every = (*logs, *test)
     least = (
         LEAST_SECONDS if len(every) == 1 and not every[0].commanded else settings.least_seconds_each

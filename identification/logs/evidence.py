@@ -77,7 +77,7 @@ _CERTAIN_LEAD = 3.4  # log-likelihood ratio over the next best: 30 to 1
 TURNING_RATE = 0.06
 _G = 9.81
 # roll and pitch of rotors 1 to 4, whatever the vehicle
-_SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
+SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 
 def likelihood(left: Sequence[float]) -> float:
@@ -152,6 +152,7 @@ class Evidence:
         gyro: (N, 3) rad/s, in the kit's body axes, without an attitude.
         along: (N,) m/s2, specific force along the body's z axis, without a pose.
         vehicle: as declared; ``thrusts`` are squared rotor speeds then. None: unknown.
+        sides: (2, 4) roll and pitch of the kit's rotors, without a vehicle.
     """
 
     def __init__(
@@ -163,10 +164,11 @@ class Evidence:
         gyro: Array | None = None,
         along: Array | None = None,
         vehicle: Vehicle | None = None,
+        sides: Array = SIDES,
     ) -> None:
         self._t, self._position, self._attitude = t, position, attitude
         self._gyro, self._along = gyro, along
-        self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), _SIDES
+        self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), sides
         self._gains = _TORQUE_GAIN, (0.0, np.inf)  # gains of thrust and of torques
         if vehicle is not None:
             self._k, self._inertia, self._mixing = vehicle.k, vehicle.inertia, vehicle.mixing[1:]
@@ -351,6 +353,22 @@ class Evidence:
         """Return how well a reading explains the flight; without torques, by forces alone."""
         mixing = self._mixing if torques else self._mixing[:0]
         mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
+        left, horizontal, cost = self._left(mixing, reading, _DELAYS if torques else (0.0,))
+        vertical, *others = max(left.tolist(), key=likelihood)
+        score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
+        return Fit(reading, horizontal, tuple(others), score)
+
+    def delay(self) -> float:
+        """Return the likeliest delay in s of the motion behind the rotors' columns, as declared."""
+        left = self._left(self._mixing, DECLARED, _DELAYS)[0].tolist()
+        return max(zip(left, _DELAYS, strict=True), key=lambda each: likelihood(each[0]))[1]
+
+    def _left(
+        self, mixing: Array, reading: ColumnReading, delays: tuple[float, ...]
+    ) -> tuple[Array, float, float]:
+        """Return the shares (d, 1 + torques) of vertical force and torques left at each delay of
+        the rotors, and the horizontal share and the penalty on the flight's place.
+        """
         rows = np.zeros((1 + len(mixing), 9))  # what drives: all together along, and each torque
         rows[0, 8], rows[1:3, :4], rows[3:, 4:8] = 1.0, mixing[:2], mixing[2:]
         if reading.mirrored:
@@ -358,7 +376,6 @@ class Evidence:
         gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
         horizontal, cost, motion = self._moved(*reading.moves)
         needed = motion[: len(rows)]
-        delays = _DELAYS if torques else (0.0,)
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
         left = shares(
@@ -368,9 +385,7 @@ class Evidence:
             np.transpose(gains),
         )
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
-        vertical, *others = max(left.tolist(), key=likelihood)
-        score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
-        return Fit(reading, horizontal, tuple(others), score)
+        return left, horizontal, cost
 
     def late(self) -> float:
         """Return the delay in s of the rotors' columns against the motion, as declared; 0: none, or

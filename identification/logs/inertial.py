@@ -24,12 +24,12 @@ from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER,
 from .table import Array, finite_rows
 
 # How inertial sensors are compared.
-_WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
+WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
 _STEP = 0.05  # s between two comparisons
 _GAP = 0.1  # s without a sample; no comparison across
 _FEWEST = 10  # comparisons for a decision
 LEAST_SAMPLES = 20  # of pose and of sensor, at least
-_STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
+STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
 _MOVING = 0.5  # m/s2 of horizontal acceleration, far above pose noise
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
@@ -120,16 +120,16 @@ def gyro_shares(
     """
     read = np.isfinite(t) & finite_rows(gyro)
     t, gyro = t[read], gyro[read]
-    begins = _windows(pose_times, t, before=0.0)
+    begins = windows(pose_times, t, before=0.0)
     if len(begins) < _FEWEST:
         return None
-    at, ends = Slerp(pose_times, attitude), begins + _WINDOW
-    turned = (at(begins).inv() * at(ends)).as_rotvec() / _WINDOW
+    at, ends = Slerp(pose_times, attitude), begins + WINDOW
+    turned = (at(begins).inv() * at(ends)).as_rotvec() / WINDOW
     sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
-    mean = (resampled(ends, t, sum_of) - resampled(begins, t, sum_of)) / _WINDOW
+    mean = (resampled(ends, t, sum_of) - resampled(begins, t, sum_of)) / WINDOW
     motion, seen = turned - np.median(turned, axis=0), mean - np.median(mean, axis=0)  # a bias
-    size = _middle(motion) + _STILL**2
-    return [_middle(motion - seen @ turn.T) / size for turn in turns]
+    size = middle(motion) + STILL**2
+    return [middle(motion - seen @ turn.T) / size for turn in turns]
 
 
 def _force_shares(
@@ -147,7 +147,7 @@ def _force_shares(
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
     """
-    middles = _windows(pose_times, t, before=_WINDOW)
+    middles = windows(pose_times, t, before=WINDOW)
     if len(middles) < _FEWEST:
         return None, None
     inside = (t >= pose_times[0]) & (t <= pose_times[-1])
@@ -158,14 +158,14 @@ def _force_shares(
         sums, times = force[inside], t[inside]
         for _ in range(2):
             sums = cumulative_trapezoid(sums, times, axis=0, initial=0.0)
-        return second_difference(middles, _WINDOW, times, sums) / _WINDOW**2
+        return second_difference(middles, WINDOW, times, sums) / WINDOW**2
 
     up, turned = np.zeros(3), None
-    needed = second_difference(middles, _WINDOW, pose_times, position) / _WINDOW**2
+    needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2
     moves = np.linalg.norm(needed[:, :2], axis=1) > _MOVING
     if np.count_nonzero(moves) >= _FEWEST:
         in_body, in_world = (
-            _middle((needed - mean(x))[moves, :2]) / _middle(needed[moves, :2])
+            middle((needed - mean(x))[moves, :2]) / middle(needed[moves, :2])
             for x in (body.apply(measured), measured)
         )
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
@@ -175,18 +175,18 @@ def _force_shares(
     up[2] = gravity
     needed += up
     return [
-        _middle(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
-        / _middle(needed)
+        middle(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
+        / middle(needed)
         for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
     ], turned
 
 
 def gravity_doubt(force: Array, gravity: float) -> str:
     """Return gravity's objection to the specific force (n, 3) of a flight, or nothing."""
-    middle = np.median(force, axis=0)
-    size = np.linalg.norm(middle)
+    median = np.median(force, axis=0)
+    size = np.linalg.norm(median)
     otherwise = (
-        f"are {size:.3g} m/s2 in the median of a flight, along a{'xyz'[np.argmax(np.abs(middle))]}"
+        f"are {size:.3g} m/s2 in the median of a flight, along a{'xyz'[np.argmax(np.abs(median))]}"
         f"; expected the specific force, which gravity makes about {gravity:.3g} along az: axes "
         "forward, left, up, of the vehicle and not of the sensor's board"
     )
@@ -199,30 +199,30 @@ def _gravity_shares(force: Array, gravity: float) -> list[float]:
     """Return the share of gravity left by the median of a specific force (n, 3), as declared and by
     each reading of ``_BY_GRAVITY``.
     """
-    middle, up = np.median(force, axis=0), np.array([0.0, 0.0, gravity])
+    median, up = np.median(force, axis=0), np.array([0.0, 0.0, gravity])
     readings = (AS_DECLARED, *_BY_GRAVITY)
-    return [float(np.sum(np.square(up - r.turn @ middle))) / gravity**2 for r in readings]
+    return [float(np.sum(np.square(up - r.turn @ median))) / gravity**2 for r in readings]
 
 
-def _middle(vectors: Array) -> float:
+def middle(vectors: Array) -> float:
     """Return the median squared length of vectors (n, 3): robust to single leaps of a pose."""
     return float(np.median(np.sum(np.square(vectors), axis=1)))
 
 
-def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
+def windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     """Return times (n,) in s without a gap of pose or sensor, from ``before`` earlier to a window
     later.
     """
     if min(len(pose_times), len(sensor_times)) < LEAST_SAMPLES:
         return np.empty(0)
     first = max(pose_times[0], sensor_times[0]) + before
-    last = min(pose_times[-1], sensor_times[-1]) - _WINDOW
+    last = min(pose_times[-1], sensor_times[-1]) - WINDOW
     if last <= first:
         return np.empty(0)
     count = min(int((last - first) / _STEP), 100_000)
     times: Array = np.linspace(first, last, count + 1)
     for clock in (pose_times, sensor_times):
         gaps = np.flatnonzero(np.diff(clock) > _GAP)
-        begun = np.searchsorted(clock[gaps], times + _WINDOW)
+        begun = np.searchsorted(clock[gaps], times + WINDOW)
         times = times[begun == np.searchsorted(clock[gaps + 1], times - before, "right")]
     return times

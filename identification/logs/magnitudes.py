@@ -5,6 +5,7 @@ The guess of a map, the reading of a log and its screening decide here, with the
 
 import re
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .column_names import WORDS, Group
 from .flight_log import FlightLog, parts_of
-from .flight_phases import usual_thrust
+from .flight_phases import carrying, usual_thrust
 from .log_map import UNITS
 from .table import Array, finite_rows
 
@@ -43,6 +44,9 @@ class Magnitudes:
     # in rad/s. Above the second, rpm is likelier: in rad/s only palm-sized vehicles hover as fast.
     # Above the third, rpm may also be a command of 16 bits
     rpm: float = 4500.0
+    # rad/s: the largest drones' rotors (1.4 m across) hover at 150; slower, the unit is wrong
+    slow: float = 100.0
+    uneven: float = 2.0  # ratio of two rotors' medians in flight, at most
     fast: float = 2600.0
     counts: float = 20_000.0
     # power of the specific force's growth: with rotor speeds, and with pulses at least
@@ -129,6 +133,37 @@ def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     )
 
 
+def motor_doubts(log: FlightLog) -> list[str]:
+    """Return doubts on four motors, whatever the vehicle: equal columns, uneven medians in flight,
+    and rotors slower than any propeller in hover.
+    """
+    measured = log.has_rotor_speeds and not log.commanded
+    motors = log.rotor_speeds if measured else log.command
+    if motors is None or not np.isfinite(motors).all() or not np.any(motors > 0.0):
+        return []
+    what = "rotor speeds" if measured else "motor commands"
+    doubts = [
+        f"{what} of motors {i + 1} and {j + 1} are equal in every row; expected four motors"
+        for i, j in combinations(range(4), 2)
+        if np.array_equal(motors[:, i], motors[:, j]) and np.ptp(motors[:, i]) > 0.0
+    ][:1]
+    medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
+    listed = ", ".join(f"{x:.3g}" for x in medians)
+    if not measured:
+        return doubts
+    if medians.max() > MAGNITUDES.uneven * medians.min():
+        doubts.append(
+            f"medians of the four rotor speeds in flight are {listed} rad/s; expected a ratio of "
+            f"at most {MAGNITUDES.uneven:g}"
+        )
+    elif medians.max() < MAGNITUDES.slow:
+        doubts.append(
+            f"medians of the four rotor speeds in flight are {listed} rad/s; expected at least "
+            f"{MAGNITUDES.slow:g}: no rotor carries a drone at less. Check the unit"
+        )
+    return doubts
+
+
 def motor_unit(
     group: Group, values: Array, vehicle: Vehicle | None, power: float = np.nan
 ) -> tuple[str, str, bool, str]:
@@ -143,7 +178,7 @@ def motor_unit(
         return "commands", "normalised", False, "all are zero"
     low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
     named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = any(word in names for word in WORDS["command_words"])
+    commanded = any(re.search(word, names) for word in WORDS["command_words"])
     speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
     speeds |= within(power, MAGNITUDES.squares) and not commanded
     pulses = low >= 850.0 and high <= 2250.0
@@ -226,7 +261,7 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
                 f"{where} {names[column]}, row {row + 1}: {values[row, column]:.3g}; expected a "
                 f"number within {MAGNITUDES.largest:g}"
             )
-    doubts = [time_doubt(log.period)]
+    doubts = [time_doubt(log.period), *motor_doubts(log)]
     if log.valid.any():
         spread = np.max(np.ptp(log.position[log.valid], axis=0))
         if spread > MAGNITUDES.widest:

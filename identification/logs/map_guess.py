@@ -53,6 +53,8 @@ _GYROS = [
     SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
     for unit, (body, turn) in product(("rad/s", "deg/s"), BODY_TURNS.items())
 ]
+# roll and pitch of a plus, by rotors at the left, rear, right and front
+_PLUS = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
 _EXAMPLES = {
     "position": "x, y, z",
     "attitude": "qw, qx, qy, qz or roll, pitch, yaw",
@@ -220,6 +222,12 @@ class _Guessing:
 
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
+            for name in named_alone(self.free, "time"):
+                x = self.data.get(name.column, np.zeros(0))
+                if len(x) > 1 and np.mean(np.diff(x) == 0.0) > 0.9:
+                    why = f"column {name.column} is {x[0]:g} in nearly every row: a program that "
+                    why += "wrote the table left out its digits; expected a time in each row"
+                    break
             lack("time", "time", why, "column")
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
         if "position" not in has and not has.issuperset(imu):
@@ -431,16 +439,16 @@ class _Guessing:
             return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
         text = " ".join(group.columns).lower()
         hint = next((name for word, name in WORDS["orders"].items() if word in text), "windwrench")
-        evidence, best = None, DECLARED
+        best, motion = DECLARED, None
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
             rates = self.values("gyro") * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body].T
-            evidence = Evidence(self.t, np.square(values), gyro=rates)
+            motion = {"gyro": rates}
         elif self.ranking is not None and self.ranking.certain(*_TURNS):
             best = self.ranking.best
-            pose = self.values("position"), self.values("attitude")
-            evidence = Evidence(self.t, np.square(values), *pose)
-        if evidence is None or not evidence.enough:
+            motion = {"position": self.values("position"), "attitude": self.values("attitude")}
+        evidence = Evidence(self.t, np.square(values), **(motion or {}))
+        if motion is None or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
         ranking = RankedFits.of(evidence, ways)
@@ -456,6 +464,11 @@ class _Guessing:
             return order, True, why
         if names and left <= 0.9 and lead >= 1.0:
             return order, False, why
+        plus = RankedFits.of(Evidence(self.t, np.square(values), sides=_PLUS, **motion), ways)
+        if plus.fit.torque <= GOOD_TORQUE and turns:
+            placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
+            why = f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
+            return ORDERS[hint], False, f"{why}expected a vehicle file with these rotor_positions"
         return ORDERS[hint], False, f"{hint}: no order is much likelier than all others"
 
     def battery(self) -> None:

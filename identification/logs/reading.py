@@ -18,6 +18,7 @@ from .inertial import check_inertial
 from .log_map import OWN_MAP, load_map
 from .magnitudes import unit_doubts
 from .mapped_log import map_table
+from .sensor_clock import on_one_clock
 from .table import Table
 from .tables import is_table, open_table
 
@@ -68,8 +69,9 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     """
     vehicle = flown_vehicle(vehicle, log.vehicle)
     of_units = unit_doubts(log, vehicle)
+    log, moved = on_one_clock(log, vehicle)
     log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
-    doubts = [*wrong, *of_units]
+    doubts = [*moved, *wrong, *of_units]
     for doubt in doubts:
         warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))

@@ -277,8 +277,11 @@ def log_readings(has_pose: bool) -> list[ColumnReading]:
         others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
         others.append(ColumnReading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
-    others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
-    return [DECLARED, *_weighed(others, OTHER)]
+    turned = _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
+    # two departures at once are as unlikely as both
+    both = [replace(r, unlikely=2.0 * OTHER) for r in turned if r.mirrored and r.rotors != ROTORS]
+    others += [r for r in turned if not (r.mirrored and r.rotors != ROTORS)]
+    return [DECLARED, *_weighed(others, OTHER), *both]
 
 
 def table_readings(

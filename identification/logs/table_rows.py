@@ -22,6 +22,7 @@ _LONGEST_GAP = 0.06
 LONGEST_STEPS = 3.5
 _FINITE = "a finite number"
 _BACK = 0.2  # share of steps back; more are no times
+_ROUNDED = 0.2  # share of repeated times: more were rounded
 _DENSE = 0.5  # share of the rows; a channel with more counts as one of every row
 _FEWEST = 10  # samples of a channel to decide on its rows
 
@@ -56,6 +57,13 @@ def rows_of(
             f"{table.path}: column {clock.column}: {len(samples.t)} time(s); expected at least two"
         )
     raw = samples.t
+    if is_whole and (even := _even_times(raw)) is not None:
+        rounded, raw = np.min(np.diff(np.unique(raw))), even
+        samples = replace(samples, t=raw)
+        notes.append(
+            f"column {clock.column}: rounded to {rounded:.3g} {clock.unit}, with several rows a "
+            "time; the rows were taken as even in time"
+        )
     step = np.diff(raw)
     back = np.flatnonzero(step <= 0.0 if is_whole else step < 0.0)
     if back.size and (is_whole or back.size > _BACK * len(step)):
@@ -94,6 +102,18 @@ def rows_of(
             joined[name] = np.where(last >= 0, column[last], np.nan)
         samples = replace(samples.cut(np.append(begins[1:], len(t)) - 1), columns=joined)
     return samples, notes
+
+
+def _even_times(raw: Array) -> Array | None:
+    """Return even times (N,) of rows whose times (N,) were rounded; None: the rows are not even, or
+    a time repeats in fewer than a fifth of them.
+    """
+    step = np.diff(raw)
+    if not np.any(step > 0.0) or np.any(step < 0.0) or np.mean(step == 0.0) < _ROUNDED:
+        return None
+    rows = np.arange(len(raw))
+    even = np.polynomial.Polynomial.fit(rows, raw, 1)(rows)
+    return even if np.max(np.abs(raw - even)) <= np.min(step[step > 0.0]) else None
 
 
 def _refuse(

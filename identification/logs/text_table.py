@@ -53,6 +53,10 @@ _MOMENT = re.compile(  # a date with a time of day, or this alone
     r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?(?P<h>\d\d?):(?P<m>\d\d):(?P<s>\d\d(?:\.\d+)?)"
     r"(?:Z|[+-]\d\d:?\d\d)?"
 )
+_MOTION_CAPTURE = {  # first lines of exports
+    "Motive": r"Format Version,.*Take Name,",
+    "Vicon Nexus": r"(?s)(Objects|Segments|Trajectories|Model Outputs)\b.*\nFrame,Sub Frame,",
+}
 _COMMENT = re.compile(r"^\s*(#|%|//)[#%/ ]*")
 # decimal commas to points; a point beside them may stand for thousands, and is no number's
 _POINTS = str.maketrans(",.", ".?")
@@ -156,6 +160,12 @@ def open_text(path: Path) -> Table:
         written.append(line)
         if sum(map(len, written)) > _LOOKED_AT:
             break
+    for program, beginning in _MOTION_CAPTURE.items():
+        if re.match(beginning, "\n".join(written[:8])):
+            raise InputError(
+                f"{path}: an export of {program}: motion capture alone, without motors; expected "
+                "the poses and the rotor speeds of the autopilot's log in one table"
+            )
     head = [_LIST.sub("0", line) for line in written]
     layout, first = _layout(path, head)
     header, first = _header(path, head, layout, first)

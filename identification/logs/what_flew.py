@@ -61,9 +61,9 @@ def rotor_order(value: object) -> Order:
     )
 
 
-def order_words(order: Order) -> str:
-    """Return an order in words."""
-    places = sorted(zip(order, PLACES, strict=True))
+def order_words(order: Order, named: Sequence[str] = PLACES) -> str:
+    """Return an order in words, by the places of the kit's rotors."""
+    places = sorted(zip(order, named, strict=True))
     return f"motors {', '.join(f'{motor} {place}' for motor, place in places)}"
 
 

@@ -75,7 +75,7 @@ def identify(
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
-    check_rotors(pieces, logs)
+    check_rotors(logs)
     notes: list[str] = []
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"

@@ -52,6 +52,7 @@ _RADIANS = 1e-5  # a gyro's scale below is in rad/us
 _ONE_G = 2.0 ** np.arange(8, 15)  # counts
 _DSHOT, _PWM = (48.0, 2047.0), (1000.0, 2000.0)
 _MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of other vehicles than quadrotors
+_HUNDREDS = "(/100)"  # behind the name eRPM of some versions, which are all in hundreds
 WHAT = "a blackbox of Betaflight or INAV"
 _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
 
@@ -87,7 +88,7 @@ def read(
     version = headers.get("Data version", "2")
     if version != "2":
         raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
-    names = headers.get("Field I name", "").split(",")
+    names = headers.get("Field I name", "").replace(_HUNDREDS, "").split(",")
     layout = _layout(path, headers, names)
     wanted = [*shipped_map("recordings/betaflight").wanted, *_MORE_MOTORS]
     keep = [name for name in wanted if name in names]
@@ -126,7 +127,7 @@ def read_table(
     wanted = {*shipped_map("recordings/betaflight").wanted, *_MORE_MOTORS}
     scales, names = {}, {"time": "time (us)"}
     for name in table.header:
-        field, _, unit = name.removesuffix(")").partition(" (")
+        field, _, unit = name.replace(_HUNDREDS, "").removesuffix(")").partition(" (")
         if field in wanted and (not unit or unit in _UNITS):
             names[field] = name
             if unit:

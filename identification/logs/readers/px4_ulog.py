@@ -113,6 +113,9 @@ def channels(
     flown = replace(flown, outputs=outputs.words)
     order, order_note = motor_order(path, stated, vehicle)
     log_map = shipped_map("recordings/px4").with_order(order)
+    if stated.get("SIM_GZ_EN") and (rotors := log_map.rotors):
+        note = f"{rotors.note}, in rad/s, as PX4 in Gazebo (SIM_GZ_EN = 1) writes them"
+        log_map = log_map.with_ways({"rotors": [replace(rotors, unit="rad/s", note=note)]})
     motors, sent = log_map.ways("commands")
     factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
     note = (

@@ -13,7 +13,7 @@ import numpy as np
 
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
-from ..log_map import LogMap, parse_map, stated
+from ..log_map import Columns, LogMap, parse_map, stated
 from ..table import Array
 from .px4_ulog import unified
 
@@ -196,6 +196,15 @@ def stamp(message: Any) -> int:
         return min(int(header.stamp.sec) * _SECOND + int(header.stamp.nanosec), _LATEST - 1)
     sampled = int(getattr(message, "timestamp_sample", 0) or getattr(message, "timestamp", 0))
     return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
+
+
+def empty_motors(first: tuple[int, Any] | None, held: Mapping[str, Columns]) -> list[str]:
+    """Return rotors or commands, whichever the first message of their topic leaves empty beside the
+    other.
+    """
+    paths = set(_paths(first[1])) if first else set()
+    empty = [name for name in MOTORS if not paths.issuperset(held[name].named)]
+    return empty if len(empty) < len(MOTORS) else []
 
 
 class MessageFields:

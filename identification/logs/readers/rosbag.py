@@ -53,7 +53,7 @@ from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
 from ..table import Array, one_line
-from .ros_topics import MessageFields, definitions, map_of, stamp
+from .ros_topics import MOTORS, MessageFields, definitions, empty_motors, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -92,6 +92,10 @@ def read(
         log_map, notes = map_of(types, given, str(path), str(file))
         for topic in sorted(log_map.topics - {""}):
             held = {name: part for name, part in log_map.sections.items() if part.topic == topic}
+            if held.keys() >= {*MOTORS}:
+                for name in empty_motors(next(messages(topic), None), held):
+                    notes.append(f"no {name}: {topic} has no {held.pop(name).columns[0]} ...")
+                    log_map = log_map.with_ways({name: []})
             wanted = dict.fromkeys(name for part in held.values() for name in part.named)
             fields = MessageFields(f"{path}: topic {topic}", types[topic], wanted)
             try:

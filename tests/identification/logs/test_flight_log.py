@@ -2,7 +2,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
@@ -138,6 +138,7 @@ def flight_logs(draw):
         draw(arrays(float, (count, 3), elements=st.floats(-3, 3)))
     ).as_quat()
     valid = draw(arrays(bool, count))
+    assume(valid.sum() != 1)  # beside an IMU in rows of its own, one pose is refused
     pose = np.where(
         valid[:, None],
         np.column_stack([draw(arrays(float, (count, 3), elements=st.floats(-9, 9))), quaternions]),

@@ -1,0 +1,55 @@
+"""A flight log on the clock of its poses, where poses are rarer than rows.
+
+Poses between two measurements are unknown. An interpolated pose has no noise above half the pose's
+own rate, so a likelihood over all rows takes interpolated poses for exact measurements. One row a
+pose is the measured flight: rotor speeds act over the whole interval that ends at the pose.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..logs.flight_log import FlightLog, with_rows
+from ..logs.table import Array, Rows, median_step
+
+_RARE = 2.5  # rows a pose, from which a log is thinned: every second row is dense enough
+
+
+def on_pose_clock(log: FlightLog) -> FlightLog:
+    """Return a log with one row a pose, or the log itself where poses stand in every second row.
+
+    Rotor speeds are the root of the mean square, commands, voltage and true wrench the mean over
+    the interval that ends at the pose. Gyro and accelerometer are means around the pose.
+    """
+    rows = np.flatnonzero(log.valid)
+    if len(rows) < 2 or median_step(log.t[rows]) < _RARE * log.period:
+        return log
+    begins = np.append(rows[0], rows[:-1] + 1)
+    middles = np.append(0, (rows[1:] + rows[:-1]) // 2 + 1)
+    thin = with_rows(log, log.valid)
+
+    def held(x: Array | None) -> Array | None:
+        return None if x is None else _means(x[: rows[-1] + 1], begins)
+
+    squares = held(np.square(log.rotor_speeds))
+    assert squares is not None
+    return replace(
+        thin,
+        rotor_speeds=np.sqrt(squares),
+        command=held(log.command),
+        voltage=held(log.voltage),
+        force=held(log.force),
+        torque=held(log.torque),
+        gyro=None if log.gyro is None else _means(log.gyro, middles),
+        accelerometer=None if log.accelerometer is None else _means(log.accelerometer, middles),
+    )
+
+
+def _means(x: Array, begins: Rows) -> Array:
+    """Return the means of the finite rows of x (N, ...), from each row of ``begins`` to the next;
+    NaN: there are none.
+    """
+    there = np.isfinite(x)
+    counts = np.add.reduceat(there.astype(float), begins)
+    sums = np.add.reduceat(np.where(there, x, 0.0), begins)
+    return np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts > 0.0)
