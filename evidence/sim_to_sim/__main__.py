@@ -35,7 +35,7 @@ from .pilots import TAUGHT, pilot_of, taught_path
 Array = NDArray[np.float64]
 Figures = dict[str, Array]  # (episodes,) by name
 
-LAWS = "hover,pid,pid-force,pid-wrench,indi,l1,lqg,oracle,linear,gru"
+LAWS = "hover,pid,pid-force,pid-wrench,indi,l1,lqg,linear,gru"
 CHUNK = 10  # episodes of a task
 _CLEAR = 2.02  # standard errors of a paired difference of 40 episodes, 95 %
 

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
 # steps of a tick, the fewest at or above each simulator's own 500 and 240 Hz
 _CRAZYFLOW_STEPS, _PYBULLET_STEPS = 3, 2
+# crazyflow's states in a vector
+_STATE, _WRENCH = ("pos", "quat", "vel", "ang_vel", "rotor_vel"), ("force", "torque")
 _SCALAR_FIRST, _SCALAR_LAST = [3, 0, 1, 2], [1, 2, 3, 0]
 
 
@@ -99,39 +101,42 @@ class Crazyflow:
         step = sim.build_step_fn()
 
         @jax.jit  # type: ignore[misc]
-        def tick(data: Any, given: Any) -> tuple[Any, Any]:
-            """Return data and motion (17,) after a tick at commands and wrench (10,)."""
-            shape = data.states.force.shape[:2]
-            command, force, torque = (
-                jax.numpy.broadcast_to(given[a:b], (*shape, b - a))
-                for a, b in ((0, 4), (4, 7), (7, 10))
+        def tick(x: Any, given: Any) -> Any:
+            """Return the state (17,) after a tick, from a state and commands and wrench (10,)."""
+            states = data.states.replace(
+                **_split(x, data.states, _STATE), **_split(given[4:], data.states, _WRENCH)
             )
-            controls = data.controls.replace(rotor_vel=command)
-            states = data.states.replace(force=force, torque=torque)
-            data = step(data.replace(controls=controls, states=states), n_steps=_CRAZYFLOW_STEPS)
-            s = data.states
-            parts = s.pos, s.quat, s.vel, s.ang_vel, s.rotor_vel
-            return data, jax.numpy.concatenate([part.ravel() for part in parts])
+            controls = data.controls.replace(rotor_vel=given[:4][None, None])
+            s = step(
+                data.replace(states=states, controls=controls), n_steps=_CRAZYFLOW_STEPS
+            ).states
+            return jax.numpy.concatenate([getattr(s, name).ravel() for name in _STATE])
 
-        self._tick, self._at_rest, self._data = tick, data, data
+        self._tick = tick
 
     def start(self, pose: Array) -> None:
         """Hover at a pose (7,) with the rotors at hover."""
-        states = self._at_rest.states
-        rotors = np.full(4, self.vehicle.hover_rate * RPM)
-        quaternion = pose[3:][_SCALAR_LAST]
-        parts = {"pos": pose[:3], "quat": quaternion, "rotor_vel": rotors}
-        placed = {name: getattr(states, name).at[...].set(part) for name, part in parts.items()}
-        self._data = self._at_rest.replace(states=states.replace(**placed))
+        rotors, quaternion = np.full(4, self.vehicle.hover_rate * RPM), pose[3:][_SCALAR_LAST]
+        self._x = np.concatenate([pose[:3], quaternion, np.zeros(6), rotors]).astype(np.float32)
 
     def step(self, command: Array, wrench: Array) -> Flown:
         """Fly a tick, as of ``Peer``."""
         given = np.concatenate([command[::-1] * RPM, wrench]).astype(np.float32)
-        self._data, moved = self._tick(self._data, given)
-        x = np.asarray(moved, dtype=np.float64)
+        self._x = np.asarray(self._tick(self._x, given))
+        x = self._x.astype(np.float64)
         quaternion = x[3:7][_SCALAR_FIRST]
         pose = np.concatenate([x[:3], quaternion / np.linalg.norm(quaternion)])
         return Flown(pose, x[7:13], x[:12:-1] / RPM)
+
+
+def _split(x: Any, states: Any, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the parts of a vector by their names, in the shapes of crazyflow's states."""
+    parts, first = {}, 0
+    for name in names:
+        shape = getattr(states, name).shape
+        parts[name] = x[first : first + shape[-1]].reshape(shape)
+        first += shape[-1]
+    return parts
 
 
 class PyBulletDrones:
