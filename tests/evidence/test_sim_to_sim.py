@@ -23,7 +23,7 @@ class Ours:
     vehicle = load_vehicle("crazyflie")
 
     def start(self, pose):
-        self.model, self.data = load_world(self.vehicle)
+        self.model, self.data = load_world(self.vehicle, False)
         self.data.qpos[:], self.speeds = pose, self.vehicle.hover_rate
 
     def step(self, command, wrench):
