@@ -35,6 +35,7 @@ Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
 _TURN_TIME = 0.3  # s, over which the reference goes on to change its acceleration
 _LOOK = 25  # decisions
+_POSITIVE = ("effort", "force", "torque", "force_time", "torque_time", "estimate_lag", "bias")
 
 
 @dataclass(eq=False)
@@ -68,8 +69,8 @@ class LQG:
             "place": 0.001,  # m
             "speed": 0.03,  # m/s
             "tilt": 0.006,  # rad
-            "force": 0.06,  # N, of the estimate
-            "torque": 0.003,  # Nm, likewise
+            "force": 0.01315,  # of the weight, of the estimate
+            "torque": 0.00521,  # of weight times arm, likewise
             "accelerometer": 0.04,  # m/s2, mean over a decision
         }
     )
@@ -78,15 +79,7 @@ class LQG:
     vehicle: Vehicle = field(default_factory=standard_vehicle)
 
     def __post_init__(self) -> None:
-        for name in (
-            "effort",
-            "force",
-            "torque",
-            "force_time",
-            "torque_time",
-            "estimate_lag",
-            "bias",
-        ):
+        for name in _POSITIVE:
             if not getattr(self, name) > 0.0:
                 raise InputError(f"LQG: {name} must be above 0, got {getattr(self, name)!r}")
         self._laws = [self._law(axis) for axis in axis_models(self.vehicle)]
@@ -109,11 +102,13 @@ class LQG:
         the reference's last turn, which is expected to go on.
         """
         k = axis.D.shape[1]
-        weight, noise = self.vehicle.weight, self.noise
-        sizes = (self.force * weight, self.torque * weight * self.vehicle.arm_l)[:k]
+        units = {"force": self.vehicle.weight}
+        units["torque"] = units["force"] * self.vehicle.arm_l
+        sizes = tuple(getattr(self, name) * unit for name, unit in units.items())[:k]
         wrench = WrenchProcess(sizes, (self.force_time, self.torque_time)[:k], self.estimate_lag)
         horizontal = ("tilt", "force", "torque") if k == 2 else ("force",)
-        seen = tuple(noise[name] for name in ("place", "speed", *horizontal, "accelerometer"))
+        names = ("place", "speed", *horizontal, "accelerometer")
+        seen = tuple(self.noise[name] * units.get(name, 1.0) for name in names)
         model = axis_filter(axis, WIND_PERIOD, wrench, self.model, seen, self.bias)
         turn = np.zeros((len(model.A), 1))
         turn[TILT] = -1.0
