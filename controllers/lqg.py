@@ -102,13 +102,14 @@ class LQG:
         the reference's last turn, which is expected to go on.
         """
         k = axis.D.shape[1]
-        units = {"force": self.vehicle.weight}
-        units["torque"] = units["force"] * self.vehicle.arm_l
-        sizes = tuple(getattr(self, name) * unit for name, unit in units.items())[:k]
+        weight, noise = self.vehicle.weight, dict(self.noise)
+        moment = weight * self.vehicle.arm_l
+        noise["force"] *= weight
+        noise["torque"] *= moment
+        sizes = (self.force * weight, self.torque * moment)[:k]
         wrench = WrenchProcess(sizes, (self.force_time, self.torque_time)[:k], self.estimate_lag)
         horizontal = ("tilt", "force", "torque") if k == 2 else ("force",)
-        names = ("place", "speed", *horizontal, "accelerometer")
-        seen = tuple(self.noise[name] * units.get(name, 1.0) for name in names)
+        seen = tuple(noise[name] for name in ("place", "speed", *horizontal, "accelerometer"))
         model = axis_filter(axis, WIND_PERIOD, wrench, self.model, seen, self.bias)
         turn = np.zeros((len(model.A), 1))
         turn[TILT] = -1.0
@@ -134,5 +135,5 @@ class LQG:
             x = observer.update(self._action[i], np.array(seen), turned[i])
             action[i] = -float(gain @ x) - ahead * turned[i]
         self._wanted = wanted
-        self._action = np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION)
+        self._action = np.clip(action, -MAX_ACCELERATION, MAX_ACCELERATION)
         return self._action.astype(np.float32)
