@@ -84,7 +84,7 @@ class Variation(Drawn):
 
 
 @dataclass(frozen=True)
-class Measured:
+class ScenarioBase:
     """Fields of every scenario: the measurement of the pose, and whether the vehicle varies."""
 
     __pydantic_config__ = STRICT
@@ -97,7 +97,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Scenario(Measured):
+class Scenario(ScenarioBase):
     """Motion of the fan, and start of the vehicle."""
 
     motions: Motions = ("sine", "triangle", "ramp", "still")

@@ -11,7 +11,7 @@ import numpy as np
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import NotNegative
 from .references import figure_of_eight, hold, random_spline
-from .scenarios import Drawn, Factors, Measured, Range, kept_scenarios
+from .scenarios import Drawn, Factors, Range, ScenarioBase, kept_scenarios
 from .wind import (
     CompiledWind,
     FanWall,
@@ -36,7 +36,7 @@ class WindVariation(Drawn):
 
 
 @dataclass(frozen=True)
-class WindScenario(Measured):
+class WindScenario(ScenarioBase):
     """Winds. A range is drawn from evenly, once an episode."""
 
     mean: Range = (0.0, 0.0)  # m/s at the vehicle's height, from any side; sheared by the log law
