@@ -41,9 +41,9 @@ class View:
         self._pilot = make_pilot(controller, task)
         (seed,) = benchmark_seeds(SEED, 1)
         self._seen, self._info = self.env.reset(seed=seed)
-        self._pilot.reset()
         if hasattr(self._pilot, "brief"):
             self._pilot.brief(self.env.briefing())
+        self._pilot.reset()
         self.errors, self.speed = [float(self._info["error"])], 0.0
         self._path = [self.env.loop.position.copy()]
         self._rng = np.random.default_rng(0)

@@ -23,7 +23,7 @@ from windwrench.envs import WindHoverEnv
 from windwrench.evaluation.episodes import Episode, benchmark_seeds, fly_episode
 from windwrench.evaluation.statistics import hierarchical_bootstrap, mean, relative_change
 from windwrench.evaluation.tasks import make_pilot, task_of
-from windwrench.evidence.runner import Jobs, run_tasks, start
+from windwrench.evidence.runner import Jobs, code_stamp, run_tasks, start
 from windwrench.runtime.page_files import write_json
 from windwrench.training.configuration import load_config
 from windwrench.training.train import train
@@ -50,7 +50,7 @@ SCENARIO = "base"
 SEEDS = (0, 1)
 # beside training/configs: for SAC SB3's own numbers, where those of the tasks suit accelerations
 SETTINGS: dict[str, tuple[str, ...]] = {
-    "ppo": (),
+    "ppo": ("estimator=ukf-lanes",),
     "sac": (
         "learner.learning_rate=0.0003",  # SB3's own
         "learning_rate_end=0.0003",
@@ -148,7 +148,9 @@ def study(
     work = work.resolve()
     wanted = [(a, s, steps or STEPS[a], str(work)) for a in names for s in SEEDS]
     runs = run_tasks(trained, wanted, work / "runs.jsonl", jobs)
-    laws = {law: flown(law, LAWED, episodes, seed) for law in LAWS}
+    flights = [(law, LAWED, episodes, seed) for law in LAWS]
+    boards = run_tasks(flown, flights, work / "laws.jsonl", jobs, code_stamp("rates_learning"))
+    laws = {task[0]: figures for task, figures in boards.items()}
     fly = partial(flown, task=LEARNED, episodes=episodes, seed=seed)
     found = {law: row([figures], laws[RIVAL]) for law, figures in laws.items()}
     for name in names:
