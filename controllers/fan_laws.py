@@ -27,6 +27,12 @@ class FanLaw:
 
     def reset(self) -> None:
         """Forget the last episode."""
+        self._last: float | None = None
+
+    def _rate(self, x: float) -> float:
+        """Return the change of ``x`` since the last decision, a second; at first none."""
+        last, self._last = self._last, x
+        return 0.0 if last is None else (x - last) / DECISION_PERIOD
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return the wanted velocity along each commanded axis, m/s."""
@@ -68,21 +74,18 @@ class Admittance(FanLaw):
 
 
 @dataclass(eq=False)
-class Ratio(FanLaw):
+class Ratio(Admittance):
     """Velocity in proportion to ``tau_z / f_x``: the ratio grows with the offset where ``tau_z``
     alone falls off again.
     """
 
-    gain: float = 8.0  # m/s per m, sideways
+    gain: float = 8.0  # m/s per m, as ``gain_z``
     least_force: float = 0.1  # N, below which the force is held to be no jet at all
-    gain_z: float | None = None  # m/s per m, up and down; None: not commanded
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-gain tau_z / f_x``, and ``gain_z tau_y / f_x``."""
         force = max(float(o[FORCE_X]), self.least_force)
-        if self.gain_z is None:
-            return (-self.gain * o[TORQUE_Z] / force,)
-        return -self.gain * float(o[TORQUE_Z]) / force, self.gain_z * float(o[TORQUE_Y]) / force
+        return tuple(each / force for each in super().command(o, info))
 
 
 @dataclass(eq=False)
@@ -97,16 +100,10 @@ class Lead(FanLaw):
     lead: float = 2.79  # m/s per m/s
     least_force: float = 0.183  # N, below which the force is held to be no jet at all
 
-    def reset(self) -> None:
-        """Forget the last episode."""
-        self._last: float | None = None
-
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-(gain x + lead dx/dt)``."""
         x = float(o[TORQUE_Z]) / max(float(o[FORCE_X]), self.least_force)
-        rate = 0.0 if self._last is None else (x - self._last) / DECISION_PERIOD
-        self._last = x
-        return (-(self.gain * x + self.lead * rate),)
+        return (-(self.gain * x + self.lead * self._rate(x)),)
 
 
 @dataclass(eq=False)
@@ -124,15 +121,13 @@ class AdmittancePID(FanLaw):
 
     def reset(self) -> None:
         """Forget the last episode."""
+        super().reset()
         self._sum = 0.0
-        self._last: float | None = None
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return the sum of the three parts."""
         torque = float(o[TORQUE_Z])
-        rate = 0.0 if self._last is None else (torque - self._last) / DECISION_PERIOD
-        self._last = torque
-        proportional = self.gain * torque + self.lead * rate
+        proportional = self.gain * torque + self.lead * self._rate(torque)
         total = self._sum + DECISION_PERIOD * torque
         command = -(proportional + self.integral * total)
         if abs(command) < MAX_COMMAND or command * torque > 0.0:

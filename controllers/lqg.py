@@ -35,6 +35,7 @@ Array = NDArray[np.floating[Any]]
 Wide = NDArray[np.float64]
 _TURN_TIME = 0.3  # s, over which the reference goes on to change its acceleration
 _LOOK = 25  # decisions
+_POSITIVE = ("effort", "force", "torque", "force_time", "torque_time", "estimate_lag", "bias")
 
 
 @dataclass(eq=False)
@@ -68,8 +69,8 @@ class LQG:
             "place": 0.001,  # m
             "speed": 0.03,  # m/s
             "tilt": 0.006,  # rad
-            "force": 0.06,  # N, of the estimate
-            "torque": 0.003,  # Nm, likewise
+            "force": 0.01315,  # of the weight, of the estimate
+            "torque": 0.00521,  # of weight times arm, likewise
             "accelerometer": 0.04,  # m/s2, mean over a decision
         }
     )
@@ -78,15 +79,7 @@ class LQG:
     vehicle: Vehicle = field(default_factory=standard_vehicle)
 
     def __post_init__(self) -> None:
-        for name in (
-            "effort",
-            "force",
-            "torque",
-            "force_time",
-            "torque_time",
-            "estimate_lag",
-            "bias",
-        ):
+        for name in _POSITIVE:
             if not getattr(self, name) > 0.0:
                 raise InputError(f"LQG: {name} must be above 0, got {getattr(self, name)!r}")
         self._laws = [self._law(axis) for axis in axis_models(self.vehicle)]
@@ -109,8 +102,11 @@ class LQG:
         the reference's last turn, which is expected to go on.
         """
         k = axis.D.shape[1]
-        weight, noise = self.vehicle.weight, self.noise
-        sizes = (self.force * weight, self.torque * weight * self.vehicle.arm_l)[:k]
+        weight, noise = self.vehicle.weight, dict(self.noise)
+        moment = weight * self.vehicle.arm_l
+        noise["force"] *= weight
+        noise["torque"] *= moment
+        sizes = (self.force * weight, self.torque * moment)[:k]
         wrench = WrenchProcess(sizes, (self.force_time, self.torque_time)[:k], self.estimate_lag)
         horizontal = ("tilt", "force", "torque") if k == 2 else ("force",)
         seen = tuple(noise[name] for name in ("place", "speed", *horizontal, "accelerometer"))
@@ -139,5 +135,5 @@ class LQG:
             x = observer.update(self._action[i], np.array(seen), turned[i])
             action[i] = -float(gain @ x) - ahead * turned[i]
         self._wanted = wanted
-        self._action = np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION)
+        self._action = np.clip(action, -MAX_ACCELERATION, MAX_ACCELERATION)
         return self._action.astype(np.float32)

@@ -76,9 +76,7 @@ class WindLaw:
         within = np.abs(action) < MAX_ACCELERATION
         self._sum = np.where(within, grown, self._sum)
         action = free + self.ki * self._sum
-        return np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION).astype(
-            np.float32
-        )
+        return np.clip(action, -MAX_ACCELERATION, MAX_ACCELERATION).astype(np.float32)
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the part (3,) m/s2 against the wind; none in this law."""
@@ -134,12 +132,15 @@ class PIDWithWrench(PIDWithForce):
     vehicle away.
     """
 
-    tilt: float = 10.0  # m/s2 for 1 Nm; g / (J k_attitude) cancels all of a steady torque: 30
+    # m/s2 for 1 Nm on the standard vehicle, on others by inertia; g / (J k_attitude) cancels all of
+    # a steady torque: 30
+    tilt: float = 10.0
     tilt_lead: float = 0.1  # s, by which the torque's change over a decision is added
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the force's part, and ``- tilt (tau + tilt_lead dtau/dt)`` across."""
-        return super().against_the_wind(o, info) - self.tilt * self._tilting(o, self.tilt_lead)
+        tilt = self.tilt * standard_vehicle().inertia[0, 0] / self.vehicle.inertia[0, 0]
+        return super().against_the_wind(o, info) - tilt * self._tilting(o, self.tilt_lead)
 
 
 @dataclass(eq=False)

@@ -43,6 +43,7 @@ class TaskDefinition:
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012
     name: ClassVar[str] = "Task"
     scenarios: ClassVar[Mapping[str, Any]] = WIND_SCENARIOS
+    vehicle: Any = "ardrone2"  # preset, YAML path or ``Vehicle``
     action: str = "acceleration"
     observation: str = "wrench"
     decision_hz: float = 25.0
@@ -66,7 +67,7 @@ class TaskDefinition:
         self,
         scenario: Any = "base",
         render_mode: str | None = None,
-        vehicle: str | Vehicle = "ardrone2",
+        vehicle: str | Vehicle | None = None,
         effects: Sequence[EffectSetting] = (),
         truth: str | Vehicle | None = None,
         settings: PlantSettings | None = None,
@@ -98,7 +99,8 @@ class TaskDefinition:
         if isinstance(scenario, str):
             scenario = find_scenario(scenario, self.scenarios)
         self.scenario = scenario
-        self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
+        declared = self.vehicle if vehicle is None else vehicle
+        self.vehicle = declared if isinstance(declared, Vehicle) else load_vehicle(declared)
         # an amended vehicle must not bring its effects into the world a second time
         true = self.vehicle if truth is None else truth
         self.truth = true if isinstance(true, Vehicle) else load_vehicle(true)
@@ -108,7 +110,6 @@ class TaskDefinition:
         given = {
             "normalize": normalize,
             "action": action,
-            "observation": observation,
             "decision_hz": decision_hz,
             "episode_s": episode_s,
             "model_in_loop": model_in_loop,
@@ -116,15 +117,13 @@ class TaskDefinition:
         for field, value in given.items():
             if value is not None:
                 setattr(self, field, value)
+        sees = self._source("observe")
+        if observation is None and type(self).observation != sees.observation:
+            observation = type(self).observation
+        elif observation is None and sees.observation == "own" and self.action != sees.action:
+            observation = "wrench"  # the task's own holds its own action
         self.chosen = None if observation == "own" else observation
-        if (
-            observation is None
-            and type(self).observation == "own"
-            and self.action != type(self).action
-        ):
-            self.chosen = self.observation = "wrench"  # the task's own holds its own action
-        if self.chosen is None:
-            self.observation = type(self).observation
+        self.observation = self.chosen or type(self).observation
         self.winds = None if winds is None else Sum(*winds, where=f"{name}: winds").winds
         self.gains = gains
         self.fan = Fan(speed=0.0, height=HEIGHT).sized(self.truth)
@@ -138,7 +137,8 @@ class TaskDefinition:
 
     def _make_spaces(self) -> None:
         """Make the spaces of actions and observations."""
-        largest = self.largest_action if self.action == type(self).action else None
+        same = self.action == self._source("largest_action").action
+        largest = self.largest_action if same else None
         self.flown = make_action(
             self.action, self.vehicle, self.axes, self.follows, largest, self.gains
         )
@@ -167,16 +167,16 @@ class TaskDefinition:
     def bounds(self) -> tuple[Sequence[float] | None, Sequence[float] | None]:
         """Return largest sizes and scales of the observation's numbers; None: any, and 1."""
         if self.chosen is None:
-            mro = type(self).__mro__
-            sees, states = (
-                next(i for i, each in enumerate(mro) if name in vars(each))
-                for name in ("observe", "limits")
-            )
-            if sees < states:  # limits are those of another observation
+            sees, states = self._source("observe"), self._source("limits")
+            if sees is not states and issubclass(sees, states):  # limits of another observation
                 return None, None
-            if self.limits is not None or sees < mro.index(TaskDefinition):
+            if self.limits is not None or sees is not TaskDefinition:
                 return self.limits, self.scales
         return bounds(self.observation, self.vehicle, self.action_size)
+
+    def _source(self, name: str) -> Any:
+        """Return the class that states an attribute."""
+        return next(each for each in type(self).__mro__ if name in vars(each))
 
     def see(self, s: State) -> ArrayLike:
         """Return what the agent observes, (n, k) in SI units: as ``observe`` has it, unless the

@@ -84,21 +84,27 @@ class Variation(Drawn):
 
 
 @dataclass(frozen=True)
-class Scenario:
-    """Motion of the fan, start of the vehicle, and its measurement."""
+class ScenarioBase:
+    """Fields of every scenario: the measurement of the pose, and whether the vehicle varies."""
 
     __pydantic_config__ = STRICT
 
     summary: str = ""
-    motions: Motions = ("sine", "triangle", "ramp", "still")
-    speed: Range = (0.05, 0.35)  # m/s, largest speed of the fan
-    offset: Range = (0.0, 0.1)  # m, from the fan's axis at the start, either side
     rise_time: Positive = 0.45  # s, of the filter
     sigma_position: Positive = 0.001  # m
     sigma_attitude: Positive = 0.005  # rad
+    varied: bool = False  # the world is drawn anew each episode, by ``variation``
+
+
+@dataclass(frozen=True)
+class Scenario(ScenarioBase):
+    """Motion of the fan, and start of the vehicle."""
+
+    motions: Motions = ("sine", "triangle", "ramp", "still")
+    speed: Range = (0.05, 0.35)  # m/s, largest speed of the fan
+    offset: Range = (0.0, 0.1)  # m, from the fan's axis at the start, either side
     turbulence: NotNegative = 0.10
-    varied: bool = False  # fan strength, distance and vehicle drawn anew each episode,
-    variation: Variation = Variation()  # from this distribution
+    variation: Variation = Variation()
 
 
 def kept_scenarios(section: str, form: type[AnyScenario]) -> dict[str, AnyScenario]:

@@ -94,13 +94,9 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
 
     @property
     def many(self) -> TaskVectorEnv:
-        """The vector of one that flies.
-
-        Raises:
-            InputError: there has been no reset.
-        """
+        """The vector of one that flies."""
         if self._many is None:
-            raise InputError(f"{self.name}: call reset before step")
+            self._many = TaskVectorEnv(1, task=self)
         return self._many
 
     @property
@@ -128,9 +124,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
                 f"none: scenario and all else are arguments of the environment"
             )
         super().reset(seed=seed)
-        if self._many is None:
-            self._many = TaskVectorEnv(1, task=self)
-        judged = self._many.begin(self.np_random)
+        judged = self.many.begin(self.np_random)
         return judged.observations[0].copy(), self._told(judged)
 
     def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
@@ -166,12 +160,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         Raises:
             InputError: not reset yet, or this machine cannot draw.
         """
-        if self._many is None:
-            raise InputError(
-                f"{self.name}: render needs a render_mode ('human' or 'rgb_array') and a reset "
-                f"before it"
-            )
-        picture: NDArray[np.uint8] | None = self._many.render()[0]
+        picture: NDArray[np.uint8] | None = self.many.render()[0]
         return picture
 
     def close(self) -> None:

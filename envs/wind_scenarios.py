@@ -10,9 +10,8 @@ import numpy as np
 
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import NotNegative
-from ..runtime.forms import STRICT, Positive
 from .references import figure_of_eight, hold, random_spline
-from .scenarios import Drawn, Factors, Range, kept_scenarios
+from .scenarios import Drawn, Factors, Range, ScenarioBase, kept_scenarios
 from .wind import (
     CompiledWind,
     FanWall,
@@ -37,12 +36,9 @@ class WindVariation(Drawn):
 
 
 @dataclass(frozen=True)
-class WindScenario:
-    """Winds, and the measurement of the pose. A range is drawn from evenly, once an episode."""
+class WindScenario(ScenarioBase):
+    """Winds. A range is drawn from evenly, once an episode."""
 
-    __pydantic_config__ = STRICT
-
-    summary: str = ""
     mean: Range = (0.0, 0.0)  # m/s at the vehicle's height, from any side; sheared by the log law
     # "", or the spectrum of turbulence: strengths, times ``strength``, and lengths are those of
     # MIL-F-8785C near the ground in the mean wind
@@ -51,10 +47,6 @@ class WindScenario:
     gusts: Range = (0.0, 0.0)  # m/s, of gusts 1 - cos of 1-3 m that pass every 3-6 s
     wall: Range = (0.0, 0.0)  # m/s, jets of a wall of 3 x 3 fans that switch by themselves
     wash: bool = False  # another vehicle crosses 1.0-1.6 m above, to and fro
-    rise_time: Positive = 0.45  # s, of the filter
-    sigma_position: Positive = 0.001  # m
-    sigma_attitude: Positive = 0.005  # rad
-    varied: bool = False
     variation: WindVariation = WindVariation()
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ def train(
     features = features_of(config) if standard else None
     envs = make_training_envs(scenario, config["environments"], config["estimator"], task)
     own = find_reward(reward) if reward else WeightedTerms(config["reward"]) if standard else None
-    env = FeatureVecEnv(envs, features, lambda i, episode: training_seed(seed, i, episode), own)
+    env = FeatureVecEnv(envs, features, partial(training_seed, seed), own)
     seen = {} if standard else task_of(task).units(envs)
     learner = make_learner(config, env, seed)
     learner.set_logger(_logger(folder))

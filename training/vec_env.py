@@ -3,6 +3,7 @@ features for observations.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -14,6 +15,7 @@ from ..controllers.features import Features, History
 from ..envs.fan_tracking import LOST_OFFSET
 from ..evaluation.episodes import error_of
 from ..evaluation.rewards import Reward, total_of
+from .seeds import training_seed
 
 Array = NDArray[np.float32]
 
@@ -30,7 +32,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     Args:
         envs: of Gymnasium, with the option ``reset_mask``.
         features: of a policy of FanTracking; None: the observations as they are.
-        seed_of: from environment and episode to the episode's seed.
+        seed_of: from environment and episode to the episode's seed; default: those of run 0.
         reward: of ``infos``; None: the environments' own.
     """
 
@@ -39,12 +41,12 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     def __init__(
         self,
         envs: Any,
-        features: Features | None,
-        seed_of: Callable[[int, int], int],
+        features: Features | None = None,
+        seed_of: Callable[[int, int], int] | None = None,
         reward: Reward | None = None,
     ) -> None:
         self.envs, self.features = envs, features
-        self._seed_of, self._reward = seed_of, reward
+        self._seed_of, self._reward = seed_of or partial(training_seed, 0), reward
         space = envs.single_observation_space
         if features is not None:
             space = gym.spaces.Box(-10.0, 10.0, (features.size,), np.float32)

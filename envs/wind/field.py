@@ -96,7 +96,7 @@ class CompiledWind:
         Raises:
             InputError: points have another shape, or numbers are not finite.
         """
-        rows, now = check_points(points, time), np.array([time], dtype=np.float64)
+        rows, now = _check_points(points, time), np.array([time], dtype=np.float64)
         out = np.zeros_like(rows)
         specialised(add_winds, self.calls, now, rows, out)(self.calls, now, rows, out)
         return np.ascontiguousarray(out.T)
@@ -140,7 +140,7 @@ def winds_of(wind: Wind) -> list[Wind]:
     return wind.winds if isinstance(wind, Sum) else [wind]
 
 
-def check_points(points: ArrayLike, time: float) -> Array:
+def _check_points(points: ArrayLike, time: float) -> Array:
     """Return points (n, 3) as rows (3, n).
 
     Raises:

@@ -1,5 +1,7 @@
 """Controllers: which way they push and what they need; laws of the tasks beside FanTracking."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -24,7 +26,7 @@ from windwrench.controllers.wind_observation import WIND_PERIOD
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, PlantSettings
-from windwrench.envs.wind_tasks import WindTrajectoryEnv
+from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from windwrench.estimator.estimate import STATE_SIZE
 from windwrench.evaluation.episodes import fly_episode
 
@@ -111,7 +113,8 @@ def test_the_torque_is_answered_before_anything_has_moved():
     assert x < -0.05
     assert y < -0.05
     assert abs(z) < 1e-6
-    fed = PIDWithWrench(tilt=10.0, tilt_lead=0.1)
+    heavy = replace(VEHICLE, inertia=2.0 * VEHICLE.inertia)
+    fed = PIDWithWrench(tilt=20.0, tilt_lead=0.1, vehicle=heavy)
     assert_allclose(fed(felt), [-0.2, -0.2, 0.0], atol=1e-6)
     expected = -10.0 * (0.03 + 0.1 * 0.01 / WIND_PERIOD)
     assert_allclose(fed(hovering(TORQUE=[-0.02, 0.03, 0.0]))[0], expected, rtol=1e-5)
@@ -138,6 +141,11 @@ def test_what_lasts_longer_is_answered_by_more(felt, axes, time, other):
     assert (answer(**{time: 0.25 * getattr(LQG, time)}) < 0.97 * usual).all()
     for share in (0.25, 4.0):
         assert_allclose(answer(**{other: share * getattr(LQG, other)}), usual, rtol=5e-3)
+
+
+def test_a_small_vehicle_is_flown_as_well():
+    env = WindHoverEnv(vehicle="crazyflie", episode_s=8.0)
+    assert fly_episode(env, LQG(), 900_000).rmse_settled < 0.01  # 0.04 with another's noise
 
 
 class Unturned(LQG):

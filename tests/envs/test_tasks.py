@@ -3,10 +3,8 @@
 import re
 import subprocess
 import sys
-import warnings
 from types import SimpleNamespace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -65,8 +63,9 @@ def test_the_rewards_are_as_stated(name, weight, width, actions):
         last = action
 
 
-def test_a_steady_wind_pushes_as_its_drag_says_and_all_see_it():
-    env = WindHoverEnv("calm", winds=[Uniform((4.0, 0.0, 0.0))])
+def test_a_steady_wind_half_of_one_s_own_pushes_as_its_drag_says_and_all_see_it():
+    half = Uniform((2.0, 0.0, 0.0))
+    env = WindHoverEnv("calm", winds=[half, SimpleNamespace(velocity=half.velocity)])
     env.reset(seed=0)
     for _ in range(150):
         observation, _, lost, _, info = env.step(np.zeros(3))
@@ -80,15 +79,6 @@ def test_a_steady_wind_pushes_as_its_drag_says_and_all_see_it():
     assert 0.465 * pushed[0] == pytest.approx(expected, abs=0.2)
 
 
-def test_a_wind_of_one_s_own_blows_as_the_kit_s_own_does():
-    blowing = Uniform((1.0, -0.5, 0.2))
-    for wind in (SimpleNamespace(velocity=blowing.velocity), blowing):
-        env = WindHoverEnv("calm", winds=[wind])
-        env.reset(seed=0)
-        *_, info = env.step(np.zeros(3))
-        np.testing.assert_allclose(info["wind"], [1.0, -0.5, 0.2])
-
-
 def test_a_lost_vehicle_ends_the_episode():
     # a storm that comes with the grid's second half
     wind = np.zeros((3, 1, 1, 1, 3))
@@ -100,15 +90,6 @@ def test_a_lost_vehicle_ends_the_episode():
 
 
 STILL = np.zeros(1, np.float32)
-
-
-def test_stable_baselines_checker_finds_nothing():
-    checker = pytest.importorskip(
-        "stable_baselines3.common.env_checker", reason="pip install 'windwrench[rl]'"
-    )
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        checker.check_env(gym.make("windwrench/FanTracking-v2"), warn=True)
 
 
 def test_the_name_with_its_module_makes_it_without_an_import_from_any_folder(tmp_path):

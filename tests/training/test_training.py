@@ -20,6 +20,7 @@ from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.scenarios import SCENARIOS
 from windwrench.envs.vector import TaskVectorEnv
+from windwrench.envs.wind_tasks import WindHoverEnv
 from windwrench.evaluation.rewards import WeightedTerms
 from windwrench.training.configuration import ALGORITHMS, load_config
 
@@ -247,9 +248,9 @@ def seed_of(environment, episode):
     return 100 * environment + episode
 
 
-def make(count, limit, scenario="static"):
-    envs = TaskVectorEnv(count, limit, task=FanTrackingEnv, scenario=scenario)
-    return FeatureVecEnv(envs, FEATURES, seed_of)
+def make(count, limit, *reward):
+    envs = TaskVectorEnv(count, limit, task=FanTrackingEnv, scenario="static")
+    return FeatureVecEnv(envs, FEATURES, seed_of, *reward)
 
 
 def away(seed):
@@ -258,9 +259,9 @@ def away(seed):
     return float(np.sign(info["offset"]))
 
 
-def lone_flight(seed, commands, scenario="static"):
+def lone_flight(seed, commands):
     """Features, rewards and losses of a single environment, computed by itself."""
-    env, history = FanTrackingEnv(scenario), History(FEATURES, 1)
+    env, history = FanTrackingEnv("static"), History(FEATURES, 1)
     observation, info = env.reset(seed=seed)
     history.restart(FEATURES.frames(observation[None]), [0])
     seen, rewards = [history.flat()[0]], []
@@ -323,14 +324,20 @@ def test_rewards_are_weighted_terms():
     env = make(1, 50)
     env.reset()
     assert_allclose([env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6)
-    squared = FeatureVecEnv(
-        TaskVectorEnv(1, 50, task=FanTrackingEnv, scenario="static"),
-        FEATURES,
-        seed_of,
-        WeightedTerms({"tracking": 0.0, "change": 0.0, "squared": 1.0}),
-    )
+    squared = make(1, 50, WeightedTerms({"tracking": 0.0, "change": 0.0, "squared": 1.0}))
     squared.reset()
     assert squared.step(np.array([[0.0]]))[1][0] == pytest.approx(-0.64, abs=0.1)  # about 0.8 m off
+
+
+class Rates(WindHoverEnv):
+    vehicle, action, observation = "crazyflie", "rates", "pose"
+
+
+def test_vehicle_action_and_observation_of_a_class_hold_and_sb3_trains_on_its_lanes():
+    env = FeatureVecEnv(Rates.vector(8, plant="lanes"))
+    shapes = env.observation_space.shape, env.action_space.shape
+    assert (env.envs.task.vehicle.name, *shapes) == ("crazyflie", (16,), (4,))
+    assert sb3.PPO("MlpPolicy", env, n_steps=8, batch_size=16).learn(64).num_timesteps == 64
 
 
 def test_the_scenario_of_a_mixed_episode_says_nothing_of_its_motion():
