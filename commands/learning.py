@@ -17,6 +17,7 @@ def train(
     algorithm: str,
     scenario: str | None = None,
     task: str | None = None,
+    observation: str | None = None,
     reward: str | None = None,
     imports: list[str] | None = None,
     seed: int = 0,
@@ -45,8 +46,8 @@ def train(
         find_reward(reward)
     values = [*(setting or []), *([f"steps={steps}"] if steps else [])]
     if algorithm == "tune":
-        if cluster or reward is not None:
-            raise InputError("train tune: expected no --cluster and no --reward")
+        if cluster or reward is not None or observation is not None:
+            raise InputError("train tune: expected no --cluster, --reward and --observation")
         values = [*([f"task={task}"] if task else []), *values]
         return _tune(load_config(algorithm, values, config), scenario or "base", seed, out)
     given = load_config(algorithm, values, config, task=task)
@@ -55,6 +56,7 @@ def train(
     if cluster:
         need("ray", "cluster")
     what = {"task": task or STANDARD_TASK, "reward": reward, "imports": tuple(imports or ())}
+    what |= {"observation": observation}
     return _learn(given, scenario, seed, cluster, out, what)
 
 

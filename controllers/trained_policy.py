@@ -209,7 +209,8 @@ class TaskPolicy(_Network):
     """A learned policy of another task: scaled observations, and the same layers.
 
     Args:
-        card: ``task``; ``scale`` (n,), divisors of the observation; ``largest``, of the action;
+        card: ``task``; ``observation``, if another than the task's own; ``scale`` (n,), divisors
+            of the observation; ``largest``, of the action;
             ``activation``; ``squash`` (a tanh of the output is a share of ``largest``). ``memory``
             (m,), if any: the layers see m first-order low-passes of the observation, each of so
             many decisions.
@@ -222,6 +223,7 @@ class TaskPolicy(_Network):
     def __init__(self, card: Mapping[str, Any], weights: Weights, name: str = "policy") -> None:
         with _entries_named(name):
             self.task, largest = str(card["task"]), float(card["largest"])
+            self.observation = card.get("observation")  # None: the task's own
             self._scale = np.array(card["scale"], dtype=np.float32)
             memory = np.array(card.get("memory", [1.0]), dtype=np.float32)
             if self._scale.ndim != 1:

@@ -128,5 +128,6 @@ def _fly_chunk(chunk: Chunk) -> list[Episode]:
     request, name, scenario, seeds = chunk
     import_files(request.imports)
     pilot = make_pilot(name, request.task)
-    env = task_of(request.task).make(scenario, request.reward)
+    seen = getattr(pilot, "observation", None)
+    env = task_of(request.task).make(scenario, request.reward, observation=seen)
     return [fly_episode(env, pilot, seed) for seed in seeds]

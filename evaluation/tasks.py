@@ -149,9 +149,13 @@ class BenchmarkTask:
         mode = "vector_entry_point" if native else "sync"
         return gym.make_vec(spec, count, vectorization_mode=mode, **given)
 
-    def units(self, envs: gym.vector.VectorEnv) -> dict[str, Any]:
+    def units(self, envs: gym.vector.VectorEnv, observation: str | None = None) -> dict[str, Any]:
         """Return the entries of a policy's card that lead from a learner's units to those of
         ``make``: ``scale`` of the observation, ``largest`` of the action.
+
+        Args:
+            envs: of ``make_many``.
+            observation: theirs; None: the task's own.
 
         Raises:
             InputError: the spaces of ``envs`` are no boxes of one dimension, or the action's range
@@ -166,8 +170,8 @@ class BenchmarkTask:
                 f"{seen} and {action}"
             )
         if self.kin or self.spec is None:
-            kind = self.environment
-            return {"scale": [float(x) for x in kind.scales], "largest": kind.largest_action}
+            world = self.make(self.flown_in, observation=observation).unwrapped
+            return {"scale": [*map(float, world.bounds()[1])], "largest": world.largest_action}
         return {"scale": [1.0] * seen.shape[0], "largest": 1.0}
 
 
