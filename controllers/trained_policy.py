@@ -195,11 +195,8 @@ class TrainedPolicy(_Network):
     ) -> Array:
         """Return the command (1,) m/s for an observation (8,)."""
         if self._count % self._repeat == 0:
-            frames = self.features.frames(np.asarray(observation)[None])
-            if self._count == 0:
-                self._history.restart(frames, [0])
-            else:
-                self._history.push(frames)
+            remember = self._history.push if self._count else self._history.restart
+            remember(self.features.frames(np.asarray(observation)[None]))
             self._held = self.act(self._history.flat()[0])
         self._count += 1
         return self._held
@@ -231,8 +228,7 @@ class TaskPolicy(_Network):
             if memory.ndim != 1 or not np.all(memory >= 1.0):
                 raise InputError(f"{name}: memory must be a list of numbers from 1 on")
             self._rates = 1.0 / memory[:, None]
-            seen = len(self._scale) * len(memory)
-            super().__init__(card, weights, seen, largest, name)
+            super().__init__(card, weights, len(self._scale) * len(memory), largest, name)
         self.reset()
 
     def reset(self) -> None:

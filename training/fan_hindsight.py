@@ -66,7 +66,7 @@ class FanHindsight:
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``."""
         self._envs = envs
-        self._history: History | None = None
+        self._history = History(self._features or FEATURES, envs.num_envs)
         self._set_point: Array | None = None
         self._flown: list[tuple[Array, ...]] = []
 
@@ -75,12 +75,8 @@ class FanHindsight:
         if self._features is None:
             seen = observations / as_numbers(self._envs.task.bounds()[1])
         else:
-            frames = self._features.frames(observations)
-            if self._history is None:
-                self._history = History(self._features, len(frames))
-                self._history.restart(frames, list(range(len(frames))))
-            else:
-                self._history.push(frames)
+            remember = self._history.push if self._flown else self._history.restart
+            remember(self._features.frames(observations))
             seen = self._history.flat()
         fan, own = infos["fan_y"], infos["y"]
         self._set_point = _moved(self._set_point, own, infos["command"][:, 0])

@@ -165,7 +165,7 @@ class Run:
         self.config, self.scenario, self.seed, self.folder = config, scenario, seed, folder
         own = {"reward": reward, "observation": observation}
         self.own = {name: value for name, value in own.items() if value is not None}
-        if task != STANDARD_TASK or observation is not None:
+        if task != STANDARD_TASK or observation:
             self.own["task"] = task_of(task).name
         self._claim()
         self.progress, self._report = Progress(), report
@@ -208,10 +208,6 @@ class Run:
         unseen = ("features", "repeat") if "task" in card else ()
         return {key: value for key, value in card.items() if key not in unseen}
 
-    def validate(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int, bool]:
-        """Return a policy's figures, as ``validate``."""
-        return validate(policy, self.judge, self.config["validation"]["episodes"])
-
     def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
         """Validate a policy, save the policy as the last one, and as the best where no earlier one
         is better.
@@ -219,13 +215,13 @@ class Run:
         Returns:
             Its RMSE and losses, as of ``validate``.
         """
-        rmse, lost, by_error = self.validate(policy)
+        episodes = self.config["validation"]["episodes"]
+        rmse, lost, by_error = validate(policy, self.judge, episodes)
         card, now = policy.card, self.progress
         now.by_error = by_error
         now.steps.append(card["steps"])
         now.rmse_m.append(rmse)
         now.lost.append(lost)
-        episodes = self.config["validation"]["episodes"]
         card["validation"] = {"rmse_m": rmse, "lost": lost, "episodes": episodes}
         save_policy(card, policy.weights, self.folder / "last.npz")
         if now.best < 0 or rmse < now.best_rmse:

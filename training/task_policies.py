@@ -12,7 +12,7 @@ observation, fitted to the same answers in one scenario, in seconds.
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -70,8 +70,8 @@ def _card(
         return card | {"features": asdict(FEATURES), "repeat": 1}
     env = TASKS[task].environment(observation=observation)
     scale = [float(f"{x:.6g}") for x in env.bounds()[1]]
-    card |= {"task": task, "scale": scale, "largest": env.largest_action}
-    return card | ({"observation": observation} if observation else {})
+    seen = {"task": task, "observation": observation, "scale": scale}
+    return card | seen | {"largest": env.largest_action}
 
 
 class FanPlaneLesson:
@@ -123,38 +123,6 @@ def _lesson_of(task: str) -> FanPlaneLesson | WindLesson:
     return FanPlaneLesson() if task == FAN_PLANE else WindLesson(task)
 
 
-def _rounds(
-    network: TaughtNetwork,
-    flights: Flights,
-    shares: Array,
-    given: dict[str, Any],
-    order: torch.Generator,
-    mirrored: Array | None,
-    whitened: bool,
-) -> Iterator[Flights]:
-    """Fly and fit round after round.
-
-    Args:
-        network: to teach.
-        flights: to fly.
-        shares: (axes, taught) of the network's means that are commanded.
-        given: as ``_FIT``.
-        order: of the episodes.
-        mirrored: as of ``taught_network.fit``.
-        whitened: whether the network sees frames as ``TaughtNetwork.whiten`` has them, by the
-            first round.
-    """
-    for number in range(given["rounds"]):
-        flights.fly(None if number == 0 else network, shares)
-        flown, last = flights.sequences(), number == given["rounds"] - 1
-        if whitened and number == 0:
-            network.whiten(flown.seen)
-        epochs, rate = given["epochs"] * (3 if last else 1), given["learning_rate"]
-        rates = rate, 0.0 if last else _LEAST_RATE * rate
-        fit(network, flown, epochs, given["batch_size"], rates, order, mirrored)
-        yield flights
-
-
 def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | TrainedPolicy:
     """Return a recurrent policy taught in rounds of DAgger.
 
@@ -166,31 +134,36 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
     """
     given = _fit_of(task) | changed
     lesson, envs, quantities, mirrored = _lesson(task, scenario, given["episodes"])
-    size, lasts = given["wander"]
+    shares = _shares(task)
     torch.manual_seed(seed)
-    shape, shares = (given["cell"], given["state"], given["net"], _ACTIVATION), _shares(task)
-    taught = 4 if task == FAN_PLANE else 3
-    network = TaughtNetwork(quantities, taught, *shape)
-    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
-    flights = Flights(envs, lesson, wander, seed)
+    shape = given["cell"], given["state"], given["net"], _ACTIVATION
+    network = TaughtNetwork(quantities, shares.shape[1], *shape)
+    flights = Flights(envs, lesson, given["wander"], seed)
     order = torch.Generator().manual_seed(seed)
-    whitened = task != FAN_PLANE
-    for flown in _rounds(network, flights, shares, given, order, mirrored, whitened):
-        print(f"{flown.episodes} episodes, {time.process_time():.0f} s", flush=True)
+    for number in range(given["rounds"]):
+        flights.fly(network if number else None, shares)
+        flown, last = flights.sequences(), number == given["rounds"] - 1
+        if number == 0 and task != FAN_PLANE:
+            network.whiten(flown.seen)
+        epochs, rate = given["epochs"] * (3 if last else 1), given["learning_rate"]
+        rates = rate, 0.0 if last else _LEAST_RATE * rate
+        fit(network, flown, epochs, given["batch_size"], rates, order, mirrored)
+        print(f"{flights.episodes} episodes, {time.process_time():.0f} s", flush=True)
     card = _card(task, given["cell"], scenario, seed, flights.episodes * lesson.decisions)
     card |= {"fit": {name: value for name, value in given.items() if name != "cell"}}
     return _chosen(card, network.policy_weights)
 
 
-def _chosen(card: dict[str, Any], weights: Callable[[Array], Weights]) -> Any:
+def _chosen(
+    card: dict[str, Any], weights: Callable[[Array], Weights]
+) -> TaskPolicy | TrainedPolicy:
     """Return the policy of ``weights`` of shares; in FanTracking2D with the gain that is best on
     validation episodes in the scenario of its training.
     """
-    if "task" not in card:
-        return TrainedPolicy(card, weights(_shares(FAN)))
-    task = card["task"]
+    task = card.get("task", FAN)
+    kind = TaskPolicy if "task" in card else TrainedPolicy
     if task != FAN_PLANE:
-        return TaskPolicy(card, weights(_shares(task)))
+        return kind(card, weights(_shares(task)))
     tried = [TaskPolicy({**card, "gain": gain}, weights(_shares(task, gain))) for gain in _GAINS]
     env = TASKS[task].make(card["scenario"], observation=card.get("observation"))
     return min(tried, key=lambda each: validate(each, env, VALIDATION)[0])
@@ -198,23 +171,20 @@ def _chosen(card: dict[str, Any], weights: Callable[[Array], Weights]) -> Any:
 
 def linear(
     task: str, scenario: str, seed: int, observation: str | None = None, **changed: Any
-) -> TaskPolicy:
+) -> TaskPolicy | TrainedPolicy:
     """Return a linear law of a task; ``observation``: one of ``OBSERVATIONS`` in place of the
     task's own; other arguments as of ``teach``.
     """
     given = _LINEAR | changed
     lesson: Any = FanHindsight(features=None) if task == FAN else _lesson_of(task)
     envs = lanes_of(task, scenario, given["episodes"], observation)
-    size, lasts = _fit_of(task)["wander"]
-    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
-    law, flights = LinearLaw(), Flights(envs, lesson, wander, seed)
+    law, flights = LinearLaw(), Flights(envs, lesson, _fit_of(task)["wander"], seed)
     for number in range(given["rounds"]):
         flights.fly(law if number else None, _shares(task))
         law.fit(flights.sequences())
-    steps = flights.episodes * lesson.decisions
-    card = _card(task, LINEAR, scenario, seed, steps, observation)
-    policy: TaskPolicy = _chosen(card | {"fit": given, "memory": list(MEMORY)}, law.weights)
-    return policy
+    flown = flights.episodes * lesson.decisions
+    card = _card(task, LINEAR, scenario, seed, flown, observation)
+    return _chosen(card | {"fit": given, "memory": list(MEMORY)}, law.weights)
 
 
 def main() -> None:
@@ -237,21 +207,19 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, help=f"{said}; default: the task's")
     parser.add_argument("--out", type=Path, help="folder; default: that of the kit's policies")
     given = parser.parse_args()
+    taught, asked = given.kind != LINEAR, vars(given)
+    if taught and given.observation:
+        parser.error("--observation: expected --kind linear")
     torch.set_num_threads(1)
     began, task = time.process_time(), given.task
-    usual = BASE if given.kind == LINEAR else MIX
-    kind, scenario = _fit_of(task)["cell"], given.scenario or usual
-    if given.kind != LINEAR and task in (FAN, FAN_PLANE):
-        scenario = "wide" if task == FAN else BASE
-    asked = {name: getattr(given, name) for name in ("rounds", "episodes", "epochs")}
-    changed = {name: count for name, count in asked.items() if count is not None}
-    if given.kind == LINEAR:
-        kind = LINEAR
-        policy: Any = linear(task, scenario, given.seed, given.observation, **changed)
-    else:
-        policy = teach(task, scenario, given.seed, **changed)
-    policies = Path("training/policies")
-    own = task == FAN and kind != LINEAR
+    changed = {name: asked[name] for name in ("rounds", "episodes", "epochs") if asked[name]}
+    usual = MIX if taught and task not in (FAN, FAN_PLANE) else BASE
+    scenario = "wide" if taught and task == FAN else given.scenario or usual
+    if not taught:
+        changed |= {"observation": given.observation}
+    policy = (teach if taught else linear)(task, scenario, given.seed, **changed)
+    policies, kind = Path("training/policies"), policy.card["algorithm"]
+    own = isinstance(policy, TrainedPolicy)
     out, start = (policies, "") if own else (policies / "tasks", f"{task}-")
     out = given.out or out
     out.mkdir(parents=True, exist_ok=True)

@@ -61,11 +61,12 @@ def train(
 
     algorithm, whole = config["algorithm"], config["steps"]
     features = features_of(config) if standard else None
-    count, estimator = config["environments"], config["estimator"]
-    envs = make_training_envs(scenario, count, estimator, task, observation)
+    envs = make_training_envs(
+        scenario, config["environments"], config["estimator"], task, observation
+    )
     own = find_reward(reward) if reward else WeightedTerms(config["reward"]) if standard else None
     env = FeatureVecEnv(envs, features, lambda i, episode: training_seed(seed, i, episode), own)
-    seen = {} if standard else task_of(task).units(envs, observation)
+    seen = {} if standard else task_of(task).units(envs, run.judge)
     learner = make_learner(config, env, seed)
     learner.set_logger(_logger(folder))
     checkpoint = folder / "checkpoint.pt"
