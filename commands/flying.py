@@ -54,9 +54,11 @@ def fly(
     known = task_of(task)
     controller, scenario = controller or known.flown, scenario or known.flown_in
     Request((controller,), (scenario,), 1, 0, task, reward, tuple(imports or ())).check()
+    pilot = make_pilot(controller, task)
     env = known.make(
         scenario,
         reward,
+        observation=getattr(pilot, "observation", None),
         render_mode="rgb_array" if gif else "human" if view else None,
         vehicle=vehicle,
         effects=effects or None,
@@ -83,7 +85,7 @@ def fly(
                 drawn = captioned(env.unwrapped, title, flown) if said else env.render()
                 pictures.append(drawn)
 
-        episode = fly_episode(env, make_pilot(controller, task), seed, each, known.decisions)
+        episode = fly_episode(env, pilot, seed, each, known.decisions)
     env.close()
     paths = [folder / "fly.png"]
     draw_episode(episode, title, paths[0])

@@ -17,6 +17,7 @@ def train(
     algorithm: str,
     scenario: str | None = None,
     task: str | None = None,
+    observation: str | None = None,
     reward: str | None = None,
     imports: list[str] | None = None,
     seed: int = 0,
@@ -34,6 +35,8 @@ def train(
     from ..evaluation.rewards import find_reward
     from ..evaluation.tasks import import_files, task_of
     from ..training.configuration import load_config
+    from ..training.run import Progress, read_progress
+    from ..training.train import train as learn
     from ..training.training_envs import check_training_env
 
     need("stable_baselines3", "rl")
@@ -45,8 +48,8 @@ def train(
         find_reward(reward)
     values = [*(setting or []), *([f"steps={steps}"] if steps else [])]
     if algorithm == "tune":
-        if cluster or reward is not None:
-            raise InputError("train tune: expected no --cluster and no --reward")
+        if cluster or reward or observation:
+            raise InputError("train tune: expected no --cluster, --reward and --observation")
         values = [*([f"task={task}"] if task else []), *values]
         return _tune(load_config(algorithm, values, config), scenario or "base", seed, out)
     given = load_config(algorithm, values, config, task=task)
@@ -54,21 +57,8 @@ def train(
     check_training_env(scenario, task or STANDARD_TASK)
     if cluster:
         need("ray", "cluster")
-    what = {"task": task or STANDARD_TASK, "reward": reward, "imports": tuple(imports or ())}
-    return _learn(given, scenario, seed, cluster, out, what)
-
-
-def _learn(
-    given: dict[str, Any],
-    scenario: str,
-    seed: int,
-    cluster: str | None,
-    out: Path,
-    what: dict[str, Any],
-) -> dict[str, Any]:
-    from ..training.run import Progress, read_progress
-    from ..training.train import train
-
+    what = {"task": task or STANDARD_TASK, "observation": observation, "reward": reward}
+    what |= {"imports": tuple(imports or ())}
     folder = results_folder(
         out,
         algorithm=given["algorithm"],
@@ -87,10 +77,10 @@ def _learn(
             console.print(f"{now.steps[-1]:8d} decisions: {figures}")
 
         if cluster:  # a run whose worker is lost resumes elsewhere, from its last checkpoint
-            there = partial(train, given, scenario, seed, **what)
+            there = partial(learn, given, scenario, seed, **what)
             ((_, path),) = every(there, [folder.resolve()], cluster=cluster)
         else:
-            path = train(given, scenario, seed, folder, progress, report, **what)
+            path = learn(given, scenario, seed, folder, progress, report, **what)
     done = read_progress(folder)
     assert done is not None
     console.print(

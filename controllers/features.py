@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,6 +102,9 @@ class Features:
         return [i for i, name in enumerate(self.frame) if QUANTITIES[name].summed]
 
 
+_ALL = slice(None)
+
+
 class History:
     """The last frames of n environments, oldest first; an episode begins with its first frame
     repeated, and sums begin at 0.
@@ -112,7 +114,7 @@ class History:
         self._summed = features.summed
         self._frames = np.zeros((count, features.history, len(features.frame)), dtype=np.float32)
 
-    def restart(self, frames: Array, which: Sequence[int] | NDArray[np.bool_]) -> None:
+    def restart(self, frames: Array, which: slice | NDArray[np.bool_] = _ALL) -> None:
         """Begin an episode in the environments ``which`` with their rows of ``frames`` (n,
         quantities).
         """

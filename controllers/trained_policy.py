@@ -195,11 +195,8 @@ class TrainedPolicy(_Network):
     ) -> Array:
         """Return the command (1,) m/s for an observation (8,)."""
         if self._count % self._repeat == 0:
-            frames = self.features.frames(np.asarray(observation)[None])
-            if self._count == 0:
-                self._history.restart(frames, [0])
-            else:
-                self._history.push(frames)
+            remember = self._history.push if self._count else self._history.restart
+            remember(self.features.frames(np.asarray(observation)[None]))
             self._held = self.act(self._history.flat()[0])
         self._count += 1
         return self._held
@@ -209,7 +206,8 @@ class TaskPolicy(_Network):
     """A learned policy of another task: scaled observations, and the same layers.
 
     Args:
-        card: ``task``; ``scale`` (n,), divisors of the observation; ``largest``, of the action;
+        card: ``task``; ``observation``, if another than the task's own; ``scale`` (n,), divisors
+            of the observation; ``largest``, of the action;
             ``activation``; ``squash`` (a tanh of the output is a share of ``largest``). ``memory``
             (m,), if any: the layers see m first-order low-passes of the observation, each of so
             many decisions.
@@ -222,6 +220,7 @@ class TaskPolicy(_Network):
     def __init__(self, card: Mapping[str, Any], weights: Weights, name: str = "policy") -> None:
         with _entries_named(name):
             self.task, largest = str(card["task"]), float(card["largest"])
+            self.observation = card.get("observation")  # None: the task's own
             self._scale = np.array(card["scale"], dtype=np.float32)
             memory = np.array(card.get("memory", [1.0]), dtype=np.float32)
             if self._scale.ndim != 1:
@@ -229,8 +228,7 @@ class TaskPolicy(_Network):
             if memory.ndim != 1 or not np.all(memory >= 1.0):
                 raise InputError(f"{name}: memory must be a list of numbers from 1 on")
             self._rates = 1.0 / memory[:, None]
-            seen = len(self._scale) * len(memory)
-            super().__init__(card, weights, seen, largest, name)
+            super().__init__(card, weights, len(self._scale) * len(memory), largest, name)
         self.reset()
 
     def reset(self) -> None:

@@ -63,8 +63,8 @@ class Request:
 
     def flights(self) -> int:
         """Return the number of episodes, those of the reference laws among them."""
-        laws, worlds = task_of(self.task).references(self.controllers), set(self.scenarios)
-        return len(laws) * len(worlds) * self.episodes
+        laws = task_of(self.task).references(self.controllers)
+        return len(laws) * len({*self.scenarios}) * self.episodes
 
 
 Chunk = tuple[Request, str, str, tuple[int, ...]]  # with controller, scenario and seeds
@@ -128,5 +128,7 @@ def _fly_chunk(chunk: Chunk) -> list[Episode]:
     request, name, scenario, seeds = chunk
     import_files(request.imports)
     pilot = make_pilot(name, request.task)
-    env = task_of(request.task).make(scenario, request.reward)
+    env = task_of(request.task).make(
+        scenario, request.reward, observation=getattr(pilot, "observation", None)
+    )
     return [fly_episode(env, pilot, seed) for seed in seeds]

@@ -81,8 +81,8 @@ class BenchmarkTask:
     @property
     def decisions(self) -> int:
         """Decisions of an episode."""
-        steps = self.spec.max_episode_steps if self.spec else None
-        return int(steps or self.environment.decisions())
+        spec = self.spec
+        return int((spec and spec.max_episode_steps) or self.environment.decisions())
 
     def policies(self) -> Mapping[str, Path]:
         """Return the kit's own policies, by name."""
@@ -145,13 +145,16 @@ class BenchmarkTask:
         if self.kin or self.spec is None:
             given["normalize"] = True
         spec = self.spec or gym.spec(f"windwrench/{self.name}-v1")
-        native = spec.vector_entry_point is not None
-        mode = "vector_entry_point" if native else "sync"
+        mode = "sync" if spec.vector_entry_point is None else "vector_entry_point"
         return gym.make_vec(spec, count, vectorization_mode=mode, **given)
 
-    def units(self, envs: gym.vector.VectorEnv) -> dict[str, Any]:
+    def units(self, envs: gym.vector.VectorEnv, judge: Any) -> dict[str, Any]:
         """Return the entries of a policy's card that lead from a learner's units to those of
         ``make``: ``scale`` of the observation, ``largest`` of the action.
+
+        Args:
+            envs: of ``make_many``.
+            judge: of ``make``, with the same observation.
 
         Raises:
             InputError: the spaces of ``envs`` are no boxes of one dimension, or the action's range
@@ -166,8 +169,8 @@ class BenchmarkTask:
                 f"{seen} and {action}"
             )
         if self.kin or self.spec is None:
-            kind = self.environment
-            return {"scale": [float(x) for x in kind.scales], "largest": kind.largest_action}
+            world = judge.unwrapped
+            return {"scale": [*map(float, world.bounds()[1])], "largest": world.largest_action}
         return {"scale": [1.0] * seen.shape[0], "largest": 1.0}
 
 

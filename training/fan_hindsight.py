@@ -19,6 +19,7 @@ from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ..controllers.preview import Oracle, lasting, preview
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.lanes.vector import TaskLanes
+from ..envs.observations import as_numbers
 
 Array = NDArray[np.float64]
 Frames = NDArray[np.float32]
@@ -52,10 +53,11 @@ class FanHindsight:
 
     decisions, period, largest = FanTrackingEnv.decisions(), DECISION_PERIOD, MAX_COMMAND
 
-    def __init__(self, limit: float = 2.5) -> None:
-        """Take a limit on what is taught, in largest commands. A fan far away on an unknown side
-        needs a mean of commands far beyond 1.
+    def __init__(self, limit: float = 2.5, features: Features | None = FEATURES) -> None:
+        """Take a limit on what is taught, in largest commands, and a policy's inputs; None: the
+        scaled observation. A fan far away on an unknown side needs a mean of commands far beyond 1.
         """
+        self._features = features
         oracle = Oracle()
         self._limit = limit * self.largest
         model = Oracle.steps(oracle.vehicle)[_ALONG_Y]
@@ -64,23 +66,23 @@ class FanHindsight:
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``."""
         self._envs = envs
-        self._history: History | None = None
+        self._history = History(self._features or FEATURES, envs.num_envs)
         self._set_point: Array | None = None
         self._flown: list[tuple[Array, ...]] = []
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
         """Return frames (n, quantities), and the commands (n, 1) of the law with sight."""
-        frames = FEATURES.frames(observations)
-        if self._history is None:
-            self._history = History(FEATURES, len(frames))
-            self._history.restart(frames, list(range(len(frames))))
+        if self._features is None:
+            seen = observations / as_numbers(self._envs.task.bounds()[1])
         else:
-            self._history.push(frames)
+            remember = self._history.push if self._flown else self._history.restart
+            remember(self._features.frames(observations))
+            seen = self._history.flat()
         fan, own = infos["fan_y"], infos["y"]
         self._set_point = _moved(self._set_point, own, infos["command"][:, 0])
         self._flown.append((self._own(infos), _felt(infos), fan.copy()))
         wanted = infos["fan_velocity"] + _LEAD * (fan - own)
-        return self._history.flat(), wanted[:, None]
+        return seen, wanted[:, None]
 
     def _own(self, infos: dict[str, Any]) -> Array:
         """Return the states (n, 7) of the vehicles along y."""

@@ -22,6 +22,7 @@ from ..controllers.axis_models import MOTOR_LAG, axis_models
 from ..controllers.preview import WindOracle, preview
 from ..controllers.wind_observation import LAST_ACTION, MAX_ACCELERATION, WIND_PERIOD
 from ..envs.lanes.vector import TaskLanes
+from ..envs.observations import as_numbers
 from ..envs.wind_scenarios import WIND_SCENARIOS, WindVariation
 from ..evaluation.tasks import TASKS
 
@@ -53,11 +54,15 @@ def mix_of(name: str, episodes: int) -> dict[str, int]:
     return {each: episodes * part // sum(parts.values()) for each, part in parts.items()}
 
 
-def lanes_of(task: str, scenario: str, episodes: int) -> list[TaskLanes]:
-    """Return environments of a task for so many episodes in a scenario, or in ``MIX``."""
+def lanes_of(
+    task: str, scenario: str, episodes: int, observation: str | None = None
+) -> list[TaskLanes]:
+    """Return environments of a task for so many episodes in a scenario, or in ``MIX``;
+    ``observation``: one of ``OBSERVATIONS`` in place of the task's own.
+    """
     kind, own = TASKS[task].environment, {LATE: _LATE}
     return [
-        TaskLanes(count, task=kind, scenario=own.get(name, name))
+        TaskLanes(count, task=kind, scenario=own.get(name, name), observation=observation)
         for name, count in mix_of(scenario, episodes).items()
     ]
 
@@ -77,7 +82,8 @@ def _models(oracle: WindOracle, late: float) -> list[tuple[Array, ...]]:
 class WindLesson:
     """A task in the wind: scaled observations, and the command that hindsight holds best.
 
-    ``lqg`` flies the first round. An episode of a lesson is the first half of one of the task.
+    The environment has any observation: the teacher and ``lqg`` see the task's own. ``lqg`` flies
+    the first round. An episode of a lesson is the first half of one of the task.
     """
 
     decisions, period, largest = 250, WIND_PERIOD, MAX_ACCELERATION
@@ -95,22 +101,23 @@ class WindLesson:
                 % and ``turbulent`` -2, 0 and 0 %; ``base`` the same within 1 %.
         """
         self._task, self._oracle, self._limit = task, WindOracle(), limit * self.largest
-        self.scale = np.array(TASKS[task].environment.scales, dtype=np.float32)
 
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``; ``leads``: ``lqg`` flies."""
         self._envs, self._late = envs, envs.late()
+        self._scale = as_numbers(envs.task.bounds()[1])
         self._commands: list[Array] = []
         self._states: list[list[Array]] = []  # of each axis (n, its states)
         self._laws = [make_controller("lqg", self._task) for _ in range(envs.num_envs * leads)]
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Any]:
-        """Return scaled observations (n, 27), and the commands (n, 3) of ``lqg`` in flight."""
-        seen = observations.astype(np.float64)
+        """Return scaled observations (n, k), and the commands (n, 3) of ``lqg`` in flight."""
+        own = as_numbers(self._envs.task.observe(self._envs.state))
+        seen = own.astype(np.float64)
         self._states.append(self._oracle.states(seen, infos | self._envs.truth()))
         self._commands.append(seen[:, LAST_ACTION:])
-        wanted = [law(each) for law, each in zip(self._laws, observations, strict=False)]
-        return observations / self.scale, np.array(wanted)
+        wanted = [law(each) for law, each in zip(self._laws, own, strict=False)]
+        return observations / self._scale, np.array(wanted)
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the best commands (decisions, n, 3), and weights (decisions, n): the vehicle flew

@@ -1,7 +1,7 @@
-"""A linear law of a task in the wind, fitted to the best commands in hindsight: a baseline.
+"""A linear law of any task, fitted to the best commands in hindsight: a baseline.
 
-Each quantity of the observation passes through first-order low-passes of several times; an axis'
-command is a weighted sum of its own quantities. No sum suits two levels of noise: taught in
+Each quantity of the observation passes through first-order low-passes of several times; a command
+is a weighted sum of all of them. No sum suits two levels of noise: taught in
 ``hindsight.MIX`` the law has 2.7 times the error on WindTrajectory's base after 3 s (24 validation
 episodes). The weights are a ridge regression (Hoerl and
 Kennard, Technometrics 12(1), 1970) on all flights so far, in rounds as of ``task_policies``.
@@ -21,13 +21,6 @@ Array = NDArray[np.float32]
 # decisions of the low-passes; 1: the newest observation itself
 MEMORY = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 32.0)
 RIDGE = 3e-3  # of the quantities' variances
-# columns of each axis' quantities in an observation: position error, velocity, velocity and
-# acceleration of the reference, force, tilting torque, specific forces, last action
-_AXES = (
-    (0, 3, 6, 9, 12, 16, 18, 21, 24),
-    (1, 4, 7, 10, 13, 15, 19, 22, 25),
-    (2, 5, 8, 11, 14, 20, 23, 26),
-)
 
 
 class LinearLaw:
@@ -43,7 +36,9 @@ class LinearLaw:
         return kept + self._rates * (frames[:, None] - kept)
 
     def __call__(self, frames: torch.Tensor, state: Any = None) -> tuple[Any, None, Array]:
-        """Return commands (1, n, 3), no deviations, and the state for frames (1, n, quantities)."""
+        """Return what is taught (1, n, taught), no deviations, and the state for frames (1, n,
+        quantities).
+        """
         state = self._remember(state, frames[0].numpy())
         said = state.reshape(len(state), -1) @ self._weight.T + self._bias
         return torch.from_numpy(said[None]), None, state
@@ -54,22 +49,17 @@ class LinearLaw:
         for frames in flown.seen:
             kept = self._remember(kept, frames)
             all_kept.append(kept)
-        some, size = flown.counts > 0.0, flown.seen.shape[-1]
-        inputs, wanted = np.array(all_kept)[some], flown.truth[some]
-        weight = np.zeros((len(_AXES), len(MEMORY), size))
-        bias = np.zeros(len(_AXES))
-        for i, columns in enumerate(_AXES):
-            seen = inputs[:, :, columns].reshape(len(inputs), -1).astype(np.float64)
-            mean, deviation = seen.mean(axis=0), seen.std(axis=0) + 1e-9
-            white = (seen - mean) / deviation
-            best = wanted[:, i] - wanted[:, i].mean()
-            square = white.T @ white / len(white) + RIDGE * np.eye(white.shape[1])
-            found = np.linalg.solve(square, white.T @ best / len(white)) / deviation
-            weight[i][:, columns] = found.reshape(len(MEMORY), -1)
-            bias[i] = wanted[:, i].mean() - mean @ found
-        self._weight = weight.reshape(len(_AXES), -1).astype(np.float32)
-        self._bias = bias.astype(np.float32)
+        some = flown.counts > 0.0
+        seen = np.array(all_kept)[some].reshape(int(some.sum()), -1).astype(np.float64)
+        mean, deviation = seen.mean(axis=0), seen.std(axis=0) + 1e-9
+        seen = (seen - mean) / deviation
+        wanted = flown.truth[some].astype(np.float64)
+        middle = wanted.mean(axis=0)
+        square = seen.T @ seen / len(seen) + RIDGE * np.eye(len(mean))
+        found = np.linalg.solve(square, seen.T @ (wanted - middle) / len(seen)).T / deviation
+        self._weight = found.astype(np.float32)
+        self._bias = (middle - found @ mean).astype(np.float32)
 
-    def weights(self) -> Weights:
-        """Return the weights of the policy."""
-        return {"weight0": self._weight, "bias0": self._bias}
+    def weights(self, shares: Array) -> Weights:
+        """Return the weights of the policy that commands ``shares`` (axes, taught)."""
+        return {"weight0": shares @ self._weight, "bias0": shares @ self._bias}

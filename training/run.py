@@ -144,6 +144,7 @@ class Run:
         report: called after each validation.
         task: a name, as of ``evaluation.tasks.task_of``.
         reward: one's own, as of ``evaluation.rewards.find_reward``; None: the task's.
+        observation: one of ``OBSERVATIONS``; None: the task's own, or features.
 
     Raises:
         InputError: an unknown name, or a folder with another run.
@@ -158,15 +159,18 @@ class Run:
         report: Callable[[Progress], None],
         task: str = STANDARD_TASK,
         reward: str | None = None,
+        observation: str | None = None,
     ) -> None:
         check_training_env(scenario, task)
         self.config, self.scenario, self.seed, self.folder = config, scenario, seed, folder
-        self.own = {} if task == STANDARD_TASK else {"task": task_of(task).name}
-        self.own |= {} if reward is None else {"reward": reward}
+        own = {"reward": reward, "observation": observation}
+        self.own = {name: value for name, value in own.items() if value is not None}
+        if task != STANDARD_TASK or observation:
+            self.own["task"] = task_of(task).name
         self._claim()
         self.progress, self._report = Progress(), report
         self._began = time.perf_counter()
-        self.judge = make_training_env(scenario, task, reward)
+        self.judge = make_training_env(scenario, task, reward, observation)
         self.best = folder / "best.npz"
 
     def _claim(self) -> None:

@@ -6,13 +6,13 @@ In every round of DAgger (Ross, Gordon and Bagnell, 2011) the newest network fli
 of any policy. For every decision a law with knowledge gives the answer, and the network is fitted
 to all answers so far, over whole episodes. In the wind and in ``FanTracking`` the answers are the
 best commands in view of the future (``hindsight``, ``fan_hindsight``), in a mix of scenarios. In
-``FanTracking2D`` the simulator gives place and motion of the fan. ``linear`` is a linear law fitted
-in the wind to the same answers in one scenario, in seconds.
+``FanTracking2D`` the simulator gives place and motion of the fan. ``linear`` is a linear law of any
+observation, fitted to the same answers in one scenario, in seconds.
 """
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
+from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, Weights, save_policy
+from ..envs.observations import OBSERVATIONS, as_numbers
 from ..evaluation.tasks import TASKS
 from .fan_hindsight import FEATURES, FanHindsight, fan_lanes
 from .flown_sequences import Flights
@@ -33,6 +34,7 @@ from .taught_network import TaughtNetwork, fit
 Array = NDArray[np.float32]
 
 FAN, FAN_PLANE, WIND = "FanTracking", "FanTracking2D", "wind"
+LINEAR = "linear"
 # of each kind of task: cell, its size, sizes of the layers after it; rounds of DAgger, episodes of
 # each, epochs of its fit (of the last thrice); episodes of a batch, the learning rate; an error
 # added to half of the flights: a share of the largest action, and s that it lasts
@@ -59,14 +61,17 @@ def _fit_of(task: str) -> dict[str, Any]:
     return _FIT.get(task, _FIT[WIND])
 
 
-def _card(task: str, kind: str, scenario: str, seed: int, steps: int) -> dict[str, Any]:
+def _card(
+    task: str, kind: str, scenario: str, seed: int, steps: int, observation: str | None = None
+) -> dict[str, Any]:
     """Return the card of a policy."""
-    env = TASKS[task].environment
     card = origin(kind, scenario, seed, steps, _ACTIVATION)
-    if task == FAN:
+    if task == FAN and kind != LINEAR:
         return card | {"features": asdict(FEATURES), "repeat": 1}
-    scale = [float(f"{x:.6g}") for x in env.scales]
-    return card | {"task": task, "scale": scale, "largest": env.largest_action}
+    env = TASKS[task].environment(observation=observation)
+    scale = [float(f"{x:.6g}") for x in env.bounds()[1]]
+    seen = {"task": task, "observation": observation, "scale": scale}
+    return card | seen | {"largest": env.largest_action}
 
 
 class FanPlaneLesson:
@@ -76,17 +81,18 @@ class FanPlaneLesson:
 
     _kind = TASKS[FAN_PLANE].environment
     decisions, period = _kind.decisions(), 1.0 / _kind.decision_hz
-    largest, scale = _kind.largest_action, np.array(_kind.scales, dtype=np.float32)
+    largest = _kind.largest_action
 
     def begin(self, envs: Any, leads: bool) -> None:
         """Start an episode in each of ``envs``."""
         self._truth: list[Any] = []
+        self._scale = as_numbers(envs.task.bounds()[1])
 
     def look(self, observations: Array, infos: dict[str, Any]) -> tuple[Array, Any]:
         """Return scaled observations (n, quantities) and the law's commands (n, 2)."""
         truth = np.hstack([infos["fan"] - infos["position"], infos["fan_velocity"]])
         self._truth.append(truth)
-        return observations / self.scale, truth @ _shares(FAN_PLANE).T
+        return observations / self._scale, truth @ _shares(FAN_PLANE).T
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
         """Return the taught quantities (decisions, n, 4), and weights (decisions, n)."""
@@ -108,42 +114,13 @@ def _lesson(task: str, scenario: str, episodes: int) -> tuple[Any, list[Any], in
     """
     if task == FAN:
         return FanHindsight(), fan_lanes(episodes), FEATURES.size, FEATURES.mirrored
-    plane = task == FAN_PLANE
-    lesson, envs = FanPlaneLesson() if plane else WindLesson(task), lanes_of
     scales = len(TASKS[task].environment.scales)
-    return lesson, envs(task, scenario, episodes), scales, _TURNED if plane else None
+    turned = _TURNED if task == FAN_PLANE else None
+    return _lesson_of(task), lanes_of(task, scenario, episodes), scales, turned
 
 
-def _rounds(
-    network: TaughtNetwork,
-    flights: Flights,
-    shares: Array,
-    given: dict[str, Any],
-    order: torch.Generator,
-    mirrored: Array | None,
-    whitened: bool,
-) -> Iterator[Flights]:
-    """Fly and fit round after round.
-
-    Args:
-        network: to teach.
-        flights: to fly.
-        shares: (axes, taught) of the network's means that are commanded.
-        given: as ``_FIT``.
-        order: of the episodes.
-        mirrored: as of ``taught_network.fit``.
-        whitened: whether the network sees frames as ``TaughtNetwork.whiten`` has them, by the
-            first round.
-    """
-    for number in range(given["rounds"]):
-        flights.fly(None if number == 0 else network, shares)
-        flown, last = flights.sequences(), number == given["rounds"] - 1
-        if whitened and number == 0:
-            network.whiten(flown.seen)
-        epochs, rate = given["epochs"] * (3 if last else 1), given["learning_rate"]
-        rates = rate, 0.0 if last else _LEAST_RATE * rate
-        fit(network, flown, epochs, given["batch_size"], rates, order, mirrored)
-        yield flights
+def _lesson_of(task: str) -> FanPlaneLesson | WindLesson:
+    return FanPlaneLesson() if task == FAN_PLANE else WindLesson(task)
 
 
 def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | TrainedPolicy:
@@ -157,49 +134,67 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
     """
     given = _fit_of(task) | changed
     lesson, envs, quantities, mirrored = _lesson(task, scenario, given["episodes"])
-    size, lasts = given["wander"]
+    shares = _shares(task)
     torch.manual_seed(seed)
-    shape, shares = (given["cell"], given["state"], given["net"], _ACTIVATION), _shares(task)
-    taught = 4 if task == FAN_PLANE else 3
-    network = TaughtNetwork(quantities, taught, *shape)
-    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
-    flights = Flights(envs, lesson, wander, seed)
+    shape = given["cell"], given["state"], given["net"], _ACTIVATION
+    network = TaughtNetwork(quantities, shares.shape[1], *shape)
+    flights = Flights(envs, lesson, given["wander"], seed)
     order = torch.Generator().manual_seed(seed)
-    whitened = task != FAN_PLANE
-    for flown in _rounds(network, flights, shares, given, order, mirrored, whitened):
-        print(f"{flown.episodes} episodes, {time.process_time():.0f} s", flush=True)
+    for number in range(given["rounds"]):
+        flights.fly(network if number else None, shares)
+        flown, last = flights.sequences(), number == given["rounds"] - 1
+        if number == 0 and task != FAN_PLANE:
+            network.whiten(flown.seen)
+        epochs, rate = given["epochs"] * (3 if last else 1), given["learning_rate"]
+        rates = rate, 0.0 if last else _LEAST_RATE * rate
+        fit(network, flown, epochs, given["batch_size"], rates, order, mirrored)
+        print(f"{flights.episodes} episodes, {time.process_time():.0f} s", flush=True)
     card = _card(task, given["cell"], scenario, seed, flights.episodes * lesson.decisions)
     card |= {"fit": {name: value for name, value in given.items() if name != "cell"}}
+    return _chosen(card, network.policy_weights)
+
+
+def _chosen(
+    card: dict[str, Any], weights: Callable[[Array], Weights]
+) -> TaskPolicy | TrainedPolicy:
+    """Return the policy of ``weights`` of shares; in FanTracking2D with the gain that is best on
+    validation episodes in the scenario of its training.
+    """
+    task = card.get("task", FAN)
+    kind = TaskPolicy if "task" in card else TrainedPolicy
     if task != FAN_PLANE:
-        kind = TrainedPolicy if task == FAN else TaskPolicy
-        return kind(card, network.policy_weights(shares))
-    tried = [
-        TaskPolicy({**card, "gain": gain}, network.policy_weights(_shares(task, gain)))
-        for gain in _GAINS
-    ]
-    env = TASKS[task].environment(BASE)
+        return kind(card, weights(_shares(task)))
+    tried = [TaskPolicy({**card, "gain": gain}, weights(_shares(task, gain))) for gain in _GAINS]
+    env = TASKS[task].make(card["scenario"], observation=card.get("observation"))
     return min(tried, key=lambda each: validate(each, env, VALIDATION)[0])
 
 
-def linear(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy:
-    """Return a linear law of a task in the wind; arguments as of ``teach``."""
+def linear(
+    task: str, scenario: str, seed: int, observation: str | None = None, **changed: Any
+) -> TaskPolicy | TrainedPolicy:
+    """Return a linear law of a task; ``observation``: one of ``OBSERVATIONS`` in place of the
+    task's own; other arguments as of ``teach``.
+    """
     given = _LINEAR | changed
-    lesson, envs, _, _ = _lesson(task, scenario, given["episodes"])
-    size, lasts = _FIT[WIND]["wander"]
-    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
-    law, flights = LinearLaw(), Flights(envs, lesson, wander, seed)
+    lesson: Any = FanHindsight(features=None) if task == FAN else _lesson_of(task)
+    envs = lanes_of(task, scenario, given["episodes"], observation)
+    law, flights = LinearLaw(), Flights(envs, lesson, _fit_of(task)["wander"], seed)
     for number in range(given["rounds"]):
         flights.fly(law if number else None, _shares(task))
         law.fit(flights.sequences())
-    card = _card(task, "linear", scenario, seed, flights.episodes * lesson.decisions)
-    return TaskPolicy(card | {"fit": given, "memory": list(MEMORY)}, law.weights())
+    flown = flights.episodes * lesson.decisions
+    card = _card(task, LINEAR, scenario, seed, flown, observation)
+    return _chosen(card | {"fit": given, "memory": list(MEMORY)}, law.weights)
 
 
 def main() -> None:
     """Train one policy and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--task", choices=[*TASKS], required=True)
-    parser.add_argument("--kind", choices=["taught", "linear"], default="taught")
+    parser.add_argument("--kind", choices=["taught", LINEAR], default="taught")
+    parser.add_argument(
+        "--observation", choices=OBSERVATIONS, help="of a linear law; default: the task's own"
+    )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
         "--scenario", help=f"of the wind; default: {BASE} for a linear law, else a mix: {MIX}"
@@ -212,27 +207,25 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, help=f"{said}; default: the task's")
     parser.add_argument("--out", type=Path, help="folder; default: that of the kit's policies")
     given = parser.parse_args()
+    taught, asked = given.kind != LINEAR, vars(given)
+    if taught and given.observation:
+        parser.error("--observation: expected --kind linear")
     torch.set_num_threads(1)
     began, task = time.process_time(), given.task
-    usual = BASE if given.kind == "linear" else MIX
-    kind, scenario = _fit_of(task)["cell"], given.scenario or usual
-    if task in (FAN, FAN_PLANE):
-        scenario = "wide" if task == FAN else BASE
-    asked = {name: getattr(given, name) for name in ("rounds", "episodes", "epochs")}
-    changed = {name: count for name, count in asked.items() if count is not None}
-    if given.kind == "linear":
-        if task in (FAN, FAN_PLANE):
-            parser.error("--kind linear: expected a task in the wind")
-        kind = "linear"
-        policy: TaskPolicy | TrainedPolicy = linear(task, scenario, given.seed, **changed)
-    else:
-        policy = teach(task, scenario, given.seed, **changed)
-    policies = Path("training/policies")
-    out, start = (policies, "") if task == FAN else (policies / "tasks", f"{task}-")
+    changed = {name: asked[name] for name in ("rounds", "episodes", "epochs") if asked[name]}
+    usual = MIX if taught and task not in (FAN, FAN_PLANE) else BASE
+    scenario = "wide" if taught and task == FAN else given.scenario or usual
+    if not taught:
+        changed |= {"observation": given.observation}
+    policy = (teach if taught else linear)(task, scenario, given.seed, **changed)
+    policies, kind = Path("training/policies"), policy.card["algorithm"]
+    own = isinstance(policy, TrainedPolicy)
+    out, start = (policies, "") if own else (policies / "tasks", f"{task}-")
     out = given.out or out
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{start}{kind}-{given.seed}.npz"
-    rmse, lost, _ = validate(policy, TASKS[task].environment(BASE), VALIDATION)
+    env = TASKS[task].make(BASE, observation=given.observation)
+    rmse, lost, _ = validate(policy, env, VALIDATION)
     policy.card |= {
         "validation": {"episodes": VALIDATION, "rmse_m": round(rmse, 5), "lost": lost},
         "training_cpu_s": round(time.process_time() - began),

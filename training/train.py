@@ -27,6 +27,7 @@ def train(
     task: str = STANDARD_TASK,
     reward: str | None = None,
     imports: Sequence[str] = (),
+    observation: str | None = None,
 ) -> Path:
     """Train a policy; return the path of the best one on the validation episodes.
 
@@ -47,23 +48,26 @@ def train(
         reward: one's own, as of ``evaluation.rewards.find_reward``; None: the configuration's in
             FanTracking, else the task's.
         imports: Python files that register a task, a scenario or a reward.
+        observation: one of ``OBSERVATIONS``, seen in place of the task's own, or of features.
 
     Raises:
         InputError: an unknown name, a folder with another run, or a task without such a learner.
     """
     import_files(imports)
-    standard = task == STANDARD_TASK
-    run = Run(config, scenario, seed, folder, report, task, reward)
+    standard = task == STANDARD_TASK and observation is None
+    run = Run(config, scenario, seed, folder, report, task, reward, observation)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv
 
     algorithm, whole = config["algorithm"], config["steps"]
     features = features_of(config) if standard else None
-    envs = make_training_envs(scenario, config["environments"], config["estimator"], task)
+    envs = make_training_envs(
+        scenario, config["environments"], config["estimator"], task, observation
+    )
     own = find_reward(reward) if reward else WeightedTerms(config["reward"]) if standard else None
     env = FeatureVecEnv(envs, features, partial(training_seed, seed), own)
-    seen = {} if standard else task_of(task).units(envs)
+    seen = {} if standard else task_of(task).units(envs, run.judge)
     learner = make_learner(config, env, seed)
     learner.set_logger(_logger(folder))
     checkpoint = folder / "checkpoint.pt"

@@ -72,7 +72,12 @@ class MixedFanTracking(FanTrackingEnv):
         return super().draw_loop(rng, kept)
 
 
-def make_training_env(name: str, task: str = STANDARD_TASK, reward: str | None = None) -> Any:
+def make_training_env(
+    name: str,
+    task: str = STANDARD_TASK,
+    reward: str | None = None,
+    observation: str | None = None,
+) -> Any:
     """Return the environment of a scenario or a tier, in SI units; ``reward`` is one's own.
 
     Raises:
@@ -80,12 +85,16 @@ def make_training_env(name: str, task: str = STANDARD_TASK, reward: str | None =
     """
     check_training_env(name, task)
     if name in TIERS and task == STANDARD_TASK:
-        return MixedFanTracking(TIERS[name])
-    return task_of(task).make(name, reward)
+        return MixedFanTracking(TIERS[name], observation=observation)
+    return task_of(task).make(name, reward, observation=observation)
 
 
 def make_training_envs(
-    name: str, count: int, estimator: str = "ukf", task: str = STANDARD_TASK
+    name: str,
+    count: int,
+    estimator: str = "ukf",
+    task: str = STANDARD_TASK,
+    observation: str | None = None,
 ) -> gym.vector.VectorEnv:
     """Return ``count`` training environments side by side.
 
@@ -95,18 +104,23 @@ def make_training_envs(
         estimator: of the environments: ``ukf``, ``constant-gain``, its fast stand-in, or
             ``ukf-lanes``: the full filter, plant and flight loop in the lanes of a vector unit.
         task: a name, as of ``evaluation.tasks.task_of``.
+        observation: one of ``OBSERVATIONS``, normalised, in place of the task's own.
 
     Raises:
         InputError: an unknown name, or ``ukf-lanes`` with a tier.
     """
     check_training_env(name, task)
+    given: dict[str, Any] = {"observation": observation} if observation else {}
     if task != STANDARD_TASK:
-        given = {"plant": "lanes"} if estimator == LANES else {"estimator": estimator}
-        return task_of(task).make_many(count, name, **({} if estimator == "ukf" else given))
+        if estimator != "ukf":
+            given |= {"plant": "lanes"} if estimator == LANES else {"estimator": estimator}
+        return task_of(task).make_many(count, name, **given)
+    given |= {"normalize": observation is not None}
     if estimator == LANES:
         if name in TIERS:
             raise InputError(f"training: {LANES} flies one scenario, got {name!r}")
-        return TaskLanes(count, DECISIONS, task=FanTrackingEnv, scenario=name)
+        return TaskLanes(count, DECISIONS, task=FanTrackingEnv, scenario=name, **given)
     kind = MixedFanTracking if name in TIERS else FanTrackingEnv
     world = TIERS.get(name, name)
-    return TaskVectorEnv(count, DECISIONS, task=kind, scenario=world, estimator=estimator)
+    given |= {"scenario": world, "estimator": estimator}
+    return TaskVectorEnv(count, DECISIONS, task=kind, **given)

@@ -24,7 +24,7 @@ def flown(lesson, scenario, size, time=1.0, seed=3, count=8):
     flights = Flights(
         [TaskLanes(count, task=FanTrackingEnv, scenario=scenario)],
         lesson,
-        {"wander": {"size": size, "time": time}},
+        (size, time),
         seed,
     )
     flights.fly(None, np.eye(3, dtype=np.float32)[:1])

@@ -263,7 +263,7 @@ def lone_flight(seed, commands):
     """Features, rewards and losses of a single environment, computed by itself."""
     env, history = FanTrackingEnv("static"), History(FEATURES, 1)
     observation, info = env.reset(seed=seed)
-    history.restart(FEATURES.frames(observation[None]), [0])
+    history.restart(FEATURES.frames(observation[None]))
     seen, rewards = [history.flat()[0]], []
     for command in commands:
         observation, reward, lost, _, info = env.step(np.array([command], dtype=np.float32))
