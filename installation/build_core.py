@@ -31,7 +31,17 @@ SETS = {
 COMMON = ["-std=c++17", "-fPIC", "-fvisibility=hidden", "-DNDEBUG"]
 # no contraction to fused operations: results are the same to the bit in all sets
 EXACT = "-ffp-contract=off"
-FLAGS = [*COMMON, "-O3", EXACT, "-fno-math-errno", "-fno-trapping-math", "-fno-tree-slp-vectorize", "-Wno-psabi", "-Wall", "-Wextra"]
+FLAGS = [
+    *COMMON,
+    "-O3",
+    EXACT,
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fno-tree-slp-vectorize",
+    "-Wno-psabi",
+    "-Wall",
+    "-Wextra",
+]
 # of nanobind itself, whose speed is that of a call
 NANOBIND_FLAGS = [*COMMON, "-O2", "-fno-strict-aliasing"]
 BINDING = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("core/binding/*.cpp"))

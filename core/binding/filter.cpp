@@ -126,7 +126,8 @@ void bind_filter(nb::module_ &m) {
         "(1 position, 2 attitude) of the sample in its memory that were measured; voltage in V.\n\n"
         "Return the parts that could be used, or -1, with the filter as it was, if the quaternion is\n"
         "no rotation.");
-  m.attr("STEP_ADDRESS") = reinterpret_cast<std::uintptr_t>(&step_at);
+  m.def("step_address", [] { return reinterpret_cast<std::uintptr_t>(&step_at); },
+        "Return the address of `step` for compiled loops: a C function with the same arguments.");
   m.def("forget_biases", &forget_biases_at, "address"_a,
         "Give the biases of gyro and accelerometer their prior.");
   m.def("start", &start, "address"_a,
@@ -144,8 +145,8 @@ void bind_filter(nb::module_ &m) {
   m.def("make_calls", &make_calls, "address"_a, "calls"_a, "rows"_a, "numbers"_a, "std"_a, "loads"_a,
         "innovations"_a.none() = nb::none(),
         "Make calls of a filter, bytes of the record CALL (n,), and write the results into the row of\n"
-        "each: numbers (N, 30 or more) and standard deviations (N, 18) of an estimate, and the loads (N, 7, 3)\n"
-        "of the vehicle's uncertainty; innovations (N, 12): whitened, of the last measured pose, and\n"
-        "the diagonal of the root of its covariance. Return the number of calls up to a quaternion\n"
-        "that is no rotation.");
+        "each: numbers (N, 30 or more) and standard deviations (N, 18) of an estimate, and the loads\n"
+        "(N, 7, 3) of the vehicle's uncertainty; innovations (N, 12): whitened, of the last measured\n"
+        "pose, and the diagonal of the root of its covariance. Return the number of calls up to a\n"
+        "quaternion that is no rotation.");
 }
