@@ -13,6 +13,7 @@ import subprocess
 import sys
 import sysconfig
 from concurrent.futures import ThreadPoolExecutor
+from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.metadata import version
 from pathlib import Path
 
@@ -29,19 +30,11 @@ SETS = {
     "avx512": [*AVX2, "-mavx512f", "-mavx512dq", "-mavx512bw", "-mavx512vl"],
 }
 COMMON = ["-std=c++17", "-fPIC", "-fvisibility=hidden", "-DNDEBUG"]
-# no contraction to fused operations: results are the same to the bit in all sets
-EXACT = "-ffp-contract=off"
-FLAGS = [
-    *COMMON,
-    "-O3",
-    EXACT,
-    "-fno-math-errno",
-    "-fno-trapping-math",
-    "-fno-tree-slp-vectorize",
-    "-Wno-psabi",
-    "-Wall",
-    "-Wextra",
-]
+# Results are the same to the bit in all sets: no contraction to fused operations, which GCC's
+# pass over straight-line code makes in spite of the first flag
+EXACT = ["-ffp-contract=off", "-fno-tree-slp-vectorize"]
+FAST = ["-O3", "-fno-math-errno", "-fno-trapping-math"]
+FLAGS = [*COMMON, *FAST, *EXACT, "-Wall", "-Wextra", "-Wno-psabi"]
 # of nanobind itself, whose speed is that of a call
 NANOBIND_FLAGS = [*COMMON, "-O2", "-fno-strict-aliasing"]
 BINDING = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("core/binding/*.cpp"))
@@ -69,10 +62,12 @@ class BuildCore(build_ext):
     """Compile and link the extensions with one compiler, as many objects at once as cores."""
 
     def run(self) -> None:
-        """Build, and note in a checkout of what sources."""
+        """Build, and note in a checkout of what sources; sets that are not built anew leave it."""
         built_of = digest()
         super().run()
         if self.inplace:
+            for name in {*SETS} - {*sets()}:
+                (ROOT / "_core" / (name + EXTENSION_SUFFIXES[0])).unlink(missing_ok=True)
             BUILT.write_text(built_of)
 
     def build_extensions(self) -> None:
@@ -84,9 +79,9 @@ class BuildCore(build_ext):
         includes = [sysconfig.get_path("include"), nanobind.include_dir()]
         includes.append(str(found / "ext/robin_map/include"))
         system = [word for path in includes for word in ("-isystem", path)]
-        # of flags of the user's own, all but the contraction count
-        own = [*shlex.split(os.environ.get("CXXFLAGS", "")), EXACT]
-        own += shlex.split(os.environ.get("ARCHFLAGS", ""))
+        # flags of the user's own hold for the core; but contraction stays off
+        machine = shlex.split(os.environ.get("ARCHFLAGS", ""))
+        own = [*shlex.split(os.environ.get("CXXFLAGS", "")), *EXACT, *machine]
         folder = ROOT / "build/core" / str(sysconfig.get_config_var("SOABI"))
         objects = Objects(words, folder, version("nanobind"))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -94,7 +89,7 @@ class BuildCore(build_ext):
                 objects.compiled,
                 Path(nanobind.source_dir()) / "nb_combined.cpp",
                 "nanobind",
-                [*NANOBIND_FLAGS, *system, *own],
+                [*NANOBIND_FLAGS, *system, *machine],
             )
             parts = []
             for extension in self.extensions:

@@ -5,6 +5,7 @@
 
 import fcntl
 import hashlib
+import os
 import subprocess
 import sys
 import sysconfig
@@ -36,7 +37,7 @@ def is_built() -> bool:
 
 
 def build_changed() -> None:
-    """Build the core in the checkout where a source changed; one process builds, others wait.
+    """Build all sets in the checkout where a source changed; one process builds, others wait.
 
     Raises ``ImportError`` with the compiler's words where the build fails.
     """
@@ -50,6 +51,7 @@ def build_changed() -> None:
         ended = subprocess.run(
             [sys.executable, "setup.py", "--quiet", "build_ext", "--inplace"],
             cwd=ROOT,
+            env={name: value for name, value in os.environ.items() if name != "WINDWRENCH_CORE"},
             capture_output=True,
             text=True,
         )
