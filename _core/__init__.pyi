@@ -10,7 +10,7 @@ def instruction_set() -> str:
 
 class Batch:
     def __init__(self, address: int, count: int) -> None:
-        """Filters side by side, `count` like the one at an address, of a vehicle without effects."""
+        """Filters side by side, `count` like the one at an address, without effects."""
 
     def put(self, n: int, address: int) -> None:
         """Let filter n stand where the one at an address stands."""
@@ -25,9 +25,9 @@ class Batch:
             NDArray[numpy.float64], dict(shape=(None, 18), order="C", device="cpu")
         ],
     ) -> None:
-        """Step all over a period: samples (n, 11), rotor speeds rad/s, position m and quaternion, NaN
-        where nothing was measured; estimates (n, 30) and variances of the error states (n, 18),
-        written.
+        """Step all over a period: samples (n, 11), rotor speeds rad/s, position m and quaternion,
+        NaN where nothing was measured; estimates (n, 30) and variances of the error states
+        (n, 18), written.
         """
 
     def covariance(
@@ -41,7 +41,7 @@ class Batch:
 
 class SingleBatch:
     def __init__(self, address: int, count: int) -> None:
-        """Filters side by side, `count` like the one at an address, of a vehicle without effects."""
+        """Filters side by side, `count` like the one at an address, without effects."""
 
     def put(self, n: int, address: int) -> None:
         """Let filter n stand where the one at an address stands."""
@@ -56,9 +56,9 @@ class SingleBatch:
             NDArray[numpy.float64], dict(shape=(None, 18), order="C", device="cpu")
         ],
     ) -> None:
-        """Step all over a period: samples (n, 11), rotor speeds rad/s, position m and quaternion, NaN
-        where nothing was measured; estimates (n, 30) and variances of the error states (n, 18),
-        written.
+        """Step all over a period: samples (n, 11), rotor speeds rad/s, position m and quaternion,
+        NaN where nothing was measured; estimates (n, 30) and variances of the error states
+        (n, 18), written.
         """
 
     def covariance(
@@ -80,7 +80,8 @@ def step(address: int, parts: int, dt: float, voltage: float) -> int:
     no rotation.
     """
 
-STEP_ADDRESS: int
+def step_address() -> int:
+    """Return the address of `step` for compiled loops: a C function with the same arguments."""
 
 def forget_biases(address: int) -> None:
     """Give the biases of gyro and accelerometer their prior."""
@@ -138,8 +139,8 @@ def make_calls(
     | None = None,
 ) -> int:
     """Make calls of a filter, bytes of the record CALL (n,), and write the results into the row of
-    each: numbers (N, 30 or more) and standard deviations (N, 18) of an estimate, and the loads (N, 7, 3)
-    of the vehicle's uncertainty; innovations (N, 12): whitened, of the last measured pose, and
-    the diagonal of the root of its covariance. Return the number of calls up to a quaternion
-    that is no rotation.
+    each: numbers (N, 30 or more) and standard deviations (N, 18) of an estimate, and the loads
+    (N, 7, 3) of the vehicle's uncertainty; innovations (N, 12): whitened, of the last measured
+    pose, and the diagonal of the root of its covariance. Return the number of calls up to a
+    quaternion that is no rotation.
     """

@@ -42,8 +42,8 @@ void block_variances(const Settings<Single<T>> &s, const Belief<T> &f, T *varian
     }
 }
 
-// Step blocks of `count` filters like `of` over a period: samples (count, 11), NaN where nothing was
-// measured; writes estimates (count, 30) and variances (count, 18)
+// Step blocks of `count` filters like `of` over a period: samples (count, 11), NaN where nothing
+// was measured; writes estimates (count, 30) and variances (count, 18)
 template <class T>
 void step_blocks(const Filter<Single<T>> &of, Belief<T> *blocks, long count, const double *samples,
                  double *numbers, double *variances) {

@@ -29,8 +29,7 @@ template <class S> void forget_biases(Imu<S> &u) {
 
 // Keep the biases within what a sensor of their class can have
 template <class S> void bound_biases(Imu<S> &u) {
-  for (int i = 0; i < BIASES; i++)
-    u.mean[i] = smaller(larger(u.mean[i], -u.bound[i]), u.bound[i]);
+  for (int i = 0; i < BIASES; i++) u.mean[i] = smaller(larger(u.mean[i], -u.bound[i]), u.bound[i]);
 }
 
 // Give the bias of a sensor, of first number `first` (0 or 3), its prior variance without any
@@ -111,16 +110,17 @@ void carry_companions(Filter<S> &f, S dt, const S B[6][N], const S cross[N][BIAS
       u.sensitivity[3 + i][BIASES + n] = turned / dt;
     }
   for (int i = 0; i < N; i++)
-    for (int j = 0; j < BIASES; j++) all_cross[i][j] = cross[i][j], all_cross[i][BIASES + j] = B[j][i];
+    for (int j = 0; j < BIASES; j++)
+      all_cross[i][j] = cross[i][j], all_cross[i][BIASES + j] = B[j][i];
   split(f, all_cross, joint);
   u.known = 1;
   for (int s = 0; s < 2; s++)
     if (u.doubt[s] >= S(0)) u.doubt[s] += dt;
 }
 
-// Begin to carry biases with a filter that had none so far. The correlation of the last step's noise
-// with the error state is known if nothing was corrected since; else an accelerometer counts from the
-// next step on
+// Begin to carry biases with a filter that had none so far. The correlation of the last step's
+// noise with the error state is known if nothing was corrected since; else an accelerometer counts
+// from the next step on
 template <class S> void begin_imu(Filter<S> &f) {
   forget_biases(f.imu);
   f.imu.refused = 0;

@@ -104,8 +104,8 @@ void correct(const Settings<Single<T>> &s, Belief<T> &f, const T *pose, A with_p
               larger(choose(with_attitude, likeliest_scale(f, 0) / (S(1) + m.widened[0]), one),
                      choose(with_position, likeliest_scale(f, 3) / (S(1) + m.widened[1]), one));
   A unlikely = measured & opposite(n.nis <= largest);  // so is what is no number
-  A late = (with_position & (m.position_age > patience)) |
-           (with_attitude & (m.attitude_age > patience));
+  A late =
+      (with_position & (m.position_age > patience)) | (with_attitude & (m.attitude_age > patience));
   A odd = measured & (unlikely | late | (m.phase > T{} + S(BELIEVING)));
   A believed = measured, taken = measured;
   Status verdict = TRACKING;
@@ -139,8 +139,7 @@ void correct(const Settings<Single<T>> &s, Belief<T> &f, const T *pose, A with_p
   take_in(s, n, f, mean);
   for (int i = 0; i < 6; i++) m.residual[i] -= choose(taken, mean[row_of(i)], T{});
   // a quaternion brought to length 1 once more may change in its last digit
-  for (int i = 0; i < 4; i++)
-    f.x[QUATERNION + i] = choose(taken, f.x[QUATERNION + i], before[i]);
+  for (int i = 0; i < 4; i++) f.x[QUATERNION + i] = choose(taken, f.x[QUATERNION + i], before[i]);
   if constexpr (!is_single<T>) {
     for (int i = 0; i < lanes_of<T>; i++)
       if (odd[i]) put_lane<T>(f, i, aside[i]);

@@ -6,9 +6,18 @@
 namespace windwrench {
 
 // layouts of dynamics/effects/base.py
-enum { AT_ROTATION = 3, AT_VELOCITY = 12, AT_RATE = 15, AT_SPEED = 18, AT_THRUST = 22, AT_WIND = 26,
-       AT_VOLTAGE = 29, AT_TIME = 30, AT_ACCELERATION = 31 };           // of the flight's state
-enum { ROTOR_STEP = 4, ROTOR_VOLTAGE = 5, ROTOR_TIME = 6 };             // of the rotors
+enum {
+  AT_ROTATION = 3,
+  AT_VELOCITY = 12,
+  AT_RATE = 15,
+  AT_SPEED = 18,
+  AT_THRUST = 22,
+  AT_WIND = 26,
+  AT_VOLTAGE = 29,
+  AT_TIME = 30,
+  AT_ACCELERATION = 31
+};  // of the flight's state
+enum { ROTOR_STEP = 4, ROTOR_VOLTAGE = 5, ROTOR_TIME = 6 };                     // of the rotors
 enum { SAMPLE_STEP = 11, HAS_SPEED, HAS_POSITION, HAS_QUATERNION, DIRECTION };  // of a sample
 
 // What the rotors deliver over a step of dt s at the logged rotor speeds (4) rad/s
@@ -33,8 +42,8 @@ template <class S> void drive(Model<S> &m, const S *speeds, S dt, S voltage) {
   rotor_wrench(m.body, m.rotors, m.rotor_wrench);
 }
 
-// What the wrench effects say at a state x of attitude R, into m.effect_wrench. The first call after
-// `drive` also carries the effects' own states over the step: made at the state itself
+// What the wrench effects say at a state x of attitude R, into m.effect_wrench. The first call
+// after `drive` also carries the effects' own states over the step: made at the state itself
 template <class S> void apply_effects(Model<S> &m, const S *x, const S R[3][3]) {
   if (m.wrench_count == 0) return;
   S *state = m.effect_state;

@@ -5,9 +5,9 @@
 
 namespace windwrench {
 
-constexpr int NOISE = 12;  // noise inputs: motor torque, torque walk, thrust, force walk
-constexpr int BIASES = 6;  // of gyro rad/s and accelerometer m/s2
-constexpr int COMPANIONS = 12;  // the biases, and the noise of the last step
+constexpr int NOISE = 12;            // noise inputs: motor torque, torque walk, thrust, force walk
+constexpr int BIASES = 6;            // of gyro rad/s and accelerometer m/s2
+constexpr int COMPANIONS = 12;       // the biases, and the noise of the last step
 constexpr int AGREEING_SAMPLES = 5;  // accelerometer samples in a row that make a push
 
 // An effect on the vehicle: (its coefficients and own state, the vehicle's numbers, the flight's
@@ -28,8 +28,8 @@ template <class S> struct Model {
   EffectModel<S> sensing_models[4];
   S sensing_coefficients[4][8];
   int64_t sensing_count;
-  S sample[16];       // rotor speeds and pose on their way through the sensing effects
-  S memory[21][112];  // of rotor-input and sensing effects; last: delivered rotor speeds
+  S sample[16];              // rotor speeds and pose on their way through the sensing effects
+  S memory[21][112];         // of rotor-input and sensing effects; last: delivered rotor speeds
   S time, voltage, wind[3];  // s, V, m/s
   S rotors[7];               // delivered rotor speeds rad/s, step s, voltage V, time s
   S rotor_wrench[4];         // their thrust N and torques Nm about the centre of mass
@@ -37,8 +37,8 @@ template <class S> struct Model {
   S effect_wrench[6];  // force in the world, torque in the body frame
 };
 
-enum Phase { BELIEVING, ONE_REFUSED, REFUSING };              // what became of the last poses
-enum Status { TRACKING, COASTING, REJECTED, RESTARTED };      // the verdict on a measurement
+enum Phase { BELIEVING, ONE_REFUSED, REFUSING };          // what became of the last poses
+enum Status { TRACKING, COASTING, REJECTED, RESTARTED };  // the verdict on a measurement
 
 // What is remembered of poses from one step to the next
 template <class T> struct Poses {
@@ -52,14 +52,14 @@ template <class T> struct Poses {
   T seen[7];       // pose that was believed last
   T position_age;  // s since a position was believed
   T attitude_age;
-  T doubted[7];  // pose that was refused last
+  T doubted[7];                                  // pose that was refused last
   T doubted_position_age, doubted_attitude_age;  // s
   T position_stride, attitude_stride;            // s between the last two refused; 0: not two
-  T pace[6];      // motion of (rho, x) over that time, per second
-  T agreeing;     // of those refused: how many went on from each other
-  T agreed_for;   // s for which they have
-  T jump[6];      // of (rho, x): what those from one to the next add up to
-  T blur[6];      // what these may miss by
+  T pace[6];                                     // motion of (rho, x) over that time, per second
+  T agreeing;    // of those refused: how many went on from each other
+  T agreed_for;  // s for which they have
+  T jump[6];     // of (rho, x): what those from one to the next add up to
+  T blur[6];     // what these may miss by
 };
 
 // What a filter must not forget from one step to the next
@@ -78,15 +78,15 @@ template <class T> struct Belief {
 // What a filter assumes
 template <class S> struct Settings {
   int64_t gated;
-  S alarm[2];    // largest NIS taken in unseen: of three numbers, of six
-  S restart_at;  // NIS beyond which no linear correction is made
+  S alarm[2];           // largest NIS taken in unseen: of three numbers, of six
+  S restart_at;         // NIS beyond which no linear correction is made
   S patience, give_up;  // s
-  S prior[N];    // variances of what nothing is known of
-  S reason[6];   // squares of torque and force beyond which none is believed
-  S lost[N];     // variances beyond which what is not measured is given up
-  S push[2];     // rad/s2 and m/s2, of the hardest push
-  S response;    // s
-  S fastest;     // rad/s, beyond which a rotor speed counts as not measured
+  S prior[N];           // variances of what nothing is known of
+  S reason[6];          // squares of torque and force beyond which none is believed
+  S lost[N];            // variances beyond which what is not measured is given up
+  S push[2];            // rad/s2 and m/s2, of the hardest push
+  S response;           // s
+  S fastest;            // rad/s, beyond which a rotor speed counts as not measured
   S motor_torque[3], torque_walk[3], thrust[3], force_walk[3];  // variances in a period
   S noise[6], imu_noise[6];  // variances of (rho, x), of gyro and accelerometer
   S uncertain[9];            // of the vehicle
@@ -96,24 +96,24 @@ template <class S> struct Settings {
 // An inertial measurement's biases, and the noise of the last step: imu.hpp
 template <class S> struct Imu {
   int64_t used, known, refused;  // known: there was a step, whose noise is the last one
-  S gate[3];        // largest NIS of three numbers, of six, and of samples that agree
-  int64_t in_row;   // accelerometer samples that the gate would refuse
+  S gate[3];                     // largest NIS of three numbers, of six, and of samples that agree
+  int64_t in_row;                // accelerometer samples that the gate would refuse
   S unlikely[AGREEING_SAMPLES][3];  // m/s2, innovations of the last of them
-  S doubt[2];       // s for which a sensor was refused; negative: it was not
+  S doubt[2];                       // s for which a sensor was refused; negative: it was not
   S prior[BIASES], walk[BIASES];    // variances; the walk's in a period
-  S bound[BIASES];  // largest bias of a sensor of its class
+  S bound[BIASES];                  // largest bias of a sensor of its class
   S mean[COMPANIONS];
-  S regression[N][COMPANIONS];      // on the error state
-  S rest[COMPANIONS][COMPANIONS];   // covariance of what that leaves
+  S regression[N][COMPANIONS];     // on the error state
+  S rest[COMPANIONS][COMPANIONS];  // covariance of what that leaves
   S bias_covariance[BIASES][BIASES];
-  S sensitivity[6][COMPANIONS];     // of gyro and accelerometer
+  S sensitivity[6][COMPANIONS];  // of gyro and accelerometer
 };
 
 template <class S> struct Filter {
   Model<S> vehicle;
   Belief<S> belief;
   Settings<S> settings;
-  S z[11];              // a step's sample: rotor speeds rad/s, position m, quaternion
+  S z[11];                  // a step's sample: rotor speeds rad/s, position m, quaternion
   S centre_rotation[3][3];  // attitude at the start of the last step
   Imu<S> imu;
 };

@@ -71,7 +71,8 @@ template <class S> void innovate_imu(Filter<S> &f, const S *z, ImuInnovation<S> 
     for (int j = 0; j < 6; j++) {
       S sum = i == j ? f.settings.imu_noise[i] : S(0), bent = S(0);
       for (int c = 0; c < COMPANIONS; c++) sum += C[i][c] * rest[c][j];
-      for (int k = 0; k < N; k++) sum += half[k][i] * half[k][j], bent += second[k][i] * second[k][j];
+      for (int k = 0; k < N; k++)
+        sum += half[k][i] * half[k][j], bent += second[k][i] * second[k][j];
       n.covariance[i][j] = sum + S(0.5) * weight * bent - mean[i] * mean[j];
     }
     for (int k = 0; k < N; k++) {
@@ -106,9 +107,9 @@ template <class S> S imu_nis(const S covariance[6][6], const S *y, int first, in
   return nis;
 }
 
-// Are the accelerometer samples that were unlikely in a row a push: far from what the filter expects,
-// by no more than two weights, and no farther from each other than noise alone makes them? Vibration
-// does not agree with itself, and a saturated sensor is too far
+// Are the accelerometer samples that were unlikely in a row a push: far from what the filter
+// expects, by no more than two weights, and no farther from each other than noise alone makes them?
+// Vibration does not agree with itself, and a saturated sensor is too far
 template <class S> bool is_push(Filter<S> &f, const ImuInnovation<S> &n) {
   Imu<S> &u = f.imu;
   for (int i = 0; i < 3; i++) u.unlikely[u.in_row % AGREEING_SAMPLES][i] = n.y[3 + i];
@@ -129,7 +130,8 @@ template <class S> bool is_push(Filter<S> &f, const ImuInnovation<S> &n) {
 
 // The rows that the gate lets in, from `first` to `last`. One of two sensors that are unlikely
 // together may be right: a saturated accelerometer does not cost the gyro
-template <class S> void believed_rows(Filter<S> &f, const ImuInnovation<S> &n, int &first, int &last) {
+template <class S>
+void believed_rows(Filter<S> &f, const ImuInnovation<S> &n, int &first, int &last) {
   Imu<S> &u = f.imu;
   if (f.belief.x[NIS] <= u.gate[last - first == 6 ? 1 : 0]) {
     for (int s = first / 3; s < last / 3; s++) u.doubt[s] = S(-1);
@@ -200,8 +202,8 @@ void correct_with_imu(Filter<S> &f, const ImuInnovation<S> &n, int first, int la
   split(f, cross, joint);
 }
 
-// Correct with the measured parts of z (6), gyro rad/s and accelerometer m/s2, unless the gate refuses
-// them. The accelerometer is left out before the first prediction
+// Correct with the measured parts of z (6), gyro rad/s and accelerometer m/s2, unless the gate
+// refuses them. The accelerometer is left out before the first prediction
 template <class S> void take_in_imu(Filter<S> &f, const S *z, bool gyro, bool accelerometer) {
   S &nis = f.belief.x[NIS];
   nis = S(NAN);
@@ -235,10 +237,8 @@ int step_with_biases(Filter<S> &f, int parts, S dt, S voltage, Innovation<S> &n)
   for (int i = 0; i < STATE; i++) before[i] = b.x[i];
   restarts = b.restarts;
   correct_parts(f, sample, usable, n);
-  if (b.restarts > restarts)
-    forget_biases(f.imu);
-  else
-    correct_companions(f, before);
+  if (b.restarts > restarts) forget_biases(f.imu);
+  else correct_companions(f, before);
   return usable;
 }
 

@@ -12,8 +12,9 @@ template <class T> T least_pivot(T variance) {
 }
 
 // The sum of six products, in pairs
-template <class T> T paired(const T *a, const T *b0, const T *b1, const T *b2, const T *b3,
-                            const T *b4, const T *b5, int i) {
+template <class T>
+T paired(const T *a, const T *b0, const T *b1, const T *b2, const T *b3, const T *b4, const T *b5,
+         int i) {
   return (a[0] * b0[i] + a[1] * b1[i]) + (a[2] * b2[i] + a[3] * b3[i]) +
          (a[4] * b4[i] + a[5] * b5[i]);
 }
@@ -27,14 +28,14 @@ void substitute(const T L[6][6], const T *scales, const T rows[][WIDTH], T out[]
     T s2 = (rows[2][i] - L[2][0] * s0 - L[2][1] * s1) * scales[2];
     T s3 = (rows[3][i] - L[3][0] * s0 - L[3][1] * s1 - L[3][2] * s2) * scales[3];
     T s4 = (rows[4][i] - L[4][0] * s0 - L[4][1] * s1 - L[4][2] * s2 - L[4][3] * s3) * scales[4];
-    T s5 = (rows[5][i] - L[5][0] * s0 - L[5][1] * s1 - L[5][2] * s2 - L[5][3] * s3 -
-            L[5][4] * s4) * scales[5];
+    T s5 = (rows[5][i] - L[5][0] * s0 - L[5][1] * s1 - L[5][2] * s2 - L[5][3] * s3 - L[5][4] * s4) *
+           scales[5];
     out[0][i] = s0, out[1][i] = s1, out[2][i] = s2, out[3][i] = s3, out[4][i] = s4, out[5][i] = s5;
   }
 }
 
-// P += sign r' r for six rows (WIDTH) in the first SIZE rows and columns of P. Lanes work out half of
-// it, and mirror: the other half is the same to the bit
+// P += sign r' r for six rows (WIDTH) in the first SIZE rows and columns of P. Lanes work out half
+// of it, and mirror: the other half is the same to the bit
 template <int SIZE, int WIDTH, class T>
 void add_squares(T P[WIDTH][WIDTH], const T rows[6][WIDTH], Single<T> sign) {
   for (int i = 0; i < SIZE; i++) {
@@ -81,7 +82,8 @@ template <int SIZE, class S> void root_of(const S P[SIZE][SIZE], S out[SIZE][SIZ
 }
 
 // rows = lower^-1 rows
-template <int SIZE, int WIDTH, class S> void divide(const S lower[SIZE][SIZE], S rows[SIZE][WIDTH]) {
+template <int SIZE, int WIDTH, class S>
+void divide(const S lower[SIZE][SIZE], S rows[SIZE][WIDTH]) {
   for (int i = 0; i < SIZE; i++) {
     for (int k = 0; k < i; k++)
       for (int j = 0; j < WIDTH; j++) rows[i][j] -= lower[i][k] * rows[k][j];

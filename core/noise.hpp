@@ -39,8 +39,8 @@ template <class T> void grow_older(const Settings<Single<T>> &s, Single<T> dt, B
 }
 
 // Learn from a measured pose how large the noise of attitudes and positions is. The innovation's
-// change since the last pose, increment (6), holds the noise of both, 2 R, and the uncertainty of the
-// expected pose, unsure (6), adds to that
+// change since the last pose, increment (6), holds the noise of both, 2 R, and the uncertainty of
+// the expected pose, unsure (6), adds to that
 template <class T, class A>
 void learn_noise(const Settings<Single<T>> &s, const T *increment, const T *unsure, A with_position,
                  A with_attitude, Belief<T> &f) {

@@ -1,4 +1,5 @@
-// Numbers of the core: double, float, or lanes of either, one register of a processor's vector unit.
+// Numbers of the core: double, float, or lanes of either, one register of a processor's vector
+// unit.
 //
 // A formula is written once for all of them. A comparison of lanes has an answer for each lane, so
 // code for all numbers takes `choose`, `any` and `all` in place of `if`. Each operation rounds like
@@ -29,23 +30,18 @@ template <class T> using Single = typename Parts<T, is_single<T>>::type;  // the
 template <class T> using Answer = decltype(std::declval<T>() < std::declval<T>());
 template <class T> constexpr int lanes_of = sizeof(T) / sizeof(Single<T>);
 
-// one lane of a number, to be read or written
-template <class T> inline decltype(auto) lane(T &a, int i) {
-  if constexpr (is_single<std::remove_const_t<T>>) {
-    return (a);
-  } else {
-    return (a[i]);
-  }
-}
-
 template <class T> inline T choose(bool c, T a, T b) { return c ? a : b; }
 template <class C, class T> inline T choose(C c, T a, T b) { return c ? a : b; }
 
 // whether a condition holds in any lane, or in all
 template <class C> inline bool any(C c) {
-  bool found = false;
-  for (int i = 0; i < lanes_of<C>; i++) found |= lane(c, i) != 0;
-  return found;
+  if constexpr (is_single<C>) {
+    return c != 0;
+  } else {
+    bool found = false;
+    for (int i = 0; i < lanes_of<C>; i++) found |= c[i] != 0;
+    return found;
+  }
 }
 template <class C> inline bool all(C c) { return !any(c == C{}); }
 inline bool opposite(bool c) { return !c; }
@@ -61,9 +57,13 @@ template <class T> inline T smaller(T a, T b) { return choose(b < a, b, a); }
 template <class T> inline T absolute(T a) { return choose(a < T{}, -a, a); }
 
 template <class T, class F> inline T lane_by_lane(T a, F function) {
-  T result;
-  for (int i = 0; i < lanes_of<T>; i++) lane(result, i) = function(lane(a, i));
-  return result;
+  if constexpr (is_single<T>) {
+    return function(a);
+  } else {
+    T result;
+    for (int i = 0; i < lanes_of<T>; i++) result[i] = function(a[i]);
+    return result;
+  }
 }
 template <class T> inline T root(T a) {
   return lane_by_lane(a, [](Single<T> one) { return std::sqrt(one); });

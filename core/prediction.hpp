@@ -15,14 +15,14 @@ namespace windwrench {
 
 // What a prediction leaves for the companions of an inertial measurement
 template <class T> struct Prediction {
-  T S[12][N];      // columns of the root of P, one a row
-  T M[12][12];     // the Schur complement of the others
-  T H[12][N];      // pairs of points after the step: their scaled half difference,
-  T E[12][N];      // and their scaled half sum, from the central one
-  T B[6][N];       // scaled noise inputs, one a row
-  T mean[N];       // (26)
-  T centre[STATE]; // where the central point is after the step
-  T R[3][3];       // attitude before it
+  T S[12][N];       // columns of the root of P, one a row
+  T M[12][12];      // the Schur complement of the others
+  T H[12][N];       // pairs of points after the step: their scaled half difference,
+  T E[12][N];       // and their scaled half sum, from the central one
+  T B[6][N];        // scaled noise inputs, one a row
+  T mean[N];        // (26)
+  T centre[STATE];  // where the central point is after the step
+  T R[3][3];        // attitude before it
 };
 
 // Six columns of the root, from `first` on, into S; rows (6) lack the columns before
@@ -116,7 +116,8 @@ void carry_covariance(const Body<Single<T>> &body, const T R[3][3], Single<T> dt
                       T P[N][N]) {
   T Z[12][N], Y[N][12];
   carry_linear<12, T>(
-      body, R, dt, [&](int i, int j) { return M[i][j]; }, [&](int i, int j) -> T & { return Y[i][j]; });
+      body, R, dt, [&](int i, int j) { return M[i][j]; },
+      [&](int i, int j) -> T & { return Y[i][j]; });
   for (int i = 0; i < N; i++)
     for (int j = 0; j < 12; j++) Z[j][i] = Y[i][j];
   for (int i = 0; i < N; i++)
@@ -171,19 +172,21 @@ void add_noise(const Body<Single<T>> &body, const Settings<Single<T>> &s, Single
   }
   // else torque and thrust have nothing to do with each other: two blocks
   for (int i = 3; i < 6; i++)
-    for (int j = 3; j < 6; j++) P[i][j] += B[0][i] * B[0][j] + B[1][i] * B[1][j] + B[2][i] * B[2][j];
+    for (int j = 3; j < 6; j++)
+      P[i][j] += B[0][i] * B[0][j] + B[1][i] * B[1][j] + B[2][i] * B[2][j];
   for (int i = 6; i < 12; i++)
     for (int j = 6; j < 12; j++)
       P[i][j] += B[3][i] * B[3][j] + (B[4][i] * B[4][j] + B[5][i] * B[5][j]);
 }
 
-// How far out sigma points lie, the factor of a pair's mean, and that of its differences: (28). With
-// a pair of errors e and d, ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2; the second half is
-// only there where the model is nonlinear, in the first 12 rows
+// How far out sigma points lie, the factor of a pair's mean, and that of its differences: (28).
+// With a pair of errors e and d, ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2; the second
+// half is only there where the model is nonlinear, in the first 12 rows
 template <class S> struct Spread {
   S spread, weight, scale;
   explicit Spread(S kappa)
-      : spread(root(S(N + NOISE) + kappa)), weight(S(0.5) / (S(N + NOISE) + kappa)),
+      : spread(root(S(N + NOISE) + kappa)),
+        weight(S(0.5) / (S(N + NOISE) + kappa)),
         scale(root(S(0.5) * weight)) {}
 };
 
@@ -200,7 +203,8 @@ void error_of_point(const T *x, const T *column, Single<T> spread, const T *cent
 
 // What a pair of points of column j adds: half difference, half sum and mean, (26)
 template <class T>
-void halve_pair(const T *plus, const T *minus, const Spread<Single<T>> &s, int j, Prediction<T> &w) {
+void halve_pair(const T *plus, const T *minus, const Spread<Single<T>> &s, int j,
+                Prediction<T> &w) {
   for (int i = 0; i < N; i++) w.H[j][i] = s.scale * (plus[i] - minus[i]);
   for (int i = 0; i < 12; i++) {
     T total = plus[i] + minus[i];
@@ -282,11 +286,14 @@ void carry(const Body<Single<T>> &body, const Settings<Single<T>> &s, const T *r
   if constexpr (is_single<T>) {
     pairs_together(body, f.x, spread, rotors, dt, w);
   } else {
-    pairs_in_turn<6>(f.x, spread, [&](const T *x, T *out) {
-      T R[3][3];
-      matrix_of(x + QUATERNION, R);
-      move(body, x, R, rotors, none, dt, out);
-    }, w);
+    pairs_in_turn<6>(
+        f.x, spread,
+        [&](const T *x, T *out) {
+          T R[3][3];
+          matrix_of(x + QUATERNION, R);
+          move(body, x, R, rotors, none, dt, out);
+        },
+        w);
   }
   gather<6>(f, w);
 }

@@ -1,8 +1,8 @@
 // Recovery of a filter from gaps, from poses noisier than declared, and from wrong poses:
 // estimator/recovery.py has the reasons, and the table of phases and verdicts.
 //
-// What is rare is written for single numbers, with plain `if`s. A lane that leaves the normal path is
-// copied out to a single filter, and copied back.
+// What is rare is written for single numbers, with plain `if`s. A lane that leaves the normal path
+// is copied out to a single filter, and copied back.
 #pragma once
 #include "linear_algebra.hpp"
 #include "noise.hpp"
@@ -97,8 +97,7 @@ template <class S> void start_over_if_broken(const Settings<S> &s, Belief<S> &f)
 
 // After a prediction over dt s: count the time since the last measurements, keep the covariance
 // within what a vehicle can do, and hold what is lost
-template <class T>
-void after_prediction(const Settings<Single<T>> &s, Single<T> dt, Belief<T> &f) {
+template <class T> void after_prediction(const Settings<Single<T>> &s, Single<T> dt, Belief<T> &f) {
   using S = Single<T>;
   const Poses<T> &m = f.poses;
   f.status = T{} + S(COASTING);
@@ -129,9 +128,9 @@ bool is_beyond(const Settings<S> &s, const Belief<S> &f, bool with_attitude, S n
   return !(nis <= s.restart_at) || (with_attitude && far);
 }
 
-// Can a pose follow an earlier one (7) that was measured some seconds before, of a vehicle that moves
-// as estimated, give or take six standard deviations and a push? miss (6), MRP and m: by how much it
-// misses; slack (6): by how much it may
+// Can a pose follow an earlier one (7) that was measured some seconds before, of a vehicle that
+// moves as estimated, give or take six standard deviations and a push? miss (6), MRP and m: by how
+// much it misses; slack (6): by how much it may
 template <class S>
 bool continues(const Settings<S> &s, const Belief<S> &f, const S *pose, const S *before,
                S position_age, S attitude_age, bool with_position, bool with_attitude, S *miss,
@@ -146,8 +145,8 @@ bool continues(const Settings<S> &s, const Belief<S> &f, const S *pose, const S 
     // the difference of two measurements, at six standard deviations
     slack[i] = S(6) * root(S(2) * s.noise[i] * likeliest_scale(f, i));
     if (i < 3) {
-      slack[i] += S(0.25) * age * (rate + S(6) * root(f.P[3 + i][3 + i]) +
-                                   s.push[0] * (s.response + S(0.5) * age));
+      slack[i] += S(0.25) * age *
+                  (rate + S(6) * root(f.P[3 + i][3 + i]) + s.push[0] * (s.response + S(0.5) * age));
     } else {
       miss[i] = pose[i - 3] - before[i - 3] - age * f.x[4 + i];
       slack[i] += age * (S(6) * root(f.P[6 + i][6 + i]) + s.push[1] * (s.response + S(0.5) * age));
@@ -172,7 +171,8 @@ bool agrees(const Settings<S> &s, Belief<S> &f, const S *pose, bool with_positio
     bool measured = i < 3 ? with_attitude : with_position;
     S age = i < 3 ? m.doubted_attitude_age : m.doubted_position_age;
     S stride = i < 3 ? m.attitude_stride : m.position_stride;
-    S lever = i < 3 ? S(0.25) : S(1), push = s.push[i < 3 ? 0 : 1];  // an MRP: a quarter of an angle
+    S lever = i < 3 ? S(0.25) : S(1),
+      push = s.push[i < 3 ? 0 : 1];  // an MRP: a quarter of an angle
     if (i >= 3) missed[i] = pose[i - 3] - m.doubted[i - 3];
     bool has_pace = stride > S(0);
     S ratio = age / larger(stride, S(1e-9));
@@ -268,8 +268,7 @@ void restart(const Settings<S> &s, Belief<S> &f, const S *pose, bool at_position
     if (at_attitude) f.x[QUATERNION + i] = pose[3 + i];
   for (int i = 0; i < 3; i++) {
     S *v = f.x + VELOCITY + i, *w = f.x + RATE + i;
-    if (at_attitude)
-      f.P[i][i] = smaller(pose_noise(s, f, i) + missed[i] * missed[i], s.prior[i]);
+    if (at_attitude) f.P[i][i] = smaller(pose_noise(s, f, i) + missed[i] * missed[i], s.prior[i]);
     if (at_position) {
       S variance = pose_noise(s, f, 3 + i) + missed[3 + i] * missed[3 + i];
       f.P[6 + i][6 + i] = smaller(variance, s.prior[6 + i]);
@@ -336,8 +335,8 @@ Status judge(const Settings<S> &s, Belief<S> &f, const S *pose, bool with_positi
   return restarted ? RESTARTED : refused ? REJECTED : TRACKING;
 }
 
-// Keep the parts of a pose that are believed now. Refused poses are done with, unless what jumped in
-// them was not measured now: an attitude alone says nothing of a position
+// Keep the parts of a pose that are believed now. Refused poses are done with, unless what jumped
+// in them was not measured now: an attitude alone says nothing of a position
 template <class T, class A>
 void remember(const Settings<Single<T>> &s, const T *pose, A with_position, A with_attitude,
               Belief<T> &f) {
@@ -357,10 +356,11 @@ void remember(const Settings<Single<T>> &s, const T *pose, A with_position, A wi
   }
 }
 
-// What poses that jumped add to the variances of the error state, out (18). Either the poses are wrong
-// or the filter is. Over Recovery.patience the weight of the second grows to one: a restart there
-// would move the pose to the refused one, and leave twist and wrench a prior's variance. Without a
-// gate the filter has followed, and the weight of the first falls from one to zero in that time
+// What poses that jumped add to the variances of the error state, out (18). Either the poses are
+// wrong or the filter is. Over Recovery.patience the weight of the second grows to one: a restart
+// there would move the pose to the refused one, and leave twist and wrench a prior's variance.
+// Without a gate the filter has followed, and the weight of the first falls from one to zero in
+// that time
 template <class S> void doubted_variance(const Settings<S> &s, const Belief<S> &f, S *out) {
   const Poses<S> &m = f.poses;
   S weight = m.phase > S(BELIEVING) ? S(1) / s.patience : S(0), none = S(0);

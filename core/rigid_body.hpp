@@ -9,7 +9,7 @@ namespace windwrench {
 // the state: position m, quaternion, velocity m/s (world), rate rad/s (body), external torque Nm
 // and force N (world), and the NIS of the last measurement behind it
 constexpr int QUATERNION = 3, VELOCITY = 7, RATE = 10, TORQUE = 13, FORCE = 16, NIS = 19;
-constexpr int STATE = 20, N = 18;  // N: error state (rho, omega, x, v, torque, force)
+constexpr int STATE = 20, N = 18;              // N: error state (rho, omega, x, v, torque, force)
 constexpr double LARGEST_MRP_VARIANCE = 0.25;  // a standard deviation of about 115 degrees
 
 template <class S> struct Body {
@@ -38,7 +38,8 @@ template <class T, class S> T row_times(const S *row, T x, T y, T z) {
 }
 
 // accelerations out (6) of the geometric centre, m/s2 world, and of the attitude, rad/s2 body: (4),
-// (12). rotors (4): thrust and torques; effects (6): declared effects' force, world, and torque, body
+// (12). rotors (4): thrust and torques; effects (6): declared effects' force, world, and torque,
+// body
 template <class T, class R4, class E6>
 void accelerations(const Body<Single<T>> &b, const T R[3][3], const T *x, const R4 *rotors,
                    const E6 *effects, T *out) {

@@ -1,5 +1,6 @@
 // Rotations: unit quaternions (scalar first, Hamilton, body to world) and modified Rodrigues
-// parameters (MRP), rho = axis * tan(angle / 4). Equation numbers: McKinnon and Schoellig, IROS 2016.
+// parameters (MRP), rho = axis * tan(angle / 4). Equation numbers: McKinnon and Schoellig, IROS
+// 2016.
 #pragma once
 #include "numbers.hpp"
 
@@ -57,11 +58,11 @@ template <class T> void turn_body(const T *q, const T *rate, Single<T> dt, T *ou
   S half = S(0.5) * dt;
   T square = half * half * (rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]);
   // cosine of half the turn, and its sine over the rate: series to the last digit of a double
-  T c = S(1) - square / S(2) *
-                   (S(1) - square / S(12) * (S(1) - square / S(30) * (S(1) - square / S(56))));
-  T s = half * (S(1) - square / S(6) *
-                           (S(1) - square / S(20) *
-                                       (S(1) - square / S(42) * (S(1) - square / S(72)))));
+  T c = S(1) -
+        square / S(2) * (S(1) - square / S(12) * (S(1) - square / S(30) * (S(1) - square / S(56))));
+  T s = half *
+        (S(1) - square / S(6) *
+                    (S(1) - square / S(20) * (S(1) - square / S(42) * (S(1) - square / S(72)))));
   auto large = square >= T{} + S(0.01);
   if (any(large)) {
     T angle = root(square);

@@ -1,4 +1,5 @@
-// The wrench filter: an unscented Kalman filter over pose, twist and external wrench of a quadrotor.
+// The wrench filter: an unscented Kalman filter over pose, twist and external wrench of a
+// quadrotor.
 //
 // McKinnon and Schoellig, Unscented External Force and Torque Estimation for Quadrotors, IROS 2016,
 // (15)-(37); estimator/reference.py is the readable text.
@@ -33,8 +34,8 @@ template <class S> int check_sample(const Settings<S> &s, Belief<S> &f, S *z, in
 }
 
 // The checked parts of the sample f.z as they were before the declared sensing effects, in
-// f.vehicle.sample. Rotor speeds count where dt is positive. Where the attitude was not measured, the
-// estimated one stands in for it
+// f.vehicle.sample. Rotor speeds count where dt is positive. Where the attitude was not measured,
+// the estimated one stands in for it
 template <class S> const S *true_sample(Filter<S> &f, int parts, S dt) {
   S *sample = f.vehicle.sample;
   for (int i = 0; i < 11; i++) sample[i] = f.z[i];
@@ -55,14 +56,11 @@ template <class S> void undo_first_pose(Filter<S> &f) {
 }
 
 // Carry the filter dt s ahead at rotor speeds (4) rad/s: (18)-(27)
-template <class S>
-void predict(Filter<S> &f, const S *speeds, S dt, S voltage, Prediction<S> &w) {
+template <class S> void predict(Filter<S> &f, const S *speeds, S dt, S voltage, Prediction<S> &w) {
   Model<S> &m = f.vehicle;
   drive(m, speeds, dt, voltage);
-  if (m.wrench_count == 0)
-    carry(m.body, f.settings, m.rotor_wrench, dt, f.belief, w);
-  else
-    carry_with_effects(m, f.settings, dt, f.belief, w);
+  if (m.wrench_count == 0) carry(m.body, f.settings, m.rotor_wrench, dt, f.belief, w);
+  else carry_with_effects(m, f.settings, dt, f.belief, w);
   after_prediction(f.settings, dt, f.belief);
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) f.centre_rotation[i][j] = w.R[i][j];
@@ -70,8 +68,7 @@ void predict(Filter<S> &f, const S *speeds, S dt, S voltage, Prediction<S> &w) {
 }
 
 // Correct with the checked parts of a sample: (29)-(37)
-template <class S>
-void correct_parts(Filter<S> &f, const S *sample, int parts, Innovation<S> &n) {
+template <class S> void correct_parts(Filter<S> &f, const S *sample, int parts, Innovation<S> &n) {
   if (parts)
     correct(f.settings, f.belief, sample + 4, (parts & POSITION_PART) != 0,
             (parts & ATTITUDE_PART) != 0, n);
@@ -92,8 +89,8 @@ template <class S> int step(Filter<S> &f, int parts, S dt, S voltage, Innovation
   return usable;
 }
 
-// Step lanes of filters of one vehicle without effects, `of` being like each of them, over a period:
-// z (11) rotor speeds, position and quaternion, NaN where nothing was measured
+// Step lanes of filters of one vehicle without effects, `of` being like each of them, over a
+// period: z (11) rotor speeds, position and quaternion, NaN where nothing was measured
 template <class T> void step_lanes(const Filter<Single<T>> &of, Belief<T> &f, T *z) {
   using S = Single<T>;
   const Settings<S> &s = of.settings;

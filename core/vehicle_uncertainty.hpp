@@ -1,5 +1,5 @@
-// Variances of torque and force by the vehicle's own uncertainty: estimator/model_uncertainty.py says
-// why they add to the output and leave the filter alone.
+// Variances of torque and force by the vehicle's own uncertainty: estimator/model_uncertainty.py
+// says why they add to the output and leave the filter alone.
 #pragma once
 #include "filter.hpp"
 

@@ -160,8 +160,9 @@ class Recovery:
 
 
 def largest_nis(gate: float, *numbers: int) -> Array:
-    """Return the NIS that is exceeded with a chance of ``1 - gate``, of so many numbers each: the
-    quantile of chi squared, without the second that SciPy's statistics take to import.
+    """Return the largest believed NIS of so many numbers each: chi squared's quantile at ``gate``.
+
+    SciPy's statistics have the same, and take half a second to import.
     """
     from scipy.special import gammaincinv
 

@@ -529,7 +529,7 @@ class WrenchUKF:
         if self.record[0]["imu"]["used"]:
             raise InputError("step_address: a filter that was given an IMU steps in Python only")
         if self._step_at is None:
-            return _core.STEP_ADDRESS
+            return _core.step_address()
         return address_of(self._step_at.py_func)
 
     @property

@@ -89,13 +89,16 @@ def filters() -> list[Contender]:
     pose = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 0.0])
     given = np.full(4, vehicle.hover_rate), *pose
     tiled = [np.tile(part, (count, 1)) for part in given]
-    alone, batch = "predict, correct, copy of the estimate", WrenchUKFBatch(vehicle, count)
+    alone, together = "predict, correct, copy of the estimate", "the same, of each of 256"
     found = [
         Contender(kind.__name__, STEP, alone, stepping(kind(vehicle), given, pose, 1))
         for kind in (WrenchUKF, ConstantGainFilter)
     ]
-    run = stepping(batch, tiled, pose, count)
-    return [*found, Contender("WrenchUKFBatch", STEP, "the same, of each of 256", run)]
+    for precision in ("double", "single"):
+        batch = WrenchUKFBatch(vehicle, count, precision=precision)
+        run = stepping(batch, tiled, pose, count)
+        found.append(Contender(f"WrenchUKFBatch, {precision}", STEP, together, run))
+    return found
 
 
 def flight(name: str, includes: str, env: Any, period: float, count: int, steps: int) -> Contender:

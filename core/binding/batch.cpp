@@ -20,7 +20,8 @@ constexpr int REGISTER = 64;  // bytes
 constexpr int REGISTER = 32;
 #endif
 
-template <class T, class... Shape> using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
+template <class T, class... Shape>
+using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 
 template <class S> class Batch {
  public:
@@ -62,8 +63,7 @@ template <class S> class Batch {
     return nb::bytes(all.data(), all.size());
   }
 
-  Batch(long count, const nb::bytes &given)
-      : count_(count), blocks_((count + LANES - 1) / LANES) {
+  Batch(long count, const nb::bytes &given) : count_(count), blocks_((count + LANES - 1) / LANES) {
     std::size_t size = blocks_.size() * sizeof(Block);
     if (given.size() != sizeof(like_) + size) throw nb::value_error("a state of another core");
     std::memcpy(static_cast<void *>(&like_), given.data(), sizeof(like_));
@@ -82,13 +82,14 @@ template <class S> class Batch {
 template <class S> void bind(nb::module_ &m, const char *name) {
   nb::class_<Batch<S>>(m, name)
       .def(nb::init<std::uintptr_t, long>(), "address"_a, "count"_a,
-           "Filters side by side, `count` like the one at an address, of a vehicle without effects.")
+           "Filters side by side, `count` like the one at an address, without effects.")
       .def("put", &Batch<S>::put_filter, "n"_a, "address"_a,
            "Let filter n stand where the one at an address stands.")
       .def("step", &Batch<S>::step, "z"_a, "numbers"_a, "variances"_a,
-           "Step all over a period: samples (n, 11), rotor speeds rad/s, position m and quaternion, NaN\n"
-           "where nothing was measured; estimates (n, 30) and variances of the error states (n, 18),\n"
-           "written.")
+           "Step all over a period: samples (n, 11), rotor speeds rad/s, position m and "
+           "quaternion,\n"
+           "NaN where nothing was measured; estimates (n, 30) and variances of the error states\n"
+           "(n, 18), written.")
       .def("covariance", &Batch<S>::covariance, "out"_a,
            "Write the covariances (n, 18, 18), of noise alone.")
       .def("__getstate__",

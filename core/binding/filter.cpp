@@ -14,7 +14,8 @@ using namespace windwrench;
 
 namespace {
 
-template <class T, class... Shape> using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
+template <class T, class... Shape>
+using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 using Sample = Array<const double, nb::shape<6>>;
 using Variances = Array<double, nb::shape<N>>;
 
@@ -75,7 +76,8 @@ void write_estimate(const Filter<double> &f, double *numbers, double *variances)
 std::size_t make_calls(std::uintptr_t address, Array<const std::uint8_t, nb::shape<-1>> calls,
                        Array<const std::int64_t, nb::shape<-1>> rows,
                        Array<double, nb::shape<-1, -1>> numbers,
-                       Array<double, nb::shape<-1, N>> std, Array<double, nb::shape<-1, 7, 3>> loads,
+                       Array<double, nb::shape<-1, N>> std,
+                       Array<double, nb::shape<-1, 7, 3>> loads,
                        std::optional<Array<double, nb::shape<-1, 12>>> innovations) {
   Innovation<double> n = {};
   Filter<double> &f = filter_at(address);
@@ -122,30 +124,39 @@ void step_many(std::uintptr_t address, std::size_t stride, Array<const double, n
 void bind_filter(nb::module_ &m) {
   m.attr("FILTER_SIZE") = sizeof(Filter<double>);
   m.def("step", &step_at, "address"_a, "parts"_a, "dt"_a, "voltage"_a,
-        "Predict the filter at an address over dt s if that is positive, then correct with the parts\n"
+        "Predict the filter at an address over dt s if that is positive, then correct with the "
+        "parts\n"
         "(1 position, 2 attitude) of the sample in its memory that were measured; voltage in V.\n\n"
-        "Return the parts that could be used, or -1, with the filter as it was, if the quaternion is\n"
+        "Return the parts that could be used, or -1, with the filter as it was, if the quaternion "
+        "is\n"
         "no rotation.");
-  m.attr("STEP_ADDRESS") = reinterpret_cast<std::uintptr_t>(&step_at);
+  m.def(
+      "step_address", [] { return reinterpret_cast<std::uintptr_t>(&step_at); },
+      "Return the address of `step` for compiled loops: a C function with the same arguments.");
   m.def("forget_biases", &forget_biases_at, "address"_a,
         "Give the biases of gyro and accelerometer their prior.");
   m.def("start", &start, "address"_a,
-        "Start at the pose in the memory: without an inertial measurement, and as the pose was before\n"
+        "Start at the pose in the memory: without an inertial measurement, and as the pose was "
+        "before\n"
         "the declared sensing effects.");
   m.def("take_in_imu", &take_in_imu_at, "address"_a, "z"_a, "gyro"_a, "accelerometer"_a,
         "Correct with the measured parts of z (6,): gyro, rad/s, and accelerometer, m/s2, body.");
   m.def("add_doubt", &add_doubt_at, "address"_a, "variances"_a,
         "Widen an estimate's variances (18,) by refused and unlikely poses, in place.");
-  m.def("step_many", &step_many, "address"_a, "stride"_a, "z"_a, "parts"_a, "dt"_a, "voltage"_a,
-        "numbers"_a, "variances"_a,
-        "Step filters one after the other, the first at an address and each so many bytes after the\n"
-        "last: samples (n, 11), dt in s, voltage (n,) V; estimates (n, 30) and variances (n, 18),\n"
-        "written.");
-  m.def("make_calls", &make_calls, "address"_a, "calls"_a, "rows"_a, "numbers"_a, "std"_a, "loads"_a,
-        "innovations"_a.none() = nb::none(),
-        "Make calls of a filter, bytes of the record CALL (n,), and write the results into the row of\n"
-        "each: numbers (N, 30 or more) and standard deviations (N, 18) of an estimate, and the loads (N, 7, 3)\n"
-        "of the vehicle's uncertainty; innovations (N, 12): whitened, of the last measured pose, and\n"
-        "the diagonal of the root of its covariance. Return the number of calls up to a quaternion\n"
-        "that is no rotation.");
+  m.def(
+      "step_many", &step_many, "address"_a, "stride"_a, "z"_a, "parts"_a, "dt"_a, "voltage"_a,
+      "numbers"_a, "variances"_a,
+      "Step filters one after the other, the first at an address and each so many bytes after the\n"
+      "last: samples (n, 11), dt in s, voltage (n,) V; estimates (n, 30) and variances (n, 18),\n"
+      "written.");
+  m.def("make_calls", &make_calls, "address"_a, "calls"_a, "rows"_a, "numbers"_a, "std"_a,
+        "loads"_a, "innovations"_a.none() = nb::none(),
+        "Make calls of a filter, bytes of the record CALL (n,), and write the results into the row "
+        "of\n"
+        "each: numbers (N, 30 or more) and standard deviations (N, 18) of an estimate, and the "
+        "loads\n"
+        "(N, 7, 3) of the vehicle's uncertainty; innovations (N, 12): whitened, of the last "
+        "measured\n"
+        "pose, and the diagonal of the root of its covariance. Return the number of calls up to a\n"
+        "quaternion that is no rotation.");
 }

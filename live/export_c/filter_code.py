@@ -52,16 +52,8 @@ _KEPT = {
     **{f"poses_{name}": MEMORY[name] for name in MEMORY.names or ()},
     **{name: FILTER[name] for name in ("rotors", "rotor_wrench", "effect_wrench")},
     **{name: FILTER[name] for name in fields_between("x", "last_speeds")},
-    **{
-        name: FILTER[name]
-        for name in (
-            "z",
-            "acceleration",
-            "rotation",
-            "centre_rotation",
-            *fields_between("S", "rows"),
-        )
-    },
+    **{name: FILTER[name] for name in ("z", *fields_between("acceleration", "rows"))},
+    "centre_rotation": FILTER["centre_rotation"],
 }
 # fields declared in templates
 _OF_IMU = {

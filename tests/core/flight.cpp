@@ -1,5 +1,5 @@
-// A flight through the core's headers alone, as a vehicle's firmware compiles them: no exceptions, no
-// RTTI. Reads a filter's memory and samples, writes estimates.
+// A flight through the core's headers alone, as a vehicle's firmware compiles them: no exceptions,
+// no RTTI. Reads a filter's memory and samples, writes estimates.
 #include <cstdio>
 #include <vector>
 
@@ -13,7 +13,8 @@ struct Row {
   double z[11], imu[6];
 };
 
-template <class S> void fly(const Filter<double> &start, const std::vector<Row> &rows, bool with_imu) {
+template <class S>
+void fly(const Filter<double> &start, const std::vector<Row> &rows, bool with_imu) {
   static Filter<S> f;
   convert(start, f);
   if (with_imu) {
@@ -28,10 +29,8 @@ template <class S> void fly(const Filter<double> &start, const std::vector<Row> 
   for (const Row &row : rows) {
     Innovation<S> n;
     for (int i = 0; i < 11; i++) f.z[i] = S(row.z[i]);
-    if (with_imu)
-      step_with_biases(f, 3, f.settings.period, S(0), n);
-    else
-      step(f, 3, f.settings.period, S(0), n);
+    if (with_imu) step_with_biases(f, 3, f.settings.period, S(0), n);
+    else step(f, 3, f.settings.period, S(0), n);
     if (with_imu) {
       S imu[6];
       for (int i = 0; i < 6; i++) imu[i] = S(row.imu[i]);
