@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from numpy.typing import NDArray
-from scipy.stats import kendalltau
+from scipy.stats import kendalltau, t
 
 from windwrench.evaluation.episodes import benchmark_seeds
 from windwrench.evaluation.statistics import (
@@ -37,7 +37,6 @@ Figures = dict[str, Array]  # (episodes,) by name
 
 LAWS = "hover,pid,pid-force,pid-wrench,indi,l1,lqg,linear,gru"
 CHUNK = 10  # episodes of a task
-_CLEAR = 2.02  # standard errors of a paired difference of 40 episodes, 95 %
 
 
 def compared(here: dict[str, Figures], there: dict[str, Figures], weight: float) -> dict[str, Any]:
@@ -46,7 +45,7 @@ def compared(here: dict[str, Figures], there: dict[str, Figures], weight: float)
     places = {law: rank for rank, law in enumerate(sorted(there, key=_by(there)), start=1)}
     rows = []
     for rank, law in enumerate(laws, start=1):
-        row: dict[str, Any] = {"law": law, "rank_here": rank, "rank_there": places[law]}
+        row: dict[str, Any] = {"law": Path(law).stem, "rank_here": rank, "rank_there": places[law]}
         for place, figures in (("here", here[law]), ("there", there[law])):
             rmse, force = figures["rmse"], figures["force"]
             row[place] = {
@@ -73,7 +72,7 @@ def _by(place: dict[str, Figures]) -> Any:
 def ranking(here: Array, there: Array) -> dict[str, Any]:
     """Return how far two places order laws alike, by RMSE (laws, episodes) in each.
 
-    A pair of laws is clear where both places tell it apart by over 2.02 standard errors.
+    A pair of laws is clear where both places tell it apart: Student's t, paired, 95 %.
     """
     rng, count = np.random.default_rng(0), here.shape[1]
     draws = rng.integers(count, size=(2000, count))
@@ -99,8 +98,10 @@ def _tau(here: Array, there: Array) -> float:
 
 def _sign(difference: Array) -> int:
     """Return the sign of a mean difference (episodes,), 0 where it is not clear."""
-    error = difference.std(ddof=1) / np.sqrt(len(difference))
-    return int(np.sign(difference.mean()) * (abs(difference.mean()) > _CLEAR * error))
+    count = len(difference)
+    error = difference.std(ddof=1) / np.sqrt(count)
+    clear = abs(difference.mean()) > t.ppf(0.975, count - 1) * error
+    return int(np.sign(difference.mean()) * clear)
 
 
 def table(name: str, found: dict[str, Any]) -> str:

@@ -100,7 +100,6 @@ class Crazyflow:
             data = data.replace(params=params.replace(rotor_dyn_coef=coefficients))
         step = sim.build_step_fn()
 
-        @jax.jit  # type: ignore[misc]
         def tick(x: Any, given: Any) -> Any:
             """Return the state (17,) after a tick, from a state and commands and wrench (10,)."""
             states = data.states.replace(
@@ -112,7 +111,7 @@ class Crazyflow:
             ).states
             return jax.numpy.concatenate([getattr(s, name).ravel() for name in _STATE])
 
-        self._tick = tick
+        self._tick = jax.jit(tick)
 
     def start(self, pose: Array) -> None:
         """Hover at a pose (7,) with the rotors at hover."""
