@@ -69,8 +69,8 @@ class LQG:
             "place": 0.001,  # m
             "speed": 0.03,  # m/s
             "tilt": 0.006,  # rad
-            "force": 0.01315,  # of the weight, of the estimate
-            "torque": 0.00521,  # of weight times arm, likewise
+            "force": 0.06,  # N, of the estimate, on the standard vehicle; others by weight
+            "torque": 0.003,  # Nm, likewise; by weight and arm
             "accelerometer": 0.04,  # m/s2, mean over a decision
         }
     )
@@ -102,10 +102,10 @@ class LQG:
         the reference's last turn, which is expected to go on.
         """
         k = axis.D.shape[1]
-        weight, noise = self.vehicle.weight, dict(self.noise)
+        weight, standard, noise = self.vehicle.weight, standard_vehicle(), dict(self.noise)
         moment = weight * self.vehicle.arm_l
-        noise["force"] *= weight
-        noise["torque"] *= moment
+        noise["force"] *= weight / standard.weight
+        noise["torque"] *= moment / (standard.weight * standard.arm_l)
         sizes = (self.force * weight, self.torque * moment)[:k]
         wrench = WrenchProcess(sizes, (self.force_time, self.torque_time)[:k], self.estimate_lag)
         horizontal = ("tilt", "force", "torque") if k == 2 else ("force",)
@@ -133,7 +133,7 @@ class LQG:
             if i < 2:
                 seen = [place[i], speed[i], tilt[i], o[FORCE][i], torque[i], felt[i]]
             x = observer.update(self._action[i], np.array(seen), turned[i])
-            action[i] = -float(gain @ x) - ahead * turned[i]
+            action[i] = -(gain @ x) - ahead * turned[i]
         self._wanted = wanted
         self._action = np.clip(action, -MAX_ACCELERATION, MAX_ACCELERATION)
         return self._action.astype(np.float32)

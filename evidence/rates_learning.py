@@ -11,7 +11,6 @@ the whole run: compiling, training and validation.
 
 import shutil
 import time
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,6 +18,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from windwrench.controllers.trained_policy import load_policy
 from windwrench.envs import WindHoverEnv
 from windwrench.evaluation.episodes import Episode, benchmark_seeds, fly_episode
 from windwrench.evaluation.statistics import hierarchical_bootstrap, mean, relative_change
@@ -91,8 +91,11 @@ def trained(algorithm: str, seed: int, steps: int, work: str) -> dict[str, Any]:
     }
 
 
-def flown(controller: str, task: str, episodes: int, seed: int) -> dict[str, list[float]]:
-    """Return the figures of a controller's test episodes, in order of their seeds.
+def flown(
+    controller: str, task: str, episodes: int, seed: int, weights: str
+) -> dict[str, list[float]]:
+    """Return the figures of a controller's test episodes, in order of their seeds. ``weights`` is
+    the digest of a policy's: another policy of the same path is flown anew.
 
     ``rotor_activity`` is the mean squared change of a rotor's true speed from decision to decision
     (40 ms), over the square of its speed in hover: laws and policies have different commands.
@@ -148,17 +151,23 @@ def study(
     work = work.resolve()
     wanted = [(a, s, steps or STEPS[a], str(work)) for a in names for s in SEEDS]
     runs = run_tasks(trained, wanted, work / "runs.jsonl", jobs)
-    flights = [(law, LAWED, episodes, seed) for law in LAWS]
-    boards = run_tasks(flown, flights, work / "laws.jsonl", jobs, code_stamp("rates_learning"))
-    laws = {task[0]: figures for task, figures in boards.items()}
-    fly = partial(flown, task=LEARNED, episodes=episodes, seed=seed)
-    found = {law: row([figures], laws[RIVAL]) for law, figures in laws.items()}
+    flyers: dict[str, list[tuple[str, str, str]]] = {law: [(law, LAWED, "")] for law in LAWS}
+    flyers["no command"] = [("hover", LEARNED, "")]
+    for name in names:
+        paths = [str(work / run["policy"]) for task, run in runs.items() if task[0] == name]
+        flyers[name] = [(path, LEARNED, load_policy(path).card["sha256"]) for path in paths]
+    flights = {
+        name: [(path, task, episodes, seed, digest) for path, task, digest in some]
+        for name, some in flyers.items()
+    }
+    every = [one for some in flights.values() for one in some]
+    boards = run_tasks(flown, every, work / "flights.jsonl", jobs, code_stamp("rates_learning"))
+    (rival,) = (boards[one] for one in flights[RIVAL])
+    found = {name: row([boards[one] for one in some], rival) for name, some in flights.items()}
+    kept = ("steps", "cpu_s", "wall_s", "validations")
     for name in names:
         some = [run for task, run in runs.items() if task[0] == name]
-        board = row([fly(str(work / run["policy"])) for run in some], laws[RIVAL])
-        kept = ("steps", "cpu_s", "wall_s", "validations")
-        found[name] = board | {"runs": [{key: run[key] for key in kept} for run in some]}
-    found["no command"] = row([fly("hover")], laws[RIVAL])
+        found[name]["runs"] = [{key: run[key] for key in kept} for run in some]
     settings = {name: load_config(name, SETTINGS[name], task=LEARNED) for name in names}
     write_json({"episodes": episodes, "seed": seed, "rows": found, "settings": settings}, out)
     print(table(found))
