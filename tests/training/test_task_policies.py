@@ -98,7 +98,10 @@ def test_a_linear_policy_learns_a_lagging_answer_and_flies_as_it_was_fitted():
     ones = np.ones(seen.shape[:2], dtype=np.float32)
     law.fit(Sequences(seen, np.array(truth), ones))
     policy, state = (
-        TaskPolicy(_card("WindHover", "linear", MIX, 0, 0) | MEMORIES, law.weights()),
+        TaskPolicy(
+            _card("WindHover", "linear", MIX, 0, 0) | MEMORIES,
+            law.weights(np.eye(3, dtype=np.float32)),
+        ),
         None,
     )
     for k, frames in enumerate(seen):

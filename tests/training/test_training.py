@@ -247,9 +247,9 @@ def seed_of(environment, episode):
     return 100 * environment + episode
 
 
-def make(count, limit, scenario="static"):
-    envs = TaskVectorEnv(count, limit, task=FanTrackingEnv, scenario=scenario)
-    return FeatureVecEnv(envs, FEATURES, seed_of)
+def make(count, limit, reward=None):
+    envs = TaskVectorEnv(count, limit, task=FanTrackingEnv, scenario="static")
+    return FeatureVecEnv(envs, FEATURES, seed_of, reward)
 
 
 def away(seed):
@@ -258,9 +258,9 @@ def away(seed):
     return float(np.sign(info["offset"]))
 
 
-def lone_flight(seed, commands, scenario="static"):
+def lone_flight(seed, commands):
     """Features, rewards and losses of a single environment, computed by itself."""
-    env, history = FanTrackingEnv(scenario), History(FEATURES, 1)
+    env, history = FanTrackingEnv("static"), History(FEATURES, 1)
     observation, info = env.reset(seed=seed)
     history.restart(FEATURES.frames(observation[None]))
     seen, rewards = [history.flat()[0]], []
@@ -323,12 +323,7 @@ def test_rewards_are_weighted_terms():
     env = make(1, 50)
     env.reset()
     assert_allclose([env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6)
-    squared = FeatureVecEnv(
-        TaskVectorEnv(1, 50, task=FanTrackingEnv, scenario="static"),
-        FEATURES,
-        seed_of,
-        WeightedTerms({"tracking": 0.0, "change": 0.0, "squared": 1.0}),
-    )
+    squared = make(1, 50, WeightedTerms({"tracking": 0.0, "change": 0.0, "squared": 1.0}))
     squared.reset()
     assert squared.step(np.array([[0.0]]))[1][0] == pytest.approx(-0.64, abs=0.1)  # about 0.8 m off
 
