@@ -8,6 +8,7 @@ interval is over policies and episodes (``evaluation.statistics``). In the fan's
 accelerometer draws its own noise: fan and start are the same, the rest of the noise is not.
 """
 
+import json
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -26,7 +27,7 @@ from windwrench.evaluation.episodes import benchmark_seeds, fly_episode
 from windwrench.evaluation.statistics import hierarchical_bootstrap, mean, relative_change
 from windwrench.evaluation.tasks import task_of
 from windwrench.evidence.kept_results import DOCS
-from windwrench.evidence.runner import Jobs, run_tasks, start
+from windwrench.evidence.runner import Jobs, kept_lines, run_tasks, start
 from windwrench.runtime.code_digest import code_digest
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit
@@ -35,7 +36,7 @@ from windwrench.training.task_policies import linear
 from windwrench.training.train import train
 
 Array = NDArray[np.float64]
-Cell = tuple[str, str, str, str, int, int, int]  # as the arguments of ``flown``
+Cell = tuple[Any, ...]  # as the arguments of ``flown``
 
 RESULTS = "results/tasks/felt_wrench.json"  # below docs/
 LAW, LEARNER = "linear", "ppo"
@@ -125,13 +126,19 @@ def change(fewer: ArrayLike, more: ArrayLike) -> dict[str, Any]:
 
 def rows(results: Mapping[Cell, Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each kind and world: figures by observation, and changes by what is
-    taken.
+    taken. A training seed counts where all observations have been flown.
     """
+    whole = [key for key in results if all(_beside(key, o) in results for o in OBSERVATIONS)]
     found: dict[tuple[str, str, str], dict[str, list[Mapping[str, Any]]]] = {}
-    for (kind, task, scenario, observation, *_), result in results.items():
-        world = found.setdefault((kind, task, scenario), {})
-        world.setdefault(observation, []).append(result)
+    for key in whole:
+        world = found.setdefault(key[:3], {})
+        world.setdefault(key[3], []).append(results[key])
     return [_row(*key, by_observation) for key, by_observation in found.items()]
+
+
+def _beside(key: Cell, observation: str) -> Cell:
+    """Return the same policy's cell of another observation."""
+    return (*key[:3], observation, *key[4:])
 
 
 def _row(
@@ -159,6 +166,9 @@ def study(
     quick: Annotated[bool, typer.Option(help="A few short trainings, to see that it works.")] = (
         False
     ),
+    finished: Annotated[
+        bool, typer.Option(help="Write what is finished, and fly nothing more.")
+    ] = False,
     seeds: Annotated[int, typer.Option(min=1, help="Trainings of each learned policy.")] = 2,
     jobs: Jobs = 1,
 ) -> None:
@@ -178,7 +188,11 @@ def study(
         for observation in OBSERVATIONS
     ]
     stamp = code_digest(_ROOMS, ("evidence/felt_wrench.py",))
-    results = run_tasks(flown, wanted, done, jobs, stamp)
+    if finished:
+        kept = {tuple(json.loads(key)): result for key, result in kept_lines(done, stamp)}
+        results = {task: kept[task] for task in wanted if task in kept}
+    else:
+        results = run_tasks(flown, wanted, done, jobs, stamp)
     request = {"seeds": seeds, "law_episodes": law_episodes, "steps": steps, "episodes": episodes}
     request |= {"test_seed": TEST_SEED}
     told = {"version": __version__, "commit": code, "request": request, "settings": SETTINGS}

@@ -58,7 +58,7 @@ def run_tasks(
         InputError: the file cannot be written, or a task is refused.
     """
     keys = {json.dumps(task): task for task in wanted}
-    done = {keys[key]: result for key, result in _kept(path, stamp) if key in keys}
+    done = {keys[key]: result for key, result in kept_lines(path, stamp) if key in keys}
     path.parent.mkdir(parents=True, exist_ok=True)
     with replaced(path) as part:
         part.write_text("".join(_line(t, stamp, r) for t, r in done.items()), encoding="utf-8")
@@ -81,7 +81,7 @@ def _do(work: Callable[..., Any], task: Task) -> Any:
     return work(*task)
 
 
-def _kept(path: Path, stamp: str) -> Iterator[tuple[str, Any]]:
+def kept_lines(path: Path, stamp: str) -> Iterator[tuple[str, Any]]:
     """Yield the task, as JSON, and the result of each whole line of this code."""
     with suppress(OSError):
         for text in path.read_text(encoding="utf-8").splitlines():

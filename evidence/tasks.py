@@ -1,4 +1,6 @@
-"""The page of the tasks, whose tables are kept results of ``windwrench benchmark --task``."""
+"""The page of the tasks: tables of ``windwrench benchmark --task``, and what the felt wrench is
+worth.
+"""
 
 from typing import Any
 
@@ -9,12 +11,10 @@ TASKS = ("WindHover", "WindTrajectory", "FanTracking2D")
 
 def page() -> dict[str, Any]:
     """Return what the page shows: rows of each task, and rows by controller and scenario."""
-    felt, unfelt = kept("results/tasks/unfelt.json")
     tasks = {task: shown(kept(f"results/tasks/{task}.json.gz")) for task in TASKS}
     return {
         "tasks": tasks,
-        "felt": felt,
-        "unfelt": unfelt,
+        "felt": kept("results/tasks/felt_wrench.json"),
         "hover": _by_name(tasks["WindHover"]),
         "trajectory": _by_name(tasks["WindTrajectory"]),
         "fan": _by_name(tasks["FanTracking2D"]),

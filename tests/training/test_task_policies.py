@@ -17,8 +17,7 @@ from windwrench.envs.plant import PlantSettings
 from windwrench.evaluation.tasks import TASKS
 from windwrench.training.hindsight import AHEAD, LATE, MIX, WindLesson, lanes_of, mix_of
 from windwrench.training.linear_policy import MEMORY, LinearLaw
-from windwrench.training.run import validate
-from windwrench.training.task_policies import _card, linear, teach
+from windwrench.training.task_policies import _card, teach
 from windwrench.training.taught_network import Sequences, TaughtNetwork
 
 HOVER = TASKS["WindHover"].environment
@@ -98,7 +97,10 @@ def test_a_linear_policy_learns_a_lagging_answer_and_flies_as_it_was_fitted():
     ones = np.ones(seen.shape[:2], dtype=np.float32)
     law.fit(Sequences(seen, np.array(truth), ones))
     policy, state = (
-        TaskPolicy(_card("WindHover", "linear", MIX, 0, 0) | MEMORIES, law.weights()),
+        TaskPolicy(
+            _card("WindHover", "linear", MIX, 0, 0) | MEMORIES,
+            law.weights(np.eye(3, dtype=np.float32)),
+        ),
         None,
     )
     for k, frames in enumerate(seen):
@@ -106,13 +108,6 @@ def test_a_linear_policy_learns_a_lagging_answer_and_flies_as_it_was_fitted():
         flown = policy(frames[2] * np.float32(HOVER.scales))
         assert_allclose(flown, said[0, 2].numpy(), atol=1e-4)
         assert_allclose(flown, truth[k][2], atol=0.05)
-
-
-@pytest.mark.slow
-def test_a_linear_law_is_fitted_in_the_wind():
-    policy = linear("WindHover", "calm", 0, rounds=2, episodes=8)
-    rmse, lost = validate(policy, HOVER("calm"), 2)
-    assert (rmse < 0.05, lost) == (True, 0)
 
 
 def test_a_mix_has_all_of_its_scenarios():
