@@ -34,7 +34,7 @@ from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_log
 from .logs.streams import MOTOR_RATES, between_samples
-from .logs.table import Array, Rows
+from .logs.table import Array, ArrayPair, Names, Rows, finite_rows
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 from .motion.smoothing import mean_square
@@ -75,7 +75,7 @@ class WrenchSeries(WrenchEstimate):
         t: Array,
         vehicle: Vehicle,
         tuning: UKFTuning,
-        notes: tuple[str, ...],
+        notes: Names,
         loads: Array,
     ) -> None:
         super().__init__(estimate.numbers, estimate.std)
@@ -131,7 +131,7 @@ def _estimate(
     report: Callable[[float], None] = lambda share: None,
     smooth: bool = False,
     gate: float | None = GATE,
-    doubts: tuple[str, ...] = (),
+    doubts: Names = (),
 ) -> WrenchSeries:
     """Return the estimate of a screened log (``screen_log``), with its doubts."""
     if log.commanded:
@@ -159,7 +159,7 @@ def _estimate(
             raise Sample(calls["z"][made]).bad_quaternion()
         if isinstance(ukf, RecordingUKF):
             events[to] = ukf.keep(calls)
-    broken = ~np.isfinite(np.column_stack([numbers[:, :NIS], std])).all(axis=1)
+    broken = ~finite_rows(np.column_stack([numbers[:, :NIS], std]))
     if broken.any():
         raise InputError(
             f"{log.source or log.name}: the estimate overflows at t = {log.t[broken][0]:.6g} s; "
@@ -173,7 +173,7 @@ def _estimate(
     return series
 
 
-def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> tuple[str, ...]:
+def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> Names:
     """Take the torque out of an estimate with seldom measured rotors, and widen the force with even
     fewer measurements; return the notes on both.
     """
@@ -196,7 +196,7 @@ def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> 
     )
 
 
-def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
+def pose_notes(log: FlightLog, vehicle: Vehicle) -> Names:
     """Return the notes of ``estimate_log`` on a screened log's poses: jumps, and restarts of the
     filter. They are for other results of the same log; none if its motion is read from an IMU.
 
@@ -315,7 +315,7 @@ def calls_of(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tupl
     for part, sensor in enumerate(sensors):
         if sensor is not None:
             imu[:, 3 * part : 3 * part + 3] = np.nan_to_num(sensor[rows])
-            read += IMU_PARTS[part] * np.isfinite(sensor[rows]).all(axis=1)
+            read += IMU_PARTS[part] * finite_rows(sensor[rows])
     carried, posed = np.repeat(rows, list(map(len, steps))), rows[log.valid[rows]]
     to = np.concatenate([carried, rows[read > 0], posed])
     calls = np.zeros(len(to), dtype=CALL)
@@ -343,7 +343,7 @@ def write_wrench(series: WrenchSeries, path: Path) -> None:
     write_csv(dict(zip(COLUMNS, values.T, strict=True)), path)
 
 
-def truth_rmse(series: WrenchSeries, log: FlightLog) -> tuple[Array, Array] | None:
+def truth_rmse(series: WrenchSeries, log: FlightLog) -> ArrayPair | None:
     """Return the RMSE (3,) of force in N and (3,) of torque in Nm against the log's truth, or None
     without one.
     """

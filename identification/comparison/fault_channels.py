@@ -8,7 +8,6 @@ smears the time of a fault.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -22,6 +21,7 @@ from ..logs.flight_phases import carrying, usual_thrust
 from ..logs.readers import px4_ulog, reader_by_content
 from ..logs.reading import read_log
 from ..logs.streams import Stream, readable
+from ..logs.table import Data, Names, median_step
 from ..motion.smoothing import lagged, resampled, runs_of
 
 _PX4 = "px4_ulog"  # the reader
@@ -50,7 +50,7 @@ class Channels:
     command: Stream  # (K, 4) motor commands, in any unit growing with thrust, 0: none
     # the command is thrust itself but for a factor (rotor speeds squared): no curve is looked for
     thrust_known: bool = False
-    motor_names: tuple[str, ...] | None = None  # the log's own, of rotors 1 to 4
+    motor_names: Names | None = None  # the log's own, of rotors 1 to 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ def read_channels(
     vehicle: Vehicle | None = None,
     log_map: str | None = None,
     log: FlightLog | None = None,
-) -> tuple[Channels, tuple[str, ...]]:
+) -> tuple[Channels, Names]:
     """Return a file's gyro, accelerometer and commands, and notes on their origin.
 
     A PX4 file alone has the channels' own rates. Other files go through their reader; ``log`` is a
@@ -107,7 +107,7 @@ def read_channels(
         log = log or read_log(path, reader, vehicle, log_map)
         return channels_of_log(log), log.notes
     recording = px4_ulog.channels(path, has_ranges=False)
-    streams: dict[str, Any] = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
+    streams: Data = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
     if missing := [part for part, stream in streams.items() if stream is None]:
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
     assert recording.log_map.commands is not None
@@ -154,7 +154,7 @@ def sample(channels: Channels) -> Samples:
     if min(map(len, times)) < 10:
         raise InputError(f"{c.name}: fewer than ten samples of gyro, accelerometer or commands")
     for what, at in zip(_CHANNELS[:2], times, strict=False):
-        if (step := float(np.median(np.diff(at)))) > LONGEST_GAP:
+        if (step := median_step(at)) > LONGEST_GAP:
             raise InputError(
                 f"{c.name}: {what}: {1.0 / step:.3g} samples a second; expected at least "
                 f"{1.0 / LONGEST_GAP:g}, to see a rotor fail"
@@ -218,7 +218,7 @@ def _means(times: Array, values: Array, middles: Array) -> Array:
 def _end(c: Channels) -> tuple[float, str]:
     """Return the end of the model's validity, and its reason: a clipped gyro, or an impact."""
     ends = [(np.inf, "")]
-    count = max(3, round(CLIPPED_SECONDS / float(np.median(np.diff(c.gyro.t)))))
+    count = max(3, round(CLIPPED_SECONDS / median_step(c.gyro.t)))
     for axis in c.gyro.values.T:
         size = np.abs(axis)
         at_limit = np.abs(size[:, None] / RANGES - 1.0).min(axis=1) < RANGE_SHARE

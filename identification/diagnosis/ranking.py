@@ -19,12 +19,20 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ..findings import Disturbance, Ranking
-from ..logs.table import Array
+from ..logs.table import Array, Names, Pair, Values
 from .climbing import Height, linearised, mode
 from .evidence import set_evidence
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts, prior_size
-from .regression import START_PREFIX, Column, RegressedFlights, moves_time, typical_size, without
+from .regression import (
+    START_PREFIX,
+    Column,
+    Effects,
+    RegressedFlights,
+    moves_time,
+    typical_size,
+    without,
+)
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
 from .starting_points import starting_points
@@ -50,9 +58,9 @@ class FittedPosterior:
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
-    sensors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sensors: Mapping[str, Pair] = field(default_factory=dict)
     # for each effect of the set: effects hidden in these logs that do as well in its place
-    behind: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    behind: Mapping[str, Names] = field(default_factory=dict)
 
 
 def rank(
@@ -107,7 +115,7 @@ def rank(
     quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
     posterior = Posterior(flights, library, (loud, quiet))
     # settings as asked for: beside the end of a fit, a little of other effects moves the request
-    tried: dict[frozenset[str], Setting] = {frozenset(): {}}
+    tried: dict[Effects, Setting] = {frozenset(): {}}
     # the best effect first, alone: another set's columns are of the model with that effect
     if setting := posterior.best_setting(1):
         best = fitted(setting, best)
@@ -166,9 +174,9 @@ def rank_by_rows(
     given = frozenset(first)
     first = likelihood.fitted(first)
     starts = starts_of(flights, library, first)
-    fitted: dict[frozenset[str], Setting] = {given: first}
-    bases: dict[frozenset[str], Base] = {given: likelihood.base(first, starts)}
-    idle: set[frozenset[str]] = set()
+    fitted = {given: first}
+    bases = {given: likelihood.base(first, starts)}
+    idle = set()
 
     def base(setting: Setting, unknown: bool = False) -> Base:
         lags = {
@@ -233,7 +241,7 @@ def rank_by_rows(
     return FittedPosterior(last, last.ranking(), best, sensors=sensors, behind=behind)
 
 
-def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, tuple[str, ...]]:
+def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     """Return, for each effect of a set, possible effects hidden in the logs with as much explained
     in its place.
     """
@@ -263,11 +271,11 @@ def starts_of(
     delays, and effects whose coefficients do nothing one by one. The latter start from the residual
     of the setting, and of ``others``: an effect may act in the place of another.
     """
-    out: dict[Column, Mapping[str, float]] = {}
+    out: dict[Column, Values] = {}
     residuals: list[Array] = []
     beside = [*setting, *(e.name for e in flights.vehicle.effects)]
     for effect in (e for e in library if e not in setting):
-        own: list[Mapping[str, float]] = []
+        own = []
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
             typical = typical_size((effect, name), flights.vehicle)

@@ -22,7 +22,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask
+from ..logs.table import Array, ArrayPair, Mask, Pair, Rows, Values, finite_rows, median_step
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
@@ -76,7 +76,8 @@ NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 # its noise (there a signal moves in time by a sample, not by a part of one)
 STEP, LARGE_STEP = 0.1, 0.5
 # coefficients by effect, beside the declared vehicle
-Setting = Mapping[str, Mapping[str, float]]
+Setting = Mapping[str, Values]
+Effects = frozenset[str]
 # an effect's coefficient
 Column = tuple[str, str]
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
@@ -211,8 +212,8 @@ class RegressedFlights:
         self.biases = self._biases()
         self.offsets = self._timings() | self.biases
         # in a log read by its IMU: effects without any trace, and effects a pose would show
-        self.without_trace: frozenset[str] = frozenset()
-        self.needs_pose: frozenset[str] = frozenset()
+        self.without_trace: Effects = frozenset()
+        self.needs_pose: Effects = frozenset()
         # the noise is added to the logs once more; the change is the effect of noise
         noisy = self._noisier()
         self.visible_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
@@ -256,7 +257,7 @@ class RegressedFlights:
         self.start: Mask = np.concatenate([t == t[0] for t in times])  # first row of a piece
         # (rows,) index of the log
         self.log: Index = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
-        self.period = float(np.median(np.diff(self.t)))  # s, from row to row
+        self.period = median_step(self.t)  # s, from row to row
         # s of unbroken flight
         self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
         short = self.commanded and self.seconds < 8 * BLOCK
@@ -269,7 +270,7 @@ class RegressedFlights:
         if self.fit_rows.all() and self.block[-1] > 0:  # fewer than four blocks
             self.fit_rows = self.block < self.block[-1]
 
-    def _lost_in_noise(self, noisy: "RegressedFlights") -> frozenset[str]:
+    def _lost_in_noise(self, noisy: "RegressedFlights") -> Effects:
         """Return the effects whose columns are largely noise.
 
         A fit of such an effect would come out too small, or remove noise of the pose to explain
@@ -285,7 +286,7 @@ class RegressedFlights:
             lost, self.without_trace = self._noisy_columns(
                 noisy, [*linear, *filter(is_nonlinear, names())]
             )
-            lacking: frozenset[str] = frozenset()  # effects a pose would not show either
+            lacking: Effects = frozenset()  # effects a pose would not show either
             if all(log.voltage is None for log in self.logs):
                 lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
             if self.commanded:
@@ -301,7 +302,7 @@ class RegressedFlights:
 
     def _noisy_columns(
         self, noisy: "RegressedFlights", effects: Iterable[str]
-    ) -> tuple[frozenset[str], frozenset[str]]:
+    ) -> tuple[Effects, Effects]:
         """Return the effects whose columns hold too much noise, and the effects without any trace
         in an IMU.
         """
@@ -325,7 +326,7 @@ class RegressedFlights:
         """Return the columns of an effect (rows, 6) at typical coefficients, one by one, or as one
         where the force is not linear in them.
         """
-        own: list[Column] = [(effect, c.name) for c in get(effect).coefficients]
+        own = [(effect, c.name) for c in get(effect).coefficients]
         if is_nonlinear(effect):
             setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
             return [self.residual({}) - self.residual(setting)]
@@ -355,7 +356,7 @@ class RegressedFlights:
         return np.concatenate(parts)
 
     @property
-    def runs(self) -> list[NDArray[np.intp]]:
+    def runs(self) -> list[Rows]:
         """The rows of each piece."""
         return np.split(np.arange(len(self.t)), np.flatnonzero(self.start)[1:])
 
@@ -376,10 +377,8 @@ class RegressedFlights:
     @property
     def rotor_speeds_vary(self) -> bool:
         """Whether the rotor speeds vary by enough of their rounding steps."""
-        return (
-            float(np.median(self.at_rows("rotor_speeds").std(axis=0)))
-            > LEAST_STEPS_OF_ROTOR_SPEED * self.vehicle.omega_lsb
-        )
+        swing = float(np.median(self.at_rows("rotor_speeds").std(axis=0)))
+        return swing > LEAST_STEPS_OF_ROTOR_SPEED * self.vehicle.omega_lsb
 
     def pieces(self, setting: Setting) -> list[FlightPiece]:
         """Return the pieces, with the vehicle's sensing effects undone in the logs."""
@@ -390,7 +389,7 @@ class RegressedFlights:
         return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
 
     def _cut(self, vehicle: Vehicle) -> list[FlightPiece]:
-        cut: list[tuple[int, Signals]] = [
+        cut = [
             (i, downsampled(s) if self.commanded else s)
             for i, log in enumerate(self.logs)
             for s in (
@@ -457,11 +456,11 @@ class RegressedFlights:
         new = (EffectSetting(name, dict(values)) for name, values in setting.items() if name)
         return replace(self.vehicle, effects=(*kept, *new))
 
-    def coefficients(self, setting: Setting, effect: str) -> Mapping[str, float]:
+    def coefficients(self, setting: Setting, effect: str) -> Values:
         """Return an effect's coefficients at a setting; outside the setting, the vehicle's own."""
         return setting[effect] if effect in setting else self._declared.get(effect, {})
 
-    def stated(self, effect: str) -> Mapping[str, float]:
+    def stated(self, effect: str) -> Values:
         """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
         the file states some. All may have changed where it states all.
         """
@@ -534,7 +533,7 @@ class RegressedFlights:
         felt = [piece.felt for piece in self.pieces(setting) if piece.felt is not None]
         return np.concatenate(felt) if len(felt) == len(self._first) else None
 
-    def step(self, setting: Setting, column: Column, size: float = STEP) -> tuple[float, float]:
+    def step(self, setting: Setting, column: Column, size: float = STEP) -> Pair:
         """Return a coefficient's value at a setting, and the step of a derivative from there: so
         many typical sizes, within the coefficient's limits.
         """
@@ -591,18 +590,18 @@ def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
 
 
 @lru_cache(maxsize=16)  # of several pieces, and again at each setting of sensing effects
-def _accelerometer(log: FlightLog) -> tuple[Array, Array] | None:
+def _accelerometer(log: FlightLog) -> ArrayPair | None:
     """Return times (n,) s, evenly spaced, and the accelerometer's readings (n, 3) m/s2 with the
     pose's low-pass; None unless the readings span the log from beginning to end.
     """
     if log.accelerometer is None:
         return None
-    read = np.isfinite(log.accelerometer).all(axis=1)
+    read = finite_rows(log.accelerometer)
     times, values = log.t[read], log.accelerometer[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
     if not len(times) or float(np.diff(ends).max()) >= LONGEST_GAP:
         return None
-    period = float(np.median(np.diff(times)))
+    period = median_step(times)
     even = np.arange(times[0], times[-1], period)
     return even, low_pass(resampled(even, times, values), CUTOFFS.pose_hz, period)
 
@@ -617,7 +616,7 @@ def blocks(t: Array, begins: Mask, seconds: float) -> Index:
     """
     since = t - t[begins][np.cumsum(begins) - 1]
     new = begins | (np.diff(since // seconds, prepend=-1.0) != 0.0)
-    return np.asarray(np.cumsum(new) - 1)
+    return np.cumsum(new) - 1
 
 
 def held_out(number: Index) -> Index:

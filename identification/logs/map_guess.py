@@ -11,10 +11,9 @@ unless the numbers contradict the name.
 
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,16 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import WORDS, Group, Name, named_alone, take_apart
-from .column_parts import CERTAIN_LEAD, SHOWN, ColumnCandidate, Numbers, candidates, named_columns
+from .column_parts import (
+    CERTAIN_LEAD,
+    SHOWN,
+    ColumnCandidate,
+    Judge,
+    Numbers,
+    Verdict,
+    candidates,
+    named_columns,
+)
 from .evidence import GOOD, GOOD_TORQUE, TURNING_RATE, Evidence, Fit, RankedFits, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
@@ -42,7 +50,7 @@ from .log_map import (
 )
 from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .table import Array, Table
+from .table import Array, Data, NamedArrays, Names, Table
 from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
@@ -71,7 +79,7 @@ class Reason:
     field: str
     certain: bool
     why: str
-    candidates: tuple[str, ...] = ()  # columns for a person's choice, the likeliest first
+    candidates: Names = ()  # columns for a person's choice, the likeliest first
 
 
 @dataclass(frozen=True)
@@ -80,7 +88,7 @@ class Guess:
 
     log_map: LogMap
     reasons: tuple[Reason, ...]
-    unused: tuple[str, ...] = ()  # columns
+    unused: Names = ()  # columns
     missing: tuple[Reason, ...] = ()  # fields ``?``; the log is not read without them
 
     @property
@@ -117,7 +125,7 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
     )
 
 
-def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
+def _numbers_of(table: Table, names: Sequence[Name]) -> NamedArrays:
     """Return the columns (rows,) of numbers, without columns of later text."""
     once = [n.column for n in names if table.header.count(n.column) == 1]
     wanted = [column for column in once if not table.numeric or column in table.numeric]
@@ -152,8 +160,8 @@ class _Guessing:
 
     def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
-        self.sections: dict[str, Any] = {}
-        self.time_columns: tuple[str, ...] = ()
+        self.sections: Data = {}
+        self.time_columns: Names = ()
         self.reasons: list[Reason] = []
         self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
@@ -189,9 +197,7 @@ class _Guessing:
         for part in motors:
             self.motors(part, self.parts[part])
 
-    def choose(
-        self, part: str, judge: Callable[[Sequence[str]], tuple[float, str]]
-    ) -> Group | None:
+    def choose(self, part: str, judge: Judge) -> Group | None:
         """Return the likeliest columns of a part, and take them from later parts; None: there are
         none. Other likely columns are a reason for doubt.
         """
@@ -240,7 +246,7 @@ class _Guessing:
             for part in half:  # for a person to complete
                 columns, unit = self.parts[part].columns, self.parts[part].unit
                 most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
-                made: Columns = Columns(columns, unit or "m")
+                made = Columns(columns, unit or "m")
                 if part == "attitude":
                     euler = "zyx" if len(columns) == 3 else ""
                     unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
@@ -300,7 +306,7 @@ class _Guessing:
     def pose(self, place: Group, group: Group) -> None:
         """Find frames, units, order and sense of the pose."""
         attitude, is_quaternion = self.values("attitude"), len(group.columns) == 4
-        units: tuple[str, ...] = ("deg", "rad")
+        units: Names = ("deg", "rad")
         if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
         elif group.unit in units:
@@ -376,7 +382,7 @@ class _Guessing:
         ranked = sorted(fits, key=lambda fit: -fit.score)
         return RankedFits(ranked, "attitude's rate is left unexplained") if fits else None
 
-    def turns_alike(self, columns: Sequence[str]) -> tuple[float, str]:
+    def turns_alike(self, columns: Sequence[str]) -> Verdict:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
         otherwise.
         """
@@ -439,7 +445,7 @@ class _Guessing:
             return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
         text = " ".join(group.columns).lower()
         hint = next((name for word, name in WORDS["orders"].items() if word in text), "windwrench")
-        best, motion = DECLARED, None
+        best, motion = DECLARED, Data()
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
             rates = self.values("gyro") * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body].T
@@ -447,8 +453,8 @@ class _Guessing:
         elif self.ranking is not None and self.ranking.certain(*_TURNS):
             best = self.ranking.best
             motion = {"position": self.values("position"), "attitude": self.values("attitude")}
-        evidence = Evidence(self.t, np.square(values), **(motion or {}))
-        if motion is None or not evidence.enough:
+        evidence = Evidence(self.t, np.square(values), **motion)
+        if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
         ranking = RankedFits.of(evidence, ways)

@@ -34,6 +34,7 @@ from .table import (
     TEXT_SUFFIXES,
     WHAT,
     Array,
+    Data,
     Table,
     file_kind,
     one_line,
@@ -135,7 +136,7 @@ def _open_arrays(path: Path) -> Table:
     if not lengths:
         raise InputError(f"{path}: no arrays of numbers; expected a flight's, of one length")
     rows = max(lengths, key=lambda n: (lengths[n], n))
-    columns: dict[str, Any] = {}
+    columns: Data = {}
     other = []
     for name, array in arrays.items():
         array = array if array.shape[:1] == (rows,) else array.T
@@ -196,7 +197,7 @@ def _open_parquet(path: Path) -> Table:
         rows = int(file.metadata.num_rows)
         nested = [field.name for field in file.schema_arrow if pyarrow.types.is_nested(field.type)]
         _check_claims(path, file, nested, 8 * LIMITS.list_numbers, LIMITS.list_numbers, "of lists")
-        columns: list[tuple[str, Any]] = []  # names, and arrays of their own or the file's fields
+        columns = []  # names, and arrays of their own or the file's fields
         held = 0
         for field in file.schema_arrow:
             if field.name in nested:

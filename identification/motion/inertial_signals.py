@@ -10,13 +10,12 @@ states.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask
+from ..logs.table import Array, Mask, Pair, Rows, finite_rows, median_step
 from .inertial_fusion import FusedMotion, Readings, fuse
 from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body
 from .smoothing import (
@@ -55,9 +54,9 @@ class InertialSignals(Signals):
 
 def pose_rate(log: FlightLog) -> float:
     """Return the number of new poses a second in a log; 0 without any."""
-    rows = np.flatnonzero(np.isfinite(log.position).all(axis=1))
+    rows = np.flatnonzero(finite_rows(log.position))
     times = log.t[_changed(rows, log.position)]
-    return float(1.0 / np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return 1.0 / median_step(times) if len(times) > 1 else 0.0
 
 
 def reads_imu(log: FlightLog) -> bool:
@@ -65,7 +64,7 @@ def reads_imu(log: FlightLog) -> bool:
     return log.gyro is not None and log.accelerometer is not None and pose_rate(log) < LEAST_POSE_HZ
 
 
-def imu_noise(log: FlightLog) -> tuple[float, float]:
+def imu_noise(log: FlightLog) -> Pair:
     """Return the standard deviation of one sample of gyro (rad/s) and accelerometer (m/s2), an
     axis, by the noise above a quarter of the sampling rate.
     """
@@ -73,13 +72,13 @@ def imu_noise(log: FlightLog) -> tuple[float, float]:
 
 
 def _level(x: Array | None) -> float:
-    read = np.empty((0, 3)) if x is None else x[np.isfinite(x).all(axis=1)]
+    read = np.empty((0, 3)) if x is None else x[finite_rows(x)]
     if len(read) < 50:
         return 0.0
     return robust_std(high_pass(read, CUTOFFS.noise_share_of_rate))
 
 
-def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
+def inertial_pieces(log: FlightLog) -> list[Rows]:
     """Return the rows of each unbroken run of IMU readings of sufficient length."""
     if log.gyro is None or log.accelerometer is None:
         return []
@@ -108,13 +107,11 @@ def inertial_signals(log: FlightLog, gravity: float) -> list[InertialSignals]:
     return [_piece(log, rows, gravity, noise) for rows in pieces]
 
 
-def _piece(
-    log: FlightLog, rows: NDArray[np.intp], gravity: float, noise: tuple[float, float]
-) -> InertialSignals:
+def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Pair) -> InertialSignals:
     assert log.gyro is not None
     assert log.accelerometer is not None
     imu_times = log.t[rows]
-    fine = float(np.median(np.diff(imu_times)))
+    fine = median_step(imu_times)
     thin = max(1, int(np.ceil(1.0 / (MOST_HZ * fine) - 1e-6)))
     period = thin * fine
     even = np.arange(imu_times[0], imu_times[-1] + 0.5 * fine, fine)
@@ -162,13 +159,13 @@ def _fused(
     gyro: Array,
     force: Array,
     gravity: float,
-    noise: tuple[float, float],
+    noise: Pair,
     thin: int,
 ) -> FusedMotion:
     """Return the fused motion, with the noise of positions and attitudes by their own scatter."""
     thinned_noise = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
-    placed = _measured(log, np.asarray(np.isfinite(log.position).all(axis=1)), t)
-    turned = _measured(log, np.asarray(np.isfinite(log.quaternion).all(axis=1) & log.valid), t)
+    placed = _measured(log, finite_rows(log.position), t)
+    turned = _measured(log, finite_rows(log.quaternion) & log.valid, t)
     positions = attitudes = None
     if len(placed) > 3:
         positions = Readings(log.t[placed], log.position[placed], FIRST_POSITION_STD)
@@ -195,7 +192,7 @@ def _fused(
     return fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
 
 
-def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
+def _measured(log: FlightLog, there: Mask, t: Array) -> Rows:
     """Return the rows of new measurements within a piece; a pose equal to the one before to the
     last digit was held.
     """
@@ -203,10 +200,10 @@ def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
     return _changed(rows, np.column_stack([log.position, np.nan_to_num(log.quaternion)]))
 
 
-def _changed(rows: NDArray[np.intp], values: Array) -> NDArray[np.intp]:
+def _changed(rows: Rows, values: Array) -> Rows:
     """Return the rows whose values (N, k) differ from the row before among them."""
     new = np.any(np.diff(values[rows], axis=0, prepend=np.inf) != 0.0, axis=1)
-    return np.asarray(rows[new])
+    return rows[new]
 
 
 def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array
+from ..logs.table import Array, ArrayPair, Names, Pair, finite_rows, median_step
 from .smoothing import turned, unbroken
 
 # shares of half the sampling rate between which the slope is read: above a vehicle's motion, below
@@ -47,7 +47,7 @@ class ChannelNoise:
     # amplitude in a lower band over the amplitude at the top, 1 of white noise; NaN where the log
     # is too slow for a band above the motion
     fall: float
-    band_hz: tuple[float, float]  # of the slope
+    band_hz: Pair  # of the slope
 
     @property
     def filtered(self) -> bool:
@@ -88,16 +88,16 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
     ):
         if x is None:
             continue
-        rows = np.flatnonzero(np.isfinite(x).all(axis=1))
+        rows = np.flatnonzero(finite_rows(x))
         if len(rows) <= SEGMENT:
             continue
-        period = float(np.median(np.diff(log.t[rows])))
+        period = median_step(log.t[rows])
         pieces = unbroken(log.t, rows, GAP * period, SEGMENT)
         turning = name == "attitude"
         yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period
 
 
-def _amplitudes(pieces: Sequence[Array]) -> tuple[Array, Array] | None:
+def _amplitudes(pieces: Sequence[Array]) -> ArrayPair | None:
     """Return shares of half the sampling rate (f,) and logarithms of the amplitude (f, k) of
     pieces (n, k) there; None for too short ones.
 
@@ -141,7 +141,7 @@ def _fall(share: Array, amplitude: Array, nyquist: float) -> float:
     return float(np.exp(np.median(amplitude[lower].mean(axis=0) - amplitude[top].mean(axis=0))))
 
 
-def filtering_notes(log: FlightLog) -> tuple[str, ...]:
+def filtering_notes(log: FlightLog) -> Names:
     """Return, as sentences, the filtered channels of a log, the evidence for the filter, and its
     consequence.
     """

@@ -9,19 +9,16 @@ value is one of the log.
 import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
-from ...runtime.arrays import Array
 from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
+from ..logs.table import Array, ArrayPair, Data, Names, Pair, Rows, finite_rows
 from ..motion.smoothing import runs_of
 from .words import percent, rounded, scale_of
-
-Index = NDArray[np.intp]
 
 # all series over time together, packed: beside library and text a page of 60 s of flight stays
 # below 600 kB
@@ -44,16 +41,16 @@ class PlotTable:
     """A caption, the heads of the columns, and the rows as texts."""
 
     caption: str
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
+    head: Names
+    rows: list[Names]
 
 
 @dataclass(frozen=True, eq=False)
 class Plot:
     """One plot of the page."""
 
-    packed: dict[str, Any]  # ``key`` is the plot's name in the page
-    lines: dict[str, tuple[Array, Array]]  # x and y (n,) of ``before``, ``after`` and ``mean``
+    packed: Data  # ``key`` is the plot's name in the page
+    lines: dict[str, ArrayPair]  # x and y (n,) of ``before``, ``after`` and ``mean``
     table: PlotTable
     title: str  # quantity and unit
     axis: str  # quantity of the x axis
@@ -97,7 +94,7 @@ class _Joined:
             for i in range(group.start, group.stop)
         ]
 
-    def kept(self, i: int) -> list[Index]:
+    def kept(self, i: int) -> list[Rows]:
         """Return the drawn samples of each piece for channel ``i``."""
         a_sample = _BASE64 * 2.0 * (3 + len(self.parts)) * len(CHANNELS)
         share = max(int(_MOST_BYTES / a_sample / 4), _LEAST_COLUMNS) / len(self.x)
@@ -106,7 +103,7 @@ class _Joined:
             for first, trace in zip(self.first_rows, self.traces, strict=True)
         ]
 
-    def held_out(self) -> list[tuple[float, float]]:
+    def held_out(self) -> list[Pair]:
         """Return start and end of each held-out block."""
         return [
             (float(self.x[first + a]), float(self.x[first + min(b, len(trace.t) - 1)]))
@@ -122,7 +119,7 @@ class PagePlots:
     time: list[Plot]  # one a channel
     frequency: list[Plot]  # force and torque
     signatures: list[Plot]  # one a named effect
-    data: dict[str, Any]
+    data: Data
 
 
 def page_plots(diagnosis: Diagnosis) -> PagePlots:
@@ -133,7 +130,7 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
     against each named effect's regressor, with the effect's own share.
     """
     time, frequency = [], []
-    data: dict[str, Any] = {}
+    data: Data = {}
     if diagnosis.traces:
         joined = _Joined(diagnosis.traces, diagnosis.effects)
         time = [_plot_over_time(joined, i) for i in joined.channels]
@@ -251,7 +248,7 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
 
 def _plot_of_signature(signature: Signature, number: int) -> Plot:
     columns = np.column_stack([signature.x, signature.residual, signature.fitted])
-    columns = columns[np.isfinite(columns).all(axis=1)]
+    columns = columns[finite_rows(columns)]
     channel = CHANNELS.index(signature.channel)
     symbol, unit = _SYMBOLS[channel], "N" if channel < 3 else "Nm"
     factor, unit = scale_of(np.abs(columns[:, 1:]).ravel(), unit)
@@ -299,7 +296,7 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
     )
 
 
-def binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
+def binned(x: Array, y: Array, count: int = 14) -> ArrayPair:
     """Return the mean of ``y`` over ``x`` (n,) in bins with as many points each."""
     if len(x) < 4 * count:
         return np.empty(0), np.empty(0)
@@ -307,7 +304,7 @@ def binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
     return np.array([x[p].mean() for p in parts]), np.array([y[p].mean() for p in parts])
 
 
-def telling_samples(trace: Trace, i: int, columns: int) -> Index:
+def telling_samples(trace: Trace, i: int, columns: int) -> Rows:
     """Return the drawn samples of a piece for channel ``i``: all of a short piece, or in each of
     ``columns`` stretches the lowest and highest before and after.
     """
@@ -328,8 +325,8 @@ def telling_samples(trace: Trace, i: int, columns: int) -> Index:
 def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> PlotTable:
     """Return the residual's rms before and after in a channel, interval by interval."""
     many, each = len(traces) > _MOST_PIECES, max(_ROWS // len(traces), 1)
-    head: tuple[str, ...] = ("Piece", "Time (s)", "Held out", "Before", "After")
-    rows: list[tuple[str, ...]] = []
+    head: Names = ("Piece", "Time (s)", "Held out", "Before", "After")
+    rows: list[Names] = []
     for number, trace in enumerate(traces[:_MOST_PIECES], 1):
         for part in np.array_split(np.arange(len(trace.t)), min(each, len(trace.t))):
             held = {0.0: "no", 1.0: "yes"}.get(trace.held_out[part].mean(), "in part")
@@ -378,7 +375,7 @@ def candidate_bars(diagnosis: Diagnosis, most: int = 14) -> list[Bar]:
     ]
 
 
-def packed_series(x: Array) -> dict[str, Any] | None:
+def packed_series(x: Array) -> Data | None:
     """Return a series (n,) as 16-bit integers in base64 and their scale; None for zeros, or nearly
     zeros, throughout.
     """

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...runtime.arrays import Array, Complex
+from ...runtime.arrays import Array
+from ..logs.table import NamedArrays, Names
 from ..motion.smoothing import derivative, lagged, low_pass
-from .channels import MotionPiece
+from .channels import MotionPiece, Pieces
 from .spectra import BAND, Segment, segments_of
 
 _STEP = {"lag": 1e-3, "gamma": 0.05}  # finite differences
@@ -49,18 +50,18 @@ class BalanceSpectra:
     """
 
     drive: Drive  # centre of linearisation
-    names: tuple[str, ...]  # columns
-    nonlinear: tuple[str, ...]  # some of NONLINEAR
+    names: Names  # columns
+    nonlinear: Names  # some of NONLINEAR
     segments: tuple[Segment, ...]
     seconds: float
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
 
-def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...]) -> BalanceSpectra:
+def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about a drive in its ``nonlinear`` parameters."""
-    segments: list[Segment] = []
-    names: tuple[str, ...] = ()
-    noise: list[Array] = []
+    segments = []
+    names: Names = ()
+    noise = []
     for piece in pieces:
         here = rotor_columns(piece, drive)
         air = air_columns(piece, drive)
@@ -87,7 +88,7 @@ def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...])
     )
 
 
-def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
+def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     """Return the columns (n,) of the rotors."""
     source = piece.command if drive.commands else piece.rotor_speeds
     assert source is not None
@@ -96,7 +97,7 @@ def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
     if drive.commands and drive.voltage_ref > 0.0 and piece.voltage is not None:
         phi *= np.power(piece.voltage / drive.voltage_ref, drive.gamma)[:, None, None]
     x, y = drive.positions[:, 0], drive.positions[:, 1]
-    out: dict[str, Array] = {}
+    out = {}
     for j in range(phi.shape[2]):
         out[f"T{j}"] = phi[:, :, j].sum(axis=1)
         out[f"X{j}"] = phi[:, :, j] @ y
@@ -124,7 +125,7 @@ def _local(piece: MotionPiece, velocity: Array, drive: Drive) -> Array:
     return velocity[:, None] + drive.known_arm * turning
 
 
-def air_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
+def air_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     """Return the columns (n,) without rotor speeds."""
     w, period = piece.angular_velocity, piece.period
     dw = derivative(w, period)
@@ -150,7 +151,7 @@ def air_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
 def _with_delay(
     s: Segment,
     drive: Drive,
-    nonlinear: tuple[str, ...],
+    nonlinear: Names,
     count: int,
     rotors: int,
     torques: list[int],
@@ -164,7 +165,7 @@ def _with_delay(
     blocks = [rest[:, :, i : i + count].copy() for i in range(0, rest.shape[2], count)]
     for block in blocks:
         block[:, :, :rotors] *= np.exp(-turn * drive.delay)
-    late: Complex = np.zeros_like(blocks[0])
+    late = np.zeros_like(blocks[0])
     late[:, :, :rotors] = -turn * blocks[0][:, :, :rotors]
     others = iter(blocks[1:])
     ordered = [late if name == "delay" else next(others) for name in nonlinear]
@@ -173,7 +174,7 @@ def _with_delay(
     return replace(s, columns=np.concatenate([measured, *every], axis=2))
 
 
-def _rotor_noise(piece: MotionPiece, drive: Drive, names: tuple[str, ...]) -> Array:
+def _rotor_noise(piece: MotionPiece, drive: Drive, names: Names) -> Array:
     """Return the white noise of each rotor's speed in each column (4, c), as the root of a
     spectrum: standard deviation of the column times the root of the period.
     """

@@ -18,8 +18,9 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
 from ..logs.flight_log import FlightLog
+from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
-from .channels import MotionPiece, Sources, pieces_of, rounding_step, speed_noise
+from .channels import MotionPiece, Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
 from .estimates import Estimates, thrust_of
@@ -52,7 +53,7 @@ def identify(
     logs: Sequence[FlightLog],
     mass: float,
     geometry: Geometry,
-    windows: Sequence[tuple[float, float]] | None = None,
+    windows: Sequence[Pair] | None = None,
     name: str = "identified",
     report: Report = lambda share, text: None,
 ) -> Identified:
@@ -76,7 +77,7 @@ def identify(
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
     check_rotors(logs)
-    notes: list[str] = []
+    notes = []
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"
     step = 0.0 if commands else rounding_step(logs)
@@ -165,7 +166,7 @@ def _with_status(vehicle: Vehicle, named: dict[str, Estimate], tested: HeldOut) 
     return replace(flown, status=replace(tested.status, coefficients=sources))
 
 
-def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:
+def _lag_alone(pieces: Pieces, fit: VehicleFit) -> Estimate:
     """Return the lag of a model without a time offset: the offset is then part of the lag."""
     place = fit.model.free.index("delay")
     model = replace(fit.model, free=(*fit.model.free[:place], *fit.model.free[place + 1 :]))
@@ -185,9 +186,7 @@ def _voltage(pieces: Sequence[MotionPiece]) -> float:
     return middle if middle > 0.0 and wide > _LEAST_VOLTAGE_RANGE * middle else 0.0
 
 
-def _first_fit(
-    pieces: list[MotionPiece], sources: Sources, drive: Drive, mass: float
-) -> VehicleFit:
+def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> VehicleFit:
     """Return the fit of the basic model."""
     if not drive.commands:
         model, start, drive = first_model(pieces, sources, drive, mass, ("delay",))
@@ -205,7 +204,7 @@ def _first_fit(
         sure = lag > _LEAST_LAG * (lag - low) / other.width
         return other if sure and plain.loss - other.loss > enough else plain
     nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
-    best: tuple[float, VehicleFit] | None = None
+    best = None
     # from the richest curve down: a poor first fit takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         here = replace(drive, exponents=exponents)
@@ -227,7 +226,7 @@ def _first_fit(
     return best[1]
 
 
-def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
+def _agreeing(pieces: Pieces, fit: VehicleFit) -> VehicleFit:
     """Return the fit up to the highest frequency without a contradiction: thrust agrees with slower
     motion alone (Hausman's test), and each sensor's bias is credible.
     """
@@ -243,7 +242,7 @@ def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
     return fit
 
 
-def _hover_thrust(fit: VehicleFit) -> tuple[float, float]:
+def _hover_thrust(fit: VehicleFit) -> Pair:
     """Return thrust as a share of the weight, at the hover speed or command of the fit's start, and
     its relative standard deviation.
     """
@@ -261,7 +260,7 @@ def _frequencies(fit: VehicleFit) -> float:
 
 
 def _with_optional(
-    pieces: list[MotionPiece], fit: VehicleFit, sources: Sources
+    pieces: Pieces, fit: VehicleFit, sources: Sources
 ) -> tuple[VehicleFit, dict[str, str], Interval | None]:
     """Return a fit with further effects, their names, and a moment of velocity that stays hidden.
 

@@ -4,7 +4,7 @@ force and torque.
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ...runtime.arrays import Array
 from ...runtime.drawing import ESTIMATE, TRUTH, new_figure, styled
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
+from ..logs.table import ArrayPair, Data, Names
 from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
@@ -29,9 +30,9 @@ _SHOWN_HZ = 8.0  # highest frequency of the picture: above it lies the pose's no
 _SHOWN_SECONDS = 10.0
 
 
-def identified_data(identified: Identified) -> dict[str, Any]:
+def identified_data(identified: Identified) -> Data:
     """Return the dictionary of ``identify.json``; None for unknown values."""
-    data: dict[str, Any] = {
+    data: Data = {
         "vehicle": identified.vehicle.name,
         "mass_kg": identified.vehicle.mass,
         "flight_s": identified.fit.balance.seconds,
@@ -56,15 +57,11 @@ def identified_data(identified: Identified) -> dict[str, Any]:
         of = zip(QUANTITIES.items(), errors.model, errors.still, strict=True)
         data[where] = {"starts": errors.starts, "horizon_s": errors.horizon}
         for i, ((name, unit), model, still) in enumerate(of):
-            data[where][name.replace(" ", "_")] = {
-                "unit": unit,
-                "model": model,
-                "if_nothing_changes": still,
-            }
+            said = {"unit": unit, "model": model, "if_nothing_changes": still}
             if where in identified.simplest:
-                simplest = identified.simplest[where].model[i]
-                data[where][name.replace(" ", "_")]["thrust_and_drag"] = simplest
-    told: dict[str, Any] = plain(data)
+                said["thrust_and_drag"] = identified.simplest[where].model[i]
+            data[where][name.replace(" ", "_")] = said
+    told: Data = plain(data)
     return told
 
 
@@ -97,7 +94,7 @@ def use_of(identified: Identified) -> str:
     return "Use: this vehicle."
 
 
-def table_of(errors: PredictionErrors, simplest: PredictionErrors | None) -> list[tuple[str, ...]]:
+def table_of(errors: PredictionErrors, simplest: PredictionErrors | None) -> list[Names]:
     """Return rows: quantity, mean error of the vehicle, of thrust and drag, of no change, unit."""
     columns = [errors.model[:, -1], errors.still[:, -1]]
     if simplest is not None:
@@ -133,7 +130,7 @@ def write_identified(identified: Identified, path: Path) -> list[Path]:
     return written
 
 
-def fitted(identified: Identified, piece: MotionPiece) -> tuple[Array, Array]:
+def fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
 
     Both are (n, 6), behind the picture's low-pass and within the band of the fit.

@@ -16,12 +16,12 @@ from scipy.stats import t as student
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
-from .channels import MotionPiece
+from ..logs.table import Values
+from .channels import Pieces
 from .columns import BalanceSpectra, Drive, balance
 from .model import Model, jacobian
 from .spectra import LOSS, TAPERS, residual_spectra
 
-Values = Mapping[str, float]
 Function = Callable[[Values], float]
 Interval = tuple[float, float, float]  # value, low and high
 
@@ -84,7 +84,7 @@ class VehicleFit:
         """Return value, low and high of a parameter, or of a function of the parameters, in SI
         units; of a positive quantity as a ratio.
         """
-        of: Function = (lambda v: v[what]) if isinstance(what, str) else what
+        of = (lambda v: v[what]) if isinstance(what, str) else what
         theta, values = self.theta, self.model.values
         here = float(of(values(theta)))
         steps = 1e-5 * np.eye(len(theta))
@@ -97,7 +97,7 @@ class VehicleFit:
         return here, here - size, here + size
 
 
-def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -> VehicleFit:
+def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFit:
     """Return the fit of Gauss-Newton from ``start`` (p,)."""
     theta = start.copy()
 
