@@ -57,8 +57,12 @@ def train(
     check_training_env(scenario, task or STANDARD_TASK)
     if cluster:
         need("ray", "cluster")
-    what = {"task": task or STANDARD_TASK, "observation": observation, "reward": reward}
-    what |= {"imports": tuple(imports or ())}
+    what: dict[str, Any] = {
+        "task": task or STANDARD_TASK,
+        "observation": observation,
+        "reward": reward,
+    }
+    what |= {"reward": reward, "imports": tuple(imports or ())}
     folder = results_folder(
         out,
         algorithm=given["algorithm"],

@@ -139,7 +139,7 @@ class PIDWithWrench(PIDWithForce):
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the force's part, and ``- tilt (tau + tilt_lead dtau/dt)`` across."""
-        tilt = self.tilt * standard_vehicle().inertia[0, 0] / self.vehicle.inertia[0, 0]
+        tilt = self.tilt * float(standard_vehicle().inertia[0, 0] / self.vehicle.inertia[0, 0])
         return super().against_the_wind(o, info) - tilt * self._tilting(o, self.tilt_lead)
 
 

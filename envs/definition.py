@@ -254,7 +254,7 @@ class TaskDefinition:
         return list(draw_winds(self.scenario, rng, self.episode_s))
 
     @property
-    def declared(self) -> Vehicle:
+    def declared(self) -> Any:
         """The declared vehicle, with the scenario's measurement of the pose."""
         scenario = self.scenario
         mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)

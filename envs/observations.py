@@ -1,9 +1,7 @@
 """What an agent observes on every task: pose and twist, the felt wrench, the accelerometer."""
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
@@ -74,6 +72,6 @@ def limit(
             out[n, i] = si[n, i] / scales[i]
 
 
-def as_numbers(values: Sequence[float]) -> NDArray[np.float32]:
+def as_numbers(values: ArrayLike) -> NDArray[np.float32]:
     """Return numbers in single precision."""
     return np.array(values, dtype=np.float32)

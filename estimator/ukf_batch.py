@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import deepcopy
 from functools import partial
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +26,7 @@ from .sample import convert
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
 
-_BATCHES = {"double": _core.Batch, "single": _core.SingleBatch}
+_BATCHES: dict[str, Any] = {"double": _core.Batch, "single": _core.SingleBatch}
 
 
 def _first_bad_quaternion(z: Array) -> int:

@@ -40,7 +40,7 @@ Cell = tuple[Any, ...]  # as the arguments of ``flown``
 
 RESULTS = "results/tasks/felt_wrench.json"  # below docs/
 LAW, LEARNER = "linear", "ppo"
-WORLDS = (
+WORLDS: Sequence[tuple[str, str]] = (
     ("FanTracking", "noisy"),
     ("FanTracking", "base"),
     ("WindHover", "noisy"),

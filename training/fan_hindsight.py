@@ -73,7 +73,7 @@ class FanHindsight:
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
         """Return frames (n, quantities), and the commands (n, 1) of the law with sight."""
         if self._features is None:
-            seen = observations / as_numbers(self._envs.task.bounds()[1])
+            seen: Frames = observations / as_numbers(self._envs.task.bounds()[1] or 1.0)
         else:
             remember = self._history.push if self._flown else self._history.restart
             remember(self._features.frames(observations))

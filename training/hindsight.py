@@ -105,7 +105,7 @@ class WindLesson:
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``; ``leads``: ``lqg`` flies."""
         self._envs, self._late = envs, envs.late()
-        self._scale = as_numbers(envs.task.bounds()[1])
+        self._scale = as_numbers(envs.task.bounds()[1] or 1.0)
         self._commands: list[Array] = []
         self._states: list[list[Array]] = []  # of each axis (n, its states)
         self._laws = [make_controller("lqg", self._task) for _ in range(envs.num_envs * leads)]

@@ -86,7 +86,7 @@ class FanPlaneLesson:
     def begin(self, envs: Any, leads: bool) -> None:
         """Start an episode in each of ``envs``."""
         self._truth: list[Any] = []
-        self._scale = as_numbers(envs.task.bounds()[1])
+        self._scale = as_numbers(envs.task.bounds()[1] or 1.0)
 
     def look(self, observations: Array, infos: dict[str, Any]) -> tuple[Array, Any]:
         """Return scaled observations (n, quantities) and the law's commands (n, 2)."""

@@ -79,6 +79,8 @@ template <class S> class Batch {
   std::vector<Block> blocks_;
 };
 
+using State = nb::typed<nb::tuple, long, nb::bytes>;  // how many, and all memory
+
 template <class S> void bind(nb::module_ &m, const char *name) {
   nb::class_<Batch<S>>(m, name)
       .def(nb::init<std::uintptr_t, long>(), "address"_a, "count"_a,
@@ -93,8 +95,8 @@ template <class S> void bind(nb::module_ &m, const char *name) {
       .def("covariance", &Batch<S>::covariance, "out"_a,
            "Write the covariances (n, 18, 18), of noise alone.")
       .def("__getstate__",
-           [](const Batch<S> &self) { return nb::make_tuple(self.count(), self.state()); })
-      .def("__setstate__", [](Batch<S> &self, const nb::tuple &given) {
+           [](const Batch<S> &self) { return State(nb::make_tuple(self.count(), self.state())); })
+      .def("__setstate__", [](Batch<S> &self, const State &given) {
         new (&self) Batch<S>(nb::cast<long>(given[0]), nb::cast<nb::bytes>(given[1]));
       });
 }

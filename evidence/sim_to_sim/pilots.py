@@ -29,7 +29,7 @@ TASK, SCENARIO, SEED = "WindHover", "base", 0
 TAUGHT = ("linear", "gru")
 _ROUNDS, _EPOCHS, _BATCH, _RATE = 4, 4, 32, 5e-3
 _EPISODES = {"linear": 64, "gru": 256}  # of a round
-_WANDER = {"size": 0.3 * WindLesson.largest, "time": 0.5}  # of an error of the commands
+_WANDER = (0.3, 0.5)  # error of the commands: share of the largest, and s
 _SHARES = np.eye(3, dtype=np.float32)
 
 
@@ -66,7 +66,7 @@ def taught_path(kind: str, vehicle: Vehicle, folder: Path) -> Path:
 
 def _flights(kind: str, vehicle: Vehicle) -> Flights:
     envs = TaskLanes(_EPISODES[kind], task=WindHoverEnv, scenario=SCENARIO, vehicle=vehicle)
-    return Flights([envs], _Lesson(vehicle), {"wander": _WANDER}, SEED)
+    return Flights([envs], _Lesson(vehicle), _WANDER, SEED)
 
 
 def _card(kind: str, flights: Flights) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def _linear(vehicle: Vehicle) -> tuple[dict[str, Any], Any]:
     for number in range(_ROUNDS):
         flights.fly(law if number else None, _SHARES)
         law.fit(flights.sequences())
-    return _card("linear", flights) | {"memory": list(MEMORY)}, law.weights()
+    return _card("linear", flights) | {"memory": list(MEMORY)}, law.weights(_SHARES)
 
 
 def _gru(vehicle: Vehicle) -> tuple[dict[str, Any], Any]:
