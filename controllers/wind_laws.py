@@ -72,11 +72,10 @@ class WindLaw:
             + self.against_the_wind(o, info)
         )
         grown = self._sum + WIND_PERIOD * error
-        action = free + self.ki * grown
-        within = np.abs(action) < MAX_ACCELERATION
+        within = np.abs(free + self.ki * grown) < MAX_ACCELERATION
         self._sum = np.where(within, grown, self._sum)
-        action = free + self.ki * self._sum
-        return np.clip(action, -MAX_ACCELERATION, MAX_ACCELERATION).astype(np.float32)
+        wanted = free + self.ki * self._sum
+        return np.clip(wanted, -MAX_ACCELERATION, MAX_ACCELERATION).astype(np.float32)
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the part (3,) m/s2 against the wind; none in this law."""
@@ -139,7 +138,7 @@ class PIDWithWrench(PIDWithForce):
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the force's part, and ``- tilt (tau + tilt_lead dtau/dt)`` across."""
-        tilt = self.tilt * float(standard_vehicle().inertia[0, 0] / self.vehicle.inertia[0, 0])
+        tilt: float = self.tilt * standard_vehicle().inertia[0, 0] / self.vehicle.inertia[0, 0]
         return super().against_the_wind(o, info) - tilt * self._tilting(o, self.tilt_lead)
 
 

@@ -137,8 +137,9 @@ class TaskDefinition:
 
     def _make_spaces(self) -> None:
         """Make the spaces of actions and observations."""
-        same = self.action == self._source("largest_action").action
-        largest = self.largest_action if same else None
+        largest = (
+            self.largest_action if self.action == self._source("largest_action").action else None
+        )
         self.flown = make_action(
             self.action, self.vehicle, self.axes, self.follows, largest, self.gains
         )
@@ -256,9 +257,9 @@ class TaskDefinition:
     @property
     def declared(self) -> Any:
         """The declared vehicle, with the scenario's measurement of the pose."""
-        scenario = self.scenario
-        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
-        return replace(self.vehicle, mocap=mocap)
+        mocap = Mocap(1.0 / TICK, self.scenario.sigma_position, self.scenario.sigma_attitude)
+        declared: Vehicle = replace(self.vehicle, mocap=mocap)
+        return declared
 
     @property
     def tuning(self) -> UKFTuning:
