@@ -16,7 +16,7 @@ The companions c are the biases of gyro (3, rad/s) and accelerometer (3, m/s2), 
 The noise of the last step follows, in standard deviations: motor torque (3) and thrust (3). A
 specific force measured over a step shares the step's noise with the velocity. With the noise as a
 state no cross terms are missing, before or after the pose of the moment (Bar-Shalom, Li and
-Kirubarajan, 2001, section 8.2.1).
+Kirubarajan, 2001, section 8.2.1). ``core/bias_states.hpp`` carries them.
 """
 
 import numpy as np

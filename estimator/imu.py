@@ -10,6 +10,8 @@ until the next step (``bias_states``).
 An accelerometer says nothing of the external force while the rotors' is unknown: before the first
 prediction, and between a restart and the next one, the gyro alone is taken in. A gyro measures the
 rate after the step, torque noise included.
+
+``core/imu.hpp`` takes the measurements in. The functions here are for the export to C.
 """
 
 import math

@@ -12,6 +12,9 @@ McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quad
   the others enter through the Schur complement.
 * The measurement is linear in the error state: the correction by 49 redrawn points is the Kalman
   update.
+
+``WrenchUKF`` steps in the compiled core (``core/ukf.hpp``). The compiled functions here have the
+same bits, for loops that are not of the core yet: lanes of environments, smoother, constant gain.
 """
 
 from __future__ import annotations
