@@ -269,7 +269,7 @@ def errors_of_models(
     Raises:
         InputError: no stretch of pose is long enough.
     """
-    parts: list[list[PredictionErrors]] = []
+    parts = []
     whole = [[(0.0, math.inf)]] * len(logs)
     for log, spans in zip(logs, windows or whole, strict=True):
         first, last = log.t[[0, -1]].tolist()

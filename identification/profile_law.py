@@ -26,7 +26,7 @@ from .jet_design import (
     shape_of,
 )
 from .logs.flight_log import FlightLog
-from .logs.table import Array
+from .logs.table import Array, finite_rows
 from .wind_profile import WindProfile, wind_profile
 from .wrench_series import estimate_log
 
@@ -143,5 +143,5 @@ def _noise(
         expected[k] -= error[2]
     way = uniform_filter1d(place, round(_SLOW / DECISION_PERIOD), mode="nearest")
     noise = np.column_stack([series.torque[rows, 2] - expected, place - way])
-    inside = noise[(place > edges[0]) & (place < edges[1]) & np.isfinite(noise).all(axis=1)]
+    inside = noise[(place > edges[0]) & (place < edges[1]) & finite_rows(noise)]
     return np.asarray(inside - inside.mean(axis=0)) if len(inside) else inside

@@ -17,7 +17,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ..estimator.estimate import TRACKING
 from ..runtime.errors import InputError
-from .logs.table import Array, Rows
+from .logs.table import Array, Rows, finite_rows
 from .wrench_series import WrenchSeries
 
 MEAN = 1.0  # s, of the means that the curve is fitted to
@@ -94,7 +94,7 @@ def wind_profile(
         InputError: no torque was estimated, or the flight is too short or too narrow.
     """
     rows = np.hstack([series.position, series.force, series.torque])
-    good = np.isfinite(rows).all(axis=1) & (series.status_code == TRACKING)
+    good = finite_rows(rows) & (series.status_code == TRACKING)
     good[good] = np.abs(rows[good, 2] - np.median(rows[good, 2])) < _FASTEST
     second = ((series.t - series.t[0]) / MEAN).astype(int)
     _, first, counts = np.unique(second[good], return_index=True, return_counts=True)

@@ -34,7 +34,7 @@ from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_log
 from .logs.streams import MOTOR_RATES, between_samples
-from .logs.table import Array, Rows
+from .logs.table import Array, Rows, finite_rows
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 from .motion.smoothing import mean_square
@@ -159,7 +159,7 @@ def _estimate(
             raise Sample(calls["z"][made]).bad_quaternion()
         if isinstance(ukf, RecordingUKF):
             events[to] = ukf.keep(calls)
-    broken = ~np.isfinite(np.column_stack([numbers[:, :NIS], std])).all(axis=1)
+    broken = ~finite_rows(np.column_stack([numbers[:, :NIS], std]))
     if broken.any():
         raise InputError(
             f"{log.source or log.name}: the estimate overflows at t = {log.t[broken][0]:.6g} s; "
@@ -315,7 +315,7 @@ def calls_of(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tupl
     for part, sensor in enumerate(sensors):
         if sensor is not None:
             imu[:, 3 * part : 3 * part + 3] = np.nan_to_num(sensor[rows])
-            read += IMU_PARTS[part] * np.isfinite(sensor[rows]).all(axis=1)
+            read += IMU_PARTS[part] * finite_rows(sensor[rows])
     carried, posed = np.repeat(rows, list(map(len, steps))), rows[log.valid[rows]]
     to = np.concatenate([carried, rows[read > 0], posed])
     calls = np.zeros(len(to), dtype=CALL)

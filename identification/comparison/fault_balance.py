@@ -99,7 +99,7 @@ class FaultBalance:
 
     def lost(self, rotor: int, share: Array) -> Array:
         """Return each channel's loss (N, 4) if a ``share`` (N,) of rotor 0 to 3 goes."""
-        return np.asarray((self.thrust[:, rotor] * share)[:, None] * _SIGNS[:, rotor])
+        return (self.thrust[:, rotor] * share)[:, None] * _SIGNS[:, rotor]
 
 
 class BalanceChannel:

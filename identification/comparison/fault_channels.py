@@ -22,6 +22,7 @@ from ..logs.flight_phases import carrying, usual_thrust
 from ..logs.readers import px4_ulog, reader_by_content
 from ..logs.reading import read_log
 from ..logs.streams import Stream, readable
+from ..logs.table import median_step
 from ..motion.smoothing import lagged, resampled, runs_of
 
 _PX4 = "px4_ulog"  # the reader
@@ -154,7 +155,7 @@ def sample(channels: Channels) -> Samples:
     if min(map(len, times)) < 10:
         raise InputError(f"{c.name}: fewer than ten samples of gyro, accelerometer or commands")
     for what, at in zip(_CHANNELS[:2], times, strict=False):
-        if (step := float(np.median(np.diff(at)))) > LONGEST_GAP:
+        if (step := median_step(at)) > LONGEST_GAP:
             raise InputError(
                 f"{c.name}: {what}: {1.0 / step:.3g} samples a second; expected at least "
                 f"{1.0 / LONGEST_GAP:g}, to see a rotor fail"
@@ -218,7 +219,7 @@ def _means(times: Array, values: Array, middles: Array) -> Array:
 def _end(c: Channels) -> tuple[float, str]:
     """Return the end of the model's validity, and its reason: a clipped gyro, or an impact."""
     ends = [(np.inf, "")]
-    count = max(3, round(CLIPPED_SECONDS / float(np.median(np.diff(c.gyro.t)))))
+    count = max(3, round(CLIPPED_SECONDS / median_step(c.gyro.t)))
     for axis in c.gyro.values.T:
         size = np.abs(axis)
         at_limit = np.abs(size[:, None] / RANGES - 1.0).min(axis=1) < RANGE_SHARE

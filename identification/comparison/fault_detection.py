@@ -194,7 +194,7 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
         return np.array([channel.part(column) for channel, column in pairs]).T
 
     # each channel's visible part, its standard deviation, and the hypothesis' means and spread
-    tried: list[tuple[Array, Array, Array, Array]] = []
+    tried = []
     for rotor in range(4):
         loss = seen(best.balance.lost(rotor, share))
         tried.append((*loss, shares[:, None] * np.ones(4), _ERROR * shares[:, None]))

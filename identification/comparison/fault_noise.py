@@ -41,7 +41,7 @@ class Noise:
         """
         n = int(self.whole.sum())
         log_scale = float(np.log(self.scale[self.whole]).sum())
-        return np.asarray(-0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale)
+        return -0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale
 
 
 def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
@@ -54,7 +54,7 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
     """
     whole = np.convolve(follows, np.ones(ORDER))[: len(follows)] == ORDER
     whole[:ORDER] = False
-    tried: list[tuple[float, Noise]] = []
+    tried = []
     for share in SHARES:
         scale = np.hypot(1.0, share * activity)
         windows = sliding_window_view(residual / scale, ORDER + 1)[whole[ORDER:], ::-1]

@@ -22,6 +22,7 @@ from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, flight_phases, flying
+from ..logs.table import median_step
 from ..motion.smoothing import runs_of
 
 LEAST_SECONDS = 3.0  # steady flight: a mean over less follows single manoeuvres
@@ -83,7 +84,7 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
         InputError: fewer than 3 s count, or the rotors do not turn.
     """
     step = np.diff(t, append=t[-1])
-    step = np.minimum(step, 5.0 * np.median(np.diff(t)))  # a gap is no flight
+    step = np.minimum(step, 5.0 * median_step(t))  # a gap is no flight
     seconds = float(step[steady].sum())
     if seconds < LEAST_SECONDS:
         raise InputError(
@@ -169,6 +170,6 @@ def carrying(t: Array, total: Array) -> Mask:
 
 def _smooth(values: Array, t: Array) -> Array:
     """Return a running mean: the noise of a pose is no motion."""
-    width = max(1, round(_SMOOTH / float(np.median(np.diff(t)))))
+    width = max(1, round(_SMOOTH / median_step(t)))
     smooth: Array = uniform_filter1d(values, width, mode="nearest")
     return smooth

@@ -64,7 +64,7 @@ def linearised(
 
     def target() -> Setting:
         best = set_evidence(m, every, base.low[at], base.high[at]).mode * base.size[at]
-        out: Setting = {e: dict(values) for e, values in setting.items()}
+        out = {e: dict(values) for e, values in setting.items()}
         for c, x in zip(base.asked, best.tolist(), strict=True):
             limits = coefficient(c)
             out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import bilinear, lfilter
 
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array
+from ..logs.table import Array, median_step
 from ..motion.signals import in_body
 from .causal_filter import FlightState
 from .priors import UNKNOWN
@@ -86,7 +86,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
     rate, body = whole.angular_velocity, in_body(whole.velocity, rotation)
     above = position[:, 2] - position[:, 2].min()
-    shapes: list[tuple[str, str, Array, tuple[int, ...]]] = []  # group, name, variable, channels
+    shapes = []  # group, name, variable, channels
     every = tuple(range(6))
     for i, axis in enumerate("xyz"):
         shapes += [
@@ -114,12 +114,12 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     shapes += [("place", name, x, every) for name, x in places]
     along = np.pi * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
     shapes += [("time", f"time {i}", np.cos(i * along), every) for i in (1, 2, 3)]
-    period = float(np.median(np.diff(t)))
+    period = median_step(t)
     for hertz, i in itertools.product(MOUNT_HZ, range(3)):
         z = _resonance(rotors[:, 1 + i], hertz, period, ends)
         shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
     size = weight_and_torque(flights.vehicle) / flights.inertias
-    out: Columns = {}
+    out = {}
 
     def add(group: str, name: str, column: Array | Product) -> None:
         out["", f"{UNKNOWN}{group}: {name}"] = column

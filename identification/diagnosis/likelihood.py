@@ -117,9 +117,10 @@ class Likelihood:
         self.gains: Array = near.gains if near else np.zeros((len(PAIRS), len(JUMP_STATE)))
         # of each piece: the rounding error of its logged rotor speeds (n, 4), which is added back,
         # and the rotors' innovations, by a filter that follows the pose closely
-        self.finer: list[Array] = near.finer if near else []
-        self.answers: list[Array] = near.answers if near else []
+        self.finer: list[Array] = []
+        self.answers: list[Array] = []
         if near:
+            self.finer, self.answers = near.finer, near.answers
             self.known, self.tracks = near.known, near.tracks
         else:
             self._see_rotors()
@@ -203,7 +204,7 @@ class Likelihood:
         # between two samples the mean of both counts
         wrench = np.sqrt(np.sum(np.square(steps), axis=0) / 2.0)
         out = np.array([0.0, 0.0, *wrench]) / self.flights.inertias
-        return np.asarray(np.maximum(out, 1e-9))
+        return np.maximum(out, 1e-9)
 
     def _search_noise(self, explained: Sequence[Array] | None = None) -> None:
         """Take the likeliest noise, and the likeliest gains on the rotors' innovations.
@@ -279,7 +280,7 @@ class Likelihood:
         a step.
         """
         there = self._accelerations(setting, self.signals if signals is None else signals)
-        return np.asarray((there - self._base) / step)
+        return (there - self._base) / step
 
     def _add(self, column: Column) -> None:
         """Add a coefficient's column, unless it is there already or no such vehicle is possible."""

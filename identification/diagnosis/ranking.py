@@ -166,9 +166,9 @@ def rank_by_rows(
     given = frozenset(first)
     first = likelihood.fitted(first)
     starts = starts_of(flights, library, first)
-    fitted: dict[frozenset[str], Setting] = {given: first}
-    bases: dict[frozenset[str], Base] = {given: likelihood.base(first, starts)}
-    idle: set[frozenset[str]] = set()
+    fitted = {given: first}
+    bases = {given: likelihood.base(first, starts)}
+    idle = set()
 
     def base(setting: Setting, unknown: bool = False) -> Base:
         lags = {
@@ -267,7 +267,7 @@ def starts_of(
     residuals: list[Array] = []
     beside = [*setting, *(e.name for e in flights.vehicle.effects)]
     for effect in (e for e in library if e not in setting):
-        own: list[Mapping[str, float]] = []
+        own = []
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
             typical = typical_size((effect, name), flights.vehicle)

@@ -22,7 +22,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask
+from ..logs.table import Array, Mask, finite_rows, median_step
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
@@ -256,7 +256,7 @@ class RegressedFlights:
         self.start: Mask = np.concatenate([t == t[0] for t in times])  # first row of a piece
         # (rows,) index of the log
         self.log: Index = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
-        self.period = float(np.median(np.diff(self.t)))  # s, from row to row
+        self.period = median_step(self.t)  # s, from row to row
         # s of unbroken flight
         self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
         short = self.commanded and self.seconds < 8 * BLOCK
@@ -325,7 +325,7 @@ class RegressedFlights:
         """Return the columns of an effect (rows, 6) at typical coefficients, one by one, or as one
         where the force is not linear in them.
         """
-        own: list[Column] = [(effect, c.name) for c in get(effect).coefficients]
+        own = [(effect, c.name) for c in get(effect).coefficients]
         if is_nonlinear(effect):
             setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
             return [self.residual({}) - self.residual(setting)]
@@ -376,10 +376,8 @@ class RegressedFlights:
     @property
     def rotor_speeds_vary(self) -> bool:
         """Whether the rotor speeds vary by enough of their rounding steps."""
-        return (
-            float(np.median(self.at_rows("rotor_speeds").std(axis=0)))
-            > LEAST_STEPS_OF_ROTOR_SPEED * self.vehicle.omega_lsb
-        )
+        swing = float(np.median(self.at_rows("rotor_speeds").std(axis=0)))
+        return swing > LEAST_STEPS_OF_ROTOR_SPEED * self.vehicle.omega_lsb
 
     def pieces(self, setting: Setting) -> list[FlightPiece]:
         """Return the pieces, with the vehicle's sensing effects undone in the logs."""
@@ -390,7 +388,7 @@ class RegressedFlights:
         return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
 
     def _cut(self, vehicle: Vehicle) -> list[FlightPiece]:
-        cut: list[tuple[int, Signals]] = [
+        cut = [
             (i, downsampled(s) if self.commanded else s)
             for i, log in enumerate(self.logs)
             for s in (
@@ -597,12 +595,12 @@ def _accelerometer(log: FlightLog) -> tuple[Array, Array] | None:
     """
     if log.accelerometer is None:
         return None
-    read = np.isfinite(log.accelerometer).all(axis=1)
+    read = finite_rows(log.accelerometer)
     times, values = log.t[read], log.accelerometer[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
     if not len(times) or float(np.diff(ends).max()) >= LONGEST_GAP:
         return None
-    period = float(np.median(np.diff(times)))
+    period = median_step(times)
     even = np.arange(times[0], times[-1], period)
     return even, low_pass(resampled(even, times, values), CUTOFFS.pose_hz, period)
 
@@ -617,7 +615,7 @@ def blocks(t: Array, begins: Mask, seconds: float) -> Index:
     """
     since = t - t[begins][np.cumsum(begins) - 1]
     new = begins | (np.diff(since // seconds, prepend=-1.0) != 0.0)
-    return np.asarray(np.cumsum(new) - 1)
+    return np.cumsum(new) - 1
 
 
 def held_out(number: Index) -> Index:

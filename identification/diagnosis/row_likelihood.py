@@ -136,7 +136,7 @@ class RowLikelihood:
             push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
             states.append(FlightState(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
         whole, ends = joined(states)
-        out: dict[Column, Array] = {}
+        out = {}
         for column, made in discrepancy_columns(whole, ends, flights).items():
             x = made[:]
             if rows.with_torques or x[:, :3].any():

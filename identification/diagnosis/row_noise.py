@@ -61,7 +61,7 @@ def white_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
 
 
 def _size(x: Array, least: Array) -> Array:
-    return np.asarray(np.sqrt(mean_square(x) + np.square(least)))
+    return np.sqrt(mean_square(x) + np.square(least))
 
 
 def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:

@@ -101,7 +101,7 @@ class Rows:
 
     def at_rows(self, x: Array) -> Array:
         """Return samples of ``flights`` at the rows (n, ...), low-passed."""
-        return np.asarray(self.flights.low_passed(x, self._cutoff)[self._at])
+        return self.flights.low_passed(x, self._cutoff)[self._at]
 
     def residual(self, setting: Setting) -> Array:
         """Return the residual (n, channels) with these effects.

@@ -370,13 +370,13 @@ class Posterior:
     def _at_mode(self, candidate: _Candidate) -> tuple[Setting, Setting]:
         """Return the coefficients of a set at the mode, and their standard deviations."""
         base, evidence = candidate.base, candidate.evidence
-        setting: Setting = {}
-        std: Setting = {}
+        setting = {}
+        std = {}
         modes = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
         for columns in candidate.variants:
             effect = columns[0][0]
-            own: dict[str, float] = dict(self.flights.coefficients({}, effect))
-            off: dict[str, float] = {}
+            own = dict(self.flights.coefficients({}, effect))
+            off = {}
             for c, (mode, deviation) in zip(columns, modes, strict=False):
                 if c[1].startswith(START_PREFIX):
                     own |= base.starts[c]

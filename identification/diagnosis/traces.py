@@ -121,7 +121,7 @@ def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[
     rotors = "motor commands" if flights.commanded else "rotor speeds"
     turned = s.rotation @ Rotation.from_rotvec([0.1, -0.1, 0.1]).as_matrix()
     # inputs, changed by some per cent, or by their variation in a calm flight (SI units)
-    changed: list[tuple[str, dict[str, Any]]] = [
+    changed = [
         (rotors, {"rotor_speeds": 1.05 * s.rotor_speeds}),
         (place, {"position": s.position + 0.1}),
         (place, {"velocity": s.velocity + 0.5}),

@@ -82,7 +82,7 @@ def turning_delay(
 
     def behind(omega: Array, seconds: float) -> Array:
         angles = (np.arctan(omega * x) if role == Role.LAG else omega * x for role, x in declared)
-        return np.asarray(omega * seconds + sum(angles))
+        return omega * seconds + sum(angles)
 
     def deviance(seconds: float) -> float:
         return sum(s.deviance(np.exp(-1j * behind(s.omega, seconds))) for s in spectra)

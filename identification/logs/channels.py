@@ -144,8 +144,8 @@ def on_one_clock(
     Raises:
         InputError: there is no such piece.
     """
-    groups: list[ChannelGroup] = []
-    notes: list[str] = []
+    groups = []
+    notes = []
     for samples in recorded:
         over = np.cumsum(np.abs(np.diff(samples.t, prepend=np.nan) + ROLLOVER) < _JITTER)
         groups.append(replace(samples, t=samples.t + ROLLOVER * over))
@@ -215,7 +215,7 @@ def _resets(t: Array) -> Rows:
     """Return the first sample of each piece but the first: where the clock goes back, and stays
     back.
     """
-    resets: list[int] = []
+    resets = []
     for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
         before, after = t[max(i - _WINDOW, 0) : i], t[i : i + _WINDOW]
         enough = min(len(before), len(after)) >= min(_WINDOW, 3)
@@ -231,14 +231,14 @@ def in_order(t: Array) -> tuple[Rows, int]:
     at its time, if a row is missing there. The others have a wrong or a repeated time.
     """
     increases = len(t) < 2 or bool(np.all(np.diff(t) > 0.0))
-    rows: Rows = np.arange(len(t)) if increases else _longest_increase(t)
+    rows = np.arange(len(t)) if increases else _longest_increase(t)
     if len(rows) > 3:  # a first or a last one far off all others is left out
         steps = np.diff(t[rows])
         far = max(_ALONE * np.median(steps), _JITTER)
         rows = rows[int(steps[0] > far) : len(rows) - int(steps[-1] > far)]
     if increases:
         return rows, 0
-    others: Mask = np.ones(len(t), dtype=np.bool_)
+    others = np.ones(len(t), dtype=np.bool_)
     others[rows] = False
     steps = np.diff(t[rows])
     if not len(steps):
@@ -258,7 +258,7 @@ def _longest_increase(t: Array) -> Rows:
     """
     ends: list[float] = []  # the least last time of a sequence of each length
     at: list[int] = []  # and its row
-    before: dict[int, int] = {}
+    before = {}
     for i, x in enumerate(t.tolist()):
         k = bisect_left(ends, x)
         if math.isfinite(x) and ends[k : k + 1] != [x]:  # the first of two samples at one time

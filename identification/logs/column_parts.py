@@ -214,7 +214,7 @@ def candidates(
     named = {column for way in _TRIPLES for g in groups_of(names, way) for column in g.columns}
     fours = (group for ending in _FOURS for group in groups_of(names, ending))
     commanded = part == "motors" and any(_named(group, part) for group in fours)
-    ways: list[tuple[Group, float, str]] = []
+    ways = []
     for number, way in enumerate(WORDS["parts"][part]):
         for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
             places = (i for i, word in enumerate(way["words"]) if re.fullmatch(word, group.key))

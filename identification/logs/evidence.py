@@ -187,7 +187,7 @@ class Evidence:
         self._moved = lru_cache(2)(self._balances)
 
     @classmethod
-    def of_log(cls, log: FlightLog, vehicle: Vehicle, by_imu: bool = False) -> "Evidence":
+    def of_log(cls, log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False) -> "Evidence":
         """Return the evidence of a log: by its pose, or by its IMU."""
         squares = np.square(log.rotor_speeds)
         if by_imu:
@@ -324,7 +324,7 @@ class Evidence:
         driven = self._inertia @ turn
         products = np.cross(turn[:, None, :], driven[:, :, None], axis=0).reshape(3, 9)
         each, columns = np.hstack([driven, products]), self._motion(*reading.attitude)[1][..., 3:]
-        needed: Array = np.vstack([along, each[:2] @ columns[:, 0].T, each[2] @ columns[:, 1].T])
+        needed = np.vstack([along, each[:2] @ columns[:, 0].T, each[2] @ columns[:, 1].T])
         needed -= needed.mean(axis=1, keepdims=True)
         return needed
 

@@ -248,7 +248,7 @@ def _section(count: int, units: Collection[str] = ()) -> WrapValidator:
             if count == 1 and "column" in given:
                 given["columns"] = [given.pop("column")]
             given.setdefault("columns", [])
-        part: Any = inner(given)
+        part = inner(given)
         quaternion = isinstance(part, Attitude) and not part.euler
         needed = 3 if isinstance(part, Attitude) and part.euler else count
         if len(part.columns) != (needed or max(1, len(part.columns))):

@@ -182,7 +182,7 @@ def motor_unit(
     speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
     speeds |= within(power, MAGNITUDES.squares) and not commanded
     pulses = low >= 850.0 and high <= 2250.0
-    carrying: list[str] = []
+    carrying = []
     if vehicle is not None and not commanded:
         there = values[finite_rows(values)]
         carrying = [

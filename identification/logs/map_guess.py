@@ -240,7 +240,7 @@ class _Guessing:
             for part in half:  # for a person to complete
                 columns, unit = self.parts[part].columns, self.parts[part].unit
                 most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
-                made: Columns = Columns(columns, unit or "m")
+                made = Columns(columns, unit or "m")
                 if part == "attitude":
                     euler = "zyx" if len(columns) == 3 else ""
                     unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
@@ -439,7 +439,7 @@ class _Guessing:
             return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
         text = " ".join(group.columns).lower()
         hint = next((name for word, name in WORDS["orders"].items() if word in text), "windwrench")
-        best, motion = DECLARED, None
+        best, motion = DECLARED, dict[str, Any]()
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
             rates = self.values("gyro") * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body].T
@@ -447,8 +447,8 @@ class _Guessing:
         elif self.ranking is not None and self.ranking.certain(*_TURNS):
             best = self.ranking.best
             motion = {"position": self.values("position"), "attitude": self.values("attitude")}
-        evidence = Evidence(self.t, np.square(values), **(motion or {}))
-        if motion is None or not evidence.enough:
+        evidence = Evidence(self.t, np.square(values), **motion)
+        if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
         ranking = RankedFits.of(evidence, ways)

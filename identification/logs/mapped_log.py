@@ -124,7 +124,7 @@ def recording_of(
             f"{', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
     said = [*notes, *of_clock, *(part.note for part in log_map.sections.values() if part.note)]
-    streams: dict[str, Stream] = {}
+    streams = {}
     for name, part in log_map.sections.items():
         samples = sources[name]
         if isinstance(part, Rotors | Commands) and not flown.airframe:
@@ -254,7 +254,7 @@ def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
     channels in rows of their own, the section's rows; else the rows with a position or an inertial
     sensor's sample. All rows stay where most have a position: the others lost the position.
     """
-    everything: Mask = np.ones(len(samples.t), bool)
+    everything = np.ones(len(samples.t), bool)
     if log_map.rows == "whole" or samples.table is None:
         return everything
     if rows_apart(samples, log_map):

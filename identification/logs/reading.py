@@ -14,11 +14,10 @@ from ...runtime.errors import InputError
 from . import readers
 from .commanded_speeds import flown_vehicle
 from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
-from .inertial import check_inertial
+from .inertial import check_inertial, on_one_clock
 from .log_map import OWN_MAP, load_map
 from .magnitudes import unit_doubts
 from .mapped_log import map_table
-from .sensor_clock import on_one_clock
 from .table import Table
 from .tables import is_table, open_table
 

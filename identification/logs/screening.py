@@ -104,7 +104,7 @@ def screen_log(
             fault and the remedy.
     """
     source, by_imu = log.source or log.name or "log", reads_imu(log)
-    notes: list[str] = []
+    notes = []
 
     def hear(findings: Findings) -> None:
         for text in findings:
@@ -132,7 +132,7 @@ def screen_log(
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
-    others: list[ColumnReading] = []
+    others = []
     if by_imu or pose_pieces(log):
         evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu)
         others = departures(evidence)[:3]

@@ -41,7 +41,7 @@ def rows_of(
     repeated = [name for name, count in Counter(table.header).items() if count > 1]
     if repeated:
         notes.append(f"columns that stand there more than once were not used: {repeated[:10]}")
-    rows: Rows = np.arange(table.rows)
+    rows = np.arange(table.rows)
     if not clock.column:
         t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
@@ -235,6 +235,6 @@ def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
     words = (
         f"it has no value for {gap:.3g} s, and gaps of up to {limit:.3g} s are interpolated over"
     )
-    bad: Mask = is_long & (np.arange(len(t)) == first)
+    bad = is_long & (np.arange(len(t)) == first)
     _refuse(samples, name, column, bad, f"{_FINITE}: {words}")
     return float(steps.max(initial=0.0))

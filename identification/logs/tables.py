@@ -196,7 +196,7 @@ def _open_parquet(path: Path) -> Table:
         rows = int(file.metadata.num_rows)
         nested = [field.name for field in file.schema_arrow if pyarrow.types.is_nested(field.type)]
         _check_claims(path, file, nested, 8 * LIMITS.list_numbers, LIMITS.list_numbers, "of lists")
-        columns: list[tuple[str, Any]] = []  # names, and arrays of their own or the file's fields
+        columns = []  # names, and arrays of their own or the file's fields
         held = 0
         for field in file.schema_arrow:
             if field.name in nested:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask
+from ..logs.table import Array, Mask, finite_rows, median_step
 from .inertial_fusion import FusedMotion, Readings, fuse
 from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body
 from .smoothing import (
@@ -55,9 +55,9 @@ class InertialSignals(Signals):
 
 def pose_rate(log: FlightLog) -> float:
     """Return the number of new poses a second in a log; 0 without any."""
-    rows = np.flatnonzero(np.isfinite(log.position).all(axis=1))
+    rows = np.flatnonzero(finite_rows(log.position))
     times = log.t[_changed(rows, log.position)]
-    return float(1.0 / np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return 1.0 / median_step(times) if len(times) > 1 else 0.0
 
 
 def reads_imu(log: FlightLog) -> bool:
@@ -73,7 +73,7 @@ def imu_noise(log: FlightLog) -> tuple[float, float]:
 
 
 def _level(x: Array | None) -> float:
-    read = np.empty((0, 3)) if x is None else x[np.isfinite(x).all(axis=1)]
+    read = np.empty((0, 3)) if x is None else x[finite_rows(x)]
     if len(read) < 50:
         return 0.0
     return robust_std(high_pass(read, CUTOFFS.noise_share_of_rate))
@@ -114,7 +114,7 @@ def _piece(
     assert log.gyro is not None
     assert log.accelerometer is not None
     imu_times = log.t[rows]
-    fine = float(np.median(np.diff(imu_times)))
+    fine = median_step(imu_times)
     thin = max(1, int(np.ceil(1.0 / (MOST_HZ * fine) - 1e-6)))
     period = thin * fine
     even = np.arange(imu_times[0], imu_times[-1] + 0.5 * fine, fine)
@@ -167,8 +167,8 @@ def _fused(
 ) -> FusedMotion:
     """Return the fused motion, with the noise of positions and attitudes by their own scatter."""
     thinned_noise = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
-    placed = _measured(log, np.asarray(np.isfinite(log.position).all(axis=1)), t)
-    turned = _measured(log, np.asarray(np.isfinite(log.quaternion).all(axis=1) & log.valid), t)
+    placed = _measured(log, finite_rows(log.position), t)
+    turned = _measured(log, finite_rows(log.quaternion) & log.valid, t)
     positions = attitudes = None
     if len(placed) > 3:
         positions = Readings(log.t[placed], log.position[placed], FIRST_POSITION_STD)
@@ -206,7 +206,7 @@ def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
 def _changed(rows: NDArray[np.intp], values: Array) -> NDArray[np.intp]:
     """Return the rows whose values (N, k) differ from the row before among them."""
     new = np.any(np.diff(values[rows], axis=0, prepend=np.inf) != 0.0, axis=1)
-    return np.asarray(rows[new])
+    return rows[new]
 
 
 def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array
+from ..logs.table import Array, finite_rows, median_step
 from .smoothing import turned, unbroken
 
 # shares of half the sampling rate between which the slope is read: above a vehicle's motion, below
@@ -88,10 +88,10 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
     ):
         if x is None:
             continue
-        rows = np.flatnonzero(np.isfinite(x).all(axis=1))
+        rows = np.flatnonzero(finite_rows(x))
         if len(rows) <= SEGMENT:
             continue
-        period = float(np.median(np.diff(log.t[rows])))
+        period = median_step(log.t[rows])
         pieces = unbroken(log.t, rows, GAP * period, SEGMENT)
         turning = name == "attitude"
         yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period

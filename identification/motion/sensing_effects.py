@@ -86,5 +86,5 @@ def _settled(log: FlightLog, delay: float) -> np.ndarray:
     broken = np.diff(log.t[seen], prepend=-np.inf) > LONGEST_GAP
     starts = np.append(-np.inf, log.t[seen[broken]])
     began = starts[np.searchsorted(starts, log.t, side="right") - 1]
-    settled: np.ndarray = log.t >= np.where(np.isfinite(began), began + delay - 1e-9, np.inf)
+    settled = log.t >= np.where(np.isfinite(began), began + delay - 1e-9, np.inf)
     return settled

@@ -125,7 +125,7 @@ def resampled(t: Array, times: Array, x: Array) -> Array:
 def second_difference(at: Array, step: float, t: Array, x: Array) -> Array:
     """Return the second differences (n, k), over ``step`` s, of ``x`` (m, k) around times (n,)."""
     before, middle, after = (resampled(at + k * step, t, x) for k in (-1, 0, 1))
-    return np.asarray(before - 2.0 * middle + after)
+    return before - 2.0 * middle + after
 
 
 def unbroken(
@@ -189,7 +189,7 @@ def turned(quaternion: Array) -> Array:
     """Return the sum (n - 1, 3) of the rotations (rad, body) between quaternions (n, 4). White
     noise stays white in this sum, except for a small share turned by the motion.
     """
-    return np.asarray(np.cumsum(turn_between(quaternion[:-1], quaternion[1:]), axis=0))
+    return np.cumsum(turn_between(quaternion[:-1], quaternion[1:]), axis=0)
 
 
 def continuous(quaternion: Array) -> Array:

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...runtime.arrays import Array
 from ...runtime.drawing import SERIES, new_figure, styled
 from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
+from ..logs.table import Array, finite_rows
 
 _GAP = 3.0  # median steps of a channel
 _BINS = 4000  # for a picture's 900 pixels: each bin draws a line's least and largest value
@@ -44,7 +44,7 @@ def log_channels(log: FlightLog) -> list[Channel]:
         axis[log.valid] = turned.apply([0.0, 0.0, 1.0])
     tilt = np.degrees(np.arccos(np.clip(axis[:, 2:], -1.0, 1.0)))
     rotors = "rotor speeds (from commands)" if log.commanded else "rotor speeds"
-    given: list[tuple[str, str, Array | None, tuple[str, ...], str]] = [
+    given = [
         ("position", "m", log.position, _AXES, "position"),
         ("attitude (tilt)", "deg", tilt, _AXES[:2], "position"),
         (
@@ -65,7 +65,7 @@ def log_channels(log: FlightLog) -> list[Channel]:
     for name, unit, values, series, section in given:
         if values is None:
             continue
-        rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+        rows = np.flatnonzero(finite_rows(values))
         if len(rows) < 2:
             continue
         t, title, drawn = log.t[rows], f"{name} ({unit})", values[rows]

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from ...runtime.arrays import Array
 from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
+from ..logs.table import Array, finite_rows
 from ..motion.smoothing import runs_of
 from .words import percent, rounded, scale_of
 
@@ -251,7 +251,7 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
 
 def _plot_of_signature(signature: Signature, number: int) -> Plot:
     columns = np.column_stack([signature.x, signature.residual, signature.fitted])
-    columns = columns[np.isfinite(columns).all(axis=1)]
+    columns = columns[finite_rows(columns)]
     channel = CHANNELS.index(signature.channel)
     symbol, unit = _SYMBOLS[channel], "N" if channel < 3 else "Nm"
     factor, unit = scale_of(np.abs(columns[:, 1:]).ravel(), unit)

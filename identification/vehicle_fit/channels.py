@@ -17,6 +17,7 @@ from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.streams import MOTOR_RATES
+from ..logs.table import median_step
 from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 from .geometry import GRAVITY
@@ -126,7 +127,7 @@ def rounding_step(logs: Sequence[FlightLog]) -> float:
     kept = np.unique(np.round(values, 6))
     if len(kept) < 3 or len(kept) > _FEW_VALUES * len(values):
         return 0.0
-    return float(np.median(np.diff(kept)))
+    return median_step(kept)
 
 
 def speed_noise(pieces: Sequence[MotionPiece]) -> float:
@@ -154,7 +155,7 @@ def pieces_of(
         InputError: a log lacks a channel, or no piece in flight is long enough.
     """
     sources = sources_of(logs)
-    pieces: list[MotionPiece] = []
+    pieces = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
         posed = "pose" in (sources.rate, sources.force)
         for motion in _posed(log, sources) if posed else _inertial(log, sources):
@@ -194,7 +195,7 @@ def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
     """Yield motion by the IMU: rate, and force if any; velocity is the pose's, if any."""
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
-    period = float(np.median(np.diff(log.t[read])))
+    period = median_step(log.t[read])
     gap = max(_GAP, 3.5 * period)
     for rows in unbroken(log.t, read, gap, 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
@@ -268,7 +269,7 @@ def _flying(piece: MotionPiece) -> Mask:
     assert drive is not None
     load = low_pass(np.mean(np.square(drive), axis=1), 1.0, piece.period)
     usual = float(np.median(load[load > 0.1 * np.quantile(load, 0.95)]))
-    return np.asarray(load > _FLYING_SHARE * usual)
+    return load > _FLYING_SHARE * usual
 
 
 def _cut(piece: MotionPiece, keep: Mask) -> list[MotionPiece]:

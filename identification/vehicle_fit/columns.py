@@ -96,7 +96,7 @@ def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
     if drive.commands and drive.voltage_ref > 0.0 and piece.voltage is not None:
         phi *= np.power(piece.voltage / drive.voltage_ref, drive.gamma)[:, None, None]
     x, y = drive.positions[:, 0], drive.positions[:, 1]
-    out: dict[str, Array] = {}
+    out = {}
     for j in range(phi.shape[2]):
         out[f"T{j}"] = phi[:, :, j].sum(axis=1)
         out[f"X{j}"] = phi[:, :, j] @ y
@@ -164,7 +164,7 @@ def _with_delay(
     blocks = [rest[:, :, i : i + count].copy() for i in range(0, rest.shape[2], count)]
     for block in blocks:
         block[:, :, :rotors] *= np.exp(-turn * drive.delay)
-    late: Complex = np.zeros_like(blocks[0])
+    late = np.zeros_like(blocks[0])
     late[:, :, :rotors] = -turn * blocks[0][:, :, :rotors]
     others = iter(blocks[1:])
     ordered = [late if name == "delay" else next(others) for name in nonlinear]

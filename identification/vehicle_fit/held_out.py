@@ -61,8 +61,8 @@ def held_out(
         InputError: too little would be left of the logs.
     """
     # each segment's log, and from and to, s after the log's start
-    number: list[int] = []
-    spans: list[tuple[float, float]] = []
+    number = []
+    spans = []
     for piece in pieces:
         t, edges = piece.t - logs[piece.log].t[0], edges_of(len(piece.t), piece.period)
         number += [piece.log] * (len(edges) - 1)
@@ -70,7 +70,7 @@ def held_out(
     turn = np.arange(len(number)) % FOLDS
     if not all(log.has_pose for log in logs):
         return _by_balance(fit, turn)
-    errors: dict[str, list[PredictionErrors]] = {}
+    errors = {}
     for where, fold in {"held_out_blocks": turn, "flights_left_out": np.array(number)}.items():
         names = np.unique(fold)
         if len(names) < 2 and where == "flights_left_out":

@@ -76,7 +76,7 @@ def identify(
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
     check_rotors(logs)
-    notes: list[str] = []
+    notes = []
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"
     step = 0.0 if commands else rounding_step(logs)
@@ -205,7 +205,7 @@ def _first_fit(
         sure = lag > _LEAST_LAG * (lag - low) / other.width
         return other if sure and plain.loss - other.loss > enough else plain
     nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
-    best: tuple[float, VehicleFit] | None = None
+    best = None
     # from the richest curve down: a poor first fit takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         here = replace(drive, exponents=exponents)

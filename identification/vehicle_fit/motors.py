@@ -37,7 +37,7 @@ def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
 
     def columns(lag: float) -> Array:
         u = [lagged(p.command, lag, p.period).ravel() for p in pieces if p.command is not None]
-        return np.asarray(np.vander(np.concatenate(u), _POWERS, increasing=True))
+        return np.vander(np.concatenate(u), _POWERS, increasing=True)
 
     target = speeds.ravel()
 

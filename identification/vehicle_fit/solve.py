@@ -84,7 +84,7 @@ class VehicleFit:
         """Return value, low and high of a parameter, or of a function of the parameters, in SI
         units; of a positive quantity as a ratio.
         """
-        of: Function = (lambda v: v[what]) if isinstance(what, str) else what
+        of = (lambda v: v[what]) if isinstance(what, str) else what
         theta, values = self.theta, self.model.values
         here = float(of(values(theta)))
         steps = 1e-5 * np.eye(len(theta))

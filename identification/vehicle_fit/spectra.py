@@ -66,8 +66,8 @@ def residual_spectra(segments: Sequence[Segment], powers: Sequence[Array]) -> li
     """Return, for each segment, the spectrum (m, 6) of residuals with given powers (m, 6): smoothed
     over the segments of a log and over frequency, infinite at no power.
     """
-    out: list[Array] = []
-    by_log: dict[int, tuple[Array, Array]] = {}
+    out = []
+    by_log = {}
     for log in {s.log for s in segments}:
         of_log = [(s, p) for s, p in zip(segments, powers, strict=True) if s.log == log]
         frequency = np.concatenate([s.frequency for s, _ in of_log])

@@ -235,7 +235,7 @@ def _with_parameters(
     slots = slots_of_motors(_functions(parameters), _MOTOR1) or list(range(4))
     outputs = [slot + 1 for slot in slots]
     assert log_map.commands is not None
-    commands: Commands = replace(
+    commands = replace(
         log_map.commands,
         columns=tuple(f"{letter}{output}" for output in outputs),
         range=(low, high),
@@ -255,7 +255,7 @@ def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[Channel
     slots, which = slots_of_motors(_functions(parameters), _MOTOR1), messages["Instance"]
     if not slots or not set(slots) <= set(which.astype(int).tolist()):
         slots = list(range(4))
-    each: list[Stream] = []
+    each = []
     for slot in slots:
         one = {name: column[which == slot] for name, column in messages.items()}
         if len(one["RPM"]) < 2 or not np.any(one["RPM"] > 0.0):
@@ -286,7 +286,7 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
     places, kinds = np.empty(most, np.int32), np.empty(most, np.uint8)
     count, used = _walk(data, places, kinds)
     places, kinds = places[:count], kinds[:count]  # take memory as they were filled
-    by_type: dict[str, Messages] = {}
+    by_type = {}
     formats = places[kinds == _FMT][:_MOST_FORMATS]
     if not len(formats):
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
@@ -321,7 +321,7 @@ def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, M
             values = rest.split(b",", len(names[name]) - 1)
             if len(values) == len(names[name]):
                 rows.setdefault(name, []).append(values)
-    by_type: dict[str, Messages] = {}
+    by_type = {}
     for name, messages in rows.items():
         check_count(f"{path}: {name}", len(messages), LIMITS.table_rows, "messages")
         columns = dict(zip(names[name], zip(*messages, strict=True), strict=True))

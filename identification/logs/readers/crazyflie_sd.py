@@ -71,7 +71,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             f"the file is damaged or was cut {end} bytes from its start ({len(data) - end} bytes "
             "are left); what stands before was used"
         )
-    events: list[ChannelGroup] = []
+    events = []
     for rows in runs:
         if len(rows) < 2:
             continue
@@ -113,7 +113,7 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
 
     first, count = next_part(_START, "bc, the version 1 or 2, and the number of events")
     version = first[0]
-    kinds: dict[int, Layout] = {}
+    kinds = {}
     for _ in range(int.from_bytes(count, "little")):
         number, name, variables = next_part(_EVENT, "an event's number, name and variables")
         many, event = int.from_bytes(variables, "little"), name.decode("ascii", "replace")

@@ -182,7 +182,7 @@ def definitions() -> list[dict[str, str]]:
     """Return definitions for rosbags' unknown types, in several variants: the newest of each comes
     first.
     """
-    known: dict[str, list[str]] = stated("ros")["definitions"]
+    known = stated("ros")["definitions"]
     return [
         {name: texts[min(variant, len(texts) - 1)] for name, texts in known.items()}
         for variant in range(max(map(len, known.values())))

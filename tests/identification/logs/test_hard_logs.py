@@ -8,10 +8,10 @@ import pytest
 from tests.support.data_paths import data_file
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.flight_log import with_rows
+from windwrench.identification.logs.inertial import on_one_clock
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.identification.logs.sensor_clock import on_one_clock
 from windwrench.identification.logs.tables import open_table
 from windwrench.runtime.errors import InputError
 
