@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..dynamics.vehicle import Vehicle
-from .logs.table import Array, Mask
+from .logs.table import Array, Mask, Names, Pair, Values
 
 CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
 
@@ -33,13 +33,13 @@ class NamedEffect:
     """
 
     name: str
-    coefficients: Mapping[str, float]
-    std: Mapping[str, float]
+    coefficients: Values
+    std: Values
     units: Mapping[str, str]
     tentative: bool
-    indistinguishable_from: tuple[str, ...]
-    evidence: Mapping[str, float]
-    channels: tuple[str, ...] = ()
+    indistinguishable_from: Names
+    evidence: Values
+    channels: Names = ()
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ class Alternative:
         probability: of these effects and no others of the library.
     """
 
-    effects: tuple[str, ...]
+    effects: Names
     probability: float
 
 
@@ -198,7 +198,7 @@ class Probabilities:
         unknown: probability of a cause outside the library.
     """
 
-    names: Mapping[str, float]
+    names: Values
     alternatives: tuple[Alternative, ...]
     unknown: float
 
@@ -214,10 +214,10 @@ class RankedSet:
         std: their standard deviations, if they have one.
     """
 
-    effects: tuple[str, ...]
+    effects: Names
     probability: float
-    coefficients: Mapping[str, Mapping[str, float]]
-    std: Mapping[str, Mapping[str, float]]
+    coefficients: Mapping[str, Values]
+    std: Mapping[str, Values]
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ class Ranking:
         tempering: power of the likelihood, 1 if its scatter is as expected.
     """
 
-    probability: Mapping[str, float]
+    probability: Values
     sets: tuple[RankedSet, ...]
     structure: float
     tempering: float
@@ -289,8 +289,8 @@ class Diagnosis:
     after: Errors
     floor_force_rms: float
     floor_torque_rms: float
-    advice: tuple[str, ...]
-    notes: tuple[str, ...]
+    advice: Names
+    notes: Names
     candidates: tuple[Candidate, ...]
     traces: tuple[Trace, ...]
     signatures: tuple[Signature, ...]
@@ -300,20 +300,20 @@ class Diagnosis:
     cutoff_hz: float
     declared: Vehicle
     amended: Vehicle
-    logs: tuple[str, ...]
-    test_logs: tuple[str, ...]
+    logs: Names
+    test_logs: Names
     seconds: float
     floor_is_bound: bool = False
     rotor_faults: tuple[Mapping[str, Any], ...] = ()
-    needs_pose: tuple[str, ...] = ()
-    doubts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    needs_pose: Names = ()
+    doubts: Mapping[str, Names] = field(default_factory=dict)
     ranking: Ranking | None = None
     probabilities: Probabilities = field(default_factory=lambda: Probabilities({}, (), math.nan))
 
     @property
-    def held_out_by_log(self) -> dict[str, list[tuple[float, float]]]:
+    def held_out_by_log(self) -> dict[str, list[Pair]]:
         """The held-out segments, from and to (s), of each log with some."""
-        blocks: dict[str, list[tuple[float, float]]] = {}
+        blocks: dict[str, list[Pair]] = {}
         for log, start, end in self.held_out_segments:
             blocks.setdefault(log, []).append((start, end))
         return blocks

@@ -30,7 +30,7 @@ from ..estimator.estimate import (
 )
 from ..estimator.model_uncertainty import LOAD, factors_of, variances_along
 from .logs.flight_log import FlightLog
-from .logs.table import Array
+from .logs.table import Array, Names, Pair
 from .motion.inertial_signals import InertialSignals, imu_noise, inertial_signals, pose_rate
 from .motion.residual import acting_wrench, needed_wrench
 from .motion.smoothing import continuous, resampled
@@ -38,7 +38,7 @@ from .motion.smoothing import continuous, resampled
 
 def inertial_wrench(
     log: FlightLog, vehicle: Vehicle, tuning: UKFTuning
-) -> tuple[WrenchEstimate, Array, tuple[str, ...]]:
+) -> tuple[WrenchEstimate, Array, Names]:
     """Return the smoothed estimate at every row (N,) of a log by its gyro and accelerometer, the
     loads (N, 7, 3) of ``estimator.model_uncertainty``, and notes.
 
@@ -84,7 +84,7 @@ def _piece(
     vehicle: Vehicle,
     tuning: UKFTuning,
     period: float,
-    noise: tuple[float, float],
+    noise: Pair,
 ) -> tuple[Array, Array, Array]:
     """Return the state (n, STATE_SIZE) of a piece, laid out as an estimate's, the standard
     deviations of torque and force (n, 6), and the loads (n, 7, 3), smoothed likewise.
@@ -193,7 +193,7 @@ def _two_sided(
     return out, np.sqrt(np.maximum(np.diagonal(smoothed), 0.0))
 
 
-def _notes(log: FlightLog, pieces: list[InertialSignals], vehicle: Vehicle) -> tuple[str, ...]:
+def _notes(log: FlightLog, pieces: list[InertialSignals], vehicle: Vehicle) -> Names:
     if pose_rate(log) > 0.0:
         return (
             "gyro and accelerometer were smoothed together with the "

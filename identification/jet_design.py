@@ -20,7 +20,7 @@ from ..controllers.briefing import Air, FilterNoise
 from ..controllers.flight import FlightGains
 from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ..controllers.wrench_lag import axis_lag
-from .logs.table import Array
+from .logs.table import Array, Pair
 
 HELD_SHARE = 0.8  # of the flights behind a fan that counts as followed
 FLIGHT_TIME = 20.0  # s
@@ -42,9 +42,9 @@ class JetShape:
 
     axis: float  # m, where the torque is zero
     slope: float  # Nm/m, the steepest over 0.2 m
-    torques: tuple[float, float]  # Nm, the largest
-    peaks: tuple[float, float]  # m, where they are; beyond, the fan is lost
-    edges: tuple[float, float]  # m; beyond, the torque is below a fifth of the largest
+    torques: Pair  # Nm, the largest
+    peaks: Pair  # m, where they are; beyond, the fan is lost
+    edges: Pair  # m; beyond, the torque is below a fifth of the largest
 
     @property
     def weaker(self) -> float:
@@ -105,7 +105,7 @@ class FollowingLoop:
     show: Array
     noise: Array  # (k, 2) of the felt torque, Nm, and of the place, m, a decision a row
 
-    def margins(self, gain: float) -> tuple[float, float]:
+    def margins(self, gain: float) -> Pair:
         """Return phase margin (rad) and delay margin (s) of the loop whose gain times slope is
         ``gain`` (1/s).
         """

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -26,7 +25,7 @@ from .jet_design import (
     shape_of,
 )
 from .logs.flight_log import FlightLog
-from .logs.table import Array, finite_rows
+from .logs.table import Array, Data, Names, Pair, finite_rows
 from .wind_profile import WindProfile, wind_profile
 from .wrench_series import estimate_log
 
@@ -52,8 +51,8 @@ class ProfiledJet:
     others: tuple[WindProfile, ...]
     why: str
     shape: JetShape | None
-    law: dict[str, Any] | None
-    notes: tuple[str, ...]
+    law: Data | None
+    notes: Names
 
 
 def profile_log(
@@ -125,7 +124,7 @@ def _noise(
     log: FlightLog,
     vehicle: Vehicle,
     profile: WindProfile,
-    edges: tuple[float, float],
+    edges: Pair,
     rise_time: float,
     loop: FollowingLoop,
 ) -> Array:

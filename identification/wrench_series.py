@@ -34,7 +34,7 @@ from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_log
 from .logs.streams import MOTOR_RATES, between_samples
-from .logs.table import Array, Rows, finite_rows
+from .logs.table import Array, Names, Rows, finite_rows
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 from .motion.smoothing import mean_square
@@ -75,7 +75,7 @@ class WrenchSeries(WrenchEstimate):
         t: Array,
         vehicle: Vehicle,
         tuning: UKFTuning,
-        notes: tuple[str, ...],
+        notes: Names,
         loads: Array,
     ) -> None:
         super().__init__(estimate.numbers, estimate.std)
@@ -131,7 +131,7 @@ def _estimate(
     report: Callable[[float], None] = lambda share: None,
     smooth: bool = False,
     gate: float | None = GATE,
-    doubts: tuple[str, ...] = (),
+    doubts: Names = (),
 ) -> WrenchSeries:
     """Return the estimate of a screened log (``screen_log``), with its doubts."""
     if log.commanded:
@@ -173,7 +173,7 @@ def _estimate(
     return series
 
 
-def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> tuple[str, ...]:
+def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> Names:
     """Take the torque out of an estimate with seldom measured rotors, and widen the force with even
     fewer measurements; return the notes on both.
     """
@@ -196,7 +196,7 @@ def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> 
     )
 
 
-def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
+def pose_notes(log: FlightLog, vehicle: Vehicle) -> Names:
     """Return the notes of ``estimate_log`` on a screened log's poses: jumps, and restarts of the
     filter. They are for other results of the same log; none if its motion is read from an IMU.
 

@@ -8,7 +8,6 @@ smears the time of a fault.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -22,7 +21,7 @@ from ..logs.flight_phases import carrying, usual_thrust
 from ..logs.readers import px4_ulog, reader_by_content
 from ..logs.reading import read_log
 from ..logs.streams import Stream, readable
-from ..logs.table import median_step
+from ..logs.table import Data, Names, median_step
 from ..motion.smoothing import lagged, resampled, runs_of
 
 _PX4 = "px4_ulog"  # the reader
@@ -51,7 +50,7 @@ class Channels:
     command: Stream  # (K, 4) motor commands, in any unit growing with thrust, 0: none
     # the command is thrust itself but for a factor (rotor speeds squared): no curve is looked for
     thrust_known: bool = False
-    motor_names: tuple[str, ...] | None = None  # the log's own, of rotors 1 to 4
+    motor_names: Names | None = None  # the log's own, of rotors 1 to 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +93,7 @@ def read_channels(
     vehicle: Vehicle | None = None,
     log_map: str | None = None,
     log: FlightLog | None = None,
-) -> tuple[Channels, tuple[str, ...]]:
+) -> tuple[Channels, Names]:
     """Return a file's gyro, accelerometer and commands, and notes on their origin.
 
     A PX4 file alone has the channels' own rates. Other files go through their reader; ``log`` is a
@@ -108,7 +107,7 @@ def read_channels(
         log = log or read_log(path, reader, vehicle, log_map)
         return channels_of_log(log), log.notes
     recording = px4_ulog.channels(path, has_ranges=False)
-    streams: dict[str, Any] = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
+    streams: Data = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
     if missing := [part for part, stream in streams.items() if stream is None]:
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
     assert recording.log_map.commands is not None

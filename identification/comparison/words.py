@@ -1,6 +1,6 @@
 """Changes between two sets of flights, and rotor faults within one: sentences, data, pictures."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from ...runtime.drawing import (
 )
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
+from ..logs.table import Data, Values
 from ..motion.smoothing import resampled
 from .change import NOWHERE, SOMETHING_ELSE, SURE, Change
 from .fault_detection import ALL, NOTHING, OTHER, RotorFault
@@ -28,7 +29,7 @@ _NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
 
-def _cannot_tell(chances: Mapping[str, float], likeliest: str, name: Callable[[str], str]) -> str:
+def _cannot_tell(chances: Values, likeliest: str, name: Callable[[str], str]) -> str:
     """Return a sentence on an unsure finding and its rivals."""
     rivals = [
         f"{name(rival)} ({p:.2f})"
@@ -74,10 +75,10 @@ def _kind(change: Change) -> str:
     )
 
 
-def change_data(change: Change) -> dict[str, Any]:
+def change_data(change: Change) -> Data:
     """Return the finding as plain data."""
 
-    def flight(trim: Trim) -> dict[str, Any]:
+    def flight(trim: Trim) -> Data:
         return {
             "log": trim.name,
             "seconds": trim.seconds,
@@ -88,7 +89,7 @@ def change_data(change: Change) -> dict[str, Any]:
         }
 
     names = ("left_less_right", "front_less_rear", "diagonals", "log_total")
-    data: dict[str, Any] = plain(
+    data: Data = plain(
         {
             "headline": change_headline(change),
             "probabilities": change.places,
@@ -186,7 +187,7 @@ def _finding(fault: RotorFault, name: str) -> str:
     return f"a fault of {place_of(fault, int(name))}"
 
 
-def fault_data(fault: RotorFault) -> dict[str, Any]:
+def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
     names = {str(i): f"rotor {i}" for i in range(1, 5)}
     of_rotor, motors = fault.likeliest in names, fault.samples.channels.motor_names

@@ -11,7 +11,7 @@ import numpy as np
 from ...dynamics.effects import Need, Role, get, needing, playing
 from ...dynamics.vehicle import Vehicle
 from ..findings import NamedEffect
-from ..logs.table import Array
+from ..logs.table import Array, Pair, Values
 from ..motion.inertial_signals import pose_rate
 from .log_offsets import ROTOR_TIME_OFFSET
 from .regression import CENTRAL, RegressedFlights, Setting, moves_time, unit_of_change
@@ -55,9 +55,7 @@ def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str
                 yield f"{a} and {b} change alike: {other} may be the one cause"
 
 
-def _relative(
-    vehicle: Vehicle, effect: str, values: Mapping[str, float], std: Mapping[str, float]
-) -> Array:
+def _relative(vehicle: Vehicle, effect: str, values: Values, std: Values) -> Array:
     """Return the relative changes by an effect, and their standard deviations."""
     names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
     unit = np.array([unit_of_change((effect, name), vehicle) for name in names])
@@ -106,7 +104,7 @@ def inertial_notes(flights: RegressedFlights, named: Sequence[str]) -> Iterator[
 
 
 def late_rotors(
-    flights: RegressedFlights, effects: Iterable[str], sensors: Mapping[str, tuple[float, float]]
+    flights: RegressedFlights, effects: Iterable[str], sensors: Mapping[str, Pair]
 ) -> Iterator[str]:
     """Yield the delay of the rotor speeds against their log, unless an effect covers it;
     ``sensors``: time offsets and their standard deviations.

@@ -10,7 +10,7 @@ of the poses, where poses and rotors were logged as measured, or of the wrench's
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +32,7 @@ from ..findings import (
 )
 from ..logs.flight_log import FlightLog
 from ..logs.screening import LEAST_SECONDS, screen_log
-from ..logs.table import Array
+from ..logs.table import Array, Names, Pair, Values
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.pose_clock import on_pose_clock
 from ..motion.smoothing import CUTOFFS, mean_square
@@ -267,7 +267,7 @@ class Judged:
             return dict(std)
         return self._widened(effect, std, THRUST_STD / math.sqrt(len(flights.logs)))
 
-    def _widened(self, effect: str, std: Mapping[str, float], relative: float) -> dict[str, float]:
+    def _widened(self, effect: str, std: Values, relative: float) -> dict[str, float]:
         """Return standard deviations of coefficients with a relative one besides."""
         return {
             name: math.hypot(x, relative * unit_of_change((effect, name), self._flights.vehicle))
@@ -287,7 +287,7 @@ class Judged:
                 most = max(most, math.erf(off / std / math.sqrt(2.0)))
         return most
 
-    def _rivals(self, effect: str) -> tuple[str, ...]:
+    def _rivals(self, effect: str) -> Names:
         """Return the effects with nearly the likelihood of one in the likeliest set, in its
         place.
         """
@@ -303,7 +303,7 @@ class Judged:
         ]
         return tuple(e for one in more if len(one) == 1 and effect not in one for e in one)
 
-    def _doubts(self, named: Sequence[str], strange: float) -> dict[str, tuple[str, ...]]:
+    def _doubts(self, named: Sequence[str], strange: float) -> dict[str, Names]:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
         flights, rule, fitted = self._flights, self._rule, self._fitted
         alike = composites(flights.vehicle, fitted.setting, self.ranking.sets[0].std)
@@ -336,7 +336,7 @@ class Judged:
         return {check: sentences for check, sentences in doubts.items() if sentences}
 
     def _named(
-        self, effect: str, probability: float, size: float, unsure: bool, others: tuple[str, ...]
+        self, effect: str, probability: float, size: float, unsure: bool, others: Names
     ) -> NamedEffect:
         flights, rule, fitted = self._flights, self._rule, self._fitted
         std = self._std(effect)
@@ -403,7 +403,7 @@ def _segments(flights: RegressedFlights) -> list[tuple[int, float, float]]:
 
 def _predicted(
     flights: RegressedFlights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]]
-) -> tuple[float, float]:
+) -> Pair:
     """Return how far a model's predictions of the held-out stretches are off: NIS, and m RMS."""
     nis, distance, weight = [], [], []
     for i, log in enumerate(flights.logs):

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import bilinear, lfilter
 
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array, median_step
+from ..logs.table import Array, NamedArrays, median_step
 from ..motion.signals import in_body
 from .causal_filter import FlightState
 from .priors import UNKNOWN
@@ -157,7 +157,7 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
 
 
-def variables(whole: FlightState) -> dict[str, Array]:
+def variables(whole: FlightState) -> NamedArrays:
     """Return the variables (n,) of a changing coefficient by name, of mean zero and standard
     deviation one.
     """

@@ -6,7 +6,6 @@ force along the body differs from a bias only where attitude, thrust or the forc
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
+from ..logs.table import Pair, Values
 from ..motion.signals import Signals
 from ..motion.smoothing import lagged, resampled
 
@@ -39,7 +39,7 @@ class Offset:
     """Typical size and range, in its unit."""
 
     size: float
-    range: tuple[float, float] = (-math.inf, math.inf)
+    range: Pair = (-math.inf, math.inf)
 
 
 _SECONDS = Offset(0.0025, (-0.006, 0.006))
@@ -80,7 +80,7 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
     return replace(signals, rotor_speeds=u + asymmetry * rate)
 
 
-def with_time_offsets(signals: Signals, offsets: Mapping[str, float]) -> Signals:
+def with_time_offsets(signals: Signals, offsets: Values) -> Signals:
     """Return the signals with the time offsets of rotor speeds, velocity and attitude applied."""
     if rotors := offsets.get(ROTOR_TIME_OFFSET[1]):
         n = np.arange(len(signals.t), dtype=np.float64)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
-from ..logs.table import Array
+from ..logs.table import Array, Pair, Values
 from .evidence import Index, Marginal, SetEvidence, marginal
 from .log_offsets import TIMINGS
 from .regression import (
@@ -27,7 +27,7 @@ from .regression import (
 
 Setting = dict[str, dict[str, float]]
 # columns of whole effects, with the coefficients of each
-Starts = Mapping[Column, Mapping[str, float]]
+Starts = Mapping[Column, Values]
 
 WHOLE_PREFIX = "whole "  # a coefficient of an effect acting at the centre, without a moment
 # columns without an effect: nuisances of any flight, and effects outside the library
@@ -46,7 +46,7 @@ class PriorSettings:
     any_size: float = 3.0  # typical sizes, of effects of any size; of others one
     most_missing_mass: float = 0.9  # share of the declared mass a vehicle may lack
     # times a column's own lag or delay: range in which the column stands for it
-    near_start: tuple[float, float] = (0.5, 1.5)
+    near_start: Pair = (0.5, 1.5)
     # error of any model as a share of an axis' force or torque: of thrust along its axis and across
     # it, and of the torques. Propellers and bearings are not stable to less
     model_error: float = 0.003
@@ -108,7 +108,7 @@ class Base:
         products[-1, -1] += power * self.penalty
         return marginal(products, asked, others, np.ones(len(others)) if size is None else size)
 
-    def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, tuple[float, float]]:
+    def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, Pair]:
         """Return the coefficients of some columns at the mode without all others, and their
         standard deviations.
         """
@@ -161,7 +161,7 @@ def prior_size(column: Column, flights: RegressedFlights) -> float:
     return math.hypot(size, flights.thrust_std) if get(effect).role == Role.THRUST else size
 
 
-def _bounds(column: Column, flights: RegressedFlights) -> tuple[float, float]:
+def _bounds(column: Column, flights: RegressedFlights) -> Pair:
     effect, name = column
     if not effect:
         return -math.inf, math.inf

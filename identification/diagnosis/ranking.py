@@ -19,7 +19,7 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ..findings import Disturbance, Ranking
-from ..logs.table import Array
+from ..logs.table import Array, Names, Pair, Values
 from .climbing import Height, linearised, mode
 from .evidence import set_evidence
 from .likelihood import Likelihood
@@ -50,9 +50,9 @@ class FittedPosterior:
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
-    sensors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sensors: Mapping[str, Pair] = field(default_factory=dict)
     # for each effect of the set: effects hidden in these logs that do as well in its place
-    behind: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    behind: Mapping[str, Names] = field(default_factory=dict)
 
 
 def rank(
@@ -233,7 +233,7 @@ def rank_by_rows(
     return FittedPosterior(last, last.ranking(), best, sensors=sensors, behind=behind)
 
 
-def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, tuple[str, ...]]:
+def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     """Return, for each effect of a set, possible effects hidden in the logs with as much explained
     in its place.
     """
@@ -263,7 +263,7 @@ def starts_of(
     delays, and effects whose coefficients do nothing one by one. The latter start from the residual
     of the setting, and of ``others``: an effect may act in the place of another.
     """
-    out: dict[Column, Mapping[str, float]] = {}
+    out: dict[Column, Values] = {}
     residuals: list[Array] = []
     beside = [*setting, *(e.name for e in flights.vehicle.effects)]
     for effect in (e for e in library if e not in setting):

@@ -22,7 +22,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask, finite_rows, median_step
+from ..logs.table import Array, Mask, Pair, Rows, Values, finite_rows, median_step
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
@@ -76,7 +76,7 @@ NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 # its noise (there a signal moves in time by a sample, not by a part of one)
 STEP, LARGE_STEP = 0.1, 0.5
 # coefficients by effect, beside the declared vehicle
-Setting = Mapping[str, Mapping[str, float]]
+Setting = Mapping[str, Values]
 # an effect's coefficient
 Column = tuple[str, str]
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
@@ -355,7 +355,7 @@ class RegressedFlights:
         return np.concatenate(parts)
 
     @property
-    def runs(self) -> list[NDArray[np.intp]]:
+    def runs(self) -> list[Rows]:
         """The rows of each piece."""
         return np.split(np.arange(len(self.t)), np.flatnonzero(self.start)[1:])
 
@@ -455,11 +455,11 @@ class RegressedFlights:
         new = (EffectSetting(name, dict(values)) for name, values in setting.items() if name)
         return replace(self.vehicle, effects=(*kept, *new))
 
-    def coefficients(self, setting: Setting, effect: str) -> Mapping[str, float]:
+    def coefficients(self, setting: Setting, effect: str) -> Values:
         """Return an effect's coefficients at a setting; outside the setting, the vehicle's own."""
         return setting[effect] if effect in setting else self._declared.get(effect, {})
 
-    def stated(self, effect: str) -> Mapping[str, float]:
+    def stated(self, effect: str) -> Values:
         """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
         the file states some. All may have changed where it states all.
         """
@@ -532,7 +532,7 @@ class RegressedFlights:
         felt = [piece.felt for piece in self.pieces(setting) if piece.felt is not None]
         return np.concatenate(felt) if len(felt) == len(self._first) else None
 
-    def step(self, setting: Setting, column: Column, size: float = STEP) -> tuple[float, float]:
+    def step(self, setting: Setting, column: Column, size: float = STEP) -> Pair:
         """Return a coefficient's value at a setting, and the step of a derivative from there: so
         many typical sizes, within the coefficient's limits.
         """

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Disturbance, TransientDisturbance
-from ..logs.table import Array
+from ..logs.table import Array, Pair
 from ..motion.smoothing import CUTOFFS
 from .discrepancy import weight_and_torque
 from .regression import RegressedFlights, Setting
@@ -31,13 +31,13 @@ class Balance:
 
     before: Array
     after: Array
-    floor: tuple[float, float]  # RMS of the sensors' noise, N and Nm
-    error_before: tuple[float, float]  # RMS on held-out rows, N and Nm
-    error_after: tuple[float, float]
+    floor: Pair  # RMS of the sensors' noise, N and Nm
+    error_before: Pair  # RMS on held-out rows, N and Nm
+    error_after: Pair
     noisy: bool  # whether the error is above the sensors' noise
     # growth of the mean square of force and torque on held-out blocks, as a share, with its
     # standard error over the blocks
-    growth: tuple[float, float]
+    growth: Pair
 
     @property
     def better(self) -> bool:
@@ -115,7 +115,7 @@ def transient_disturbances(
     return [transient for _, transient in sorted(largest.values(), key=lambda x: -x[0])]
 
 
-def _rms(wrench: Array) -> tuple[float, float]:
+def _rms(wrench: Array) -> Pair:
     """Return the RMS of force (N) and torque (Nm) over rows and axes."""
     force, torque = np.sqrt(np.square(wrench).reshape(-1, 2, 3).mean(axis=(0, 2))).tolist()
     return force, torque

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ...dynamics.effects import Role, playing
-from ..logs.table import Array
+from ..logs.table import Array, Pair
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
@@ -178,7 +178,7 @@ class RowLikelihood:
         """Return the mode of the posterior of a setting's effects."""
         return mode(setting, self._height)
 
-    def sensors(self, setting: Setting) -> dict[str, tuple[float, float]]:
+    def sensors(self, setting: Setting) -> dict[str, Pair]:
         """Return the likeliest biases of accelerometers from which the motion was read, and the
         time offsets of logs, in the units of ``offsets``, with their standard deviations.
         """

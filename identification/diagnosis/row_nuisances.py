@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..logs.table import Array
+from ..logs.table import Array, NamedArrays
 from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import MODEL_ERROR, PRIORS
 from .rows import Rows
@@ -22,14 +22,14 @@ STOPPED_WITHIN = 0.1  # s, in which a flight loop stops an unwanted angular velo
 AXES = dict(zip("xyz", np.eye(3), strict=True))  # of the body
 
 
-def row_nuisances(rows: Rows) -> dict[str, Array]:
+def row_nuisances(rows: Rows) -> NamedArrays:
     """Return columns (n, channels) by name, each in standard deviations of its prior.
 
     For thrust at a command they are the differences between flights. The common part is the
     thrust's own coefficient; beside it, a nearly equal column would become a lag or a drag.
     """
     flights = rows.flights
-    out: dict[str, Array] = {}
+    out: NamedArrays = {}
     rotors = flights.rotor_wrench({}) / flights.inertias[2:]
     numbers = np.unique(flights.log).tolist()
     for i in numbers:
@@ -48,7 +48,7 @@ def row_nuisances(rows: Rows) -> dict[str, Array]:
     return out | {c[1]: flights.offsets[c].size * x for c, x in offsets.items()}
 
 
-def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> dict[str, Array]:
+def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     """Return the possible errors of sensors in one flight.
 
     Args:
@@ -62,7 +62,7 @@ def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> dict[str, Arra
     return {f"accelerometer {name}": rows.from_body(none, x) for name, x in read.items()}
 
 
-def _of_commands(rows: Rows, here: Array, thrust: Array) -> dict[str, Array]:
+def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     """Return the differences between flights with rotors known by commands.
 
     From one sample to the next rotors may be held or not, and lag: half a period is not known. The
@@ -88,7 +88,7 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> dict[str, Array]:
     return out
 
 
-def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> dict[str, Array]:
+def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedArrays:
     """Return the errors of the model of measured rotors; ``turning`` (samples, 3): angular
     acceleration by the rotors, rad/s2.
 
@@ -140,7 +140,7 @@ def followers(rows: Rows) -> dict[str, tuple[Array, Sequence[int]]]:
 
 def answered(
     rows: Rows, signals: Mapping[str, tuple[Array, Sequence[int]]], disturbance: Array
-) -> dict[str, Array]:
+) -> NamedArrays:
     """Return the disturbances in signals that follow them: a share of each signal.
 
     A signal that follows a disturbance ``d`` explains the share ``var(d) / var(signal)`` of itself

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
-from ..logs.table import Array
+from ..logs.table import Array, Pair, Values
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
     Index,
@@ -70,7 +70,7 @@ class _Candidate:
 def is_possible(
     flights: RegressedFlights,
     setting: Setting,
-    std: Mapping[str, float],
+    std: Values,
     effect: str,
     plausible: bool,
 ) -> bool:
@@ -299,7 +299,7 @@ class Posterior:
                 out[effect] = max(out.get(effect, 0.0), m.explained(own, z) / whole)
         return out
 
-    def nuisances(self) -> dict[Column, tuple[float, float]]:
+    def nuisances(self) -> dict[Column, Pair]:
         """Return the nuisances of any flight at the mode beside the likeliest set: values and
         standard deviations.
         """

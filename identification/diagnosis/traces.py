@@ -7,14 +7,13 @@ torques. A model reads an input if its wrench changes with it.
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import get
 from ..findings import CHANNELS, Signature
-from ..logs.table import Array
+from ..logs.table import Array, Names
 from ..motion.signals import Signals, in_body
 from ..motion.smoothing import mean_square
 from .regression import RegressedFlights, Setting, without
@@ -83,7 +82,7 @@ def explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[t
     return [(name, x) for name, x in named if x.std() > 1e-9]
 
 
-def carrying_channels(flights: RegressedFlights, setting: Setting, effect: str) -> tuple[str, ...]:
+def carrying_channels(flights: RegressedFlights, setting: Setting, effect: str) -> Names:
     """Return the channels that carry a named effect at a setting, in the order of ``ORDER``: the
     channels with its trace, and the channels read by its model.
     """

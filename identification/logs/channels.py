@@ -19,13 +19,13 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from .log_map import UNITS, Attitude, Battery, Columns, Commands, LogMap, Rotors, Sensor, constant
-from .table import Array, Mask, Rows, Table, finite_rows
+from .table import Array, Mask, NamedArrays, Rows, Table, finite_rows
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-WORLD_TURNS: dict[str, Array] = {"enu": np.eye(3), "ned": _HALF_TURN, "y_up": _Y_UP}
-BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN, "y_up": _Y_UP}
+WORLD_TURNS: NamedArrays = {"enu": np.eye(3), "ned": _HALF_TURN, "y_up": _Y_UP}
+BODY_TURNS: NamedArrays = {"flu": np.eye(3), "frd": _HALF_TURN, "y_up": _Y_UP}
 
 
 @dataclass(frozen=True, eq=False)

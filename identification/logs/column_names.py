@@ -8,11 +8,11 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ...runtime.yaml_file import read_yaml
+from .table import Data, Names
 
-WORDS: dict[str, Any] = read_yaml(Path(__file__).with_name("column_words.yaml"), "words")
+WORDS: Data = read_yaml(Path(__file__).with_name("column_words.yaml"), "words")
 # by spelling; nothing for a unit without use in maps
 _UNITS: dict[str, str] = {
     word: unit for unit, spellings in WORDS["units"].items() for word in spellings
@@ -42,10 +42,10 @@ def unit_spelled(text: str) -> str:
 class Group:
     """Columns of one vector or of one set of motors."""
 
-    columns: tuple[str, ...]
+    columns: Names
     key: str  # the common part of the names
     unit: str = ""
-    endings: tuple[str, ...] = ()  # axes or numbers in the names, where known
+    endings: Names = ()  # axes or numbers in the names, where known
 
     @property
     def numbered(self) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 from ..motion.smoothing import resampled, second_difference
 from .column_names import WORDS, Group, Name, groups_of, named_alone
 from .magnitudes import likely_unit
-from .table import Array, finite_rows
+from .table import Array, Names, finite_rows
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
 _TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # their columns are no other group's
@@ -58,7 +58,7 @@ class Numbers:
         # times (n,) in s of comparisons of motors
         self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
-        self._rows: dict[tuple[str, ...], tuple[Array, Array]] = {}
+        self._rows: dict[Names, tuple[Array, Array]] = {}
         self.attitude: Sequence[str] = ()  # a quaternion, whose tilt drives the position
         self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
 
@@ -232,7 +232,7 @@ def candidates(
         measured = tuple(name.column for name in loose if not re.search(wanted, name.base))
         for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
-    likeliest: dict[tuple[str, ...], ColumnCandidate] = {}
+    likeliest: dict[Names, ColumnCandidate] = {}
     for group, score, why in ways:
         there = len(numbers.rows(group.columns)[0]) > 0
         strength, told = judge(group.columns) if there else (0.0, "")

@@ -27,11 +27,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from .table import Array, Mask, finite_rows, median_step
+from .table import Array, Data, Mask, NamedArrays, Names, Values, finite_rows, median_step
 from .tables import write_table
 from .what_flew import UNSTATED, WhatFlew
 
@@ -93,13 +92,13 @@ class FlightLog:
     gyro: Array | None = None
     name: str = ""
     source: str = ""
-    notes: tuple[str, ...] = ()
+    notes: Names = ()
     valid: Mask = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
     extra: Mapping[str, Array] = field(default_factory=dict)
     commanded: bool = False
     command: Array | None = None
     vehicle: str = ""
-    rates: Mapping[str, float] = field(default_factory=dict)
+    rates: Values = field(default_factory=dict)
     flown: WhatFlew = UNSTATED
 
     def __post_init__(self) -> None:
@@ -139,7 +138,7 @@ class FlightLog:
         return median_step(self.t)
 
 
-def time_notes(t: Array) -> tuple[str, ...]:
+def time_notes(t: Array) -> Names:
     """Return a note on the gaps in times (N,) in s: steps of more than 3 median ones."""
     step = np.diff(t)
     gaps = np.flatnonzero(step > _GAP * np.median(step)) if step.size else step
@@ -157,16 +156,14 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
     """Return a log with the rows ``keep`` (N,); the log itself where all are kept."""
     if keep.all():
         return log
-    parts: dict[str, Any] = {
-        name: x[keep] for name, x in vars(log).items() if isinstance(x, np.ndarray)
-    }
+    parts: Data = {name: x[keep] for name, x in vars(log).items() if isinstance(x, np.ndarray)}
     return replace(log, **parts, extra={name: x[keep] for name, x in log.extra.items()})
 
 
-def parts_of(log: FlightLog) -> list[tuple[tuple[str, ...], Array]]:
+def parts_of(log: FlightLog) -> list[tuple[Names, Array]]:
     """Return a log's channels (N, k), with their columns' names in a file."""
     pose = np.where(log.valid[:, None], np.column_stack([log.position, log.quaternion]), np.nan)
-    parts: list[tuple[tuple[str, ...], Array | None]] = [(("t",), log.t)]
+    parts: list[tuple[Names, Array | None]] = [(("t",), log.t)]
     if log.has_pose or log.accelerometer is None or log.gyro is None:
         parts.append((POSE, pose))
     elif np.isfinite(log.position).any():
@@ -187,7 +184,7 @@ def write_log(log: FlightLog, path: str | Path) -> None:
     Raises:
         InputError: the name's ending is unknown or the file cannot be written.
     """
-    columns: dict[str, Array] = {}
+    columns: NamedArrays = {}
     for names, values in parts_of(log):
         columns |= zip(names, values.reshape(len(log.t), -1).T, strict=True)
     if VEHICLE.fullmatch(named := f"vehicle={log.vehicle}"):

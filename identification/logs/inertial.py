@@ -14,7 +14,6 @@ wrong: torques turn the body at once.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -27,7 +26,7 @@ from .excerpt import excerpt
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
-from .table import Array, Mask, Rows, finite_rows
+from .table import Array, Data, Mask, NamedArrays, Names, Pair, Rows, finite_rows
 
 # How inertial sensors are compared.
 _WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
@@ -48,7 +47,7 @@ _FEWEST_WINDOWS = 40
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
-def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tuple[str, ...]]:
+def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, Names]:
     """Return a log without the inertial sensors contradicting its pose, and a note on each.
 
     Args:
@@ -87,7 +86,7 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tu
             alone = sensor_doubt(_gravity_shares(measured, gravity), _BY_GRAVITY, "")
         if doubt:
             notes.append(f"{columns} {doubt}. They were left out")
-            left_out: dict[str, Any] = {field: None}
+            left_out: Data = {field: None}
             log = replace(log, **left_out)
         elif shares is None and alone:  # no pose shows the error
             notes.append(f"{columns} {alone}")
@@ -255,7 +254,7 @@ def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     return times
 
 
-def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, tuple[str, ...]]:
+def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Names]:
     """Return a log with IMU and pose on one clock, and a note on an offset beyond 10 ms.
 
     Samples are moved by whole rows. Beyond 0.3 s the inertial sensors are left out.
@@ -290,7 +289,7 @@ def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, tu
     )
 
 
-def _imu_delay(log: FlightLog) -> tuple[float, float]:
+def _imu_delay(log: FlightLog) -> Pair:
     """Return the delay in s of the IMU against the pose, and its standard deviation; 0: unknown."""
     if log.gyro is None:
         return 0.0, 0.0
@@ -329,7 +328,7 @@ def _rotor_delay(log: FlightLog, vehicle: Vehicle | None) -> float:
     return evidence.delay() if evidence.enough else 0.0
 
 
-def _moved(t: Array, there: Mask, late: float, columns: dict[str, Array]) -> dict[str, Any]:
+def _moved(t: Array, there: Mask, late: float, columns: NamedArrays) -> Data:
     """Return columns (N, k) with the samples ``there`` (N,) moved ``late`` s back in time, to the
     nearest rows; NaN elsewhere.
     """

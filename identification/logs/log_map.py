@@ -64,7 +64,7 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .table import Array
+from .table import Array, Data, Names, Pair
 from .what_flew import ORDERS, Order, rotor_order
 
 MAPS = Path(__file__).parent / "maps"  # the kit's own maps
@@ -74,7 +74,7 @@ UNKNOWN = "?"  # a field that a person must choose
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
 BODIES = ("flu", "frd", "y_up")
 UNITS: dict[str, dict[str, float]] = WORDS["factors"]
-COMMAND_UNITS: dict[str, tuple[float, float] | None] = {
+COMMAND_UNITS: dict[str, Pair | None] = {
     unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()
 }
 SENSES = ("body_to_world", "world_to_body")
@@ -97,7 +97,7 @@ def one_of(known: Collection[str]) -> BeforeValidator:
     return BeforeValidator(lambda value, info: _known(value, known, info.field_name))
 
 
-def _two_levels(given: tuple[float, float]) -> tuple[float, float]:
+def _two_levels(given: Pair) -> Pair:
     if given[0] == given[1]:
         raise ValueError("the same")
     return given
@@ -167,7 +167,7 @@ class TimeColumn:
     optional: ClassVar[bool] = False
 
     @property
-    def named(self) -> tuple[str, ...]:
+    def named(self) -> Names:
         """The columns of the table."""
         return tuple(filter(None, (self.column, self.nanoseconds)))
 
@@ -193,7 +193,7 @@ class Attitude(Columns):
     order: Annotated[str, one_of(QUATERNIONS)] = "wxyz"  # order of a quaternion's columns
     euler: Annotated[str, one_of(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
     sense: Annotated[str, one_of(SENSES)] = "body_to_world"
-    of: tuple[str, ...] = ()  # topics of positions; empty: of all
+    of: Names = ()  # topics of positions; empty: of all
 
 
 @dataclass(frozen=True)
@@ -300,9 +300,9 @@ class LogMap:
     torque: Annotated[Columns, _section(3, UNITS["torque"])] | None = None
     about: str = ""
     vehicle: str = ""
-    recognise: tuple[str, ...] = ()
+    recognise: Names = ()
     name: str = ""  # source: a shipped map's name or a file
-    notes: tuple[str, ...] = ()
+    notes: Names = ()
     rows: Literal["mixed", "whole", "messages"] = "mixed"
     stray_rows: Annotated[int, Field(ge=0)] = 0
     extra: Mapping[str, Annotated[Columns, _section(0)]] = field(default_factory=dict)
@@ -327,9 +327,7 @@ class LogMap:
 
     def with_ways(self, ways: Mapping[str, Sequence[Any]]) -> "LogMap":
         """Return the map with these ways to fill its sections, without empty ones."""
-        first: dict[str, Any] = {
-            name: listed[0] if listed else None for name, listed in ways.items()
-        }
+        first: Data = {name: listed[0] if listed else None for name, listed in ways.items()}
         others = {name: tuple(listed[1:]) for name, listed in ways.items()}
         return replace(self, **first, alternatives={**self.alternatives, **others})
 
@@ -414,9 +412,9 @@ def shipped_map(name: str) -> LogMap:
 
 
 @cache
-def stated(name: str) -> dict[str, Any]:
+def stated(name: str) -> Data:
     """Return a file of ``maps/recordings`` other than a map."""
-    content: dict[str, Any] = read_yaml(MAPS / "recordings" / f"{name}.yaml", name)
+    content: Data = read_yaml(MAPS / "recordings" / f"{name}.yaml", name)
     return content
 
 

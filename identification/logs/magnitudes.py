@@ -15,7 +15,7 @@ from .column_names import WORDS, Group
 from .flight_log import FlightLog, parts_of
 from .flight_phases import carrying, usual_thrust
 from .log_map import UNITS
-from .table import Array, finite_rows
+from .table import Array, Pair, finite_rows
 
 
 @dataclass(frozen=True)
@@ -26,20 +26,20 @@ class Magnitudes:
     # s, of any step. A log in nanoseconds has steps of 1e7; a step of a year is no flight
     longest_step: float = 1e12
     largest: float = 1e9  # SI units, all other numbers; millimetres or rpm stay far below
-    rates: tuple[float, float] = (5.0, 5000.0)  # Hz of rows: a unit of time is likely
-    sure_rates: tuple[float, float] = (15.0, 2500.0)  # the same: the unit is certain
-    voltages: tuple[float, float] = (2.7, 100.0)  # V of a battery: the unit is likely
-    sure_voltages: tuple[float, float] = (2.7, 60.0)  # the same: the unit is certain
+    rates: Pair = (5.0, 5000.0)  # Hz of rows: a unit of time is likely
+    sure_rates: Pair = (15.0, 2500.0)  # the same: the unit is certain
+    voltages: Pair = (2.7, 100.0)  # V of a battery: the unit is likely
+    sure_voltages: Pair = (2.7, 60.0)  # the same: the unit is certain
     widest: float = 300.0  # m, spread of one flight's positions
     # thrust by weight of rotors in their right unit; mass and thrust curve may be off
-    carries: tuple[float, float] = (0.55, 1.8)
-    flies: tuple[float, float] = (0.2, 5.0)  # its median; beyond, another vehicle flew
-    doubtful: tuple[float, float] = (0.5, 2.0)  # the same; beyond, another may have flown
-    gravity: tuple[float, float] = (0.85, 1.15)  # specific force by 1 g: the unit is certain
+    carries: Pair = (0.55, 1.8)
+    flies: Pair = (0.2, 5.0)  # its median; beyond, another vehicle flew
+    doubtful: Pair = (0.5, 2.0)  # the same; beyond, another may have flown
+    gravity: Pair = (0.85, 1.15)  # specific force by 1 g: the unit is certain
     fastest_gyro: float = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     slow_gyro: float = 6.0  # rad/s: 99.5 % of a flight's angular velocities are less
-    named_rates: tuple[float, float] = (0.5, 20_000.0)  # Hz of rows; beyond, no name counts
+    named_rates: Pair = (0.5, 20_000.0)  # Hz of rows; beyond, no name counts
     # limits of four motors' median. Above the first, only rpm is left: no propeller turns as fast
     # in rad/s. Above the second, rpm is likelier: in rad/s only palm-sized vehicles hover as fast.
     # Above the third, rpm may also be a command of 16 bits
@@ -50,7 +50,7 @@ class Magnitudes:
     fast: float = 2600.0
     counts: float = 20_000.0
     # power of the specific force's growth: with rotor speeds, and with pulses at least
-    squares: tuple[float, float] = (1.5, 2.5)
+    squares: Pair = (1.5, 2.5)
     offset: float = 2.8
 
 
@@ -63,7 +63,7 @@ _SPEEDS = {
 }
 
 
-def within(value: float, limits: tuple[float, float]) -> bool:
+def within(value: float, limits: Pair) -> bool:
     """Return whether a value lies between two limits."""
     return limits[0] <= value <= limits[1]
 

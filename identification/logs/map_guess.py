@@ -14,7 +14,6 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
-from typing import Any
 
 import numpy as np
 
@@ -42,7 +41,7 @@ from .log_map import (
 )
 from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .table import Array, Table
+from .table import Array, Data, NamedArrays, Names, Table
 from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
@@ -71,7 +70,7 @@ class Reason:
     field: str
     certain: bool
     why: str
-    candidates: tuple[str, ...] = ()  # columns for a person's choice, the likeliest first
+    candidates: Names = ()  # columns for a person's choice, the likeliest first
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class Guess:
 
     log_map: LogMap
     reasons: tuple[Reason, ...]
-    unused: tuple[str, ...] = ()  # columns
+    unused: Names = ()  # columns
     missing: tuple[Reason, ...] = ()  # fields ``?``; the log is not read without them
 
     @property
@@ -117,7 +116,7 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
     )
 
 
-def _numbers_of(table: Table, names: Sequence[Name]) -> dict[str, Array]:
+def _numbers_of(table: Table, names: Sequence[Name]) -> NamedArrays:
     """Return the columns (rows,) of numbers, without columns of later text."""
     once = [n.column for n in names if table.header.count(n.column) == 1]
     wanted = [column for column in once if not table.numeric or column in table.numeric]
@@ -152,8 +151,8 @@ class _Guessing:
 
     def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
-        self.sections: dict[str, Any] = {}
-        self.time_columns: tuple[str, ...] = ()
+        self.sections: Data = {}
+        self.time_columns: Names = ()
         self.reasons: list[Reason] = []
         self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
@@ -300,7 +299,7 @@ class _Guessing:
     def pose(self, place: Group, group: Group) -> None:
         """Find frames, units, order and sense of the pose."""
         attitude, is_quaternion = self.values("attitude"), len(group.columns) == 4
-        units: tuple[str, ...] = ("deg", "rad")
+        units: Names = ("deg", "rad")
         if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
         elif group.unit in units:
@@ -439,7 +438,7 @@ class _Guessing:
             return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
         text = " ".join(group.columns).lower()
         hint = next((name for word, name in WORDS["orders"].items() if word in text), "windwrench")
-        best, motion = DECLARED, dict[str, Any]()
+        best, motion = DECLARED, Data()
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
             rates = self.values("gyro") * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body].T

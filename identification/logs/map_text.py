@@ -1,11 +1,10 @@
 """A guessed map as a YAML file, with comments on certain fields, guesses and choices."""
 
-from typing import Any
-
 import yaml
 
 from .log_map import UNKNOWN, Battery, Columns, Commands, Rotors
 from .map_guess import Guess
+from .table import Data
 from .what_flew import order_names
 
 
@@ -14,7 +13,7 @@ def map_yaml(guess: Guess) -> str:
     columns to choose from for each ``?``.
     """
     m = guess.log_map
-    sections: dict[str, Any] = {"vehicle": m.vehicle} if m.vehicle else {}
+    sections: Data = {"vehicle": m.vehicle} if m.vehicle else {}
     if m.time.column:
         sections["time"] = {"column": m.time.column, "unit": m.time.unit}
         if m.time.nanoseconds:
@@ -44,7 +43,7 @@ def map_yaml(guess: Guess) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _fields(part: Columns) -> dict[str, Any]:
+def _fields(part: Columns) -> Data:
     """Return a section's fields for the file, without defaults."""
     fields = {
         name: list(value) if isinstance(value, tuple) else value

@@ -16,11 +16,11 @@ from scipy.spatial.transform import Rotation
 from ...runtime.yaml_file import read_yaml
 from .channels import quaternions, scaled
 from .log_map import SENSES, UNITS, Attitude
-from .table import Array, Mask, finite_rows
+from .table import Array, Data, Mask, Names, finite_rows
 from .what_flew import ORDERS, Order, order_names
 
 _I = np.eye(3)
-_STATED: dict[str, Any] = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
+_STATED: Data = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
 _PLACE, _QUATERNION = ("px", "py", "pz"), ("qw", "qx", "qy", "qz")
 
 
@@ -116,7 +116,7 @@ class ColumnReading:
         """The fields for rotations: the first five."""
         return self.order, self.euler, self.unit, self.pitch_sign, self.sense
 
-    def part(self, columns: tuple[str, ...] = ()) -> Attitude:
+    def part(self, columns: Names = ()) -> Attitude:
         """Return the map's section for an attitude in some columns."""
         signs = (1, self.pitch_sign, 1) if self.pitch_sign < 0 else ()
         unit = self.unit if self.euler else ""

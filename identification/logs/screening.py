@@ -29,9 +29,8 @@ from .flight_log import FlightLog
 from .flight_phases import carrying, flying
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
-from .readings import ColumnReading
 from .streams import MOTOR_RATES
-from .table import Array, Mask, median_step
+from .table import Array, Mask, Names, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
@@ -80,7 +79,7 @@ Findings = Iterable[str]
 
 def screen_log(
     log: FlightLog, vehicle: Vehicle, least_seconds: float | None = LEAST_SECONDS
-) -> tuple[FlightLog, tuple[str, ...]]:
+) -> tuple[FlightLog, Names]:
     """Return a log for a filter, and doubts, or refuse the log.
 
     Of equal poses to the last digit only the first is valid in the returned log: the others are no

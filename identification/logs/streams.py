@@ -20,7 +20,7 @@ from ..motion.smoothing import resampled
 from .commanded_speeds import flown_vehicle, speeds_of_wrench, with_commanded_speeds
 from .flight_log import FlightLog, time_notes
 from .log_map import LogMap
-from .table import Array, Rows, finite_rows, median_step
+from .table import Array, Names, Rows, finite_rows, median_step
 from .what_flew import UNSTATED, WhatFlew
 
 _SENSOR_GAP = 3.5  # median steps, the longest gap for interpolating an inertial sensor
@@ -188,16 +188,14 @@ class Recording:
         return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
-def _cleaned(
-    path: Path, streams: Mapping[str, Stream]
-) -> tuple[dict[str, Stream], tuple[str, ...]]:
+def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Stream], Names]:
     """Return the streams with values, within a flight's limits, and notes.
 
     Raises:
         InputError: too few samples, or an infinite rotor speed.
     """
     made: dict[str, Stream] = {}
-    notes: tuple[str, ...] = ()
+    notes: Names = ()
     for name, stream in streams.items():
         if name in ("position", *_MOTORS) and len(stream.t) < 2:
             raise InputError(
@@ -241,7 +239,7 @@ def _cleaned(
 
 def _rows(
     path: Path, pose: Stream | None, motors: Stream, sensors: Sequence[Stream]
-) -> tuple[Array, Array, tuple[str, ...]]:
+) -> tuple[Array, Array, Names]:
     """Return the rows' times (M,) in s, the poses (M, 7) in them, NaN where there is none, and
     notes.
 

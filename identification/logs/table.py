@@ -1,10 +1,11 @@
 """A table of numbers in a file: its columns by name, and where a row stands."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,11 @@ from ...runtime.file_limits import LIMITS, check_count
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
+Names = tuple[str, ...]  # of columns, logs or effects; sentences
+Pair = tuple[float, float]  # low and high, or a value and its standard deviation
+Values = Mapping[str, float]  # numbers by name
+NamedArrays = dict[str, Array]
+Data = dict[str, Any]  # plain values by name
 
 WHAT = "a flight log"  # for errors
 SUFFIXES = (".csv", ".csv.gz", ".parquet")  # of the kit's own tables
@@ -31,15 +37,15 @@ class Table:
     """
 
     path: Path
-    header: tuple[str, ...]
+    header: Names
     rows: int
     load: Callable[["Table", Sequence[str]], Iterable[Array]]  # gives columns (rows,) by names
     first_line: int = 0  # line of the first row in a text; 0: rows have no lines
     blank_before: tuple[int, ...] = ()  # a row for each blank line before it, in their order
-    units: tuple[str, ...] = ()  # of a line of units behind the header
-    notes: tuple[str, ...] = ()  # on layout and omissions
-    numeric: tuple[str, ...] = ()  # columns of numbers in the first rows; empty: all
-    _columns: dict[str, Array] = field(default_factory=dict, repr=False)  # read so far
+    units: Names = ()  # of a line of units behind the header
+    notes: Names = ()  # on layout and omissions
+    numeric: Names = ()  # columns of numbers in the first rows; empty: all
+    _columns: NamedArrays = field(default_factory=dict, repr=False)  # read so far
 
     def __post_init__(self) -> None:
         check_count(self.path, self.rows, LIMITS.table_rows, "rows")
@@ -48,7 +54,7 @@ class Table:
                 f"{self.path}: no rows; expected a header and at least one row of numbers"
             )
 
-    def read(self, names: Sequence[str]) -> dict[str, Array]:
+    def read(self, names: Sequence[str]) -> NamedArrays:
         """Return columns (rows,) by their names, read-only; empty fields are NaN.
 
         Raises:

@@ -13,7 +13,7 @@ import numpy as np
 from ...runtime.errors import InputError
 from .channels import ChannelGroup
 from .log_map import UNITS, Columns, LogMap
-from .table import Array, Mask, Rows, Table
+from .table import Array, Mask, Table
 
 _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
 # s to interpolate: the lag of a small vehicle's motors, with hardly a change of speed. And steps of

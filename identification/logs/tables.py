@@ -34,6 +34,7 @@ from .table import (
     TEXT_SUFFIXES,
     WHAT,
     Array,
+    Data,
     Table,
     file_kind,
     one_line,
@@ -135,7 +136,7 @@ def _open_arrays(path: Path) -> Table:
     if not lengths:
         raise InputError(f"{path}: no arrays of numbers; expected a flight's, of one length")
     rows = max(lengths, key=lambda n: (lengths[n], n))
-    columns: dict[str, Any] = {}
+    columns: Data = {}
     other = []
     for name, array in arrays.items():
         array = array if array.shape[:1] == (rows,) else array.T

@@ -17,7 +17,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from .column_names import WORDS
-from .table import Array, Table, finite_rows
+from .table import Array, Pair, Table, finite_rows
 
 Order = tuple[int, int, int, int]
 
@@ -160,9 +160,7 @@ def slots_of_motors(functions: Sequence[int], first: int) -> list[int]:
     return [functions.index(motor) for motor in motors] if {*motors} <= {*functions} else []
 
 
-def order_by_places(
-    places: Sequence[tuple[float, float]], vehicle: Vehicle | None = None
-) -> Order | None:
+def order_by_places(places: Sequence[Pair], vehicle: Vehicle | None = None) -> Order | None:
     """Return the motor, from 1, of each of the vehicle's rotors, by directions from the centre;
     None: no match.
 

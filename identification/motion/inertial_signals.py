@@ -10,13 +10,12 @@ states.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask, finite_rows, median_step
+from ..logs.table import Array, Mask, Pair, Rows, finite_rows, median_step
 from .inertial_fusion import FusedMotion, Readings, fuse
 from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body
 from .smoothing import (
@@ -65,7 +64,7 @@ def reads_imu(log: FlightLog) -> bool:
     return log.gyro is not None and log.accelerometer is not None and pose_rate(log) < LEAST_POSE_HZ
 
 
-def imu_noise(log: FlightLog) -> tuple[float, float]:
+def imu_noise(log: FlightLog) -> Pair:
     """Return the standard deviation of one sample of gyro (rad/s) and accelerometer (m/s2), an
     axis, by the noise above a quarter of the sampling rate.
     """
@@ -79,7 +78,7 @@ def _level(x: Array | None) -> float:
     return robust_std(high_pass(read, CUTOFFS.noise_share_of_rate))
 
 
-def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
+def inertial_pieces(log: FlightLog) -> list[Rows]:
     """Return the rows of each unbroken run of IMU readings of sufficient length."""
     if log.gyro is None or log.accelerometer is None:
         return []
@@ -108,9 +107,7 @@ def inertial_signals(log: FlightLog, gravity: float) -> list[InertialSignals]:
     return [_piece(log, rows, gravity, noise) for rows in pieces]
 
 
-def _piece(
-    log: FlightLog, rows: NDArray[np.intp], gravity: float, noise: tuple[float, float]
-) -> InertialSignals:
+def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Pair) -> InertialSignals:
     assert log.gyro is not None
     assert log.accelerometer is not None
     imu_times = log.t[rows]
@@ -162,7 +159,7 @@ def _fused(
     gyro: Array,
     force: Array,
     gravity: float,
-    noise: tuple[float, float],
+    noise: Pair,
     thin: int,
 ) -> FusedMotion:
     """Return the fused motion, with the noise of positions and attitudes by their own scatter."""
@@ -195,7 +192,7 @@ def _fused(
     return fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
 
 
-def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
+def _measured(log: FlightLog, there: Mask, t: Array) -> Rows:
     """Return the rows of new measurements within a piece; a pose equal to the one before to the
     last digit was held.
     """
@@ -203,7 +200,7 @@ def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
     return _changed(rows, np.column_stack([log.position, np.nan_to_num(log.quaternion)]))
 
 
-def _changed(rows: NDArray[np.intp], values: Array) -> NDArray[np.intp]:
+def _changed(rows: Rows, values: Array) -> Rows:
     """Return the rows whose values (N, k) differ from the row before among them."""
     new = np.any(np.diff(values[rows], axis=0, prepend=np.inf) != 0.0, axis=1)
     return rows[new]

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, finite_rows, median_step
+from ..logs.table import Array, Names, Pair, finite_rows, median_step
 from .smoothing import turned, unbroken
 
 # shares of half the sampling rate between which the slope is read: above a vehicle's motion, below
@@ -47,7 +47,7 @@ class ChannelNoise:
     # amplitude in a lower band over the amplitude at the top, 1 of white noise; NaN where the log
     # is too slow for a band above the motion
     fall: float
-    band_hz: tuple[float, float]  # of the slope
+    band_hz: Pair  # of the slope
 
     @property
     def filtered(self) -> bool:
@@ -141,7 +141,7 @@ def _fall(share: Array, amplitude: Array, nyquist: float) -> float:
     return float(np.exp(np.median(amplitude[lower].mean(axis=0) - amplitude[top].mean(axis=0))))
 
 
-def filtering_notes(log: FlightLog) -> tuple[str, ...]:
+def filtering_notes(log: FlightLog) -> Names:
     """Return, as sentences, the filtered channels of a log, the evidence for the filter, and its
     consequence.
     """

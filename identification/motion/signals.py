@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array
+from ..logs.table import Array, Data, Rows
 from .smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, turning, unbroken
 
 SHORTEST_PIECE = 3.0  # s of unbroken pose; a shorter one is all edge to the filters
@@ -39,7 +39,7 @@ class Signals:
 
     def at(self, samples: slice | NDArray[np.integer[Any]]) -> "Signals":
         """Return the signals at some samples, with the period as it was."""
-        sampled: dict[str, Any] = {
+        sampled: Data = {
             name: x[samples]
             for name, x in vars(self).items()
             if isinstance(x, np.ndarray) and len(x) == len(self.t)
@@ -72,7 +72,7 @@ def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signal
     return [_piece(log, piece, wide_hz) for piece in known_pieces(log)]
 
 
-def known_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
+def known_pieces(log: FlightLog) -> list[Rows]:
     """Return the rows of each unbroken run of poses of sufficient length.
 
     Raises:
@@ -86,7 +86,7 @@ def known_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
     return pieces
 
 
-def pose_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
+def pose_pieces(log: FlightLog) -> list[Rows]:
     """Return the same, or none."""
     return unbroken(log.t, np.flatnonzero(log.valid), longest_step(log), 8, SHORTEST_PIECE)
 
@@ -96,7 +96,7 @@ def longest_step(log: FlightLog) -> float:
     return max(LONGEST_GAP, 3.5 * log.period)
 
 
-def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
+def _piece(log: FlightLog, rows: Rows, wide_hz: float) -> Signals:
     period = log.period
     t = np.arange(log.t[rows[0]], log.t[rows[-1]] + 0.5 * period, period)
     t = t[t <= log.t[rows[-1]]]

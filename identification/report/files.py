@@ -7,13 +7,13 @@ import shlex
 from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from ... import __version__
 from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.page_files import write_text
 from ...runtime.plain_values import as_text, plain
 from ..findings import Diagnosis, Errors
+from ..logs.table import Data
 from .headline import headline
 from .page import report_page
 
@@ -56,11 +56,11 @@ def write_report(
     return [numbers, html, vehicle]
 
 
-def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
+def report_data(diagnosis: Diagnosis) -> Data:
     """Return the content of ``report.json``, as in ``report_schema``: plain Python values, six
     significant digits, None for numbers that are not finite.
     """
-    error: dict[str, Any] = {
+    error: Data = {
         "held_out_segments": [[start, end] for _, start, end in diagnosis.held_out_segments],
         "before": _errors(diagnosis.before),
         "after": _errors(diagnosis.after),
@@ -72,7 +72,7 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
     if len(diagnosis.logs) + len(diagnosis.test_logs) > 1:
         error["held_out_by_log"] = diagnosis.held_out_by_log
     stated = diagnosis.probabilities
-    data: dict[str, Any] = {
+    data: Data = {
         "verdict": diagnosis.verdict,
         "remainder": diagnosis.remainder,
         "effects": [
@@ -93,14 +93,14 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "version": __version__,
         "schema_version": SCHEMA_VERSION,
     }
-    kept: dict[str, Any] = plain(data, 6)
+    kept: Data = plain(data, 6)
     return kept
 
 
-def report_schema() -> dict[str, Any]:
+def report_schema() -> Data:
     """Return the JSON Schema (draft 2020-12) of ``report.json``."""
     text = resources.files(__package__).joinpath("report.schema.json").read_text(encoding="utf-8")
-    schema: dict[str, Any] = json.loads(text)
+    schema: Data = json.loads(text)
     return schema
 
 

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...runtime.drawing import SERIES, new_figure, styled
 from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, finite_rows
+from ..logs.table import Array, Names, Rows, finite_rows
 
 _GAP = 3.0  # median steps of a channel
 _BINS = 4000  # for a picture's 900 pixels: each bin draws a line's least and largest value
@@ -33,7 +32,7 @@ class Channel:
     t: Array  # (n,) s
     drawn: Array  # (n, k) lines of the picture: extremes of many rows
     title: str  # the picture's
-    series: tuple[str, ...]  # names of the k lines
+    series: Names  # names of the k lines
 
 
 def log_channels(log: FlightLog) -> list[Channel]:
@@ -82,7 +81,7 @@ def log_channels(log: FlightLog) -> list[Channel]:
     return out
 
 
-def _extremes(values: Array) -> NDArray[np.intp]:
+def _extremes(values: Array) -> Rows:
     """Return the rows for drawing the lines of values (N, k) over N: the extremes of each line in
     each bin, or all if few.
     """

@@ -4,7 +4,6 @@ import re
 import warnings
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from ..logs.map_text import map_yaml
 from ..logs.mapped_log import map_table
 from ..logs.reading import finished, read_log, unknown_table
 from ..logs.screening import screen_log
-from ..logs.table import Table
+from ..logs.table import Data, Names, Table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
 
@@ -33,7 +32,7 @@ class LogCheck:
     log: FlightLog
     read_by: str
     channels: list[Channel]
-    doubts: tuple[str, ...]
+    doubts: Names
     guess: Guess | None = None
     map_text: str = ""  # the log's map as a YAML file; empty without one
 
@@ -46,7 +45,7 @@ class LogCheck:
         """Return facts of the vehicle and its flight: name, value, source."""
         return [*self.log.flown.rows(), ("flew", *flew(self.log))]
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Data:
         """Return the check as plain values."""
         log = self.log
         reasons = self.guess.reasons if self.guess else ()

@@ -9,7 +9,7 @@ value is one of the log.
 import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from scipy.signal import welch
 
 from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
-from ..logs.table import Array, finite_rows
+from ..logs.table import Array, Data, Names, Pair, finite_rows
 from ..motion.smoothing import runs_of
 from .words import percent, rounded, scale_of
 
@@ -44,15 +44,15 @@ class PlotTable:
     """A caption, the heads of the columns, and the rows as texts."""
 
     caption: str
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
+    head: Names
+    rows: list[Names]
 
 
 @dataclass(frozen=True, eq=False)
 class Plot:
     """One plot of the page."""
 
-    packed: dict[str, Any]  # ``key`` is the plot's name in the page
+    packed: Data  # ``key`` is the plot's name in the page
     lines: dict[str, tuple[Array, Array]]  # x and y (n,) of ``before``, ``after`` and ``mean``
     table: PlotTable
     title: str  # quantity and unit
@@ -106,7 +106,7 @@ class _Joined:
             for first, trace in zip(self.first_rows, self.traces, strict=True)
         ]
 
-    def held_out(self) -> list[tuple[float, float]]:
+    def held_out(self) -> list[Pair]:
         """Return start and end of each held-out block."""
         return [
             (float(self.x[first + a]), float(self.x[first + min(b, len(trace.t) - 1)]))
@@ -122,7 +122,7 @@ class PagePlots:
     time: list[Plot]  # one a channel
     frequency: list[Plot]  # force and torque
     signatures: list[Plot]  # one a named effect
-    data: dict[str, Any]
+    data: Data
 
 
 def page_plots(diagnosis: Diagnosis) -> PagePlots:
@@ -133,7 +133,7 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
     against each named effect's regressor, with the effect's own share.
     """
     time, frequency = [], []
-    data: dict[str, Any] = {}
+    data: Data = {}
     if diagnosis.traces:
         joined = _Joined(diagnosis.traces, diagnosis.effects)
         time = [_plot_over_time(joined, i) for i in joined.channels]
@@ -328,8 +328,8 @@ def telling_samples(trace: Trace, i: int, columns: int) -> Index:
 def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> PlotTable:
     """Return the residual's rms before and after in a channel, interval by interval."""
     many, each = len(traces) > _MOST_PIECES, max(_ROWS // len(traces), 1)
-    head: tuple[str, ...] = ("Piece", "Time (s)", "Held out", "Before", "After")
-    rows: list[tuple[str, ...]] = []
+    head: Names = ("Piece", "Time (s)", "Held out", "Before", "After")
+    rows: list[Names] = []
     for number, trace in enumerate(traces[:_MOST_PIECES], 1):
         for part in np.array_split(np.arange(len(trace.t)), min(each, len(trace.t))):
             held = {0.0: "no", 1.0: "yes"}.get(trace.held_out[part].mean(), "in part")
@@ -378,7 +378,7 @@ def candidate_bars(diagnosis: Diagnosis, most: int = 14) -> list[Bar]:
     ]
 
 
-def packed_series(x: Array) -> dict[str, Any] | None:
+def packed_series(x: Array) -> Data | None:
     """Return a series (n,) as 16-bit integers in base64 and their scale; None for zeros, or nearly
     zeros, throughout.
     """

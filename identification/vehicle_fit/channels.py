@@ -7,7 +7,6 @@ Rotors come as measured speeds, or as motor commands.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 from scipy.signal import welch
@@ -17,7 +16,7 @@ from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.streams import MOTOR_RATES
-from ..logs.table import median_step
+from ..logs.table import Data, Pair, median_step
 from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 from .geometry import GRAVITY
@@ -59,9 +58,7 @@ class MotionPiece:
     def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
         """Return the piece with each of its series changed."""
         series = {f.name: getattr(self, f.name) for f in fields(self)}
-        changed: dict[str, Any] = {
-            name: change(x) for name, x in series.items() if isinstance(x, np.ndarray)
-        }
+        changed: Data = {name: change(x) for name, x in series.items() if isinstance(x, np.ndarray)}
         return replace(self, **changed)
 
 
@@ -143,7 +140,7 @@ def speed_noise(pieces: Sequence[MotionPiece]) -> float:
 
 
 def pieces_of(
-    logs: Sequence[FlightLog], windows: Sequence[tuple[float, float]]
+    logs: Sequence[FlightLog], windows: Sequence[Pair]
 ) -> tuple[list[MotionPiece], Sources]:
     """Return all unbroken pieces of the logs in flight, and their sensors.
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...runtime.arrays import Array, Complex
+from ...runtime.arrays import Array
+from ..logs.table import NamedArrays, Names
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece
 from .spectra import BAND, Segment, segments_of
@@ -49,17 +50,17 @@ class BalanceSpectra:
     """
 
     drive: Drive  # centre of linearisation
-    names: tuple[str, ...]  # columns
-    nonlinear: tuple[str, ...]  # some of NONLINEAR
+    names: Names  # columns
+    nonlinear: Names  # some of NONLINEAR
     segments: tuple[Segment, ...]
     seconds: float
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
 
-def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...]) -> BalanceSpectra:
+def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: Names) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about a drive in its ``nonlinear`` parameters."""
     segments: list[Segment] = []
-    names: tuple[str, ...] = ()
+    names: Names = ()
     noise: list[Array] = []
     for piece in pieces:
         here = rotor_columns(piece, drive)
@@ -87,7 +88,7 @@ def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...])
     )
 
 
-def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
+def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     """Return the columns (n,) of the rotors."""
     source = piece.command if drive.commands else piece.rotor_speeds
     assert source is not None
@@ -124,7 +125,7 @@ def _local(piece: MotionPiece, velocity: Array, drive: Drive) -> Array:
     return velocity[:, None] + drive.known_arm * turning
 
 
-def air_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
+def air_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     """Return the columns (n,) without rotor speeds."""
     w, period = piece.angular_velocity, piece.period
     dw = derivative(w, period)
@@ -150,7 +151,7 @@ def air_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
 def _with_delay(
     s: Segment,
     drive: Drive,
-    nonlinear: tuple[str, ...],
+    nonlinear: Names,
     count: int,
     rotors: int,
     torques: list[int],
@@ -173,7 +174,7 @@ def _with_delay(
     return replace(s, columns=np.concatenate([measured, *every], axis=2))
 
 
-def _rotor_noise(piece: MotionPiece, drive: Drive, names: tuple[str, ...]) -> Array:
+def _rotor_noise(piece: MotionPiece, drive: Drive, names: Names) -> Array:
     """Return the white noise of each rotor's speed in each column (4, c), as the root of a
     spectrum: standard deviation of the column times the root of the period.
     """

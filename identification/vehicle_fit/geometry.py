@@ -6,6 +6,7 @@ import numpy as np
 
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
+from ..logs.table import Pair
 
 QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
 SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
@@ -20,13 +21,13 @@ class Usual:
 
     # Jz over Jx + Jy: 0.88 to 0.96 in these vehicles; 1, the largest ratio, in a flat body
     flat: float = 0.9
-    flat_range: tuple[float, float] = (0.75, 1.0)
+    flat_range: Pair = (0.75, 1.0)
     # (Jx + Jy) / 2 over mass times the squared arm: 0.35 to 0.58 in these vehicles
     gyration: float = 0.45
-    gyration_range: tuple[float, float] = (0.25, 0.8)
+    gyration_range: Pair = (0.25, 0.8)
     # reaction torque over thrust, as a share of the arm: 0.18 to 0.24 in these vehicles
     reach: float = 0.2
-    reach_range: tuple[float, float] = (0.1, 0.4)
+    reach_range: Pair = (0.1, 0.4)
     radius: float = 0.78  # rotor radius, as a share of the arm: 0.71 to 0.83
     # standard deviations, as shares, of thrust from day to day, invisible in the logs of one day:
     # at one rotor speed sessions differ by 0.6 to 2.4 %, at one command by 10 %

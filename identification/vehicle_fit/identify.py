@@ -18,6 +18,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
 from ..logs.flight_log import FlightLog
+from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Sources, pieces_of, rounding_step, speed_noise
 from .columns import ANSWERED_HZ, Drive, balance
@@ -52,7 +53,7 @@ def identify(
     logs: Sequence[FlightLog],
     mass: float,
     geometry: Geometry,
-    windows: Sequence[tuple[float, float]] | None = None,
+    windows: Sequence[Pair] | None = None,
     name: str = "identified",
     report: Report = lambda share, text: None,
 ) -> Identified:
@@ -243,7 +244,7 @@ def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
     return fit
 
 
-def _hover_thrust(fit: VehicleFit) -> tuple[float, float]:
+def _hover_thrust(fit: VehicleFit) -> Pair:
     """Return thrust as a share of the weight, at the hover speed or command of the fit's start, and
     its relative standard deviation.
     """

@@ -8,12 +8,12 @@ Parameters (``theta``) are numbers near 1 or 0; ``Model.scale`` holds the unit o
 offset and voltage exponent change the columns themselves, and stand in SI units.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...runtime.arrays import Array
+from ..logs.table import Names, Values
 from .geometry import GRAVITY
 
 _AXES = "xyz"
@@ -31,9 +31,9 @@ class Model:
 
     mass: float  # kg
     powers: int
-    free: tuple[str, ...]
-    scale: Mapping[str, float]  # one unit of a parameter in SI units; 1 where none is given
-    prior: Mapping[str, float]  # standard deviation about 0, SI units
+    free: Names
+    scale: Values  # one unit of a parameter in SI units; 1 where none is given
+    prior: Values  # standard deviation about 0, SI units
 
     @property
     def weight(self) -> float:
@@ -48,7 +48,7 @@ class Model:
         }
 
     @property
-    def nonlinear(self) -> tuple[str, ...]:
+    def nonlinear(self) -> Names:
         """Names of the parameters inside the columns themselves."""
         return tuple(name for name in self.free if name in NONLINEAR)
 
@@ -57,13 +57,13 @@ class Model:
         return replace(self, free=(*self.free, *names)), np.append(theta, np.zeros(len(names)))
 
 
-def inertia_of(p: Mapping[str, float]) -> Array:
+def inertia_of(p: Values) -> Array:
     """Return the inertia (3, 3)."""
     xy, xz, yz = (p.get(n, 0.0) for n in ("Jxy", "Jxz", "Jyz"))
     return np.array([[p["Jx"], xy, xz], [xy, p["Jy"], yz], [xz, yz, p["Jz"]]])
 
 
-def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, powers: int) -> Array:
+def coefficients(p: Values, names: Names, mass: float, powers: int) -> Array:
     """Return the coefficients (6, c) of the columns for parameters in SI units."""
     place, get = {name: i for i, name in enumerate(names)}, p.get
     inertia, lever = inertia_of(p), np.array([get(f"r{a}", 0.0) for a in _AXES])
@@ -111,7 +111,7 @@ def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, po
     return out
 
 
-def jacobian(model: Model, theta: Array, names: tuple[str, ...]) -> tuple[Array, Array]:
+def jacobian(model: Model, theta: Array, names: Names) -> tuple[Array, Array]:
     """Return the coefficients (6, c) and their derivatives (p, 6, c) by the free parameters."""
 
     def at(x: Array) -> Array:

@@ -11,6 +11,7 @@ from scipy.signal import butter, sosfiltfilt
 from ...dynamics.effects import Role
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
+from ..logs.table import NamedArrays, Names, Pair
 from .channels import MotionPiece, Sources
 from .columns import ANSWERED_HZ, Drive, rotor_columns
 from .geometry import GRAVITY, USUAL
@@ -42,7 +43,7 @@ BIASES = ("force bias x", "force bias y", "force bias z")
 class Further:
     """An effect for logs that get much likelier by it."""
 
-    parameters: tuple[str, ...]
+    parameters: Names
     role: Role | None = None  # the library effect's role; None: not in the library
     first: int = 0  # index of the effect's first coefficient here
     shows: str = ""  # in force along body x and y; or along "z", or in "turning"
@@ -137,9 +138,9 @@ def first_model(
 
 def _first_gains(
     pieces: list[MotionPiece],
-    columns: list[dict[str, Array]],
+    columns: list[NamedArrays],
     thrust: list[float],
-    band: tuple[float, float],
+    band: Pair,
 ) -> tuple[Array, Array]:
     """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly, and their correlation
     (3,) in a ``band`` in Hz. About x and y the first is the inertia's inverse, about z the inverse
@@ -164,7 +165,7 @@ def _first_gains(
     return gains, alike
 
 
-def _passed(x: Array, period: float, band: tuple[float, float]) -> Array:
+def _passed(x: Array, period: float, band: Pair) -> Array:
     """Return the part of ``x`` (n,) in a ``band`` in Hz."""
     low, high = (2.0 * f * period for f in band)
     sections = butter(2, [min(low, 0.8), min(0.9, high)], btype="bandpass", output="sos")

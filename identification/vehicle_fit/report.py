@@ -4,7 +4,7 @@ force and torque.
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ...runtime.arrays import Array
 from ...runtime.drawing import ESTIMATE, TRUTH, new_figure, styled
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
+from ..logs.table import Data, Names
 from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
@@ -29,9 +30,9 @@ _SHOWN_HZ = 8.0  # highest frequency of the picture: above it lies the pose's no
 _SHOWN_SECONDS = 10.0
 
 
-def identified_data(identified: Identified) -> dict[str, Any]:
+def identified_data(identified: Identified) -> Data:
     """Return the dictionary of ``identify.json``; None for unknown values."""
-    data: dict[str, Any] = {
+    data: Data = {
         "vehicle": identified.vehicle.name,
         "mass_kg": identified.vehicle.mass,
         "flight_s": identified.fit.balance.seconds,
@@ -64,7 +65,7 @@ def identified_data(identified: Identified) -> dict[str, Any]:
             if where in identified.simplest:
                 simplest = identified.simplest[where].model[i]
                 data[where][name.replace(" ", "_")]["thrust_and_drag"] = simplest
-    told: dict[str, Any] = plain(data)
+    told: Data = plain(data)
     return told
 
 
@@ -97,7 +98,7 @@ def use_of(identified: Identified) -> str:
     return "Use: this vehicle."
 
 
-def table_of(errors: PredictionErrors, simplest: PredictionErrors | None) -> list[tuple[str, ...]]:
+def table_of(errors: PredictionErrors, simplest: PredictionErrors | None) -> list[Names]:
     """Return rows: quantity, mean error of the vehicle, of thrust and drag, of no change, unit."""
     columns = [errors.model[:, -1], errors.still[:, -1]]
     if simplest is not None:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...dynamics.vehicle import Vehicle
+from ..logs.table import Names
 from ..prediction import PredictionErrors
 from .channels import MotionPiece, Sources
 from .solve import VehicleFit
@@ -46,8 +47,8 @@ class Identified:
     sources: Sources
     pieces: tuple[MotionPiece, ...]
     fit: VehicleFit
-    notes: tuple[str, ...]
-    advice: tuple[str, ...]
+    notes: Names
+    advice: Names
     # errors on data outside the fit: held_out_blocks, flights_left_out (each in turn, of several),
     # and prediction, of further flights
     predicted: Mapping[str, PredictionErrors]

@@ -26,7 +26,7 @@ from ....runtime.regular_files import open_regular
 from ..flight_log import FlightLog
 from ..log_map import load_map
 from ..mapped_log import map_table
-from ..table import SUFFIXES
+from ..table import SUFFIXES, Names
 from . import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
 
 _HEAD = 4096  # bytes at a file's start
@@ -45,7 +45,7 @@ class Reader:
     # function of a path (with a signature: of a table), of a vehicle or None, and, for some, of the
     # option behind the name's colon
     read: Callable[..., FlightLog]
-    signature: tuple[str, ...] = ()  # columns of a table
+    signature: Names = ()  # columns of a table
     begins: bytes = b""  # regular expression of a file's first bytes; empty: of a table
 
 

@@ -37,7 +37,7 @@ from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup, in_order
 from ..flight_log import FlightLog
-from ..log_map import Commands, LogMap, shipped_map, stated
+from ..log_map import LogMap, shipped_map, stated
 from ..mapped_log import recording_of
 from ..streams import MOST_VOLTS, Stream
 from ..table import Array

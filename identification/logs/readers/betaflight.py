@@ -37,7 +37,7 @@ from ..flight_log import FlightLog
 from ..log_map import shipped_map
 from ..mapped_log import recording_of
 from ..streams import MOST_VOLTS
-from ..table import Array, Table
+from ..table import Array, NamedArrays, Table
 from .blackbox_frames import ENCODINGS, FRAMES, PREDICTORS, Layout, decode
 
 BEGINS = b"H Product:Blackbox"
@@ -141,7 +141,7 @@ def read_table(
 def _log(
     path: Path,
     reader: str,
-    fields: dict[str, Array],
+    fields: NamedArrays,
     stated: set[str],
     headers: Mapping[str, str],
     option: str,

@@ -37,7 +37,7 @@ from ..flight_log import FlightLog
 from ..log_map import shipped_map, stated
 from ..mapped_log import recording_of
 from ..streams import Recording
-from ..table import Array, one_line
+from ..table import Array, NamedArrays, one_line
 from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
 Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
@@ -207,7 +207,7 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[ChannelGr
     yield ChannelGroup(t, unified(topic, columns), topic)
 
 
-def unified(topic: str, fields: Fields) -> dict[str, Array]:
+def unified(topic: str, fields: Fields) -> NamedArrays:
     """Return a topic's columns by the map's names; none of an unused topic."""
     columns = dict(fields)
     if topic == "esc_status":
@@ -427,7 +427,7 @@ def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Ou
     return Outputs(slots, np.full(4, low), np.full(4, high), words)
 
 
-def shares_of_outputs(columns: Fields, outputs: Outputs) -> dict[str, Array]:
+def shares_of_outputs(columns: Fields, outputs: Outputs) -> NamedArrays:
     """Return each output's values (N,) as 0 to 1, other outputs' in the motors' range; nothing if a
     motor's output never changes.
     """

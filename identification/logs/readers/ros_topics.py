@@ -14,7 +14,7 @@ import numpy as np
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
 from ..log_map import Columns, LogMap, parse_map, stated
-from ..table import Array
+from ..table import Array, Data, NamedArrays
 from .px4_ulog import unified
 
 SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerometer", "gyro")
@@ -43,7 +43,7 @@ def map_of(
         InputError: the map has an unknown field; a needed section is missing or ambiguous; or a
             topic cannot hold its section.
     """
-    sections: dict[str, Any] = {}
+    sections: Data = {}
     refused: dict[str, str] = {}
     notes: list[str] = []
     for section in SECTIONS:
@@ -81,7 +81,7 @@ def map_of(
         why = refused.get(section) or f"{section}: {_missing(types, section, where)}"
         raise InputError(f"{source}: {why}")
     is_ned = types.get(_topic_of(sections.get("position")) or "") in stated("ros")["ned"]
-    clock: dict[str, Any] = {"time": {"column": "stamp", "unit": "ns"}}
+    clock: Data = {"time": {"column": "stamp", "unit": "ns"}}
     clock |= {"world": "ned", "body": "frd"} if is_ned else {}
     log_map = parse_map({**clock, **given, **sections}, where)
     sensed = {part.body for part in (log_map.accelerometer, log_map.gyro) if part is not None}
@@ -98,7 +98,7 @@ def _topic_of(section: object) -> str | None:
 
 def _usual(
     types: Mapping[str, str], section: str, said: Mapping[str, Any], topic: str, where: str
-) -> dict[str, Any]:
+) -> Data:
     """Return a section of a topic's messages by their type alone.
 
     Raises:
@@ -243,7 +243,7 @@ class MessageFields:
             names, self._names = self._names, []
             raise self._lack(names, list(_paths(message))) from None
 
-    def columns(self, rows: Array) -> dict[str, Array]:
+    def columns(self, rows: Array) -> NamedArrays:
         """Return the columns (N,) of messages' numbers (N, K), by name.
 
         Raises:

@@ -52,7 +52,7 @@ from ....runtime.yaml_file import read_yaml
 from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
-from ..table import Array, one_line
+from ..table import Data, NamedArrays, one_line
 from .ros_topics import MOTORS, MessageFields, definitions, empty_motors, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
@@ -87,7 +87,7 @@ def read(
     file = Path(option) if option else named.parent / f"{stem}.topics.yaml"
     given = given_map(file) if option or os.path.exists(file) else {}
     path = _bag_in(path)
-    decoded: list[tuple[NDArray[np.int64], dict[str, Array], str]] = []
+    decoded: list[tuple[NDArray[np.int64], NamedArrays, str]] = []
     with _opened(path) as (types, messages):
         log_map, notes = map_of(types, given, str(path), str(file))
         for topic in sorted(log_map.topics - {""}):
@@ -104,7 +104,7 @@ def read(
                 if held.keys() & {*given, "position", "rotors"}:
                     raise
                 notes.append(f"no {', '.join(held)}: {error}")  # the map did not ask for it
-                left_out: dict[str, Any] = dict.fromkeys(held)
+                left_out: Data = dict.fromkeys(held)
                 log_map = replace(log_map, **left_out)
                 continue
             decoded.append((times, columns, topic))
@@ -233,7 +233,7 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 def _decoded_topic(
     fields: MessageFields, messages: Iterator[tuple[int, Any]]
-) -> tuple[NDArray[np.int64], dict[str, Array], str]:
+) -> tuple[NDArray[np.int64], NamedArrays, str]:
     """Return times (N,) in ns and columns (N,) of a topic by name, and a doubt on its time stamps.
 
     Raises:
