@@ -30,7 +30,7 @@ from ..estimator.estimate import (
 )
 from ..estimator.model_uncertainty import LOAD, factors_of, variances_along
 from .logs.flight_log import FlightLog
-from .logs.table import Array, Names, Pair
+from .logs.table import Array, ArrayPair, Names, Pair
 from .motion.inertial_signals import InertialSignals, imu_noise, inertial_signals, pose_rate
 from .motion.residual import acting_wrench, needed_wrench
 from .motion.smoothing import continuous, resampled
@@ -165,9 +165,7 @@ def _smoothed_turning(
     return out[:, 1], float(std[1])
 
 
-def _two_sided(
-    y: Array, drive: Array, model: Array, noise: Array, variance: float
-) -> tuple[Array, Array]:
+def _two_sided(y: Array, drive: Array, model: Array, noise: Array, variance: float) -> ArrayPair:
     """Return the states (n, m, c) of a steady fixed-interval smoother with measurements (n, c) of
     the first, and their standard deviations (m,).
     """

@@ -20,7 +20,7 @@ from ..controllers.briefing import Air, FilterNoise
 from ..controllers.flight import FlightGains
 from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ..controllers.wrench_lag import axis_lag
-from .logs.table import Array, Pair
+from .logs.table import Array, ArrayPair, NamedNumbers, Pair
 
 HELD_SHARE = 0.8  # of the flights behind a fan that counts as followed
 FLIGHT_TIME = 20.0  # s
@@ -160,7 +160,7 @@ def followed(
     gains: Array,
     speeds: Array,
     seed: int = 0,
-) -> tuple[Array, Array]:
+) -> ArrayPair:
     """Fly the law behind fans of steady speeds. Each flight begins anywhere in the measured noise,
     with either sign; flights are the same for all gains and speeds.
 
@@ -218,7 +218,7 @@ def design_admittance(
     torque: Array,
     shape: JetShape,
     speed: float | None = None,
-) -> dict[str, float] | None:
+) -> NamedNumbers | None:
     """Return the gain with the least offset behind fans of all speeds up to one, among those with a
     phase margin of ``MARGIN``, and what it can follow; None where no gain follows any fan.
 

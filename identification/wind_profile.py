@@ -17,7 +17,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ..estimator.estimate import TRACKING
 from ..runtime.errors import InputError
-from .logs.table import Array, Rows, finite_rows
+from .logs.table import Array, ArrayPair, Rows, finite_rows
 from .wrench_series import WrenchSeries
 
 MEAN = 1.0  # s, of the means that the curve is fitted to
@@ -193,7 +193,7 @@ def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Arra
     return B @ beta, std, draws, len(y) / more
 
 
-def _fit(X: Array, y: Array) -> tuple[Array, Array]:
+def _fit(X: Array, y: Array) -> ArrayPair:
     """Return a spline's coefficients and their posterior covariance, for the penalty's weight of
     the greatest restricted likelihood of values with unit variance.
     """

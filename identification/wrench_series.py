@@ -34,7 +34,7 @@ from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_log
 from .logs.streams import MOTOR_RATES, between_samples
-from .logs.table import Array, Names, Rows, finite_rows
+from .logs.table import Array, ArrayPair, Names, Rows, finite_rows
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 from .motion.smoothing import mean_square
@@ -343,7 +343,7 @@ def write_wrench(series: WrenchSeries, path: Path) -> None:
     write_csv(dict(zip(COLUMNS, values.T, strict=True)), path)
 
 
-def truth_rmse(series: WrenchSeries, log: FlightLog) -> tuple[Array, Array] | None:
+def truth_rmse(series: WrenchSeries, log: FlightLog) -> ArrayPair | None:
     """Return the RMSE (3,) of force in N and (3,) of torque in Nm against the log's truth, or None
     without one.
     """

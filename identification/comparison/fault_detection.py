@@ -25,6 +25,7 @@ from .fault_balance import BalanceChannel, Begin, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
 
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
+Interval = tuple[float, float, float]  # middle, low and high; of a trial: lag, bend and dead zone
 
 _LOSSES = (0.05, 1.0)  # share of a rotor's thrust
 _ALL_LOSE = 0.5  # the largest share tried for all rotors together
@@ -58,8 +59,8 @@ class RotorFault:
     probabilities: dict[str, float]
     # the likeliest rotor; onset as median, thrust as mean, each with a 95 % interval
     rotor: int
-    onset: tuple[float, float, float]  # s, on the log's clock
-    remaining: tuple[float, float, float]  # remaining share of thrust
+    onset: Interval  # s, on the log's clock
+    remaining: Interval  # remaining share of thrust
 
     @property
     def seconds(self) -> float:
@@ -121,9 +122,9 @@ class _Tried(NamedTuple):
 
 def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
     """Return all trials: lags, and then curves, each from the best so far."""
-    rows, tried = _rows(len(samples.t)), dict[tuple[float, float, float], _Tried]()
+    rows, tried = _rows(len(samples.t)), dict[Interval, _Tried]()
 
-    def best_of(keys: Iterable[tuple[float, float, float]]) -> tuple[float, float, float]:
+    def best_of(keys: Iterable[Interval]) -> Interval:
         for key in keys:
             if key not in tried:
                 tried[key] = _fitted(FaultBalance(samples, samples.thrust(*key), key[0]), rows)
@@ -225,7 +226,7 @@ def _rows(count: int) -> Index:
     return rows
 
 
-def _quantiles(values: Array, weight: Array, margin: float) -> tuple[float, float, float]:
+def _quantiles(values: Array, weight: Array, margin: float) -> Interval:
     """Return the median and the ends of a 95 % interval, widened by a step of the grid."""
     order = np.argsort(values, kind="stable")
     at = np.searchsorted(np.cumsum(weight[order]), (0.025, 0.5, 0.975))

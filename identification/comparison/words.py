@@ -19,12 +19,12 @@ from ...runtime.drawing import (
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
 from ..logs.table import Data, Values
+from ..logs.what_flew import PLACES
 from ..motion.smoothing import resampled
 from .change import NOWHERE, SOMETHING_ELSE, SURE, Change
 from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
-_PLACES = ("front-left", "rear-left", "rear-right", "front-right")
 _NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
@@ -152,7 +152,7 @@ def place_of(fault: RotorFault, rotor: int) -> str:
     """Return the name of a rotor (1 to 4), with the log's own name if any."""
     names = fault.samples.channels.motor_names
     own = "" if names is None else f"; {names[rotor - 1]} in the log"
-    return f"rotor {rotor} ({_PLACES[rotor - 1]}{own})"
+    return f"rotor {rotor} ({PLACES[rotor - 1]}{own})"
 
 
 def fault_headline(fault: RotorFault) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ...dynamics.effects import Role, get, playing
 from ..findings import NamedEffect
+from ..logs.table import NamedNumbers
 from .commanded_rotors import THRUST_FACTORS
 from .regression import CENTRAL, RegressedFlights
 from .turning_delay import turning_delay
@@ -17,8 +18,8 @@ class Given:
     """Facts without need of evidence."""
 
     library: list[str]  # effects to ask about
-    first: dict[str, dict[str, float]]  # in every set; with coefficients where a fit begins
-    fixed: dict[str, dict[str, float]]  # known from elsewhere, with their coefficients
+    first: dict[str, NamedNumbers]  # in every set; with coefficients where a fit begins
+    fixed: dict[str, NamedNumbers]  # known from elsewhere, with their coefficients
     # the delay of commands, from the vehicle's turns and not from a force; None if unknown
     late: NamedEffect | None = None
 

@@ -32,7 +32,7 @@ from ..findings import (
 )
 from ..logs.flight_log import FlightLog
 from ..logs.screening import LEAST_SECONDS, screen_log
-from ..logs.table import Array, Names, Pair, Values
+from ..logs.table import Array, NamedNumbers, Names, Pair, Values
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.pose_clock import on_pose_clock
 from ..motion.smoothing import CUTOFFS, mean_square
@@ -258,7 +258,7 @@ class Judged:
         )
         self.probabilities = Probabilities(names, stated, strange)
 
-    def _std(self, effect: str) -> dict[str, float]:
+    def _std(self, effect: str) -> NamedNumbers:
         """Return the standard deviations of an effect in the likeliest set. For a factor on the
         thrust of commands, they include the spread of thrust from flight to flight.
         """
@@ -267,7 +267,7 @@ class Judged:
             return dict(std)
         return self._widened(effect, std, THRUST_STD / math.sqrt(len(flights.logs)))
 
-    def _widened(self, effect: str, std: Values, relative: float) -> dict[str, float]:
+    def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
         """Return standard deviations of coefficients with a relative one besides."""
         return {
             name: math.hypot(x, relative * unit_of_change((effect, name), self._flights.vehicle))

@@ -21,7 +21,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask
+from ..logs.table import Array, ArrayPair, Mask
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
@@ -215,9 +215,7 @@ class Likelihood:
         """
         jumps = self._jumps()
 
-        def see(
-            steady: SteadyFilter, gains: Array, slopes: Array | None
-        ) -> Iterator[tuple[Array, Array]]:
+        def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
             self._run(steady, self._said(jumps, gains))
             for i, track in enumerate(self.tracks):
                 none, counts = np.empty((len(track.t), 6, 0)), self._counts(i)

@@ -10,7 +10,7 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from ..logs.table import Array
+from ..logs.table import Array, ArrayPair
 from .evidence import bounded_mode
 from .steady_filter import PAIRS, PoseNoise, SteadyFilter, steady_filter
 
@@ -43,7 +43,7 @@ class NoiseSearch:
         gravity: m/s2.
     """
 
-    see: Callable[[SteadyFilter, Array, Array | None], Iterable[tuple[Array, Array]]]
+    see: Callable[[SteadyFilter, Array, Array | None], Iterable[ArrayPair]]
     held: Array
     period: float
     gravity: float
@@ -119,7 +119,7 @@ class NoiseSearch:
         right[len(held) :] += 0.5 * np.einsum("mij,ji->m", share, left)
         return self._deviance(own, steady.covariance, at, n), normal, right
 
-    def _filter_slopes(self, at: Array, here: SteadyFilter) -> tuple[Array, Array]:
+    def _filter_slopes(self, at: Array, here: SteadyFilter) -> ArrayPair:
         """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
         covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
         """

@@ -11,13 +11,14 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
-from ..logs.table import Array, Pair, Values
+from ..logs.table import Array, NamedNumbers, Pair, Values
 from .evidence import Index, Marginal, SetEvidence, marginal
 from .log_offsets import TIMINGS
 from .regression import (
     CENTRAL,
     START_PREFIX,
     Column,
+    Effects,
     RegressedFlights,
     coefficient,
     moves_time,
@@ -25,7 +26,7 @@ from .regression import (
     unit_of_change,
 )
 
-Setting = dict[str, dict[str, float]]
+Setting = dict[str, NamedNumbers]
 # columns of whole effects, with the coefficients of each
 Starts = Mapping[Column, Values]
 
@@ -76,7 +77,7 @@ class Base:
     blocks: Array  # (blocks, k + 1, k + 1), the same of each block, of the columns ``single``
     single: Index  # (k,) columns without the dictionary, nine tenths of all
     penalty: float
-    effects: frozenset[str]  # of the setting
+    effects: Effects  # of the setting
     plain: Index  # nuisances of any flight
     typical: Array  # (c,) typical sizes in prior standard deviations
     dictionary: Index  # columns of the discrepancy

@@ -24,7 +24,15 @@ from .climbing import Height, linearised, mode
 from .evidence import set_evidence
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts, prior_size
-from .regression import START_PREFIX, Column, RegressedFlights, moves_time, typical_size, without
+from .regression import (
+    START_PREFIX,
+    Column,
+    Effects,
+    RegressedFlights,
+    moves_time,
+    typical_size,
+    without,
+)
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
 from .starting_points import starting_points
@@ -107,7 +115,7 @@ def rank(
     quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
     posterior = Posterior(flights, library, (loud, quiet))
     # settings as asked for: beside the end of a fit, a little of other effects moves the request
-    tried: dict[frozenset[str], Setting] = {frozenset(): {}}
+    tried: dict[Effects, Setting] = {frozenset(): {}}
     # the best effect first, alone: another set's columns are of the model with that effect
     if setting := posterior.best_setting(1):
         best = fitted(setting, best)

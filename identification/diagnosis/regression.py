@@ -22,7 +22,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask, Pair, Rows, Values, finite_rows, median_step
+from ..logs.table import Array, ArrayPair, Mask, Pair, Rows, Values, finite_rows, median_step
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
@@ -77,6 +77,7 @@ NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 STEP, LARGE_STEP = 0.1, 0.5
 # coefficients by effect, beside the declared vehicle
 Setting = Mapping[str, Values]
+Effects = frozenset[str]
 # an effect's coefficient
 Column = tuple[str, str]
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
@@ -211,8 +212,8 @@ class RegressedFlights:
         self.biases = self._biases()
         self.offsets = self._timings() | self.biases
         # in a log read by its IMU: effects without any trace, and effects a pose would show
-        self.without_trace: frozenset[str] = frozenset()
-        self.needs_pose: frozenset[str] = frozenset()
+        self.without_trace: Effects = frozenset()
+        self.needs_pose: Effects = frozenset()
         # the noise is added to the logs once more; the change is the effect of noise
         noisy = self._noisier()
         self.visible_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
@@ -269,7 +270,7 @@ class RegressedFlights:
         if self.fit_rows.all() and self.block[-1] > 0:  # fewer than four blocks
             self.fit_rows = self.block < self.block[-1]
 
-    def _lost_in_noise(self, noisy: "RegressedFlights") -> frozenset[str]:
+    def _lost_in_noise(self, noisy: "RegressedFlights") -> Effects:
         """Return the effects whose columns are largely noise.
 
         A fit of such an effect would come out too small, or remove noise of the pose to explain
@@ -285,7 +286,7 @@ class RegressedFlights:
             lost, self.without_trace = self._noisy_columns(
                 noisy, [*linear, *filter(is_nonlinear, names())]
             )
-            lacking: frozenset[str] = frozenset()  # effects a pose would not show either
+            lacking: Effects = frozenset()  # effects a pose would not show either
             if all(log.voltage is None for log in self.logs):
                 lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
             if self.commanded:
@@ -301,7 +302,7 @@ class RegressedFlights:
 
     def _noisy_columns(
         self, noisy: "RegressedFlights", effects: Iterable[str]
-    ) -> tuple[frozenset[str], frozenset[str]]:
+    ) -> tuple[Effects, Effects]:
         """Return the effects whose columns hold too much noise, and the effects without any trace
         in an IMU.
         """
@@ -589,7 +590,7 @@ def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
 
 
 @lru_cache(maxsize=16)  # of several pieces, and again at each setting of sensing effects
-def _accelerometer(log: FlightLog) -> tuple[Array, Array] | None:
+def _accelerometer(log: FlightLog) -> ArrayPair | None:
     """Return times (n,) s, evenly spaced, and the accelerometer's readings (n, 3) m/s2 with the
     pose's low-pass; None unless the readings span the log from beginning to end.
     """

@@ -18,6 +18,7 @@ from ..logs.table import Array
 from ..motion.signals import in_body
 from .causal_filter import Poses, Track, level
 
+Seen = list[tuple[Poses, Track]]  # pieces, as measured and as the filter sees them
 # past samples of the rotors in a prediction: a loop's own filter has a memory. Of 23 flights whose
 # loops saw more than their logs, 7 got a wrong probable set with 4 samples, and 4 with 20
 LAGS = 20
@@ -29,7 +30,7 @@ ROUNDS = 5
 DRIVEN = (2, 3, 4, 5)
 
 
-def rotor_innovations(pieces: list[tuple[Poses, Track]]) -> list[Array]:
+def rotor_innovations(pieces: Seen) -> list[Array]:
     """Return the rotors' innovations (n, 4) of each piece, as accelerations: along body z (m/s2)
     and about the body's axes (rad/s2). The first samples, with too short a past, have none.
 
@@ -43,7 +44,7 @@ def rotor_innovations(pieces: list[tuple[Poses, Track]]) -> list[Array]:
     return out
 
 
-def unrounded(pieces: list[tuple[Poses, Track]], step: float) -> list[Array]:
+def unrounded(pieces: Seen, step: float) -> list[Array]:
     """Return the corrections of rotor speeds (n, 4) of each piece, rad/s, from the log's multiples
     of ``step`` to the expected speeds.
 
@@ -70,7 +71,7 @@ def unrounded(pieces: list[tuple[Poses, Track]], step: float) -> list[Array]:
     return [now - log for log, now in zip(logged, speeds, strict=True)]
 
 
-def _predicted(pieces: list[tuple[Poses, Track]], rotors: list[Array]) -> list[Array]:
+def _predicted(pieces: Seen, rotors: list[Array]) -> list[Array]:
     """Return the least-squares predictions (n - LAGS, 4) of each piece's rotors (n, 4)."""
     each = list(zip(pieces, rotors, strict=True))
     x = np.concatenate([_known_before(track, now) for (_, track), now in each])

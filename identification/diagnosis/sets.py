@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
-from ..logs.table import Array, Pair, Values
+from ..logs.table import Array, NamedNumbers, Pair, Values
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
     Index,
@@ -36,6 +36,7 @@ from .regression import (
     CENTRAL,
     START_PREFIX,
     Column,
+    Effects,
     RegressedFlights,
     coefficient,
     moves_time,
@@ -118,15 +119,15 @@ class Posterior:
         library: Sequence[str],
         bases: Sequence[Base],
         power: float = 1.0,
-        given: frozenset[str] | None = None,
-        idle: Collection[frozenset[str]] = (),
+        given: Effects | None = None,
+        idle: Collection[Effects] = (),
     ) -> None:
         self.flights, self.library, self.bases, self.power = flights, library, bases, power
         self.idle, self.given = idle, given
         self.asked_about = len(library) - len(given or ())
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
-        self.known: dict[frozenset[str], _Candidate] = {}
-        self.scores: dict[frozenset[str], float] = {}
+        self.known: dict[Effects, _Candidate] = {}
+        self.scores: dict[Effects, float] = {}
         # beside the noise of nothing explained no effect shows: only sets found elsewhere go there
         for i in range(1 if given is None else 0, len(bases)):
             self._search(i)
@@ -152,7 +153,7 @@ class Posterior:
             little[[base.names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
         return little
 
-    def _counts(self, number: int, key: frozenset[str]) -> bool:
+    def _counts(self, number: int, key: Effects) -> bool:
         """Return whether a set is judged beside a base."""
         if self.given is None:  # another base has the columns of this set
             return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
@@ -279,7 +280,7 @@ class Posterior:
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
-    def alone(self) -> dict[str, float]:
+    def alone(self) -> NamedNumbers:
         """Return the deviance of each effect of the library alone, beside the given effects, over
         the deviance of all effects together.
         """
@@ -291,7 +292,7 @@ class Posterior:
         m = base.marginal(at, np.append(base.plain, always), power=self.power)
         normal = m.normal + np.eye(len(asked))
         whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
-        out: dict[str, float] = {}
+        out: NamedNumbers = {}
         for columns in self._variants(base):
             if (effect := columns[0][0]) not in given:
                 own = [index[c] for c in columns]
@@ -307,7 +308,7 @@ class Posterior:
         fitted = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
         return {c: x for c, x in fitted.items() if not c[0]}
 
-    def shown(self, known: Sequence[Column] = ()) -> dict[str, float]:
+    def shown(self, known: Sequence[Column] = ()) -> NamedNumbers:
         """Return the change of the deviance by a typical size of each effect outside the likeliest
         set; ``known``: nuisances taken as fully known.
         """
@@ -315,7 +316,7 @@ class Posterior:
         others = np.append(np.setdiff1d(base.plain, base.at(known)), base.at(best.columns))
         m = base.marginal(base.at(base.asked), others, power=self.power)
         index = {c: i for i, c in enumerate(base.asked)}
-        out: dict[str, float] = {}
+        out: NamedNumbers = {}
         for columns in self._variants(base):
             (effect, name), *_ = columns
             if name.startswith(START_PREFIX) or effect in {v[0][0] for v in best.variants}:
@@ -354,7 +355,7 @@ class Posterior:
         keys.sort(key=self.scores.__getitem__, reverse=True)
         return [self._at_mode(self.known[k])[0] for k in keys[:MOST_RIVALS]]
 
-    def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
+    def is_elsewhere(self, new: Setting, tried: Mapping[Effects, Setting]) -> bool:
         """Return whether a set is untried, or was tried only with coefficients more than a standard
         deviation away.
         """

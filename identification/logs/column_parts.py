@@ -16,10 +16,12 @@ import numpy as np
 from ..motion.smoothing import resampled, second_difference
 from .column_names import WORDS, Group, Name, groups_of, named_alone
 from .magnitudes import likely_unit
-from .table import Array, Names, finite_rows
+from .table import Array, ArrayPair, Names, finite_rows
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
 _TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # their columns are no other group's
+Verdict = tuple[float, str]  # how well columns obey a part's physics, and in words
+Judge = Callable[[Sequence[str]], Verdict]
 
 
 # When numbers speak for a part, and their score beside a name's (4 for the likeliest).
@@ -58,11 +60,11 @@ class Numbers:
         # times (n,) in s of comparisons of motors
         self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
-        self._rows: dict[Names, tuple[Array, Array]] = {}
+        self._rows: dict[Names, ArrayPair] = {}
         self.attitude: Sequence[str] = ()  # a quaternion, whose tilt drives the position
         self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
 
-    def rows(self, columns: Sequence[str]) -> tuple[Array, Array]:
+    def rows(self, columns: Sequence[str]) -> ArrayPair:
         """Return the times (n,) and values (n, k) of the rows with all columns."""
         if (key := tuple(columns)) not in self._rows:
             values = np.column_stack([self.data[name][self.order] for name in columns])
@@ -86,7 +88,7 @@ class Numbers:
         """Return whether a column takes more than a few values: no counter's and no switch's."""
         return column in self.data and len(np.unique(self.some([column]))) > _LEVELS
 
-    def quaternion(self, columns: Sequence[str]) -> tuple[float, str]:
+    def quaternion(self, columns: Sequence[str]) -> Verdict:
         """Return 1 where columns may be an attitude: three angles are 0, for nothing shows them;
         minus infinite where four columns have another length than 1.
         """
@@ -101,7 +103,7 @@ class Numbers:
         is_one = np.quantile(off, 0.98) < _LENGTH_ERROR[1]
         return (1.0 if is_one else -np.inf), "their length is 1"
 
-    def gravity(self, columns: Sequence[str]) -> tuple[float, str]:
+    def gravity(self, columns: Sequence[str]) -> Verdict:
         """Return 1 where gravity lies along the third of three columns, 0.8 along another."""
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
@@ -111,7 +113,7 @@ class Numbers:
             return 0.0, ""  # another size, a direction, or a turning vector
         return (1.0 if middle.argmax() == 2 else 0.8), f"their size is gravity's, in {unit}"
 
-    def follows_tilt(self, columns: Sequence[str]) -> tuple[float, str]:
+    def follows_tilt(self, columns: Sequence[str]) -> Verdict:
         """Return the correlation of two of three columns' second differences with the tilt; 0 where
         there is little.
         """
@@ -129,7 +131,7 @@ class Numbers:
                 best = max(best, min(correlations))
         return (best if best > _FOLLOWS else 0.0), "their acceleration follows the tilt"
 
-    def moves_together(self, columns: Sequence[str]) -> tuple[float, str]:
+    def moves_together(self, columns: Sequence[str]) -> Verdict:
         """Return 1 where four columns are of one size and move with the specific force."""
         x = self.some(columns)
         x = x[np.any(x != 0.0, axis=1)]
@@ -199,7 +201,7 @@ def candidates(
     part: str,
     names: Sequence[Name],
     numbers: Numbers,
-    judge: Callable[[Sequence[str]], tuple[float, str]],
+    judge: Judge,
 ) -> list[ColumnCandidate]:
     """Return the candidates of a part by their names and numbers, the likeliest first.
 

@@ -39,7 +39,7 @@ from .flight_log import FlightLog
 from .flight_phases import carrying
 from .log_map import UNITS
 from .readings import DECLARED, OFFSET, ColumnReading, as_written, log_readings
-from .table import Array, Rows, finite_rows, median_step
+from .table import Array, ArrayPair, Rows, finite_rows, median_step
 
 # Filters, and when a reading is certain.
 # Hz, of the angular acceleration: from, to, and to of yaw, where rotors do least. Below, steady
@@ -265,7 +265,7 @@ class Evidence:
             out.append(np.column_stack([p.band(x).reshape(-1, 8), p.slow(total), total]))
         return out
 
-    def _pushes(self, *delays: float) -> tuple[Array, Array]:
+    def _pushes(self, *delays: float) -> ArrayPair:
         """Return whether the samples compared, less each delay (d, n), lie within their piece (1,
         or 0), and thrusts. The thrusts (d, 9, n) are the first nine of ``_driving``, less their
         means; zero elsewhere.
@@ -281,7 +281,7 @@ class Evidence:
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
-    def _turned(self, reading: ColumnReading) -> Iterator[tuple[Array, Array]]:
+    def _turned(self, reading: ColumnReading) -> Iterator[ArrayPair]:
         """Yield each piece's rotations (m, 3, 3), zero without an attitude, and angular velocity
         (m, 3), by a reading.
         """
@@ -299,7 +299,7 @@ class Evidence:
                 q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
                 yield turning(q, p.period)
 
-    def _moving(self, *attitude: Any) -> tuple[Array, Array]:
+    def _moving(self, *attitude: Any) -> ArrayPair:
         """Return thrust and turns by one reading of the attitude. Thrust is specific, times the
         body's axes (n, 3, 3), in m/s2, in the world. Turns in two bands (n, 2, 15) are angular
         velocity, angular acceleration and products of the angular velocity.

@@ -64,7 +64,7 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .table import Array, Data, Names, Pair
+from .table import Array, Data, NamedNumbers, Names, Pair
 from .what_flew import ORDERS, Order, rotor_order
 
 MAPS = Path(__file__).parent / "maps"  # the kit's own maps
@@ -73,7 +73,7 @@ UNKNOWN = "?"  # a field that a person must choose
 
 WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
 BODIES = ("flu", "frd", "y_up")
-UNITS: dict[str, dict[str, float]] = WORDS["factors"]
+UNITS: dict[str, NamedNumbers] = WORDS["factors"]
 COMMAND_UNITS: dict[str, Pair | None] = {
     unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()
 }

@@ -11,7 +11,7 @@ unless the numbers contradict the name.
 
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 
@@ -22,7 +22,16 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import WORDS, Group, Name, named_alone, take_apart
-from .column_parts import CERTAIN_LEAD, SHOWN, ColumnCandidate, Numbers, candidates, named_columns
+from .column_parts import (
+    CERTAIN_LEAD,
+    SHOWN,
+    ColumnCandidate,
+    Judge,
+    Numbers,
+    Verdict,
+    candidates,
+    named_columns,
+)
 from .evidence import GOOD, GOOD_TORQUE, TURNING_RATE, Evidence, Fit, RankedFits, likelihood
 from .excerpt import LONGEST
 from .inertial import gyro_shares
@@ -188,9 +197,7 @@ class _Guessing:
         for part in motors:
             self.motors(part, self.parts[part])
 
-    def choose(
-        self, part: str, judge: Callable[[Sequence[str]], tuple[float, str]]
-    ) -> Group | None:
+    def choose(self, part: str, judge: Judge) -> Group | None:
         """Return the likeliest columns of a part, and take them from later parts; None: there are
         none. Other likely columns are a reason for doubt.
         """
@@ -375,7 +382,7 @@ class _Guessing:
         ranked = sorted(fits, key=lambda fit: -fit.score)
         return RankedFits(ranked, "attitude's rate is left unexplained") if fits else None
 
-    def turns_alike(self, columns: Sequence[str]) -> tuple[float, str]:
+    def turns_alike(self, columns: Sequence[str]) -> Verdict:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
         otherwise.
         """

@@ -155,7 +155,7 @@ def open_text(path: Path) -> Table:
     Raises:
         InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
     """
-    written: list[str] = []
+    written = []
     for line in islice(_lines(path), _LINES):
         written.append(line)
         if sum(map(len, written)) > _LOOKED_AT:

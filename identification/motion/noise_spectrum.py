@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Names, Pair, finite_rows, median_step
+from ..logs.table import Array, ArrayPair, Names, Pair, finite_rows, median_step
 from .smoothing import turned, unbroken
 
 # shares of half the sampling rate between which the slope is read: above a vehicle's motion, below
@@ -97,7 +97,7 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period
 
 
-def _amplitudes(pieces: Sequence[Array]) -> tuple[Array, Array] | None:
+def _amplitudes(pieces: Sequence[Array]) -> ArrayPair | None:
     """Return shares of half the sampling rate (f,) and logarithms of the amplitude (f, k) of
     pieces (n, k) there; None for too short ones.
 

@@ -13,7 +13,7 @@ from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.page_files import write_text
 from ...runtime.plain_values import as_text, plain
 from ..findings import Diagnosis, Errors
-from ..logs.table import Data
+from ..logs.table import Data, NamedNumbers
 from .headline import headline
 from .page import report_page
 
@@ -72,7 +72,7 @@ def report_data(diagnosis: Diagnosis) -> Data:
     if len(diagnosis.logs) + len(diagnosis.test_logs) > 1:
         error["held_out_by_log"] = diagnosis.held_out_by_log
     stated = diagnosis.probabilities
-    data: Data = {
+    data = {
         "verdict": diagnosis.verdict,
         "remainder": diagnosis.remainder,
         "effects": [
@@ -104,7 +104,7 @@ def report_schema() -> Data:
     return schema
 
 
-def _errors(errors: Errors) -> dict[str, float]:
+def _errors(errors: Errors) -> NamedNumbers:
     return {
         "force_rms_N": errors.force_rms,
         "torque_rms_Nm": errors.torque_rms,

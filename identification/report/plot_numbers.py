@@ -12,16 +12,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
 from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
-from ..logs.table import Array, Data, Names, Pair, finite_rows
+from ..logs.table import Array, ArrayPair, Data, Names, Pair, Rows, finite_rows
 from ..motion.smoothing import runs_of
 from .words import percent, rounded, scale_of
-
-Index = NDArray[np.intp]
 
 # all series over time together, packed: beside library and text a page of 60 s of flight stays
 # below 600 kB
@@ -53,7 +50,7 @@ class Plot:
     """One plot of the page."""
 
     packed: Data  # ``key`` is the plot's name in the page
-    lines: dict[str, tuple[Array, Array]]  # x and y (n,) of ``before``, ``after`` and ``mean``
+    lines: dict[str, ArrayPair]  # x and y (n,) of ``before``, ``after`` and ``mean``
     table: PlotTable
     title: str  # quantity and unit
     axis: str  # quantity of the x axis
@@ -97,7 +94,7 @@ class _Joined:
             for i in range(group.start, group.stop)
         ]
 
-    def kept(self, i: int) -> list[Index]:
+    def kept(self, i: int) -> list[Rows]:
         """Return the drawn samples of each piece for channel ``i``."""
         a_sample = _BASE64 * 2.0 * (3 + len(self.parts)) * len(CHANNELS)
         share = max(int(_MOST_BYTES / a_sample / 4), _LEAST_COLUMNS) / len(self.x)
@@ -299,7 +296,7 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
     )
 
 
-def binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
+def binned(x: Array, y: Array, count: int = 14) -> ArrayPair:
     """Return the mean of ``y`` over ``x`` (n,) in bins with as many points each."""
     if len(x) < 4 * count:
         return np.empty(0), np.empty(0)
@@ -307,7 +304,7 @@ def binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
     return np.array([x[p].mean() for p in parts]), np.array([y[p].mean() for p in parts])
 
 
-def telling_samples(trace: Trace, i: int, columns: int) -> Index:
+def telling_samples(trace: Trace, i: int, columns: int) -> Rows:
     """Return the drawn samples of a piece for channel ``i``: all of a short piece, or in each of
     ``columns`` stretches the lowest and highest before and after.
     """

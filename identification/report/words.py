@@ -58,10 +58,10 @@ def in_words(names: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
-def in_unit(value: float, unit: str, digits: int = 2) -> str:
+def in_unit(value: float, unit: str) -> str:
     """Return a number with its unit, plain or milli."""
     factor, unit = scale_of([value], unit)
-    return f"{rounded(factor * value, digits)}{SPACE}{unit}"
+    return f"{rounded(factor * value, 2)}{SPACE}{unit}"
 
 
 def percent(share: float) -> str:

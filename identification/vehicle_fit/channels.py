@@ -62,6 +62,9 @@ class MotionPiece:
         return replace(self, **changed)
 
 
+Pieces = list[MotionPiece]
+
+
 @dataclass(frozen=True)
 class Sources:
     """The sensors of the balance."""
@@ -139,9 +142,7 @@ def speed_noise(pieces: Sequence[MotionPiece]) -> float:
     return math.sqrt(float(np.median(powers))) if powers else 0.0
 
 
-def pieces_of(
-    logs: Sequence[FlightLog], windows: Sequence[Pair]
-) -> tuple[list[MotionPiece], Sources]:
+def pieces_of(logs: Sequence[FlightLog], windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     """Return all unbroken pieces of the logs in flight, and their sensors.
 
     Args:
@@ -269,7 +270,7 @@ def _flying(piece: MotionPiece) -> Mask:
     return load > _FLYING_SHARE * usual
 
 
-def _cut(piece: MotionPiece, keep: Mask) -> list[MotionPiece]:
+def _cut(piece: MotionPiece, keep: Mask) -> Pieces:
     """Return the kept runs of samples that are long enough."""
     if keep.all():
         return [piece]

@@ -15,7 +15,7 @@ import numpy as np
 from ...runtime.arrays import Array
 from ..logs.table import NamedArrays, Names
 from ..motion.smoothing import derivative, lagged, low_pass
-from .channels import MotionPiece
+from .channels import MotionPiece, Pieces
 from .spectra import BAND, Segment, segments_of
 
 _STEP = {"lag": 1e-3, "gamma": 0.05}  # finite differences
@@ -57,11 +57,11 @@ class BalanceSpectra:
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
 
-def balance(pieces: list[MotionPiece], drive: Drive, nonlinear: Names) -> BalanceSpectra:
+def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about a drive in its ``nonlinear`` parameters."""
-    segments: list[Segment] = []
+    segments = []
     names: Names = ()
-    noise: list[Array] = []
+    noise = []
     for piece in pieces:
         here = rotor_columns(piece, drive)
         air = air_columns(piece, drive)

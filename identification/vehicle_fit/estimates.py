@@ -11,12 +11,13 @@ from scipy.optimize import brentq
 
 from ...dynamics.effects import Role, get
 from ...runtime.errors import InputError
+from ..logs.table import Values
 from .channels import MotionPiece, Sources
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
 from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
-from .solve import Function, Interval, Values, VehicleFit
+from .solve import Function, Interval, VehicleFit
 
 UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 

@@ -20,7 +20,7 @@ from ...runtime.threads import one_thread
 from ..logs.flight_log import FlightLog
 from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
-from .channels import MotionPiece, Sources, pieces_of, rounding_step, speed_noise
+from .channels import MotionPiece, Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
 from .estimates import Estimates, thrust_of
@@ -166,7 +166,7 @@ def _with_status(vehicle: Vehicle, named: dict[str, Estimate], tested: HeldOut) 
     return replace(flown, status=replace(tested.status, coefficients=sources))
 
 
-def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:
+def _lag_alone(pieces: Pieces, fit: VehicleFit) -> Estimate:
     """Return the lag of a model without a time offset: the offset is then part of the lag."""
     place = fit.model.free.index("delay")
     model = replace(fit.model, free=(*fit.model.free[:place], *fit.model.free[place + 1 :]))
@@ -186,9 +186,7 @@ def _voltage(pieces: Sequence[MotionPiece]) -> float:
     return middle if middle > 0.0 and wide > _LEAST_VOLTAGE_RANGE * middle else 0.0
 
 
-def _first_fit(
-    pieces: list[MotionPiece], sources: Sources, drive: Drive, mass: float
-) -> VehicleFit:
+def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> VehicleFit:
     """Return the fit of the basic model."""
     if not drive.commands:
         model, start, drive = first_model(pieces, sources, drive, mass, ("delay",))
@@ -228,7 +226,7 @@ def _first_fit(
     return best[1]
 
 
-def _agreeing(pieces: list[MotionPiece], fit: VehicleFit) -> VehicleFit:
+def _agreeing(pieces: Pieces, fit: VehicleFit) -> VehicleFit:
     """Return the fit up to the highest frequency without a contradiction: thrust agrees with slower
     motion alone (Hausman's test), and each sensor's bias is credible.
     """
@@ -262,7 +260,7 @@ def _frequencies(fit: VehicleFit) -> float:
 
 
 def _with_optional(
-    pieces: list[MotionPiece], fit: VehicleFit, sources: Sources
+    pieces: Pieces, fit: VehicleFit, sources: Sources
 ) -> tuple[VehicleFit, dict[str, str], Interval | None]:
     """Return a fit with further effects, their names, and a moment of velocity that stays hidden.
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...runtime.arrays import Array
-from ..logs.table import Names, Values
+from ..logs.table import ArrayPair, NamedNumbers, Names, Values
 from .geometry import GRAVITY
 
 _AXES = "xyz"
@@ -40,7 +40,7 @@ class Model:
         """Weight, N."""
         return self.mass * GRAVITY
 
-    def values(self, theta: Array) -> dict[str, float]:
+    def values(self, theta: Array) -> NamedNumbers:
         """Return the free parameters in SI units."""
         return {
             name: float(self.scale.get(name, 1.0) * (np.exp(x) if name in LOGARITHMIC else x))
@@ -111,7 +111,7 @@ def coefficients(p: Values, names: Names, mass: float, powers: int) -> Array:
     return out
 
 
-def jacobian(model: Model, theta: Array, names: Names) -> tuple[Array, Array]:
+def jacobian(model: Model, theta: Array, names: Names) -> ArrayPair:
     """Return the coefficients (6, c) and their derivatives (p, 6, c) by the free parameters."""
 
     def at(x: Array) -> Array:

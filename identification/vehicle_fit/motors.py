@@ -10,7 +10,7 @@ from scipy.stats import t as student
 
 from ...runtime.arrays import Array
 from ..motion.smoothing import lagged
-from .channels import MotionPiece
+from .channels import Pieces
 
 _LAGS = (1e-3, 0.5)  # s, the shortest and the longest
 _SEGMENT = 5.0  # s: errors further apart are taken as independent
@@ -26,7 +26,7 @@ class MotorResponse:
     left: float  # unexplained share of the speeds' standard deviation
 
 
-def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
+def motor_response(pieces: Pieces) -> MotorResponse | None:
     """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
     if any(p.command is None or p.rotor_speeds is None for p in pieces):
         return None

@@ -11,8 +11,8 @@ from scipy.signal import butter, sosfiltfilt
 from ...dynamics.effects import Role
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-from ..logs.table import NamedArrays, Names, Pair
-from .channels import MotionPiece, Sources
+from ..logs.table import ArrayPair, NamedArrays, Names, Pair
+from .channels import Pieces, Sources
 from .columns import ANSWERED_HZ, Drive, rotor_columns
 from .geometry import GRAVITY, USUAL
 from .model import Model
@@ -72,7 +72,7 @@ FURTHER: dict[str, Further] = {
 
 
 def first_model(
-    pieces: list[MotionPiece],
+    pieces: Pieces,
     sources: Sources,
     drive: Drive,
     mass: float,
@@ -137,11 +137,11 @@ def first_model(
 
 
 def _first_gains(
-    pieces: list[MotionPiece],
+    pieces: Pieces,
     columns: list[NamedArrays],
     thrust: list[float],
     band: Pair,
-) -> tuple[Array, Array]:
+) -> ArrayPair:
     """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly, and their correlation
     (3,) in a ``band`` in Hz. About x and y the first is the inertia's inverse, about z the inverse
     times torque over thrust (m). Each is taken at the delay, up to 80 ms, of the largest

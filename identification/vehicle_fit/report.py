@@ -13,7 +13,7 @@ from ...runtime.arrays import Array
 from ...runtime.drawing import ESTIMATE, TRUTH, new_figure, styled
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
-from ..logs.table import Data, Names
+from ..logs.table import ArrayPair, Data, Names
 from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
@@ -57,14 +57,10 @@ def identified_data(identified: Identified) -> Data:
         of = zip(QUANTITIES.items(), errors.model, errors.still, strict=True)
         data[where] = {"starts": errors.starts, "horizon_s": errors.horizon}
         for i, ((name, unit), model, still) in enumerate(of):
-            data[where][name.replace(" ", "_")] = {
-                "unit": unit,
-                "model": model,
-                "if_nothing_changes": still,
-            }
+            said = {"unit": unit, "model": model, "if_nothing_changes": still}
             if where in identified.simplest:
-                simplest = identified.simplest[where].model[i]
-                data[where][name.replace(" ", "_")]["thrust_and_drag"] = simplest
+                said["thrust_and_drag"] = identified.simplest[where].model[i]
+            data[where][name.replace(" ", "_")] = said
     told: Data = plain(data)
     return told
 
@@ -134,7 +130,7 @@ def write_identified(identified: Identified, path: Path) -> list[Path]:
     return written
 
 
-def fitted(identified: Identified, piece: MotionPiece) -> tuple[Array, Array]:
+def fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
 
     Both are (n, 6), behind the picture's low-pass and within the band of the fit.

@@ -16,12 +16,12 @@ from scipy.stats import t as student
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
-from .channels import MotionPiece
+from ..logs.table import Values
+from .channels import Pieces
 from .columns import BalanceSpectra, Drive, balance
 from .model import Model, jacobian
 from .spectra import LOSS, TAPERS, residual_spectra
 
-Values = Mapping[str, float]
 Function = Callable[[Values], float]
 Interval = tuple[float, float, float]  # value, low and high
 
@@ -97,7 +97,7 @@ class VehicleFit:
         return here, here - size, here + size
 
 
-def solve(pieces: list[MotionPiece], drive: Drive, model: Model, start: Array) -> VehicleFit:
+def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFit:
     """Return the fit of Gauss-Newton from ``start`` (p,)."""
     theta = start.copy()
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.support.random_tables import flight, random_table, save
 from windwrench.cli import app
@@ -33,7 +34,7 @@ def test_check_proposes_a_map_and_writes_the_log_by_it(tmp_path, written, capsys
     ours = tmp_path / "ours.csv.gz"
     run(capsys, "check", theirs, "--map", map_file, "--write", ours, "--out", tmp_path / "by_map")
     log = read_log(ours)
-    np.testing.assert_allclose(log.position, written.log.position, atol=1e-9)
+    assert_allclose(log.position, written.log.position, atol=1e-9)
     again = run(capsys, "check", ours, "--out", tmp_path / "again")
     assert again["read_by"] == "this kit's own format"
     assert again["vehicle"] == "ardrone2"

@@ -10,6 +10,7 @@ from io import StringIO
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.live.stream import Running, as_lines, flight
 from tests.live.test_pipeline import offline
@@ -148,5 +149,5 @@ def test_its_user_or_its_system_ends_it_and_loses_nothing(tmp_path, sent, taken,
     assert "700 estimates over 3.5 s" in said
     assert said.rstrip().endswith(word)
     found = np.array([line.split(b",")[:7] for line in lines[1:]], dtype=float)
-    np.testing.assert_allclose(found, offline(flight())[:700], atol=1e-9, rtol=0)
+    assert_allclose(found, offline(flight())[:700], atol=1e-9, rtol=0)
     assert len(read_log(log).t) == 700

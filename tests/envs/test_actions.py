@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from numpy.testing import assert_allclose, assert_array_equal
 
 import windwrench  # noqa: F401  registers the environments
 from tests.support.vector_flights import TASKS
@@ -43,12 +44,12 @@ def test_zero_hovers(action, vehicle):
     zero = [0.0] * (3 if action in ("velocity", "acceleration") else 4)
     env, info, _ = flying(action, 0.5, zero, vehicle=vehicle)
     assert info["error"] < 0.1
-    np.testing.assert_allclose(env.loop.command, load_vehicle(vehicle).hover_rate, rtol=0.05)
+    assert_allclose(env.loop.command, load_vehicle(vehicle).hover_rate, rtol=0.05)
 
 
 def test_a_velocity_and_an_acceleration_are_flown():
     env, *_ = flying("velocity", 1.5, [0.5, -0.3, 0.2])
-    np.testing.assert_allclose(env.loop.velocity, [0.5, -0.3, 0.2], atol=0.1)
+    assert_allclose(env.loop.velocity, [0.5, -0.3, 0.2], atol=0.1)
     env, info, _ = flying("acceleration", 3.0, [0.25, 0.0, 0.0])
     assert info["command"].tolist() == [1.0, 0.0, 0.0]
     assert env.loop.position[0] - 2.3 == pytest.approx(1.0 / 4.0, abs=0.08)  # over the loop's gain
@@ -56,7 +57,7 @@ def test_a_velocity_and_an_acceleration_are_flown():
 
 def test_an_attitude_is_roll_and_pitch_at_the_present_yaw_yaw_rate_and_thrust():
     env, info, _ = flying("attitude", 0.4, [0.4, -0.2, 0.25, 0.0])
-    np.testing.assert_allclose(info["command"], [0.2, -0.1, 0.5, 9.81], rtol=1e-6)
+    assert_allclose(info["command"], [0.2, -0.1, 0.5, 9.81], rtol=1e-6)
     R = turned(env.loop)
     yaw = np.arctan2(R[1, 0], R[0, 0])
     c, s = np.cos(yaw), np.sin(yaw)
@@ -69,8 +70,8 @@ def test_an_attitude_is_roll_and_pitch_at_the_present_yaw_yaw_rate_and_thrust():
 def test_rates_are_of_the_body_and_thrust_lifts():
     env, info, _ = flying("rates", 0.15, [0.1, -0.05, 0.2, 0.5])
     wanted = info["command"]
-    np.testing.assert_allclose(wanted[:3], [11 / 18, -5.5 / 18, 0.4], rtol=1e-6)
-    np.testing.assert_allclose(env.loop.motion[1][3:5], wanted[:2], rtol=0.15)
+    assert_allclose(wanted[:3], [11 / 18, -5.5 / 18, 0.4], rtol=1e-6)
+    assert_allclose(env.loop.motion[1][3:5], wanted[:2], rtol=0.15)
     assert env.loop.motion[1][5] == pytest.approx(wanted[2], rel=0.5)  # yaw is slow
     assert wanted[3] == pytest.approx(9.81 * 1.35)
     assert env.loop.velocity[2] > 0.2
@@ -79,27 +80,27 @@ def test_rates_are_of_the_body_and_thrust_lifts():
 def test_rotors_are_rotor_speeds_from_none_to_the_largest():
     env, info, _ = flying("rotors", 0.1, [1.0, 1.0, 1.0, 1.0])
     assert info["command"] == pytest.approx(load_vehicle("ardrone2").omega_max)
-    np.testing.assert_array_equal(env.loop.command, info["command"])
+    assert_array_equal(env.loop.command, info["command"])
     _, info, _ = flying("rotors", 0.1, [-1.0, -0.5, 0.0, 0.0])
     hover = load_vehicle("ardrone2").hover_rate
-    np.testing.assert_allclose(info["command"], hover * np.array([0.0, 0.5, 1.0, 1.0]))
+    assert_allclose(info["command"], hover * np.array([0.0, 0.5, 1.0, 1.0]))
 
 
 def test_observations_are_of_the_estimate_relative_to_the_reference():
     env, _, seen = flying("attitude", 0.4, [0.4, 0.0, 0.0, 0.0], observation="all", normalize=False)
     loop, row = env.loop, env.many.episodes.references[0, 80]
-    np.testing.assert_allclose(seen[:3], row[:3] - loop.state[:3], atol=1e-6)
-    np.testing.assert_allclose(seen[3:6], -loop.state[7:10], atol=1e-6)
-    np.testing.assert_allclose(seen[6:9], [0.2, 0.0, 0.0], atol=0.03)
-    np.testing.assert_allclose(seen[9:12], loop.state[10:13], atol=1e-6)
-    np.testing.assert_allclose(seen[12:15], loop.state[16:19], atol=1e-6)
-    np.testing.assert_allclose(seen[15:18], loop.state[13:16], atol=1e-6)
-    np.testing.assert_allclose(seen[18:24], [*loop.specific, *loop.thrust], rtol=1e-5)
-    np.testing.assert_allclose(seen[24:], [0.4, 0.0, 0.0, 0.0], rtol=1e-6)
+    assert_allclose(seen[:3], row[:3] - loop.state[:3], atol=1e-6)
+    assert_allclose(seen[3:6], -loop.state[7:10], atol=1e-6)
+    assert_allclose(seen[6:9], [0.2, 0.0, 0.0], atol=0.03)
+    assert_allclose(seen[9:12], loop.state[10:13], atol=1e-6)
+    assert_allclose(seen[12:15], loop.state[16:19], atol=1e-6)
+    assert_allclose(seen[15:18], loop.state[13:16], atol=1e-6)
+    assert_allclose(seen[18:24], [*loop.specific, *loop.thrust], rtol=1e-5)
+    assert_allclose(seen[24:], [0.4, 0.0, 0.0, 0.0], rtol=1e-6)
     parts = {"pose": slice(0, 12), "wrench": slice(0, 18), "imu": [*range(12), *range(18, 24)]}
     for name, some in parts.items():
         other = flying("attitude", 0.4, [0.4, 0.0, 0.0, 0.0], observation=name, normalize=False)
-        np.testing.assert_array_equal(other[2], np.concatenate([seen[some], seen[24:]]))
+        assert_array_equal(other[2], np.concatenate([seen[some], seen[24:]]))
 
 
 @pytest.mark.parametrize(
@@ -178,7 +179,7 @@ def test_five_actions_and_four_observations_on_four_tasks(task, action, observat
     twins = copy.deepcopy(env.unwrapped), pickle.loads(pickle.dumps(env.unwrapped))
     after = env.step(step)[0]
     for twin in twins:
-        np.testing.assert_array_equal(twin.step(step)[0], after)
+        assert_array_equal(twin.step(step)[0], after)
     flown = {
         mode: numbers(gym.make_vec(name, num_envs=2, **how, **given), 3)
         for mode, how in {
@@ -187,6 +188,6 @@ def test_five_actions_and_four_observations_on_four_tasks(task, action, observat
             "lanes": {"plant": "lanes"},
         }.items()
     }
-    np.testing.assert_array_equal(flown["sync"], flown["mujoco"])
-    np.testing.assert_allclose(flown["lanes"], flown["mujoco"], atol=2e-5)
+    assert_array_equal(flown["sync"], flown["mujoco"])
+    assert_allclose(flown["lanes"], flown["mujoco"], atol=2e-5)
     assert flown["lanes"].shape[2] == env.observation_space.shape[0] + 1

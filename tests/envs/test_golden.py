@@ -8,8 +8,8 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import gymnasium
-import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import windwrench  # noqa: F401 - registers the environment
 from tests.support.golden_trajectories import GOLDEN, GOLDEN_TASKS, SEED, SEED_OF_TASKS, trajectory
@@ -34,7 +34,7 @@ def test_trajectories_are_those_of_the_environments_version(task, scenario):
     now, golden = trajectory(task, scenario), KEPT[task]["scenarios"][scenario]
     tolerances = TOLERANCE if task == "FanTracking" else TOLERANCE_OF_TASKS
     for name, tolerance in tolerances.items():
-        np.testing.assert_allclose(
+        assert_allclose(
             now[name],
             golden[name],
             rtol=0,

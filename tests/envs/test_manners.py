@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
+from numpy.testing import assert_array_equal, assert_equal
 
 from tests.support.vector_flights import fly_alone, make, make_single
 from windwrench.dynamics import EffectSetting
@@ -36,18 +37,18 @@ def seen(**kwargs):
 def test_views_are_the_frame_over_fixed_scales_a_part_of_it_and_the_last_ones():
     """The history begins full."""
     frames, history, scaled = seen(), seen(observe="history"), seen(normalize=True)
-    np.testing.assert_array_equal(scaled, frames / np.float32(SCALES))
+    assert_array_equal(scaled, frames / np.float32(SCALES))
     assert 0.05 < np.abs(scaled[:, [0, 5, 6, 7]]).mean() < 2.0
-    np.testing.assert_array_equal(seen(observe="wrench-without-fx"), frames[:, 1:])
+    assert_array_equal(seen(observe="wrench-without-fx"), frames[:, 1:])
     padded = np.concatenate([np.repeat(frames[:1], FRAMES - 1, axis=0), frames])
     for k, row in enumerate(history):
-        np.testing.assert_array_equal(row.reshape(FRAMES, 8), padded[k : k + FRAMES])
+        assert_array_equal(row.reshape(FRAMES, 8), padded[k : k + FRAMES])
 
 
 def test_the_pose_alone_tells_no_wrench():
     env = FanTrackingEnv("fast", observe="pose")
     first, _ = env.reset(seed=3)
-    np.testing.assert_array_equal(first[:3], 0.0)
+    assert_array_equal(first[:3], 0.0)
     for action in ACTIONS:
         frame, *_ = env.step(action)
     state = env.loop.state
@@ -72,12 +73,12 @@ def test_episodes_follow_each_other_as_gymnasium_s_own_vector_environment_has_it
         [lambda: make_single(max_episode_steps=4, **given)] * 2, autoreset_mode=mode
     )
     assert native.metadata["autoreset_mode"] is mode
-    np.testing.assert_array_equal(native.reset(seed=5)[0], plain.reset(seed=5)[0])
+    assert_array_equal(native.reset(seed=5)[0], plain.reset(seed=5)[0])
     for action in ACTIONS[:10]:
         one, other = (envs.step(np.stack([action, -action])) for envs in (native, plain))
         for *_, infos in (one, other):  # arrays in an array of objects
             infos["final_obs"] = list(infos.get("final_obs", ()))
-        np.testing.assert_equal(one, other)
+        assert_equal(one, other)
 
 
 def test_the_stated_distribution_is_the_one_drawn_from():
@@ -99,10 +100,10 @@ def test_gymnasium_s_checker_finds_nothing_and_spaces_are_scaled(task):
     check_env(env.unwrapped, skip_render_check=True)
     kind = TASKS[task].environment
     assert env.spec.max_episode_steps == TASKS[task].decisions
-    np.testing.assert_array_equal(env.action_space.high, np.ones(env.action_space.shape))
+    assert_array_equal(env.action_space.high, np.ones(env.action_space.shape))
     bound = np.array(kind.limits, dtype=np.float32) / np.array(kind.scales, dtype=np.float32)
-    np.testing.assert_array_equal(env.observation_space.high, bound)
-    np.testing.assert_array_equal(env.observation_space.low, -bound)
+    assert_array_equal(env.observation_space.high, bound)
+    assert_array_equal(env.observation_space.low, -bound)
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -122,24 +123,24 @@ def test_an_old_id_is_the_new_one_in_si_units_which_info_has(task, plant):
     plain, scaled = made(f"{name}1", normalize=False), made(f"{name}1")
     seed = 4 if plant == "single" else [4, 5]
     (a, _), (b, told) = plain.reset(seed=seed), scaled.reset(seed=seed)
-    np.testing.assert_array_equal(old.reset(seed=seed)[0], a)
-    np.testing.assert_array_equal(told["observation"], a)
-    np.testing.assert_array_equal(told["command"], 0.0)
+    assert_array_equal(old.reset(seed=seed)[0], a)
+    assert_array_equal(told["observation"], a)
+    assert_array_equal(told["command"], 0.0)
     rng = np.random.default_rng(1)
     for _ in range(6):
         action = rng.uniform(-1.0, 1.0, scaled.action_space.shape).astype(np.float32)
         a, reward, *_ = plain.step(largest * action)
         b, other, *_, told = scaled.step(action)
-        np.testing.assert_array_equal(old.step(largest * action)[0], a)
-        np.testing.assert_array_equal(told["observation"], a)
-        np.testing.assert_array_equal(told["command"], largest * action)
-        np.testing.assert_array_equal(b, a / scales)
-        np.testing.assert_array_equal(other, reward)
+        assert_array_equal(old.step(largest * action)[0], a)
+        assert_array_equal(told["observation"], a)
+        assert_array_equal(told["command"], largest * action)
+        assert_array_equal(b, a / scales)
+        assert_array_equal(other, reward)
 
 
 def test_info_has_the_frame_of_another_view():
     frames, info = make_single(observe="history").reset(seed=3)
-    np.testing.assert_array_equal(frames[-8:], info["observation"])
+    assert_array_equal(frames[-8:], info["observation"])
 
 
 LAG = [EffectSetting("motor_lag", {"tau": 0.03}), EffectSetting("rotor_drag", {"kdx": 1e-4})]
@@ -159,10 +160,10 @@ def test_a_copy_in_flight_goes_on_like_the_original_bit_for_bit(name, how, given
     fly_alone(env)
     other = COPIES[how](env)
     fly_alone(COPIES[how](env), 2)  # what is done to one leaves the others alone
-    np.testing.assert_array_equal(fly_alone(env), fly_alone(other))
+    assert_array_equal(fly_alone(env), fly_alone(other))
     # the episodes that follow, without a seed of their own, are the same too
-    np.testing.assert_array_equal(env.reset()[0], other.reset()[0])
-    np.testing.assert_array_equal(fly_alone(env), fly_alone(other))
+    assert_array_equal(env.reset()[0], other.reset()[0])
+    assert_array_equal(fly_alone(env), fly_alone(other))
 
 
 def test_a_copy_goes_on_in_another_process(tmp_path):

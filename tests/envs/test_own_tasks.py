@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TransformReward
+from numpy.testing import assert_allclose
 
 import windwrench
 from tests.support.vector_flights import make
@@ -76,7 +77,7 @@ def test_a_task_of_ten_lines_flies_alike_in_each_way_and_is_truncated(way):
     assert info["height"] == pytest.approx(1.5, abs=0.3)
     assert np.all(info["std"] > 0.0)
     rows, infos = flown(gym.make_vec("me/Land-v0", num_envs=3, **WAYS[way]), 10)
-    np.testing.assert_allclose(rows[:, 0], alone, atol=2e-5 if way == "lanes" else 0.0)
+    assert_allclose(rows[:, 0], alone, atol=2e-5 if way == "lanes" else 0.0)
     assert not np.array_equal(rows[:, 0], rows[:, 1])
     assert infos["height"].shape == (3,)
     assert infos["reward_cost"].tolist() == [-0.1] * 3
@@ -113,11 +114,11 @@ def test_what_a_subclass_overrides_of_the_kit_s_task_holds_in_many_as_in_a_singl
     frame, _ = single.reset(seed=4)
     frames, infos = many.reset(seed=4)
     assert infos["trajectory"].tolist() == ["higher"] * 2
-    np.testing.assert_allclose(infos["reference"][0], [2.4, 0.1, 1.6])
+    assert_allclose(infos["reference"][0], [2.4, 0.1, 1.6])
     for k, action in enumerate(([5.0, 0.0, 0.0], [-7.0, 1.0, 0.0], [0.0, 0.0, 0.0])):
         frame, reward, lost, _, info = single.step(np.array(action))
         frames, rewards, losts, _, infos = many.step(np.tile(action, (2, 1)))
-        np.testing.assert_allclose(frames[0], frame, atol=2e-5)
+        assert_allclose(frames[0], frame, atol=2e-5)
         assert rewards[0] == pytest.approx(reward, abs=1e-9)
         assert info["reward_tracking"] == 2.0 / (1.0 + (info["error"] / 0.1) ** 2)
         assert info["time"] == 0.02 * (k + 1)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import EffectSetting, load_vehicle
@@ -66,11 +67,11 @@ def test_a_torque_step_turns_it_as_a_rigid_body(axis):
     rows = Bench().run(VEHICLE.rotor_speeds(VEHICLE.weight, torque), 40)
     t = TICK * np.arange(1, 41)
     alpha = torque[axis] / VEHICLE.inertia[axis, axis]
-    np.testing.assert_allclose(rows[:, 10 + axis], alpha * t, rtol=1e-9)
+    assert_allclose(rows[:, 10 + axis], alpha * t, rtol=1e-9)
     angle = Rotation.from_quat(rows[:, 3:7], scalar_first=True).as_rotvec()[:, axis]
-    np.testing.assert_allclose(angle, 0.5 * alpha * t**2, atol=alpha * TICK / SUBSTEPS * t[-1])
+    assert_allclose(angle, 0.5 * alpha * t**2, atol=alpha * TICK / SUBSTEPS * t[-1])
     others = [i for i in range(3) if i != axis]
-    np.testing.assert_allclose(rows[:, [10 + i for i in others]], 0.0, atol=1e-12)
+    assert_allclose(rows[:, [10 + i for i in others]], 0.0, atol=1e-12)
 
 
 def test_the_motors_follow_their_commands_with_the_stated_lag():
@@ -80,13 +81,13 @@ def test_the_motors_follow_their_commands_with_the_stated_lag():
         bench.run(command, 1)
         logged.append(bench.plant["z"][:4].copy())
     decay = np.exp(-TICK * np.arange(1, 31) / 0.04)[:, None]
-    np.testing.assert_allclose(logged, command + (HOVER - command) * decay, rtol=1e-12)
+    assert_allclose(logged, command + (HOVER - command) * decay, rtol=1e-12)
 
 
 def test_a_motor_turns_neither_backwards_nor_too_fast():
     bench = Bench()
     bench.run([-100.0, 1e4, 0.0, HOVER], 1)
-    np.testing.assert_allclose(bench.plant["z"][:4], [0.0, VEHICLE.omega_max, 0.0, HOVER])
+    assert_allclose(bench.plant["z"][:4], [0.0, VEHICLE.omega_max, 0.0, HOVER])
 
 
 def test_the_body_gets_the_thrust_of_a_rate_that_is_not_rounded():
@@ -151,15 +152,15 @@ def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backw
     assert rows[:, 3].min() >= 0.0
     flips = np.count_nonzero(np.diff(np.sign(rows[:, 6])))
     assert flips > 50  # of 400 samples; noise alone decides the sign
-    np.testing.assert_allclose(np.linalg.norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
+    assert_allclose(np.linalg.norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
 
 
 def test_the_pose_has_the_noise_that_the_vehicle_s_motion_capture_states():
     rows = sensed([1.0, 0.0, 0.0, 0.0], 3000)
     angles = Rotation.from_quat(rows[:, 3:], scalar_first=True).as_rotvec()
     mocap = VEHICLE.mocap
-    np.testing.assert_allclose(angles.std(axis=0), mocap.sigma_att_rad, rtol=0.06)
-    np.testing.assert_allclose(rows[:, :3].std(axis=0), mocap.sigma_pos_m, rtol=0.06)
+    assert_allclose(angles.std(axis=0), mocap.sigma_att_rad, rtol=0.06)
+    assert_allclose(rows[:, :3].std(axis=0), mocap.sigma_pos_m, rtol=0.06)
 
 
 def test_the_filter_flies_on_through_dropouts():
@@ -168,8 +169,8 @@ def test_the_filter_flies_on_through_dropouts():
     loop.reset(rng, np.array([0.0, 0.0, 1.5]), math.pi)
     loop.run(rng.standard_normal((2000, NOISE)))
     assert loop.healthy()
-    np.testing.assert_allclose(loop.position, [0, 0, 1.5], atol=0.05)
-    np.testing.assert_allclose(loop.state[:3], loop.position, atol=0.01)
+    assert_allclose(loop.position, [0, 0, 1.5], atol=0.05)
+    assert_allclose(loop.state[:3], loop.position, atol=0.01)
     assert np.linalg.eigvalsh(loop.covariance)[0] > 0
 
 
@@ -179,8 +180,8 @@ def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
         EffectSetting("constant_torque", {"tz": 0.01}),
     )
     log = record_flight(VEHICLE, effects, "hover", 3.0, 0, QUIET)
-    np.testing.assert_allclose(log["force"][1:], np.tile([0.1, 0, 0], (600, 1)), atol=1e-12)
-    np.testing.assert_allclose(log["torque"][1:, 2], 0.01, rtol=1e-3)
+    assert_allclose(log["force"][1:], np.tile([0.1, 0, 0], (600, 1)), atol=1e-12)
+    assert_allclose(log["torque"][1:, 2], 0.01, rtol=1e-3)
 
 
 @pytest.mark.parametrize("trajectory", sorted(TRAJECTORIES))

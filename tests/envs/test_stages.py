@@ -5,6 +5,7 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.vector_flights import TASKS, fly, fly_alone, make, make_single
 from windwrench.dynamics import load_vehicle
@@ -26,7 +27,7 @@ def alone(name, **given):
 def test_stage_by_stage_the_flight_is_that_of_the_compiled_call_bit_for_bit(name):
     seen = []
     watch = Stage("watch", lambda loop: seen.append(loop.ticks), before="estimate")
-    np.testing.assert_array_equal(alone(name, stages=[watch]), alone(name))
+    assert_array_equal(alone(name, stages=[watch]), alone(name))
     assert seen[0] == -300
     assert np.all(np.diff(seen) == 1)
 
@@ -35,7 +36,7 @@ def test_so_it_flies_in_a_vector_of_environments():
     given = {"stages": [Stage("push", push, before="actuate")]}
     single = [lambda: make_single(**given)] * 2
     many = fly(make(2, **given), 4)
-    np.testing.assert_array_equal(many, fly(gym.vector.SyncVectorEnv(single), 4))
+    assert_array_equal(many, fly(gym.vector.SyncVectorEnv(single), 4))
     assert not np.array_equal(many, fly(make(2), 4))
 
 
@@ -105,8 +106,8 @@ def test_rotors_follow_commands_and_a_pose_is_one_of_so_many_ticks_ago(ticks):
         for loop, before in ticking(replace(QUIET, actuator_delay=late, pose_delay=late), 60)
     ]
     commands, speeds, places, measured = (np.array(part) for part in zip(*flown, strict=True))
-    np.testing.assert_array_equal(speeds[ticks:], commands[: 60 - ticks])
-    np.testing.assert_array_equal(measured[ticks:], places[: 60 - ticks])
+    assert_array_equal(speeds[ticks:], commands[: 60 - ticks])
+    assert_array_equal(measured[ticks:], places[: 60 - ticks])
 
 
 def test_an_accelerometer_tells_what_it_felt_so_many_ticks_ago():
@@ -115,7 +116,7 @@ def test_an_accelerometer_tells_what_it_felt_so_many_ticks_ago():
         record = loop.record[0]
         felt.append(record["plant"]["rotation"].T @ loop.world.xfrc[:3] / VEHICLE.mass)
         told.append(record["flight"]["rotation"].T @ loop.specific)
-    np.testing.assert_allclose(told[3:], felt[:-3], atol=1e-9)
+    assert_allclose(told[3:], felt[:-3], atol=1e-9)
     assert np.abs(np.array(told) - np.array(felt)).max() > 0.01
 
 
@@ -141,5 +142,5 @@ def test_lanes_are_late_as_mujoco_is_with_delays_stated_and_drawn(task):
     ):
         for plant in ("mujoco", "lanes"):
             flown[how, plant] = fly(make(3, plant, task, **given), 6, seed=7)
-        np.testing.assert_allclose(flown[how, "lanes"], flown[how, "mujoco"], atol=2e-5)
+        assert_allclose(flown[how, "lanes"], flown[how, "mujoco"], atol=2e-5)
     assert np.abs(flown["as stated", "lanes"] - flown["at once", "lanes"]).max() > 1e-3

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import gymnasium as gym
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import windwrench  # noqa: F401  registers the environments
 from tests.support.vector_flights import fly_alone
@@ -36,7 +37,7 @@ def test_the_docstring_s_tables_are_the_spaces(cls):
         first, last = int(row[0]), int(row[1] or row[0])
         limits[first : last + 1] = float(row[2].split("|")[1])
     assert rows
-    np.testing.assert_array_equal(env.observation_space.high, limits.astype(np.float32))
+    assert_array_equal(env.observation_space.high, limits.astype(np.float32))
 
 
 @pytest.mark.parametrize(
@@ -71,7 +72,7 @@ def test_a_steady_wind_pushes_as_its_drag_says_and_all_see_it():
     for _ in range(150):
         observation, _, lost, _, info = env.step(np.zeros(3))
     assert not lost
-    np.testing.assert_allclose(info["wind"], [4.0, 0.0, 0.0], atol=1e-9)
+    assert_allclose(info["wind"], [4.0, 0.0, 0.0], atol=1e-9)
     expected = 4 * 0.020 * 4.0 + 0.5 * 1.2 * 0.060 * 16.0  # rotors, and the hull
     assert info["force"][0] == pytest.approx(expected, abs=0.15)
     assert observation[seen.FORCE][0] == pytest.approx(expected, abs=0.2)
@@ -86,7 +87,7 @@ def test_a_wind_of_one_s_own_blows_as_the_kit_s_own_does():
         env = WindHoverEnv("calm", winds=[wind])
         env.reset(seed=0)
         *_, info = env.step(np.zeros(3))
-        np.testing.assert_allclose(info["wind"], [1.0, -0.5, 0.2])
+        assert_allclose(info["wind"], [1.0, -0.5, 0.2])
 
 
 def test_a_lost_vehicle_ends_the_episode():
@@ -129,8 +130,8 @@ def test_an_episode_and_numpy_s_global_random_state_leave_each_other_alone():
     np.random.seed(123)  # noqa: NPY002
     expected = np.random.random(3)  # noqa: NPY002
     np.random.seed(123)  # noqa: NPY002
-    np.testing.assert_array_equal(fly_alone(env, 15, 5), first)
-    np.testing.assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
+    assert_array_equal(fly_alone(env, 15, 5), first)
+    assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
 
 
 def test_after_a_bad_fan_path_which_is_named_there_is_no_step():

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from numba import njit
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.vector_flights import TASKS, fly, make, make_single
 from windwrench.dynamics import InputError, load_vehicle
@@ -33,7 +34,7 @@ def test_the_bits_depend_on_neither_number_nor_threads(given, threads):
     alone = fly(make(many, **given), decisions)
     for other in (make(2, **given), make(many, threads=threads, **given)):
         count = other.num_envs
-        np.testing.assert_array_equal(fly(other, decisions), alone[:, :count])
+        assert_array_equal(fly(other, decisions), alone[:, :count])
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "lanes"])
@@ -51,7 +52,7 @@ def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_pa
     assert lost.tolist() == infos["lost"].tolist() == [False, True, False]
     assert frames in envs.observation_space
     assert np.isfinite([rewards, infos["offset"]]).all()
-    np.testing.assert_array_equal(frames[[0, 2]], healthy.step(actions)[0][[0, 2]])
+    assert_array_equal(frames[[0, 2]], healthy.step(actions)[0][[0, 2]])
     _, rewards, lost, _, infos = envs.step(actions)
     assert not lost.any()
     assert (rewards[1], infos["time"][1]) == (0.0, 0.0)
@@ -68,14 +69,14 @@ def test_many_environments_want_a_reset_of_all_first():
 def test_seeds_may_be_listed_and_a_part_reset():
     envs = make(3)
     frames, _ = envs.reset(seed=[7, 5, 7])
-    np.testing.assert_array_equal(frames[0], frames[2])
+    assert_array_equal(frames[0], frames[2])
     assert not np.array_equal(frames[0], frames[1])
     for _ in range(2):
         envs.step(np.zeros((3, 1), np.float32))
     again, infos = envs.reset(
         seed=[7, None, None], options={"reset_mask": np.array([True, False, False])}
     )
-    np.testing.assert_array_equal(again[0], frames[0])
+    assert_array_equal(again[0], frames[0])
     assert infos["time"].tolist() == [0.0, pytest.approx(0.16), pytest.approx(0.16)]
 
 
@@ -110,7 +111,7 @@ def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():
 def test_side_by_side_is_single_bit_for_bit_and_lanes_to_rounding(task, scenario):
     many = fly(make(3, "mujoco", task, scenario=scenario), 6)
     alone = [lambda: make_single(task, scenario=scenario)] * 3
-    np.testing.assert_array_equal(fly(gym.vector.SyncVectorEnv(alone), 6), many)
+    assert_array_equal(fly(gym.vector.SyncVectorEnv(alone), 6), many)
     difference = np.abs(fly(make(3, "lanes", task, scenario=scenario), 6) - many)
     size = alone[0]().observation_space.shape[0]  # of a frame, which is of single precision
     assert difference[..., :size].max() < 2e-5
@@ -124,7 +125,7 @@ def test_a_copy_of_many_goes_on_as_they_do(task, plant):
     other = copy.deepcopy(envs)
     still = np.zeros(envs.action_space.shape, dtype=np.float32)
     for _ in range(5):
-        np.testing.assert_array_equal(envs.step(still)[0], other.step(still)[0])
+        assert_array_equal(envs.step(still)[0], other.step(still)[0])
 
 
 SET = (
@@ -180,5 +181,5 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
         data.xfrc_applied[model.body("vehicle").id] = wrench[:, lane]
         for _ in range(round(SUBSTEPS / TICK)):
             mujoco.mj_step(model, data)
-        np.testing.assert_allclose(blocks.loops["qpos"][0, :, lane], data.qpos, atol=1e-9)
-        np.testing.assert_allclose(blocks.loops["qvel"][0, :, lane], data.qvel, atol=1e-8)
+        assert_allclose(blocks.loops["qpos"][0, :, lane], data.qpos, atol=1e-9)
+        assert_allclose(blocks.loops["qvel"][0, :, lane], data.qvel, atol=1e-8)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal, assert_equal
 from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
 
@@ -68,9 +69,9 @@ def test_spectra_along_the_mean_wind_are_those_of_the_specification(form, case):
 def test_low_altitude_is_the_specification_s_worked_out():
     sigma, length = low_altitude(100 * FOOT, 10.0)
     part = 0.177 + 0.0823
-    np.testing.assert_allclose(sigma, [1.0 / part**0.4, 1.0 / part**0.4, 1.0])
-    np.testing.assert_allclose(length / FOOT, [100 / part**1.2, 100 / part**1.2, 100.0])
-    np.testing.assert_array_equal(low_altitude(0.5, 3.0)[1], low_altitude(10 * FOOT, 3.0)[1])
+    assert_allclose(sigma, [1.0 / part**0.4, 1.0 / part**0.4, 1.0])
+    assert_allclose(length / FOOT, [100 / part**1.2, 100 / part**1.2, 100.0])
+    assert_array_equal(low_altitude(0.5, 3.0)[1], low_altitude(10 * FOOT, 3.0)[1])
 
 
 def test_the_air_keeps_its_volume():
@@ -87,9 +88,9 @@ def test_shear_grows_with_height():
     points = np.array([[0, 0, h * FOOT] for h in (0.1, 3.0, 20.0, 200.0)])
     log = Shear((0, 5.0, 0), law="log").velocity(points, 0.0)
     above = np.log(np.maximum(points[:, 2] / FOOT, 0.15) / 0.15)
-    np.testing.assert_allclose(log[:, 1], 5.0 * above / math.log(20 / 0.15), atol=1e-12)
+    assert_allclose(log[:, 1], 5.0 * above / math.log(20 / 0.15), atol=1e-12)
     power = Shear((5.0, 0, 0), reference=10.0, law="power", exponent=0.2)
-    np.testing.assert_allclose(power.velocity(points, 0.0)[:, 0], 5.0 * (points[:, 2] / 10) ** 0.2)
+    assert_allclose(power.velocity(points, 0.0)[:, 0], 5.0 * (points[:, 2] / 10) ** 0.2)
 
 
 def test_a_gust_comes_and_goes_by_its_cosine():
@@ -97,14 +98,14 @@ def test_a_gust_comes_and_goes_by_its_cosine():
     for falls, last in ((True, 0), (False, 1)):
         gust = Gust((0, 0, -2.0), 3.0, **given, falls=falls)
         seen = [gust.velocity([[2, 7, 1]], t)[0, 2] for t in (1.0, 1.5, 1.875, 2.25, 3.2)]
-        np.testing.assert_allclose(seen, np.multiply(-2.0, [0, 0, 0.5, 1, last]), atol=1e-12)
+        assert_allclose(seen, np.multiply(-2.0, [0, 0, 0.5, 1, last]), atol=1e-12)
 
 
 def test_one_fan_of_a_wall_is_the_fan_of_the_environment():
     wall = FanWall([FAN.speed], 1, 1, radius=FAN.radius, hub_radius=FAN.hub_radius, turbulence=0.0)
     points = np.random.default_rng(3).uniform([0.1, -1.5, 0.0], [6.0, 1.5, 2.5], (50, 3))
     expected = [wind(*point) for point in points]
-    np.testing.assert_allclose(wall.velocity(points, 3.0), expected, atol=1e-12)
+    assert_allclose(wall.velocity(points, 3.0), expected, atol=1e-12)
 
 
 def test_a_wall_adds_momentum_and_turns_with_its_direction():
@@ -114,9 +115,9 @@ def test_a_wall_adds_momentum_and_turns_with_its_direction():
 
     one, other, both = blown((4, 0)), blown((0, 3)), blown((4, 3))
     assert both[0] == pytest.approx(math.hypot(one[0], other[0]))
-    np.testing.assert_allclose(both[1:], one[1:] + other[1:])
+    assert_allclose(both[1:], one[1:] + other[1:])
     turned = blown((4, 3), (-0.4, 2.0, 0.9), direction=(0, 1, 0))
-    np.testing.assert_allclose(turned, [-both[1], both[0], both[2]], atol=1e-12)
+    assert_allclose(turned, [-both[1], both[0], both[2]], atol=1e-12)
 
 
 def test_a_wash_carries_its_vehicle():
@@ -136,7 +137,7 @@ def test_winds_add_up():
     points = np.random.default_rng(5).uniform(-2, 2, (4, 3))
     whole = parts[0] + parts[1] + parts[2]
     assert isinstance(whole, Wind)
-    np.testing.assert_allclose(
+    assert_allclose(
         whole.velocity(points, 0.3), sum(p.velocity(points, 0.3) for p in parts), atol=1e-12
     )
 
@@ -157,7 +158,7 @@ def test_a_wind_of_one_s_own_flies_as_a_grid():
         ([[5.0, 0.0, 1.0]], [[1.0, 0.0, 1.0]], (9.0, 2.0)),  # beyond the ends
     ):
         seen, expected = grid.velocity(there, when[0]), Vortex().velocity(at, when[1])
-        np.testing.assert_allclose(seen, expected, atol=1e-12)
+        assert_allclose(seen, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", [".npz", ".nc"])
@@ -167,7 +168,7 @@ def test_a_grid_comes_back_from_its_file(tmp_path, kind):
     grid = on_grid(Vortex(), (-1, -1, 0), (1, 1, 2), 0.5, times=[0.0, 1.0])
     path = write_wind(grid, tmp_path / f"wind{kind}")
     again = read_wind(path)
-    np.testing.assert_equal((again.wind, *again.axes), (grid.wind, *grid.axes))
+    assert_equal((again.wind, *again.axes), (grid.wind, *grid.axes))
 
 
 def test_a_netcdf_of_another_order_and_without_a_time_is_read(tmp_path):
@@ -177,7 +178,7 @@ def test_a_netcdf_of_another_order_and_without_a_time_is_read(tmp_path):
     data = xarray.Dataset({n: (("z", "y", "x"), k * u) for k, n in enumerate("uvw")}, coords=axes)
     data.to_netcdf(tmp_path / "a.nc")
     wind = read_wind(tmp_path / "a.nc")
-    np.testing.assert_allclose(wind.velocity([[1.5, 1.0, 1.0]], 4.0), [[0.0, 19.0, 38.0]])
+    assert_allclose(wind.velocity([[1.5, 1.0, 1.0]], 4.0), [[0.0, 19.0, 38.0]])
 
 
 def test_a_file_that_lacks_an_axis_or_numbers_is_named(tmp_path):
@@ -212,7 +213,7 @@ def test_the_drag_lies_along_the_wind_that_the_moving_vehicle_meets():
     far = 5.0  # beside the jet
     F = wrench(far, velocity=(1.0, 0.0, 0.0))[:3]
     # four rotors at 0.020 N/(m/s) and the hull's 0.5 rho CdA u^2
-    np.testing.assert_allclose(F, [-(4 * 0.020 + 0.5 * 1.2 * 0.060), 0, 0], atol=1e-12)
+    assert_allclose(F, [-(4 * 0.020 + 0.5 * 1.2 * 0.060), 0, 0], atol=1e-12)
 
 
 def test_the_momentum_flux_is_the_same_at_every_distance():
@@ -222,7 +223,7 @@ def test_the_momentum_flux_is_the_same_at_every_distance():
         for x in (0.4, 1.0, 1.7, 2.3, 3.0)
     ]
     disc = np.pi * (FAN.radius**2 - FAN.hub_radius**2) * FAN.speed**2
-    np.testing.assert_allclose(flux, disc, rtol=0.005)
+    assert_allclose(flux, disc, rtol=0.005)
 
 
 def test_the_wrench_does_not_depend_on_the_vehicle_s_yaw():

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import InputError
@@ -39,10 +40,10 @@ def test_pyflyt_and_rotorpy_get_the_same_field():
     # as Aviary makes and asks for it
     field = pyflyt_wind_type(wind)(np_random=np.random.default_rng(0))
     for one in (field, PyFlytWind(wind)):
-        np.testing.assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
+        assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
     wind = FanWall(np.full(9, 4.0))
     seen = RotorPyWind(wind).update(0.4, np.array([2.0, 0.1, 1.2]))
-    np.testing.assert_array_equal(seen, wind.velocity([[2.0, 0.1, 1.2]], 0.4)[0])
+    assert_array_equal(seen, wind.velocity([[2.0, 0.1, 1.2]], 0.4)[0])
 
 
 def still(time=0.0):
@@ -54,12 +55,12 @@ def still(time=0.0):
 def test_a_wind_pushes_and_a_shear_turns():
     force, torque = still(time=0.5)
     along = 4.0 * DRAG * (3.5 + 2.0 * PLACE[:, 1])
-    np.testing.assert_allclose(force, np.column_stack([along, 0 * along, 0 * along]), atol=1e-12)
+    assert_allclose(force, np.column_stack([along, 0 * along, 0 * along]), atol=1e-12)
     # sum of -y F_x over four rotors at y = arm / sqrt 2
-    np.testing.assert_allclose(torque, [[0, 0, -4 * DRAG * 2.0 * ARM**2 / 2]] * 2, atol=1e-12)
+    assert_allclose(torque, [[0, 0, -4 * DRAG * 2.0 * ARM**2 / 2]] * 2, atol=1e-12)
     calm = WindDrag(Turbulence(0, 1e-12, 1.0, (1, 0, 0)), ARM, DRAG)
     force, torque = calm.wrench(0.0, PLACE, ROTATION, VELOCITY, RATE)
-    np.testing.assert_allclose(force, -4 * DRAG * VELOCITY, atol=1e-10)
+    assert_allclose(force, -4 * DRAG * VELOCITY, atol=1e-10)
     assert np.all(np.sum(torque * RATE, axis=1) < 0.0)  # drag brakes
 
 
@@ -90,7 +91,7 @@ def test_crazyflow_gets_force_and_torque_of_all_worlds():
     data = Tree(states=states, core=Tree(steps=np.full((2, 1), 250), freq=500))
     blown = blow_crazyflow(data, WindDrag(Sheared(), ARM, DRAG)).states
     for seen, wanted in zip((blown.force, blown.torque), expected(0.5), strict=True):
-        np.testing.assert_allclose(seen[:, 0], wanted, atol=1e-12)
+        assert_allclose(seen[:, 0], wanted, atol=1e-12)
     assert blown.pos is states.pos
 
 
@@ -119,8 +120,8 @@ def test_pybullet_drones_get_force_and_torque(monkeypatch):
     blow_pybullet_drones(env, drag)
     force, torque = expected(0.5)
     for i, body in enumerate(env.DRONE_IDS):
-        np.testing.assert_allclose(forces[i], [body, -1, *force[i], *PLACE[i], 2, 1])
-        np.testing.assert_allclose(torques[i], [body, -1, *torque[i], 2, 1])
+        assert_allclose(forces[i], [body, -1, *force[i], *PLACE[i], 2, 1])
+        assert_allclose(torques[i], [body, -1, *torque[i], 2, 1])
     env.PYB_STEPS_PER_CTRL, env.CTRL_FREQ = 5, 48
     with pytest.raises(InputError, match="expected ctrl_freq equal to pyb_freq, got 48 and 240 Hz"):
         blow_pybullet_drones(env, drag)

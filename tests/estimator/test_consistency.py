@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from tests.support.model_flights import (
@@ -126,15 +127,15 @@ def test_the_filter_stays_as_it_is_and_says_in_hover_what_follows_by_hand(make):
         ukf.reset((0, 0, 1), (1, 0, 0, 0))
     for _ in range(1000):
         a, b = (u.step([VEHICLE.hover_rate] * 4, (0, 0, 1), (1, 0, 0, 0)) for u in (exact, stated))
-    np.testing.assert_array_equal(a.state, b.state)
-    np.testing.assert_array_equal(a.covariance, b.covariance)
-    np.testing.assert_array_equal(a.std_force, a.std[15:])
+    assert_array_equal(a.state, b.state)
+    assert_array_equal(a.covariance, b.covariance)
+    assert_array_equal(a.std_force, a.std[15:])
     turn = VEHICLE.weight * VEHICLE.arm_l * known.rotor / 2.0
     lift = VEHICLE.weight * np.sqrt(known.mass**2 + known.thrust**2 + known.rotor**2 / 4.0)
-    np.testing.assert_allclose(b.model_std, [turn, turn, 0, 0, 0, lift], rtol=1e-4, atol=1e-9)
-    np.testing.assert_array_equal(b.std_force, np.hypot(b.std[15:], b.model_std[3:]))
+    assert_allclose(b.model_std, [turn, turn, 0, 0, 0, lift], rtol=1e-4, atol=1e-9)
+    assert_array_equal(b.std_force, np.hypot(b.std[15:], b.model_std[3:]))
 
 
 def test_the_parts_of_what_a_model_does_not_know_add_up():
     commanded = replace(VEHICLE, omega_source="commanded")
-    np.testing.assert_allclose(sum(factors_alone(commanded).values()), factors_of(commanded))
+    assert_allclose(sum(factors_alone(commanded).values()), factors_of(commanded))

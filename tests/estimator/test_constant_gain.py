@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.flights import fly, yawing_flight
 from tests.support.model_flights import ANISOTROPIC
@@ -86,7 +87,7 @@ def test_after_a_gap_it_is_honest_at_any_heading(turning, through_a_gap):
     full, constant, _ = through_a_gap
     rise, first, last = 200, constant[GAP[0] - 1], constant[GAP[-1] - 1]
     assert all(np.isnan(e.nis) for e in constant[GAP[0] - 1 : GAP[-1]])
-    np.testing.assert_array_equal(first.force, last.force)
+    assert_array_equal(first.force, last.force)
     assert np.linalg.norm(last.position - first.position) > 0.01
     deviations = [np.sqrt(np.diag(e[GAP[-1] - 1].covariance)) for e in (full, constant)]
     ratio = deviations[1] / deviations[0]
@@ -130,7 +131,7 @@ def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
         f.reset([0, 0, 1], [1, 0, 0, 0])
         found.append([f.step(speeds, *pose) for pose in zip(position, attitude, strict=True)])
     assert_close(*(estimates[2500:] for estimates in found), 0.1)
-    np.testing.assert_allclose(np.diag(constant.covariance), np.diag(full.covariance), rtol=1e-3)
+    assert_allclose(np.diag(constant.covariance), np.diag(full.covariance), rtol=1e-3)
 
 
 def test_a_gap_widens_its_covariance_with_the_declared_effects():
@@ -144,5 +145,5 @@ def test_a_gap_widens_its_covariance_with_the_declared_effects():
             e = f.step(np.full(4, vehicle.hover_rate), *pose)
         deviations.append(np.sqrt(np.diag(e.covariance))[9:11])  # of the horizontal velocity
     full, constant, free = deviations
-    np.testing.assert_allclose(constant, full, rtol=1e-3)
+    assert_allclose(constant, full, rtol=1e-3)
     assert np.all(free > 1.1 * constant)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support import flights
 from tests.support.flights import PERIOD, matrix, yawing_flight
@@ -223,7 +224,7 @@ def test_biases_are_found_and_cost_nothing():
     assert np.all(np.abs(f.accelerometer_bias + 0.1) < 4 * f.accelerometer_bias_std)
     assert np.all(f.gyro_bias_std < 0.002)
     assert np.all(f.accelerometer_bias_std < 0.02)
-    np.testing.assert_allclose(f.estimate.force, g.estimate.force, atol=0.003)
+    assert_allclose(f.estimate.force, g.estimate.force, atol=0.003)
 
 
 @pytest.mark.parametrize("posed", [True, False])
@@ -248,12 +249,12 @@ def test_an_accelerometer_says_nothing_while_the_rotors_are_unknown():
         P = f.covariance
         e = f.correct_imu(accelerometer=[0.0, 0.0, VEHICLE.gravity])
         assert np.isnan(e.nis)
-        np.testing.assert_array_equal(e.force, 0.0)
-        np.testing.assert_array_equal(f.covariance, P)
+        assert_array_equal(e.force, 0.0)
+        assert_array_equal(f.covariance, P)
         e = f.correct_imu(np.zeros(3), [0.0, 0.0, 30.0])
         assert e.nis == 0.0  # of the gyro
         assert e.covariance[3, 3] < P[3, 3]
-        np.testing.assert_array_equal(e.force, 0.0)
+        assert_array_equal(e.force, 0.0)
         # from the first step on it does
         f.predict(np.full(4, VEHICLE.hover_rate))
         e = f.correct_imu(accelerometer=[0.0, 0.0, VEHICLE.gravity + 0.1])
@@ -272,11 +273,11 @@ def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
         )
         one, other = f.step(speeds, x, q), g.step(speeds, x, q)
         # nor do biases that nothing measures change the pose's part
-        np.testing.assert_array_equal(one.state, other.state)
-        np.testing.assert_array_equal(one.covariance, other.covariance)
+        assert_array_equal(one.state, other.state)
+        assert_array_equal(one.covariance, other.covariance)
     assert f.covariance.shape == (18, 18)
-    np.testing.assert_array_equal(f.gyro_bias, 0.0)
-    np.testing.assert_allclose(f.gyro_bias_std, UKFTuning().gyro_bias_std)
+    assert_array_equal(f.gyro_bias, 0.0)
+    assert_allclose(f.gyro_bias_std, UKFTuning().gyro_bias_std)
     assert isinstance(f.step_address, int)
     with pytest.raises(InputError, match="IMU"):
         _ = g.step_address
@@ -293,10 +294,10 @@ def test_a_flight_that_begins_anew_has_the_prior_of_the_biases(begun):
     else:
         estimate = f.correct([50.0, 0.0, 1.0], flight.measured_quaternion[-1])
         assert (estimate.status, estimate.restarts) == ("restarted", 1)
-    np.testing.assert_array_equal(np.concatenate([f.gyro_bias, f.accelerometer_bias]), 0.0)
-    np.testing.assert_allclose(f.gyro_bias_std, 0.1)
-    np.testing.assert_allclose(f.accelerometer_bias_std, 0.2)
-    np.testing.assert_array_equal(f.covariance_with_biases[:18, 18:], 0.0)
+    assert_array_equal(np.concatenate([f.gyro_bias, f.accelerometer_bias]), 0.0)
+    assert_allclose(f.gyro_bias_std, 0.1)
+    assert_allclose(f.accelerometer_bias_std, 0.2)
+    assert_array_equal(f.covariance_with_biases[:18, 18:], 0.0)
 
 
 @pytest.mark.parametrize(
@@ -335,7 +336,7 @@ def test_a_gate_leaves_the_gyro_in_where_the_accelerometer_saturates():
     expected = g.correct_imu(flight.gyro[59])
     assert e.nis > 1000
     assert f.imu_refused == 1
-    np.testing.assert_allclose(e.state[:19], expected.state[:19], atol=1e-9)
+    assert_allclose(e.state[:19], expected.state[:19], atol=1e-9)
 
 
 def hovering(gate=None):
@@ -363,7 +364,7 @@ def test_of_two_sensors_that_are_unlikely_together_alone_the_likelier_counts(lik
         g.correct_imu(*(read[0], None) if likelier == 0 else (None, read[1])),
     )
     assert (f.imu_refused, both.nis > 22.5) == (1, True)
-    np.testing.assert_allclose(both.state[:19], one.state[:19], atol=1e-12)
+    assert_allclose(both.state[:19], one.state[:19], atol=1e-12)
 
 
 def test_a_push_is_believed_although_it_is_unlikely():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 
 from tests.support.flights import PERIOD, yawing_flight
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
@@ -93,7 +94,7 @@ def stream(timed, flight, measurements, delays):
 def assert_same(timed, ukf):
     """Bit for bit: state and covariance, and all else that the filter remembers."""
     for one, other in zip(timed.ukf.memory, ukf.memory, strict=True):
-        np.testing.assert_array_equal(one, other)
+        assert_array_equal(one, other)
 
 
 def measured(flight, stamps, parts):
@@ -149,7 +150,7 @@ def test_what_is_older_than_the_horizon_is_refused_and_changes_nothing():
     before = timed.ukf.memory[0].copy()
     assert timed.correct(0.399, *pose) is None
     assert (timed.late, timed.too_late) == (0, 2)
-    np.testing.assert_array_equal(timed.ukf.memory[0], before)
+    assert_array_equal(timed.ukf.memory[0], before)
     assert timed.correct(0.401, *pose) is not None
     assert (timed.late, timed.too_late) == (1, 2)
     start(timed, flight)
@@ -179,7 +180,7 @@ def test_what_is_wrong_is_named_and_changes_nothing():
         with pytest.raises(InputError, match=words):
             call()
         assert len(timed._events) == events
-        np.testing.assert_array_equal(timed.estimate.state, before)
+        assert_array_equal(timed.estimate.state, before)
 
 
 def test_a_wrong_measurement_at_any_time_leaves_the_past_as_it_was():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from tests.support.exported_c.hostile import KINDS, befall
 from tests.support.parameters import mostly_slow
@@ -237,7 +238,7 @@ def test_what_is_claimed_widens_while_poses_are_refused():
     assert flight.estimator.dead_reckoning == pytest.approx(0.5)
     back = flight.recover(0.025)  # three poses that go on from each other
     assert back.status == "tracking"
-    np.testing.assert_allclose(back.std_force, calm.std_force, rtol=0.2)
+    assert_allclose(back.std_force, calm.std_force, rtol=0.2)
 
 
 def test_a_bias_stays_within_its_bound():
@@ -400,7 +401,7 @@ def noisy_hover(kind, vehicle, dt, gate, noise, seconds, lost=(0.0, 0.0), seed=0
 def test_noise_of_poses_is_learned_of_attitude_and_position_apart(kind, noise):
     said = list(noisy_hover(kind, "ardrone2", 0.005, None, noise, 4.0))
     scales = np.median([e.noise_scales for e in said[400:]], axis=0)
-    np.testing.assert_allclose(scales, noise, rtol=0.08)
+    assert_allclose(scales, noise, rtol=0.08)
     assert said[-1].noise_scale == pytest.approx(np.sqrt(np.mean(np.square(noise))), rel=0.15)
     assert said[-1].restarts == 0
     force = np.array([e.force / e.std_force for e in said[400:]])

@@ -5,6 +5,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
 from windwrench.dynamics import load_vehicle
@@ -134,7 +135,7 @@ def test_unlikely_poses_widen_what_is_smoothed_before_and_after():
     assert z[800:].max() < 6.0
     assert z[700:800].max() < 6.0
     diagonal = np.diagonal(found.covariance, axis1=1, axis2=2)
-    np.testing.assert_allclose(found.std**2, diagonal, rtol=1e-12)
+    assert_allclose(found.std**2, diagonal, rtol=1e-12)
 
 
 @pytest.mark.parametrize("seed", [0, 2, 5])

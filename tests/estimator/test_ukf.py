@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, begin, fly, yawing_flight
@@ -62,7 +63,7 @@ def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_
     found = fast.smooth(covariance=True)
     for k, (state, P) in enumerate(slow.smoothed()):
         e, size = found.at(k), np.sqrt(np.diag(P))
-        np.testing.assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
+        assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
         assert np.abs((e.covariance - P) / np.outer(size, size)).max() < 1e-7
 
 
@@ -77,10 +78,10 @@ def test_asynchronous_measurements_agree_with_regular_ones():
             halves.predict(flight["rotors"][k], PERIOD / 2)
         halves.correct(flight["position"][k], None)
         b = halves.correct(None, flight["quaternion"][k])
-    np.testing.assert_allclose(a.force, b.force, atol=0.02)
-    np.testing.assert_allclose(a.torque, b.torque, atol=0.002)
+    assert_allclose(a.force, b.force, atol=0.02)
+    assert_allclose(a.torque, b.torque, atol=0.002)
     # half-steps integrate the rate a little better
-    np.testing.assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
+    assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
 
 
 @compiled

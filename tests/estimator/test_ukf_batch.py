@@ -9,6 +9,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from tests.support.flights import yawing_flight
 from windwrench.dynamics import EffectSetting, load_vehicle
@@ -73,14 +74,14 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
     for k in range(1, STEPS):
         together = batch.step(rotors[k], position[k], quaternion[k])
         for n, ukf in enumerate(singles):
-            np.testing.assert_array_equal(
+            assert_array_equal(
                 together.state[n], ukf.step(rotors[k, n], position[k, n], quaternion[k, n]).state
             )
         if k % 10 == 5 or k == STEPS - 1:  # while poses are refused, and after
             alone = [ukf.estimate for ukf in singles]
-            np.testing.assert_array_equal(together.std, [one.std for one in alone])
-            np.testing.assert_array_equal(together.std_wrench, [one.std_wrench for one in alone])
-            np.testing.assert_array_equal(batch.covariance, [one.covariance for one in alone])
+            assert_array_equal(together.std, [one.std for one in alone])
+            assert_array_equal(together.std_wrench, [one.std_wrench for one in alone])
+            assert_array_equal(batch.covariance, [one.covariance for one in alone])
             doubted |= bool(np.any(together.status_code == REJECTED))
     assert doubted or gate is None
     assert together.restarts.tolist() == [ukf.estimate.restarts for ukf in singles]
@@ -90,7 +91,7 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
     vectors = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
     assert (last.model_std > 0.0).all()
     for name in (*vectors, "nis", "model_std"):
-        np.testing.assert_array_equal(getattr(together, name)[-1], getattr(last, name))
+        assert_array_equal(getattr(together, name)[-1], getattr(last, name))
 
 
 TURNS = np.array([[0.0, 0, 1], [0, 0, 60], [0, 0, -2]])
@@ -120,8 +121,8 @@ def test_it_starts_from_what_is_given_and_coasts_as_single_filters_do(common, ea
         single.reset(places[n], q, **common, **{name: values[n] for name, values in each.items()})
         alone = [single.estimate, *(single.step(speeds[n]) for _ in range(5))]
         for a, b in zip(together, alone, strict=True):  # an estimate stays what it was
-            np.testing.assert_array_equal(a.state[n], b.state)
-        np.testing.assert_array_equal(batch.covariance[n], single.covariance)
+            assert_array_equal(a.state[n], b.state)
+        assert_array_equal(batch.covariance[n], single.covariance)
     assert len(batch) == 3
     assert np.isnan(together[-1].nis).all()
 
@@ -143,7 +144,7 @@ def test_one_rotor_speed_that_no_vehicle_has_changes_nothing(kind, speed):
     for k in range(60):
         kept = clean.step(HOVER, *POSE).force
         found = spoiled.step(odd if k == 30 else HOVER, *POSE).force
-    np.testing.assert_array_equal(found, kept)
+    assert_array_equal(found, kept)
 
 
 def test_masked_entries_are_not_measured():
@@ -213,7 +214,7 @@ def test_any_form_of_the_same_numbers_gives_the_same_estimate(form):
         for _ in range(5):
             estimate = estimator.step(*(change(a) for a in ARGUMENTS))
         states.append(estimate.state)
-    np.testing.assert_array_equal(*states)
+    assert_array_equal(*states)
 
 
 def pickled(one):
@@ -239,13 +240,13 @@ def test_a_copy_and_an_estimate_go_their_own_way(count, duplicate):
     state, covariance, other = first.state.copy(), one.covariance, duplicate(one)
     second = go_on(one)
     assert not np.array_equal(second.state, state)
-    np.testing.assert_array_equal(second.state, one.estimate.state)
+    assert_array_equal(second.state, one.estimate.state)
     after, biases = one.covariance, None if count else one.covariance_with_biases
     go_on(one)
-    np.testing.assert_array_equal(first.state, state)
-    np.testing.assert_array_equal(other.covariance, covariance)
-    np.testing.assert_array_equal(go_on(other).state, second.state)
-    np.testing.assert_array_equal(other.covariance, after)
+    assert_array_equal(first.state, state)
+    assert_array_equal(other.covariance, covariance)
+    assert_array_equal(go_on(other).state, second.state)
+    assert_array_equal(other.covariance, after)
     if not count:
-        np.testing.assert_array_equal(first.covariance, covariance)
-        np.testing.assert_array_equal(other.covariance_with_biases, biases)
+        assert_array_equal(first.covariance, covariance)
+        assert_array_equal(other.covariance_with_biases, biases)

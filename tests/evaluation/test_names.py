@@ -5,6 +5,7 @@ line.
 import gymnasium as gym
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from windwrench.controllers.registry import OWN_LAWS
 from windwrench.dynamics import InputError
@@ -108,7 +109,7 @@ def test_a_class_of_a_file_is_a_task_and_has_the_laws_of_the_kit_s_task(tmp_path
         fly_episode(task_of(task).make("turbulent"), make_pilot("lqg", task), 7, decisions=30)
         for task in (name, "WindHover")
     )
-    np.testing.assert_array_equal(mine.error, kits.error)
+    assert_array_equal(mine.error, kits.error)
     assert task_of("windwrench/WindHover-v1") is TASKS["WindHover"]
     envs = known.make_many(2, "base")
     observations, _ = envs.reset(seed=3)
@@ -127,9 +128,9 @@ def test_a_reward_of_one_s_own_holds_alone_and_its_terms_stand_in_info(tmp_path)
     weights = written(tmp_path, "weights.yaml", "tracking: 2.0\nsquared: 3.0\n")
     info = {"reward_tracking": np.array([0.5, 0.1]), "error": np.array([0.2, 9.0])}
     total, terms = total_of(find_reward(weights), info)
-    np.testing.assert_allclose(total, [1.0 - 0.12, 0.2 - 3.0 * 6.25])
+    assert_allclose(total, [1.0 - 0.12, 0.2 - 3.0 * 6.25])
     assert set(terms) == {"reward_tracking", "reward_squared"}
-    np.testing.assert_allclose(total_of(find_reward("error"), info)[0], [0.92, 0.0], atol=1e-9)
+    assert_allclose(total_of(find_reward("error"), info)[0], [0.92, 0.0], atol=1e-9)
     with pytest.raises(InputError, match="unknown term 'tracking'; expected one of error, squared"):
         total_of(find_reward(weights), {"error": 0.1})
     with pytest.raises(InputError, match="unknown reward 'eror'"):

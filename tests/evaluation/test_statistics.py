@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import scipy.stats
+from numpy.testing import assert_allclose, assert_array_equal
 
 from windwrench.evaluation.statistics import (
     episode_bootstrap,
@@ -53,7 +54,7 @@ def test_the_interquartile_mean_is_that_of_the_middle_half_of_all():
     assert interquartile_mean([[0.0, 1.0], [2.0, 99.0]]) == 1.5
     flat = np.sort(X.ravel())
     assert interquartile_mean(X) == pytest.approx(flat[15:45].mean())
-    np.testing.assert_allclose(
+    assert_allclose(
         interquartile_mean(np.stack([X, 2.0 * X])), np.array([1.0, 2.0]) * flat[15:45].mean()
     )
     lost = np.append(X.ravel()[:-1], 1e3)  # one lost episode
@@ -64,7 +65,7 @@ def test_strata_are_drawn_among_themselves():
     """Between strata that differ, and hold equal numbers, nothing varies."""
     scores = np.repeat([1.0, 5.0], [6, 6])[None]
     apart = hierarchical_draws(mean, scores, resamples=50, strata=(6, 6))
-    np.testing.assert_array_equal(apart, np.full(50, 3.0))
+    assert_array_equal(apart, np.full(50, 3.0))
     assert hierarchical_draws(mean, scores, resamples=50).std() > 0.1
     uneven = [1.0, 2.0, 7.0, 9.0, 5.0]
     draws = hierarchical_draws(lambda x: x.max(axis=(1, 2)), [uneven], strata=(2, 3))
@@ -104,14 +105,14 @@ def test_a_single_policy_stays_and_a_pair_is_drawn_together():
     hard = np.linspace(0.1, 5.0, 30)[None]
     assert hierarchical_bootstrap(relative_change, 0.9 * hard, hard) == pytest.approx((-0.1, -0.1))
     one = hierarchical_draws(mean, [[3.0]], resamples=10)
-    np.testing.assert_array_equal(one, np.full(10, 3.0))
+    assert_array_equal(one, np.full(10, 3.0))
 
 
 def test_holm_on_an_example_done_by_hand():
     # 4 x 0.01, 3 x 0.02 = 0.06, 2 x 0.03 = 0.06, 1 x 0.04 -> not below 0.06
-    np.testing.assert_allclose(holm([0.03, 0.01, 0.04, 0.02]), [0.06, 0.04, 0.06, 0.06])
-    np.testing.assert_allclose(holm([0.6, 0.7]), [1.0, 1.0])
-    np.testing.assert_allclose(holm([0.02]), [0.02])
+    assert_allclose(holm([0.03, 0.01, 0.04, 0.02]), [0.06, 0.04, 0.06, 0.06])
+    assert_allclose(holm([0.6, 0.7]), [1.0, 1.0])
+    assert_allclose(holm([0.02]), [0.02])
     assert holm([]).shape == (0,)
 
 

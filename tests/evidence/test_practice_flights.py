@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.paths import ROOT
 from windwrench.dynamics import EffectSetting, load_vehicle
@@ -57,7 +58,7 @@ def test_a_disturbance_acts_in_flight_and_is_what_the_residual_shows(name):
     assert {**OUTSIDERS, **HELD_BACK}[name].__doc__
     r, truth = disturbed(name)
     kept = json.loads(GOLDEN.read_text(encoding="utf-8"))[name]
-    np.testing.assert_allclose(spread(truth), kept, rtol=1e-3, atol=1e-6)
+    assert_allclose(spread(truth), kept, rtol=1e-3, atol=1e-6)
     scale = np.repeat([WEIGHT, WEIGHT * ARM], 3)
     assert np.abs(truth / scale).max() < LARGEST
     axis = int(np.argmax(truth.std(axis=0) / scale))
@@ -71,7 +72,7 @@ def test_the_same_seed_gives_the_same_log_and_another_one_another():
         fly_practice(VEHICLE, drag, "excite", 2.0, seed, "contact_pushes") for seed in (1, 1, 2)
     ]
     for field in ("position", "quaternion", "rotor_speeds", "voltage", "force", "torque"):
-        np.testing.assert_array_equal(getattr(logs[0], field), getattr(logs[1], field))
+        assert_array_equal(getattr(logs[0], field), getattr(logs[1], field))
         assert not np.array_equal(getattr(logs[0], field), getattr(logs[2], field))
 
 

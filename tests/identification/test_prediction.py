@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded, resting, settings, without_pose
@@ -73,11 +74,11 @@ def test_a_delayed_pose_is_not_made_up_after_a_gap():
     late = {"clock_offset": {"dt": -0.03}}
     log = without_pose(fly(seconds=8.0, **late), slice(800, 900))
     corrected = undo_log_sensing(log, VEHICLE.with_effects(*settings(late)))
-    np.testing.assert_array_equal(np.flatnonzero(~corrected.valid), [*range(6), *range(800, 906)])
+    assert_array_equal(np.flatnonzero(~corrected.valid), [*range(6), *range(800, 906)])
     assert np.isnan(corrected.position[905]).all()
     # the pose of a row is the log's of 6 rows before, and the turn rates are the row's own
-    np.testing.assert_allclose(corrected.position[906:], log.position[900:-6], atol=1e-12)
-    np.testing.assert_array_equal(corrected.rotor_speeds, log.rotor_speeds)
+    assert_allclose(corrected.position[906:], log.position[900:-6], atol=1e-12)
+    assert_array_equal(corrected.rotor_speeds, log.rotor_speeds)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +123,7 @@ def test_predictions_start_where_a_whole_horizon_follows(clean):
     turned = np.abs(np.sum(made.quaternion[inside, -1] * log.quaternion[ends[inside]], axis=1))
     assert 2 * np.degrees(np.arccos(np.minimum(turned, 1.0))).mean() < 2.0
     ahead = made.position[:, 1:] - made.position[:, :-1]
-    np.testing.assert_allclose(ahead, 0.005 * made.velocity[:, 1:], atol=2e-3)
+    assert_allclose(ahead, 0.005 * made.velocity[:, 1:], atol=2e-3)
 
 
 LATE = {"clock_offset": {"dt": -0.03}}
@@ -149,12 +150,12 @@ def test_nothing_after_a_start_changes_its_prediction(kind):
                 moved[sensor] = read + rng.normal(0.0, 5.0, read.shape)
         moved = {name: np.where(later[:, None], x, getattr(log, name)) for name, x in moved.items()}
         before, after = (predict(x, vehicle, 0.3, 10) for x in (log, replace(log, **moved)))
-        np.testing.assert_array_equal(before.start, after.start)
+        assert_array_equal(before.start, after.start)
         known = before.start <= k
         assert known.any()
         for name in ("position", "velocity", "quaternion", "angular_velocity"):
             x, y = getattr(before, name), getattr(after, name)
-            np.testing.assert_allclose(x[known], y[known], rtol=0.0, atol=1e-9)
+            assert_allclose(x[known], y[known], rtol=0.0, atol=1e-9)
             assert np.abs(x[~known] - y[~known]).max() > 0.1
 
 
@@ -163,7 +164,7 @@ def test_a_log_that_ends_after_a_horizon_has_the_same_predictions():
     whole, part = (predict(x, VEHICLE, 0.3, 10) for x in (log, with_rows(log, log.t < 5.0)))
     count = len(part.start)
     assert count == 94
-    np.testing.assert_allclose(whole.position[:count], part.position, rtol=0.0, atol=1e-9)
+    assert_allclose(whole.position[:count], part.position, rtol=0.0, atol=1e-9)
 
 
 def test_a_state_is_taken_as_it_is():
@@ -177,15 +178,15 @@ def test_a_state_is_taken_as_it_is():
     state[:, 10:12] = 0.0
     state[30:40, 8] = np.nan
     made = predict(log, VEHICLE, 0.2, 5, state)
-    np.testing.assert_array_equal(made.start, np.setdiff1d(np.arange(0, n - 20, 5), [30, 35]))
+    assert_array_equal(made.start, np.setdiff1d(np.arange(0, n - 20, 5), [30, 35]))
     begun = state[made.start, None]
     after = made.period * np.arange(1, 21)[:, None]
     fall = np.array([0.0, 0.0, -VEHICLE.gravity])
     position = begun[..., :3] + after * (begun[..., 7:10] + 0.5 * after * fall)
-    np.testing.assert_allclose(made.position, position, atol=1e-9)
-    np.testing.assert_allclose(made.velocity, begun[..., 7:10] + after * fall, atol=1e-9)
+    assert_allclose(made.position, position, atol=1e-9)
+    assert_allclose(made.velocity, begun[..., 7:10] + after * fall, atol=1e-9)
     rate = np.broadcast_to(begun[..., 10:], made.angular_velocity.shape)
-    np.testing.assert_allclose(made.angular_velocity, rate, atol=1e-9)
+    assert_allclose(made.angular_velocity, rate, atol=1e-9)
     turn = Rotation.from_rotvec((after * rate).reshape(-1, 3))
     first = np.broadcast_to(begun[..., 3:7], made.quaternion.shape).reshape(-1, 4)
     turned = Rotation.from_quat(first, scalar_first=True) * turn
@@ -263,6 +264,6 @@ def test_models_are_compared_from_the_same_starts(clean):
     heavy = replace(VEHICLE, inertia=1e3 * np.eye(3))
     own = prediction_errors([clean], VEHICLE)
     kept = prediction_errors([clean], heavy, start_by=VEHICLE)
-    np.testing.assert_array_equal(kept.still, own.still)
+    assert_array_equal(kept.still, own.still)
     assert kept.model[3] == pytest.approx(own.still[3], rel=1e-3)
     assert np.all(own.model[:, -1] < kept.model[:, -1])

@@ -4,6 +4,7 @@ flies as the task does, and no law where there is no jet.
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from windwrench.controllers import Admittance
 from windwrench.controllers.briefing import FilterNoise
@@ -50,8 +51,8 @@ def test_the_intervals_of_a_sweep_hold_the_jet(swept):
 def test_the_jet_of_a_sweep_has_its_shape(swept):
     true = shape_of(swept.profile.place, true_profile(FAN, VEHICLE, swept.profile)[5])
     assert swept.shape.axis == pytest.approx(0.0, abs=0.08)
-    np.testing.assert_allclose(swept.shape.peaks, true.peaks, atol=0.12)
-    np.testing.assert_allclose(swept.shape.torques, true.torques, rtol=0.25)
+    assert_allclose(swept.shape.peaks, true.peaks, atol=0.12)
+    assert_allclose(swept.shape.torques, true.torques, rtol=0.25)
     assert swept.shape.slope == pytest.approx(true.slope, rel=0.3)
 
 
@@ -88,7 +89,7 @@ def test_intervals_of_correlated_errors_hold_95_percent_of_the_places():
         mean, std, draws, samples = _curve(place, second, means, at)
         inside.append(np.mean(np.abs(mean - np.interp(at, PLACE, JET)) < 1.96 * std))
         assert samples < 200
-        np.testing.assert_allclose(draws.std(axis=0).mean(), std.mean(), rtol=0.25)
+        assert_allclose(draws.std(axis=0).mean(), std.mean(), rtol=0.25)
     assert 0.9 < np.mean(inside) < 0.99
 
 
@@ -113,10 +114,10 @@ def test_what_is_no_jet_is_told(torque, why):
 def test_a_jet_has_its_places():
     shape = shape_of(PLACE, JET)
     assert shape.axis == pytest.approx(0.0, abs=1e-6)
-    np.testing.assert_allclose(shape.peaks, (-0.46, 0.46), atol=0.011)
+    assert_allclose(shape.peaks, (-0.46, 0.46), atol=0.011)
     assert shape.weaker == pytest.approx(0.03, rel=1e-3)
     fifth = np.interp(np.abs(shape.edges), PLACE, JET) / 0.03
-    np.testing.assert_allclose(fifth, 0.2, atol=0.02)
+    assert_allclose(fifth, 0.2, atol=0.02)
     assert shape.slope == pytest.approx(0.1, rel=0.1)
 
 
@@ -129,7 +130,7 @@ def test_in_calm_air_the_bound_is_the_fastest_fan():
         shape_of(PLACE, JET),
         gains,
     )
-    np.testing.assert_allclose(fastest, gains * 0.03, rtol=0.12)
+    assert_allclose(fastest, gains * 0.03, rtol=0.12)
 
 
 def test_margins_tell_where_the_loop_begins_to_swing():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
@@ -72,8 +73,8 @@ def test_a_constant_force_is_found():
     log = held_flight(0.005 * np.arange(2000))
     series = estimate_log(log, VEHICLE)
     assert finite(series)
-    np.testing.assert_allclose(series.force[1000:].mean(axis=0), [0, 0, 0.3], atol=0.02)
-    np.testing.assert_allclose(series.torque[1000:].mean(axis=0), 0.0, atol=2e-3)
+    assert_allclose(series.force[1000:].mean(axis=0), [0, 0, 0.3], atol=0.02)
+    assert_allclose(series.torque[1000:].mean(axis=0), 0.0, atol=2e-3)
     force, torque = truth_rmse(series, log)
     assert force.max() < 0.1
     assert torque.max() < 0.01
@@ -90,9 +91,7 @@ def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):
     lost[rng.integers(300)] = False
     series = estimate_log(held_flight(t, lost=lost), VEHICLE)
     assert finite(series)
-    np.testing.assert_array_equal(
-        np.isfinite(series.nis), ~lost & (np.arange(300) > np.argmin(lost))
-    )
+    assert_array_equal(np.isfinite(series.nis), ~lost & (np.arange(300) > np.argmin(lost)))
 
 
 @pytest.mark.parametrize("with_imu", [False, True])
@@ -119,9 +118,9 @@ def test_a_log_is_the_calls_of_a_filter(with_imu):
         if log.valid[k]:
             ukf.correct(log.position[k], log.quaternion[k])
         now = ukf.estimate
-        np.testing.assert_array_equal(found.state[k, :19], now.state[:19])
-        np.testing.assert_array_equal(found.std[k], now.std)
-        np.testing.assert_array_equal(found.loads[k], ukf.record["load"][0])
+        assert_array_equal(found.state[k, :19], now.state[:19])
+        assert_array_equal(found.std[k], now.std)
+        assert_array_equal(found.loads[k], ukf.record["load"][0])
         assert found.status[k] == now.status
     assert found.restarts[-1] == now.restarts
 
@@ -136,7 +135,7 @@ def test_a_gap_widens_the_band_and_is_bridged():
     assert "the filter restarted at t = 6 s: after a gap" in series.notes[0]
     assert finite(series)
     # one prediction of a second instead of 200 would leave the attitude's covariance no meaning
-    np.testing.assert_allclose(series.force[1400:].mean(axis=0), [0, 0, 0.3], atol=0.05)
+    assert_allclose(series.force[1400:].mean(axis=0), [0, 0, 0.3], atol=0.05)
 
 
 @pytest.mark.parametrize("smooth", [False, True])
@@ -178,8 +177,8 @@ def test_smoothing_is_the_filters_nis_with_a_narrower_band():
 def test_rows_before_the_first_pose_have_a_wrench():
     series = estimate_log(held_flight(0.005 * np.arange(100), lost=slice(0, 30)), VEHICLE)
     assert finite(series)
-    np.testing.assert_array_equal(series.force[:31], 0.0)
-    np.testing.assert_array_equal(series.std_force[:30], np.tile(series.std_force[30], (30, 1)))
+    assert_array_equal(series.force[:31], 0.0)
+    assert_array_equal(series.std_force[:30], np.tile(series.std_force[30], (30, 1)))
 
 
 def test_a_log_without_a_pose_is_refused():
@@ -197,12 +196,12 @@ def test_wrench_csv(tmp_path):
         rows = list(csv.reader(file))
     assert rows[0] == HEADER
     values = np.array(rows[1:], dtype=float)
-    np.testing.assert_array_equal(values[:, 0], log.t)
+    assert_array_equal(values[:, 0], log.t)
     wrench = np.column_stack([series.force, series.torque])
     std = np.column_stack([series.std_force, series.std_torque])
     for found, known in ((values[:, 1:7], wrench), (values[:, 7:13], std)):
-        np.testing.assert_allclose(found, known, rtol=1e-8, atol=0.0)
-    np.testing.assert_allclose(values[:, 13], series.nis, rtol=1e-8)
+        assert_allclose(found, known, rtol=1e-8, atol=0.0)
+    assert_allclose(values[:, 13], series.nis, rtol=1e-8)
     assert max(len(field.lstrip("-0.")) for row in rows[1:] for field in row[1:]) < 15
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
@@ -221,11 +220,11 @@ def test_a_track_of_the_wrench_is_a_bag_that_ros_s_reader_opens(tmp_path):
             (c.topic, at, reader.deserialize(raw, c.msgtype)) for c, at, raw in reader.messages()
         ]
     wrench = [message.wrench for topic, _, message in read if topic == "/wrench"]
-    np.testing.assert_array_equal([w.force.x for w in wrench], series.force[:, 0])
-    np.testing.assert_array_equal([w.torque.z for w in wrench], series.torque[:, 2])
+    assert_array_equal([w.force.x for w in wrench], series.force[:, 0])
+    assert_array_equal([w.torque.z for w in wrench], series.torque[:, 2])
     poses = [(at, m.pose) for topic, at, m in read if topic == "/pose"]
-    np.testing.assert_allclose([1e-9 * at for at, _ in poses], log.t, atol=1e-9)
-    np.testing.assert_array_equal([p.orientation.w for _, p in poses], series.quaternion[:, 0])
+    assert_allclose([1e-9 * at for at, _ in poses], log.t, atol=1e-9)
+    assert_array_equal([p.orientation.w for _, p in poses], series.quaternion[:, 0])
 
 
 # phases
@@ -247,7 +246,7 @@ def test_phases_of_a_hop(top, bounce):
     t, height, speeds, edges = hop(top, bounce)
     phases = flight_phases(t, height, speeds, VEHICLE)
     assert [phase.name for phase in phases] == [GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND]
-    np.testing.assert_allclose([phase.end for phase in phases[:4]], edges, atol=0.3)
+    assert_allclose([phase.end for phase in phases[:4]], edges, atol=0.3)
     assert phases[0].start == t[0]
     assert phases[-1].end == t[-1]
 
@@ -299,7 +298,7 @@ def test_gyro_and_accelerometer_of_a_log_sharpen_its_estimate(flown):
 
     def errors(**less):
         series = estimate_log(replace(log, **less), VEHICLE)
-        np.testing.assert_array_equal(np.isfinite(series.nis[1:]), log.valid[1:])
+        assert_array_equal(np.isfinite(series.nis[1:]), log.valid[1:])
         return [
             np.linalg.norm((x - y)[400:])
             for x, y in ((series.force, log.force), (series.torque, log.torque))
@@ -325,5 +324,5 @@ def test_the_force_is_the_posterior_of_a_walk():
     precision = np.eye(n) / variance + between.T @ between / walk
     covariance = np.linalg.inv(precision)
     inner = slice(150, 250)
-    np.testing.assert_allclose(found[inner, 0, 0], (covariance @ y / variance)[inner], atol=1e-5)
+    assert_allclose(found[inner, 0, 0], (covariance @ y / variance)[inner], atol=1e-5)
     assert std[0] == pytest.approx(np.sqrt(covariance[200, 200]), rel=1e-4)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.support.exported_c import firmware
 from tests.support.exported_c.compiled import (
@@ -270,7 +271,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             which = 3 if effect.kind == "wrench" else 2
             assert np.any(double[which] != 0.0), name
             scale = np.abs(double[which]).max()
-            np.testing.assert_allclose(given[which], double[which], rtol=0, atol=1e-5 * scale)
+            assert_allclose(given[which], double[which], rtol=0, atol=1e-5 * scale)
 
 
 def commands(c, seen):
@@ -292,7 +293,7 @@ def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
     wanted = np.zeros(51)
     for k in range(50):
         wanted[k + 1] = python(np.append(seen[k, :7], wanted[k]))[0]
-    np.testing.assert_allclose(commands(c, seen), wanted[1:], rtol=0, atol=2e-5)
+    assert_allclose(commands(c, seen), wanted[1:], rtol=0, atol=2e-5)
 
 
 def test_the_law_with_lead(tmp_path):
@@ -303,7 +304,7 @@ def test_the_law_with_lead(tmp_path):
     seen[:, FORCE_X] = force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
     x = torque / np.maximum(force, 0.183)
     wanted = np.clip(-(11.35 * x + 2.79 * np.diff(x, prepend=x[0]) / 0.08), -1.0, 1.0)
-    np.testing.assert_allclose(commands(c, seen), wanted, rtol=0, atol=1e-5)
+    assert_allclose(commands(c, seen), wanted, rtol=0, atol=1e-5)
 
 
 def test_the_example_finds_the_force_that_it_is_given(tmp_path):

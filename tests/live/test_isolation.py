@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager, suppress
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.live.stream import Kept, Running, free_port
 from tests.support.programs import started, until
@@ -73,7 +74,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_estimates(tmp_path, size, ou
     assert path.exists() == bool(rows)
     if rows:
         log = read_log(path)
-        np.testing.assert_allclose(log.t, 0.005 * np.arange(rows))
+        assert_allclose(log.t, 0.005 * np.arange(rows))
 
 
 def test_a_disk_that_stalls_costs_rows_and_no_estimate(tmp_path, monkeypatch, outputs):
@@ -139,7 +140,7 @@ def test_a_terminal_that_stalls_costs_no_estimate(tmp_path):
     os.close(terminal)
     assert child.wait() == 0, child.stderr.read()
     child.stderr.close()
-    np.testing.assert_allclose(read_log(path).t[-1], 5.0)
+    assert_allclose(read_log(path).t[-1], 5.0)
 
 
 def test_a_pipe_that_is_closed_ends_the_telling_and_not_the_estimates(outputs):

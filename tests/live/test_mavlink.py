@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from tests.live.stream import (
@@ -106,9 +107,9 @@ def test_each_pose_in_the_kits_frames(pose):
     assert not pilot.failed
     assert len(pilot.outputs) == 100
     row, flown, k = pilot.outputs[50].row, flight(), 150
-    np.testing.assert_allclose(row.position, flown["position"][k], atol=1e-6)
+    assert_allclose(row.position, flown["position"][k], atol=1e-6)
     assert abs(row.quaternion @ flown["quaternion"][k]) == pytest.approx(1.0, abs=1e-6)
-    np.testing.assert_allclose(row.rotor_speeds, flown["rotor_speeds"][k], atol=0.06)
+    assert_allclose(row.rotor_speeds, flown["rotor_speeds"][k], atol=0.06)
 
 
 def test_a_flight_with_faults():
@@ -179,7 +180,7 @@ def test_the_wrench_comes_back_in_the_vehicles_own_frame():
     last, output = got["DEBUG_FLOAT_ARRAY"][-1], pilot.end().outputs[-1]
     assert last.name == "wrench"
     wanted = [*output.estimate.force * NED, *output.estimate.torque * NED, *output.std]
-    np.testing.assert_allclose(last.data[:12], wanted, rtol=1e-5, atol=1e-8)
+    assert_allclose(last.data[:12], wanted, rtol=1e-5, atol=1e-8)
     assert {m.name for m in got["NAMED_VALUE_FLOAT"]} >= {"force_n", "force_d", "torque_e"}
     assert {"HEARTBEAT", "WIND_COV"} <= set(got)
 
@@ -200,7 +201,7 @@ def test_commands_by_the_motor_curve_and_none_without():
         else:
             row = pilot.outputs[-1].row
             assert row.commanded
-            np.testing.assert_allclose(row.rotor_speeds, speeds[399], atol=0.4)
+            assert_allclose(row.rotor_speeds, speeds[399], atol=0.4)
 
 
 def test_gyro_accelerometer_and_battery():
@@ -215,8 +216,8 @@ def test_gyro_accelerometer_and_battery():
     pilot.play(range(200), beside=beside).end()
     assert not pilot.failed
     imu = [o.row for o in pilot.outputs if o.row.gyro is not None]
-    np.testing.assert_allclose(imu[-1].gyro, flown["gyro"][199], atol=1e-6)
-    np.testing.assert_allclose(imu[-1].accelerometer, flown["accelerometer"][199], atol=1e-5)
+    assert_allclose(imu[-1].gyro, flown["gyro"][199], atol=1e-6)
+    assert_allclose(imu[-1].accelerometer, flown["accelerometer"][199], atol=1e-5)
     assert imu[-1].voltage == pytest.approx(11.1)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.live.stream import VEHICLE, Pipeline, flight, log_of
 from windwrench.dynamics import EffectSetting
@@ -84,7 +85,7 @@ def test_a_tuning_that_is_too_slow_is_told_with_what_to_do():
 def test_a_clock_that_drifts_changes_nothing_and_is_told(drift):
     flown = flight(30.0, "gentle")
     live = Pipeline().take(whole(flown, drift=drift))
-    np.testing.assert_allclose(live.wrench(), offline(flown), atol=1e-9, rtol=0)
+    assert_allclose(live.wrench(), offline(flown), atol=1e-9, rtol=0)
     assert live.session.clocks.drift == pytest.approx(1e6 * drift, rel=0.1)
 
 
@@ -198,7 +199,7 @@ def test_a_recording_diagnosed_offline_is_what_was_seen_live(tmp_path):
     log = read_log(recorder.path)
     assert (log.vehicle, len(log.t)) == ("ardrone2", recorder.rows)
     found = estimate_log(log, VEHICLE)
-    np.testing.assert_allclose(
+    assert_allclose(
         live.wrench()[:, 1:], np.column_stack([found.force, found.torque]), atol=1e-9, rtol=0
     )
 
@@ -223,7 +224,7 @@ def test_a_recording_that_is_cut_anywhere_is_a_log_up_to_there(tmp_path):
         recorder.path.write_bytes(whole_text[:cut])
         again = read_log(recorder.path)
         assert len(again.t) in (len(log.t) - 1, len(log.t))
-        np.testing.assert_array_equal(again.rotor_speeds, log.rotor_speeds[: len(again.t)])
+        assert_array_equal(again.rotor_speeds, log.rotor_speeds[: len(again.t)])
         assert (len(again.t) < len(log.t)) == any("cut off" in note for note in again.notes) or (
             cut == last
         )
@@ -247,6 +248,6 @@ def test_inertial_rows_between_poses(tmp_path):
     recorder = record(tmp_path / "flight.csv", live.rows)
     log = read_log(recorder.path)
     assert log.valid.sum() == (len(log.t) + 1) // 2
-    np.testing.assert_allclose(log.gyro, flown["gyro"])
+    assert_allclose(log.gyro, flown["gyro"])
     found = estimate_log(log, VEHICLE)
-    np.testing.assert_allclose(live.wrench()[:, 1:4], found.force, atol=1e-9, rtol=0)
+    assert_allclose(live.wrench()[:, 1:4], found.force, atol=1e-9, rtol=0)

@@ -5,6 +5,7 @@ import socket
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.live.stream import (
     VEHICLE,
@@ -36,7 +37,7 @@ def run_text(text, log_map=None, pieces=1):
 @pytest.mark.parametrize("pieces", [1, 977])
 def test_lines_on_standard_input_are_the_log(pieces):
     stream = run_text(as_lines(flight()), pieces=pieces)
-    np.testing.assert_allclose(stream.wrench(), offline(flight()), atol=1e-9, rtol=0)
+    assert_allclose(stream.wrench(), offline(flight()), atol=1e-9, rtol=0)
     assert stream.session.ended == "the source ended"
     assert not stream.tallies.counts
 
@@ -76,10 +77,10 @@ def test_fields_of_another_kind_by_their_map(tmp_path):
     for k, row in enumerate(rows):
         sample = fields.sample(row, 0)
         assert sample.stamp == round(log.t[k] * 1e9)
-        np.testing.assert_allclose(sample.position, log.position[k])
+        assert_allclose(sample.position, log.position[k])
         sign = np.sign(sample.quaternion @ log.quaternion[k])
-        np.testing.assert_allclose(sign * sample.quaternion, log.quaternion[k], atol=1e-12)
-        np.testing.assert_allclose(sample.rotor_speeds, log.rotor_speeds[k])
+        assert_allclose(sign * sample.quaternion, log.quaternion[k], atol=1e-12)
+        assert_allclose(sample.rotor_speeds, log.rotor_speeds[k])
         assert sample.voltage == log.voltage[k]
     assert run_text("\n".join(map(json.dumps, rows)), wanted).session.estimates == 3
 
@@ -314,8 +315,8 @@ def test_the_simulated_vehicle_feels_the_jet():
     for one in flights:
         one.thread.join()
     force = flights[0].wrench()[:, 1:4]
-    np.testing.assert_array_equal(force, flights[1].wrench()[:, 1:4])
+    assert_array_equal(force, flights[1].wrench()[:, 1:4])
     truth = np.array([o.row.force for o in flights[0].outputs])
     assert truth[600:, 0].mean() > 0.2
     # the filter follows with 1 s, and has come from nothing
-    np.testing.assert_allclose(force[900:].mean(axis=0), truth[900:].mean(axis=0), atol=0.1)
+    assert_allclose(force[900:].mean(axis=0), truth[900:].mean(axis=0), atol=0.1)

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.support.exported_c.compiled import CompiledFilter, begin, needs, take
 from tests.support.model_flights import drawn
@@ -126,5 +127,5 @@ def test_a_stream_says_what_a_log_says(flights, commanded):
     columns = {name: flights[0][name][:STEPS] for name in ("t", *SAMPLE)}
     log = FlightLog(**columns, name="flight", source="flight", commanded=commanded)
     stream = by_stream(flights[0], commanded)
-    np.testing.assert_allclose(stream[1:], told(estimate_log(log, VEHICLE))[1:], rtol=1e-9)
+    assert_allclose(stream[1:], told(estimate_log(log, VEHICLE))[1:], rtol=1e-9)
     assert (stream[-1, 11] > 0.1 * VEHICLE.weight) == commanded

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.commands.conftest import call, recorded
 from tests.live.stream import VEHICLE, Pipeline, flight
@@ -50,7 +51,7 @@ def test_the_words_say_what_to_set(scales, file, said):
 def test_a_stream_warns_once_of_its_noise(monkeypatch, scales, warned):
     monkeypatch.setattr(WrenchEstimate, "noise_scales", shown(scales), raising=False)
     live = Pipeline().take(whole(flight()))
-    np.testing.assert_allclose(live.session.watch.noise_scales, scales)
+    assert_allclose(live.session.watch.noise_scales, scales)
     said = [line for line in live.tallies.news() if "noise" in line]
     assert len(said) == warned
     assert bool(live.session.watch.words) == warned

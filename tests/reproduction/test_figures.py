@@ -9,6 +9,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from numpy.testing import assert_allclose
 
 from windwrench.controllers import Hover
 from windwrench.dynamics import InputError, load_vehicle
@@ -66,10 +67,10 @@ def an_ekf_on_the_same_model_is_as_good(figures):
     assert {(r["noise"], r["error"]) for r in ratios} == {
         (n, e) for n in NOISES for e in fig5.ERRORS
     }
-    np.testing.assert_allclose([row["ratio"] for row in ratios], 1.0, atol=0.05)
+    assert_allclose([row["ratio"] for row in ratios], 1.0, atol=0.05)
     assert all(r["ci95"][0] <= r["ratio"] <= r["ci95"][1] for r in figures["rmse_ratio"])
     nis = [row["nis"] for row in figures["rmse"] if row["estimator"] == "UKF 1 s"]
-    np.testing.assert_allclose(nis, 6.0, atol=0.5)
+    assert_allclose(nis, 6.0, atol=0.5)
 
 
 def the_map_of_the_jet(figures):

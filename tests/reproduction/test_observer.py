@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal, assert_array_less
 from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, fly, yawing_flight
@@ -42,11 +43,11 @@ def errors_along(flight, missing=()):
 def test_steady_state_is_exact_after_a_rise_of_a_second():
     force, torque = np.array([0.4, -0.3, 0.5]), np.array([0.02, -0.01, 0.015])
     forces, torques, e = loaded_hover(NonlinearObserver(VEHICLE), 3000, force, torque)
-    np.testing.assert_allclose(forces[-1], force, atol=1e-9)
-    np.testing.assert_allclose(torques[-1], torque, atol=1e-9)
-    np.testing.assert_allclose(e.position, [0, 0, 1], atol=1e-9)
-    np.testing.assert_allclose(e.velocity, 0, atol=1e-9)
-    np.testing.assert_allclose(e.angular_velocity, 0, atol=1e-9)
+    assert_allclose(forces[-1], force, atol=1e-9)
+    assert_allclose(torques[-1], torque, atol=1e-9)
+    assert_allclose(e.position, [0, 0, 1], atol=1e-9)
+    assert_allclose(e.velocity, 0, atol=1e-9)
+    assert_allclose(e.angular_velocity, 0, atol=1e-9)
     assert np.isnan(e.nis)
     for signal in (forces[:, 2], torques[:, 0], torques[:, 2]):
         rise = PERIOD * (
@@ -59,14 +60,14 @@ def test_a_yawing_flight_is_no_wrench():
     flight = yawing_flight(VEHICLE, 2501, sigma_position=0.0, sigma_attitude=0.0, substeps=6)
     clean = errors_along(flight)[1200:]
     bounds = np.repeat([2e-3, 5e-5, 1e-3, 1e-3], 3)
-    np.testing.assert_array_less(np.abs(clean[:, :12]).max(axis=0), bounds)
+    assert_array_less(np.abs(clean[:, :12]).max(axis=0), bounds)
     flight = yawing_flight(VEHICLE, 2501, seed=2, substeps=3)
     errors = errors_along(flight)
     noisy = np.sqrt(np.mean(errors[1200:] ** 2, axis=0))
-    np.testing.assert_array_less(noisy[:12], np.repeat([6e-3, 0.6e-3, 1e-3, 0.01], 3))
+    assert_array_less(noisy[:12], np.repeat([6e-3, 0.6e-3, 1e-3, 0.01], 3))
     signs = np.random.default_rng(0).choice([-1.0, 1.0], 2501)
     flipped = flight | {"quaternion": signs[:, None] * flight["quaternion"]}
-    np.testing.assert_array_equal(errors_along(flipped), errors)
+    assert_array_equal(errors_along(flipped), errors)
 
 
 def test_missing_measurements_leave_the_wrench_where_it_was():
@@ -97,7 +98,7 @@ def test_declared_effects_are_not_a_wrench():
         force[vehicle is VEHICLE] = np.concatenate([e.force, e.torque])
     pull = 3e-4 * 4 * VEHICLE.hover_rate
     torque = VEHICLE.weight * np.array([-0.006, -0.01])
-    np.testing.assert_allclose(force[True], 0.0, atol=1e-6)
+    assert_allclose(force[True], 0.0, atol=1e-6)
     # the wrench that cancels drag and the offset thrust in a steady translation
-    np.testing.assert_allclose(force[False][0], pull, rtol=1e-6)
-    np.testing.assert_allclose(np.abs(force[False][3:5]), np.abs(torque), rtol=1e-6)
+    assert_allclose(force[False][0], pull, rtol=1e-6)
+    assert_allclose(np.abs(force[False][3:5]), np.abs(torque), rtol=1e-6)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.testing import assert_allclose, assert_array_equal
 
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.plant import NOISE, PlantSettings
@@ -25,7 +26,7 @@ def test_a_load_at_rest_pulls_with_its_weight():
     loop = _hung(LOAD, 40.0)
     weight = LOAD.mass * 9.81
     expected = [0, 0, -weight, 0.05 * weight, 0.1 * weight, 0]
-    np.testing.assert_allclose(loop.load_pull(), expected, atol=0.01 * weight)
+    assert_allclose(loop.load_pull(), expected, atol=0.01 * weight)
     stretch = loop.data.tendon("thread").length[0] - LOAD.length
     assert 0.0 < stretch < 1e-3
 
@@ -38,11 +39,11 @@ def test_the_load_does_not_touch_the_vehicle_before_it_is_hung_on():
         loop.reset(rng, np.array([0.0, 0.0, 1.5]))
         loop.run(rng.standard_normal((400, NOISE)))
         flown.append(np.concatenate([loop.state[:19], loop.position, loop.quaternion]))
-    np.testing.assert_array_equal(flown[0], flown[1])
+    assert_array_equal(flown[0], flown[1])
 
 
 def test_reset_takes_the_load_off():
     loop = _hung(LOAD, 1.0)
     loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
     loop.run(np.zeros((200, NOISE)))
-    np.testing.assert_array_equal(loop.load_pull(), 0.0)
+    assert_array_equal(loop.load_pull(), 0.0)

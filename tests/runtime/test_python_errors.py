@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from tests.support.bad_inputs import table
 from tests.support.map_tables import hover_table
@@ -52,8 +53,8 @@ def refusal(case, folder):
     with pytest.raises(InputError) as refused:
         eval(call, names)
     for one, (state, covariance) in zip(started.values(), before, strict=True):
-        np.testing.assert_array_equal(one.estimate.state, state)
-        np.testing.assert_array_equal(one.covariance, covariance)
+        assert_array_equal(one.estimate.state, state)
+        assert_array_equal(one.covariance, covariance)
     return str(refused.value).replace(f"{folder}/", "")
 
 

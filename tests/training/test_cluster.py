@@ -7,8 +7,8 @@ import signal
 import threading
 import time
 
-import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from tests.runtime.test_workers import work
 from tests.training.tiny import TINY
@@ -87,7 +87,7 @@ def test_flights_on_a_cluster_are_the_local_ones(cluster):
     assert list(there) == list(here)
     for key, flown in here.items():
         for a, b in zip(flown, there[key], strict=True):
-            np.testing.assert_array_equal(a.y, b.y)
+            assert_array_equal(a.y, b.y)
             assert (a.rmse, a.seed, a.lost) == (b.rmse, b.seed, b.lost)
 
 

@@ -122,11 +122,6 @@ def _head(path: Path) -> bytes:
         return file.read(_HEAD)
 
 
-def binary_logs() -> str:
-    """Return the words for the files known by their first bytes."""
-    return ", ".join(reader.what for reader in READERS.values() if reader.begins)
-
-
 def unknown_content(path: Path) -> InputError:
     """Return the error for an unknown file without a table's name.
 
@@ -147,8 +142,9 @@ def unknown_content(path: Path) -> InputError:
     is_text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start)
     shown = repr(start.decode("ascii")) if is_text else " ".join(f"{x:02x}" for x in start[:8])
     shown = shown if head else "nothing (it is empty)"
+    known = ", ".join(reader.what for reader in READERS.values() if reader.begins)
     return InputError(
-        f"{path}: unknown kind of file: it begins with {shown}; expected {binary_logs()}, "
+        f"{path}: unknown kind of file: it begins with {shown}; expected {known}, "
         f"or a table, with a name that ends in {', '.join(SUFFIXES)}"
     )
 

@@ -41,6 +41,7 @@ from ..table import Array, NamedArrays, Table
 from .blackbox_frames import ENCODINGS, FRAMES, PREDICTORS, Layout, decode
 
 BEGINS = b"H Product:Blackbox"
+Headers = Mapping[str, str]
 SIGNATURE = ("time (us)", "motor[0]", "motor[3]")
 
 # stated units in the map's: g, degrees per second, volts
@@ -143,7 +144,7 @@ def _log(
     reader: str,
     fields: NamedArrays,
     stated: set[str],
-    headers: Mapping[str, str],
+    headers: Headers,
     option: str,
     vehicle: Vehicle | None,
     notes: list[str],
@@ -189,7 +190,7 @@ def _log(
     return recording_of(path, samples, log_map, reader, said, piece).log(vehicle)
 
 
-def _gyro_scale(headers: Mapping[str, str]) -> float:
+def _gyro_scale(headers: Headers) -> float:
     """Return the gyro's count in deg/s: the bits of a number in the header, of degrees per second,
     or of radians per microsecond in Baseflight's.
     """
@@ -204,7 +205,7 @@ def _gyro_scale(headers: Mapping[str, str]) -> float:
     return fine * scale * (1e6 * np.degrees(1.0) if scale < _RADIANS else 1.0)
 
 
-def _range(path: Path, motors: list[Array], headers: Mapping[str, str]) -> tuple[float, float, str]:
+def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, float, str]:
     """Return the values of the commands 0 and 1, and whence they are known.
 
     Raises:
@@ -250,7 +251,7 @@ def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
     return _POLES, "assumed; betaflight:NUMBER says another"
 
 
-def _one_g(t: Array, force: list[Array], headers: Mapping[str, str]) -> tuple[float, str]:
+def _one_g(t: Array, force: list[Array], headers: Headers) -> tuple[float, str]:
     """Return the accelerometer's counts of 1 g, and words on whence they are known."""
     if stated := whole_number(headers.get("acc_1G", ""), 1, 10**6):
         return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
@@ -270,7 +271,7 @@ def whole_number(text: str, least: int, most: int) -> int | None:
     return int(text) if least <= int(text) <= most else None
 
 
-def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
+def _layout(path: Path, headers: Headers, names: list[str]) -> Layout:
     """Return the frames' layout from the headers.
 
     Raises:
@@ -314,7 +315,7 @@ def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
 
 
 def _frame_lists(
-    path: Path, headers: Mapping[str, str], what: str, known: Collection[int]
+    path: Path, headers: Headers, what: str, known: Collection[int]
 ) -> list[list[int]]:
     """Return the predictors or the encodings of each kind of frame.
 

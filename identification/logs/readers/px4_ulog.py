@@ -37,7 +37,7 @@ from ..flight_log import FlightLog
 from ..log_map import shipped_map, stated
 from ..mapped_log import recording_of
 from ..streams import Recording
-from ..table import Array, NamedArrays, one_line
+from ..table import Array, NamedArrays, NamedNumbers, one_line
 from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
 Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
@@ -151,7 +151,7 @@ def channels(
     return recording
 
 
-def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], dict[str, float], bool]:
+def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], NamedNumbers, bool]:
     """Return the topics of the map, the parameters at the log's start, and whether the file is
     damaged. A topic's instances are mappings from field to column.
 

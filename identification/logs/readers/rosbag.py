@@ -62,6 +62,8 @@ BEGINS = _ROS1 + rb"|\x89MCAP0\r\n|SQLite format 3\0"
 
 _Messages = Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at ns, message)
 
+# times (N,) in ns, columns by name, and a topic, or a doubt on its time stamps
+_Decoded = tuple[NDArray[np.int64], NamedArrays, str]
 _SAME_CLOCK = 1_000_000_000  # ns between a header's time and the recording's
 _NANOSECOND = 1e-9  # s
 LARGEST = LIMITS.bag_chunk
@@ -87,7 +89,7 @@ def read(
     file = Path(option) if option else named.parent / f"{stem}.topics.yaml"
     given = given_map(file) if option or os.path.exists(file) else {}
     path = _bag_in(path)
-    decoded: list[tuple[NDArray[np.int64], NamedArrays, str]] = []
+    decoded: list[_Decoded] = []
     with _opened(path) as (types, messages):
         log_map, notes = map_of(types, given, str(path), str(file))
         for topic in sorted(log_map.topics - {""}):
@@ -231,9 +233,7 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
             del stores[0]
 
 
-def _decoded_topic(
-    fields: MessageFields, messages: Iterator[tuple[int, Any]]
-) -> tuple[NDArray[np.int64], NamedArrays, str]:
+def _decoded_topic(fields: MessageFields, messages: Iterator[tuple[int, Any]]) -> _Decoded:
     """Return times (N,) in ns and columns (N,) of a topic by name, and a doubt on its time stamps.
 
     Raises:

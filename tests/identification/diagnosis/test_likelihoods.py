@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
@@ -180,7 +181,7 @@ def test_the_accelerometer_is_read_beside_the_pose():
     left = rows.residual({})[rows.fit]
     # its bias is in its channels, and only there; the gust is in both
     off = (left[:, 3:] - left[:, :3]).mean(axis=0)
-    np.testing.assert_allclose(off, [0.15, -0.1, 0.2], atol=0.01)
+    assert_allclose(off, [0.15, -0.1, 0.2], atol=0.01)
     both = np.corrcoef(left[:, 0], left[:, 3])[0, 1]
     assert both > 0.85
 
@@ -196,17 +197,17 @@ def test_the_noise_of_an_autoregression_is_found():
     begins[5000] = True
     fit = np.arange(len(x)) % 400 < 300
     found = fitted_noise(x, begins, fit, np.zeros(2))
-    np.testing.assert_allclose(found.lags[0], lag, atol=0.06)
-    np.testing.assert_allclose(found.covariance, root @ root.T, atol=0.06)
+    assert_allclose(found.lags[0], lag, atol=0.06)
+    assert_allclose(found.covariance, root @ root.T, atol=0.06)
     white = found.white(x)[found.known]
-    np.testing.assert_allclose(np.cov(white.T), np.eye(2), atol=0.15)
+    assert_allclose(np.cov(white.T), np.eye(2), atol=0.15)
     assert not found.known[:3].any()
     assert not found.known[5000:5003].any()
 
 
 def test_noise_without_memory_only_scales():
     noise = RowNoise(np.zeros((0, 1, 1)), np.array([[4.0]]), np.array([True, False, False]))
-    np.testing.assert_allclose(noise.white(np.array([[2.0], [4.0], [6.0]]))[:, 0], [1.0, 2.0, 3.0])
+    assert_allclose(noise.white(np.array([[2.0], [4.0], [6.0]]))[:, 0], [1.0, 2.0, 3.0])
     assert noise.known.all()
 
 
@@ -221,6 +222,6 @@ def test_a_column_of_factors_is_their_product_a_part_at_a_time():
     dense = np.zeros((2, 50, 6))
     dense[0, :, :3], dense[1, :, 4] = 1.7 * z[:, None] * turned, 0.3 * z
     for rows in (slice(None), slice(7, 31)):
-        np.testing.assert_array_equal(force[rows], dense[0, rows])
-        np.testing.assert_array_equal(torque[rows], dense[1, rows])
-        np.testing.assert_array_equal(share[rows], (part * z[:, None])[rows])
+        assert_array_equal(force[rows], dense[0, rows])
+        assert_array_equal(torque[rows], dense[1, rows])
+        assert_array_equal(share[rows], (part * z[:, None])[rows])

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
 
@@ -113,26 +114,26 @@ def test_the_gains_are_those_of_the_riccati_equation():
         P = solve_discrete_are(F.T, H.T, Q, R)
         S = H @ P @ H.T + R
         K = P @ H.T @ np.linalg.inv(S)
-        np.testing.assert_allclose(found.covariance[np.ix_(pair, pair)], S, rtol=1e-6, atol=1e-15)
+        assert_allclose(found.covariance[np.ix_(pair, pair)], S, rtol=1e-6, atol=1e-15)
         for i, axis in enumerate(pair):
             own = np.column_stack([K[3 * i : 3 * i + 3, i], K[3 * i : 3 * i + 3, 1 - i]])
-            np.testing.assert_allclose(found.gain[axis], own, rtol=1e-5, atol=1e-6)
+            assert_allclose(found.gain[axis], own, rtol=1e-5, atol=1e-6)
 
 
 def test_the_likeliest_noise_is_the_true_one(search):
     near = PoseNoise(2.0 * TRUE.pose, 0.5 * TRUE.disturbance, np.full(6, 0.4), 0.3 * TRUE.white)
     found, gains = search.likeliest(near, np.zeros((3, 1)))
-    np.testing.assert_allclose(found.pose, TRUE.pose, rtol=0.06)
-    np.testing.assert_allclose(found.disturbance, TRUE.disturbance, rtol=0.35)
+    assert_allclose(found.pose, TRUE.pose, rtol=0.06)
+    assert_allclose(found.disturbance, TRUE.disturbance, rtol=0.35)
     there, here = (steady_filter(x, PERIOD, GRAVITY).covariance for x in (TRUE, found))
-    np.testing.assert_allclose(np.diagonal(here), np.diagonal(there), rtol=0.06)
-    np.testing.assert_allclose(gains.ravel(), [0.0, 0.0, GAIN], atol=0.1)
+    assert_allclose(np.diagonal(here), np.diagonal(there), rtol=0.06)
+    assert_allclose(gains.ravel(), [0.0, 0.0, GAIN], atol=0.1)
 
 
 def assert_gradient(search, at, numbers):
     """Assert that a search's gradient by some of its numbers is that of the height."""
     height, _, right = search._slopes(at)
-    np.testing.assert_allclose(height, search._height(at))
+    assert_allclose(height, search._height(at))
     for i in numbers:
         step = 1e-4 * np.eye(len(at))[i]
         rise = (search._height(at + step) - search._height(at - step)) / 2e-4
@@ -164,7 +165,7 @@ def test_gyroscopic_torques_grow_with_the_rate():
     found = gyration(replace(VEHICLE, inertia=J), rate[None])[0]
     for i, step in enumerate(1e-4 * np.eye(3)):
         there, here = (np.linalg.solve(J, np.cross(w, J @ w)) for w in (rate + step, rate - step))
-        np.testing.assert_allclose(found[:, i], (here - there) / 2e-4, atol=1e-9)
+        assert_allclose(found[:, i], (here - there) / 2e-4, atol=1e-9)
 
 
 def test_columns_say_what_a_coefficient_changes_in_the_innovations():

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE
@@ -67,7 +68,7 @@ def test_thrust_at_a_command_is_a_nuisance_by_its_differences_between_flights():
     one, two = (row_nuisances(Rows(RegressedFlights(x, STATED), {})) for x in (logs[:1], logs))
     assert not one["thrust 0"].any()
     assert np.abs(two["thrust 0"]).max() > 0.4 * THRUST_STD * STATED.gravity
-    np.testing.assert_allclose(two["thrust 0"], -two["thrust 1"], atol=1e-12)
+    assert_allclose(two["thrust 0"], -two["thrust 1"], atol=1e-12)
 
 
 def test_a_hover_shows_a_load_by_the_mean_thrust_alone():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.support.flown import VEHICLE, resting
 from tests.support.imu_flights import imu_flight, pose_removed
@@ -75,7 +76,7 @@ def test_rows_hold_forces_and_torques(offset):
     without, found = rows.residual({}), rows.residual({"com_offset": dict(OFFSET.coefficients)})
     assert np.mean(np.square(found[:, 4])) < 0.2 * np.mean(np.square(without[:, 4]))
     column = rows.columns({}, [("com_offset", "cx")])["com_offset", "cx"]
-    np.testing.assert_allclose(without - found, 0.01 * column, atol=0.03 * abs(without).max())
+    assert_allclose(without - found, 0.01 * column, atol=0.03 * abs(without).max())
 
 
 def test_a_centre_of_mass_is_found_behind_a_filter(offset):
@@ -125,8 +126,8 @@ def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
             for x in (0.1, 1.0)
         )
         moved = signal - signal[rows.fit].mean()
-        np.testing.assert_allclose(rough[:, channels[0]], moved, rtol=0.05)
-        np.testing.assert_allclose(calm, 0.01 * rough, rtol=0.1)
+        assert_allclose(rough[:, channels[0]], moved, rtol=0.05)
+        assert_allclose(calm, 0.01 * rough, rtol=0.1)
 
 
 def test_a_disturbance_that_thrust_answers_by_its_change_counts_as_one(weak):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import butter, sosfilt, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
@@ -56,9 +57,7 @@ def test_the_residual_is_newton_and_euler(flown):
     thrust = rotors[:, :1] * [0.0, 0.0, 1.0]
     torque = alpha @ body.inertia.T + np.cross(omega, momentum)
     torque -= rotors[:, 1:] - np.cross(body.com, thrust)
-    np.testing.assert_allclose(
-        residual_wrench(flown, AMENDED), np.column_stack([force, torque]), atol=1e-10
-    )
+    assert_allclose(residual_wrench(flown, AMENDED), np.column_stack([force, torque]), atol=1e-10)
 
 
 @pytest.mark.parametrize("shape", [(10, 1), (500,), (500, 2), (500, 3, 3)])
@@ -66,7 +65,7 @@ def test_the_low_pass_is_that_of_scipy_to_the_last_digit(shape):
     x = np.cumsum(np.random.default_rng(0).standard_normal(shape), axis=0)
     for cutoff in (1.0, 5.0, 40.0):
         there = sosfiltfilt(butter(2, cutoff / 100.0, output="sos"), x, axis=0)
-        np.testing.assert_array_equal(low_pass(x, cutoff, 0.005), there)
+        assert_array_equal(low_pass(x, cutoff, 0.005), there)
 
 
 def test_the_size_of_white_noise_is_read_behind_a_high_pass_and_through_outliers():
@@ -84,8 +83,8 @@ def test_a_first_order_lag_has_made_63_per_cent_of_a_step_after_its_time(lag):
     x = rest + np.outer(np.arange(200) >= 20, step)
     since = np.maximum(period * (np.arange(200) - 19), 0.0)
     made = rest + np.outer(1.0 - np.exp(-since / lag), step)
-    np.testing.assert_allclose(lagged(x, lag, period), made, rtol=1e-12)
-    np.testing.assert_array_equal(lagged(x, 0.0, period), x)
+    assert_allclose(lagged(x, lag, period), made, rtol=1e-12)
+    assert_array_equal(lagged(x, 0.0, period), x)
 
 
 def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
@@ -116,9 +115,9 @@ def test_a_declared_clock_offset_delays_the_voltage_and_takes_the_first_poses_af
     log.valid[1000:1100] = False
     late = VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": -0.02}))
     undone = undo_log_sensing(log, late)
-    np.testing.assert_allclose(undone.voltage[4:], log.voltage[:-4], rtol=1e-9)
+    assert_allclose(undone.voltage[4:], log.voltage[:-4], rtol=1e-9)
     unseen = np.flatnonzero(~undone.valid)
-    np.testing.assert_array_equal(unseen, [*range(4), *range(1000, 1104)])
+    assert_array_equal(unseen, [*range(4), *range(1000, 1104)])
 
 
 @pytest.mark.parametrize(
@@ -156,7 +155,7 @@ def test_an_imu_at_1_khz_tells_as_much_as_one_of_half_its_noise_at_250_hz():
             GRAVITY,
         )
         found.append(np.concatenate([signals.attitude_std[-1], signals.velocity_std[-1]]))
-    np.testing.assert_allclose(found[0], found[1], rtol=0.15)
+    assert_allclose(found[0], found[1], rtol=0.15)
 
 
 @pytest.fixture(scope="module", params=["excite", "hover"])

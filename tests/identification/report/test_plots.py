@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from tests.support.browser import look, needs_browser
 from tests.support.diagnoses import made_diagnosis, made_trace
@@ -212,4 +213,4 @@ def test_a_line_of_many_rows_is_drawn_by_its_extremes():
     assert {0, 777_777, rows - 1} <= set(shown.tolist())
     assert len(shown) < 5 * log_channels._BINS
     few = values[: 2 * log_channels._BINS]
-    np.testing.assert_array_equal(few[log_channels._extremes(few)], few)
+    assert_array_equal(few[log_channels._extremes(few)], few)
