@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..dynamics.vehicle import Vehicle
-from .logs.table import Array, Mask, Names, Pair, Values
+from .logs.table import Array, ArrayMap, Mask, Names, Pair, Values
 
 CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
 
@@ -95,7 +95,7 @@ class Trace:
     before: Array = field(repr=False)
     after: Array = field(repr=False)
     held_out: Mask = field(repr=False)
-    parts: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    parts: ArrayMap = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -185,7 +185,7 @@ def followed(
     left, right = np.array(shape.edges) - shape.axis
     state, error = np.zeros((len(loop.push), *size)), np.zeros((3, *size))
     felt = np.broadcast_to(np.interp(start, at, torque), size)
-    held, square = np.ones(size, dtype=np.bool_), np.zeros(size)
+    held, square = np.ones(size, dtype=bool), np.zeros(size)
     for k in range(decisions):
         noise, drift = signs * loop.noise[(first + k) % len(loop.noise)].T
         wanted = -gains[:, None, None] * (felt - error[2] + noise)

@@ -112,7 +112,7 @@ def wind_profile(
     number = _groups(beyond)
     lines = np.array([np.median(beyond[number == k]) for k in range(max(number) + 1)])
     sizes = np.bincount(number[number >= 0]) if beside is None else -np.abs(lines - beside)
-    chosen = np.zeros(len(means), dtype=np.bool_)
+    chosen = np.zeros(len(means), dtype=bool)
     chosen[slow] = number == int(np.argmax(sizes))
     here = good.copy()
     here[good] = np.repeat(chosen, counts)

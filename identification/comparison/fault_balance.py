@@ -165,7 +165,7 @@ class BalanceChannel:
         begun = padded(1.0 / noise.scale)[at]
         begun[:, : len(ramp)] *= ramp
         taps = toeplitz(np.append(noise.filter, np.zeros(len(ramp) - 1)), np.zeros(early))
-        values = begun @ taps.T * padded(noise.whole.astype(np.float64))[at]
+        values = begun @ taps.T * padded(noise.whole.astype(float))[at]
         sums[:, :-1] += np.einsum("kj,kjq->kq", values, padded(against)[at])
         p = sums[:, 2:-1]
         own = sums[:, -1] + np.square(values).sum(axis=1) - np.square(p).sum(axis=1)

@@ -157,7 +157,7 @@ def carrying(t: Array, total: Array) -> Mask:
         t: (N,) s.
         total: (N,) thrust of all rotors, in any unit.
     """
-    steady, smooth = np.zeros(len(t), dtype=np.bool_), _smooth(total, t)
+    steady, smooth = np.zeros(len(t), dtype=bool), _smooth(total, t)
     for first, end in runs_of(flying(smooth)):  # a single low sample is no landing
         # a log may begin and end in flight
         start = t[first] + (EDGE if first > 0 else 0.0)

@@ -148,7 +148,7 @@ def _draw_change(change: Change) -> Any:
     return figure
 
 
-def place_of(fault: RotorFault, rotor: int) -> str:
+def _place_of(fault: RotorFault, rotor: int) -> str:
     """Return the name of a rotor (1 to 4), with the log's own name if any."""
     names = fault.samples.channels.motor_names
     own = "" if names is None else f"; {names[rotor - 1]} in the log"
@@ -171,7 +171,7 @@ def fault_headline(fault: RotorFault) -> str:
         )
     if likeliest == ALL:
         return f"All rotors lost thrust at once {sure}: the battery, the air, or the vehicle."
-    place = place_of(fault, fault.rotor)
+    place = _place_of(fault, fault.rotor)
     when, low, high = fault.onset
     left, least, most = (100 * share for share in fault.remaining)
     return (
@@ -184,25 +184,28 @@ def fault_headline(fault: RotorFault) -> str:
 def _finding(fault: RotorFault, name: str) -> str:
     if name in (NOTHING, ALL, OTHER):
         return name
-    return f"a fault of {place_of(fault, int(name))}"
+    return f"a fault of {_place_of(fault, int(name))}"
 
 
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
     names = {str(i): f"rotor {i}" for i in range(1, 5)}
-    of_rotor, motors = fault.likeliest in names, fault.samples.channels.motor_names
+    motors = fault.samples.channels.motor_names
+    of_rotor = {
+        "rotor": fault.rotor,
+        "motor": motors[fault.rotor - 1] if motors else None,
+        "onset_s": fault.onset[0],
+        "onset_ci95_s": list(fault.onset[1:]),
+        "remaining": fault.remaining[0],
+        "remaining_ci95": list(fault.remaining[1:]),
+    }
     return {
         "log": fault.samples.channels.name,
         "headline": fault_headline(fault),
         "found": names.get(fault.likeliest, fault.likeliest),
         "sure": fault.sure,
         "probabilities": {names.get(k, k): p for k, p in fault.probabilities.items()},
-        "rotor": fault.rotor if of_rotor else None,
-        "motor": motors[fault.rotor - 1] if of_rotor and motors else None,
-        "onset_s": fault.onset[0] if of_rotor else None,
-        "onset_ci95_s": list(fault.onset[1:]) if of_rotor else None,
-        "remaining": fault.remaining[0] if of_rotor else None,
-        "remaining_ci95": list(fault.remaining[1:]) if of_rotor else None,
+        **(of_rotor if fault.likeliest in names else dict.fromkeys(of_rotor)),
         "flight_s": fault.seconds,
         "ended_because": fault.samples.ended or None,
     }

@@ -5,14 +5,13 @@ counts, and torque is left out. Thrust and the motion capture's vertical differ 
 flight: see ``row_nuisances``.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ...dynamics.effects import Role, playing
+from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
-from ..logs.flight_log import FlightLog, with_rows
+from ..logs.flight_log import FlightLog, Logs, with_rows
 from ..logs.flight_phases import FLIGHT, flight_phases, usual_thrust
 from ..motion.signals import Signals
 from ..motion.smoothing import CUTOFFS, low_pass
@@ -73,18 +72,8 @@ def downsampled(signals: Signals) -> Signals:
     return replace(every, period=step * signals.period)
 
 
-def thrust_is_assumed(logs: Sequence[FlightLog], vehicle: Vehicle) -> bool:
+def thrust_is_assumed(logs: Logs, vehicle: Vehicle) -> bool:
     """Return whether rotor speeds come from commands, and no curve (``motor_curve``) of the vehicle
     states a command's thrust.
     """
     return vehicle.motor_curve is None and any(log.commanded for log in logs)
-
-
-def assumed_thrust_doubts(effects: Sequence[str]) -> tuple[str, ...]:
-    """Return, as sentences, the effects that rest on an unmeasured thrust."""
-    return tuple(
-        f"{effect}: the log holds motor commands and the vehicle file states no motor curve, so "
-        "how much thrust a command makes is an assumption, and this effect may be its error alone. "
-        "State motor_curve in the vehicle file, or log rotor speeds"
-        for effect in playing(*THRUST_FACTORS, among=effects)
-    )

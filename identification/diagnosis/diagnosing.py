@@ -10,7 +10,7 @@ of the poses, where poses and rotors were logged as measured, or of the wrench's
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +30,7 @@ from ..findings import (
     Structure,
     Trace,
 )
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import Logs
 from ..logs.screening import LEAST_SECONDS, screen_log
 from ..logs.table import Array, NamedNumbers, Names, Pair, Values
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
@@ -39,10 +39,10 @@ from ..motion.smoothing import CUTOFFS, mean_square
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
 from .advice import FILTERED, advice, composites, inertial_notes, late_rotors, outside_the_fit
-from .commanded_rotors import THRUST_FACTORS, assumed_thrust_doubts
+from .commanded_rotors import THRUST_FACTORS
 from .commands import what_commands_show
 from .priors import NUISANCE
-from .ranking import LEAST_RIVAL, rank, rank_by_rows
+from .ranking import LEAST_RIVAL, Report, rank, rank_by_rows
 from .regression import (
     CENTRAL,
     RegressedFlights,
@@ -67,11 +67,11 @@ LEAST_SHOWN = 13.0
 
 @one_thread()
 def diagnose(
-    logs: Sequence[FlightLog],
+    logs: Logs,
     vehicle: Vehicle,
-    test: Sequence[FlightLog] = (),
+    test: Logs = (),
     without: Sequence[str] = (),
-    report: Callable[[str], None] | None = None,
+    report: Report | None = None,
     settings: DiagnosisSettings = DIAGNOSIS,
 ) -> Diagnosis:
     """Return the findings of one vehicle's logs about its model.
@@ -187,7 +187,7 @@ class Judged:
         flights: RegressedFlights,
         library: Sequence[str],
         rule: DiagnosisSettings,
-        report: Callable[[str], None],
+        report: Report,
     ) -> None:
         self._flights, self._rule = flights, rule
         library = [e for e in library if e not in flights.not_identifiable]
@@ -332,7 +332,12 @@ class Judged:
             for effect, hidden in fitted.behind.items()
         )
         if flights.thrust_std > 0.0:
-            doubts["assumed thrust"] = assumed_thrust_doubts(named)
+            doubts["assumed thrust"] = tuple(
+                f"{effect}: the log holds motor commands and the vehicle file states no motor "
+                "curve, so how much thrust a command makes is an assumption, and this effect may "
+                "be its error alone. State motor_curve in the vehicle file, or log rotor speeds"
+                for effect in playing(*THRUST_FACTORS, among=named)
+            )
         return {check: sentences for check, sentences in doubts.items() if sentences}
 
     def _named(

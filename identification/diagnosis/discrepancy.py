@@ -4,14 +4,14 @@ The columns are of the filter's predicted state: none holds the noise of the pos
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.signal import bilinear, lfilter
 
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array, NamedArrays, median_step
+from ..logs.table import Array, ArrayMap, NamedArrays, median_step
 from ..motion.signals import in_body
 from .causal_filter import FlightState
 from .priors import UNKNOWN
@@ -181,7 +181,7 @@ def variables(whole: FlightState) -> NamedArrays:
     return {name: x for name, x in scaled.items() if x.any()}
 
 
-def changing_columns(parts: Mapping[str, Array], followed: Mapping[str, Array]) -> Columns:
+def changing_columns(parts: ArrayMap, followed: ArrayMap) -> Columns:
     """Return columns of coefficients changing with a variable.
 
     Args:

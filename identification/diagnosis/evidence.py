@@ -206,7 +206,7 @@ def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[floa
         tried: the possible ones of these columns.
         sizes: possible standard deviations of their coefficients.
     """
-    square, left = np.square(np.asarray(sizes))[:, None], m.own[tried]
+    square, left = np.square(sizes)[:, None], m.own[tried]
     gained = 0.5 * square * np.square(m.right[tried]) / (1.0 + square * left)
     factors = gained - 0.5 * np.log1p(square * left)
     return float(logsumexp(factors)) - math.log(factors.size)

@@ -103,7 +103,7 @@ class Likelihood:
                 rows = flights.log == i
                 if not flights.fit_rows[rows].any():  # a test log
                     continue
-                for piece in read_poses(log, self.vehicle, finer):
+                for piece in _read_poses(log, self.vehicle, finer):
                     at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
                     self.pieces.append(piece)
                     self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
@@ -558,7 +558,7 @@ def gyration(vehicle: Vehicle, rate: Array) -> Array:
     return np.asarray(np.einsum("nk,kji->nij", rate, twist + twist.swapaxes(0, 1)))
 
 
-def read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
+def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
     """Return the unbroken pieces of a log as measured, with the vehicle's sensing effects undone;
     ``finer`` is added to the rotor speeds (n, 4) of each.
 

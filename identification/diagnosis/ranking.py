@@ -37,6 +37,7 @@ from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
 from .starting_points import starting_points
 
+Report = Callable[[str], None]  # takes a line of progress
 # typical sizes of the trials of a lag or a delay as a whole: their columns change with them
 TIME_STARTS = (0.3, 0.6, 1.2)
 # share of the likeliest set's probability from which flights do not tell another effect from one of
@@ -66,7 +67,7 @@ class FittedPosterior:
 def rank(
     flights: RegressedFlights,
     library: Sequence[str],
-    report: Callable[[str], None] = lambda text: None,
+    report: Report = lambda text: None,
 ) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
@@ -156,7 +157,7 @@ def rank_by_rows(
     library: Sequence[str],
     first: Setting,
     fixed: Setting,
-    report: Callable[[str], None] = lambda text: None,
+    report: Report = lambda text: None,
 ) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 

@@ -7,7 +7,7 @@ columns share the low-pass.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -21,7 +21,7 @@ from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..logs.excerpt import excerpt
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import FlightLog, Logs
 from ..logs.table import Array, ArrayPair, Mask, Pair, Rows, Values, finite_rows, median_step
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
@@ -171,9 +171,7 @@ class RegressedFlights:
         test: further logs outside the fit; without any, one block of 3 s of each four is held out.
     """
 
-    def __init__(
-        self, logs: Sequence[FlightLog], vehicle: Vehicle, test: Sequence[FlightLog] = ()
-    ) -> None:
+    def __init__(self, logs: Logs, vehicle: Vehicle, test: Logs = ()) -> None:
         self.vehicle = vehicle
         self._declared: Setting = {e.name: e.coefficients for e in vehicle.effects}
         self.logs = (*logs, *test)

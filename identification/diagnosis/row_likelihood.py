@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ...dynamics.effects import Role, playing
-from ..logs.table import Array, Pair
+from ..logs.table import Array, ArrayMap, Pair
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
@@ -200,5 +200,5 @@ class RowLikelihood:
         }
 
 
-def _named(columns: Mapping[str, Array]) -> dict[Column, Array]:
+def _named(columns: ArrayMap) -> dict[Column, Array]:
     return {("", f"{NUISANCE}{name}"): x for name, x in columns.items()}

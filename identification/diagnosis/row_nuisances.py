@@ -2,7 +2,7 @@
 integrated out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,6 +19,8 @@ TILT_STD = 0.01  # rad, of the motion capture's vertical, and of the rotors' mea
 BIAS_STD = 0.3  # m/s2, of a MEMS accelerometer between warm and cold
 SCALE_STD = 0.02  # relative, of an accelerometer
 STOPPED_WITHIN = 0.1  # s, in which a flight loop stops an unwanted angular velocity
+# signals (n,) by name, each with the channels of the disturbances that it follows
+Followers = dict[str, tuple[Array, Sequence[int]]]
 AXES = dict(zip("xyz", np.eye(3), strict=True))  # of the body
 
 
@@ -33,7 +35,7 @@ def row_nuisances(rows: Rows) -> NamedArrays:
     rotors = flights.rotor_wrench({}) / flights.inertias[2:]
     numbers = np.unique(flights.log).tolist()
     for i in numbers:
-        here = (flights.log == i)[:, None].astype(np.float64)
+        here = (flights.log == i)[:, None].astype(float)
         thrust, turning = here * rotors[:, :1], here * rotors[:, 1:]
         own = _of_accelerometers(rows, here, thrust) if rows.has_accelerometer else {}
         if flights.commanded:
@@ -106,7 +108,7 @@ def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedA
     return out
 
 
-def followers(rows: Rows) -> dict[str, tuple[Array, Sequence[int]]]:
+def followers(rows: Rows) -> Followers:
     """Return the signals of rotors and of the motion that follow disturbances, as an answer of the
     flight loop or as the disturbed motion itself: each (n,) in m/s2 or rad/s2, and the channels of
     the disturbances.
@@ -122,9 +124,7 @@ def followers(rows: Rows) -> dict[str, tuple[Array, Sequence[int]]]:
     torque = rows.channels - 3 * rows.with_torques
     forces = [range(axis, torque, 3) for axis in range(3)]
     tilt = rows.at_rows(flights.vehicle.gravity * rows.rotation[:, 2, :2])
-    out: dict[str, tuple[Array, Sequence[int]]] = {
-        f"tilt {x}": (tilt[:, i], forces[i]) for i, x in enumerate("xy")
-    }
+    out: Followers = {f"tilt {x}": (tilt[:, i], forces[i]) for i, x in enumerate("xy")}
     if not rows.with_torques:
         return out
     delivered = flights.rotor_wrench({}) / flights.inertias[2:]
@@ -138,9 +138,7 @@ def followers(rows: Rows) -> dict[str, tuple[Array, Sequence[int]]]:
     return out | {f"rate {x}": (rates[:, i], [torque + i]) for i, x in enumerate("xyz")}
 
 
-def answered(
-    rows: Rows, signals: Mapping[str, tuple[Array, Sequence[int]]], disturbance: Array
-) -> NamedArrays:
+def answered(rows: Rows, signals: Followers, disturbance: Array) -> NamedArrays:
     """Return the disturbances in signals that follow them: a share of each signal.
 
     A signal that follows a disturbance ``d`` explains the share ``var(d) / var(signal)`` of itself

@@ -49,13 +49,13 @@ def signature(
     channel = int(np.argmax(size if np.any(size > 0.3) else np.abs(share).mean(axis=0) / noise))
     y = share[:, channel]
     name, x = max(
-        explanatory_variables(flights, setting),
+        _explanatory_variables(flights, setting),
         key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0,
     )
     return Signature(effect, CHANNELS[channel], name, x, y + after[:, channel], y)
 
 
-def explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[tuple[str, Array]]:
+def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[tuple[str, Array]]:
     """Return the explanatory variables of a force at the rows, named with their units."""
     names = ("t", "position", "rotation", "velocity")
     t, position, rotation, velocity = (flights.at_rows(name, setting) for name in names)

@@ -10,7 +10,7 @@ rolls over, or a vehicle was switched on twice. Each group keeps its stamps in t
 import math
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from .log_map import UNITS, Attitude, Battery, Columns, Commands, LogMap, Rotors, Sensor, constant
-from .table import Array, Mask, NamedArrays, Rows, Table, finite_rows
+from .table import Array, ArrayMap, Mask, NamedArrays, Rows, Table, finite_rows
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
@@ -33,7 +33,7 @@ class ChannelGroup:
     """Columns with one clock; rows in the order of time."""
 
     t: Array  # (N,) s
-    columns: Mapping[str, Array]  # by name (N,); NaN: no value
+    columns: ArrayMap  # by name (N,); NaN: no value
     topic: str = ""  # of the columns' message, in a log of several
     table: Table | None = None  # of the columns
     rows: Rows | None = None  # (N,) of it
@@ -73,8 +73,7 @@ class ChannelGroup:
 
 def scaled(part: Columns, values: Array) -> Array:
     """Return columns (N, k), with the section's signs and scale."""
-    signs = np.array(part.signs, dtype=np.float64) if part.signs else 1.0
-    return values * signs * part.scale
+    return np.asarray(values * np.array(part.signs or (1,)) * part.scale)
 
 
 def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) -> Array:
@@ -238,7 +237,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
         rows = rows[int(steps[0] > far) : len(rows) - int(steps[-1] > far)]
     if increases:
         return rows, 0
-    others = np.ones(len(t), dtype=np.bool_)
+    others = np.ones(len(t), dtype=bool)
     others[rows] = False
     steps = np.diff(t[rows])
     if not len(steps):

@@ -8,7 +8,7 @@ telling names are tried by adjacent threes and fours.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +16,12 @@ import numpy as np
 from ..motion.smoothing import resampled, second_difference
 from .column_names import WORDS, Group, Name, groups_of, named_alone
 from .magnitudes import likely_unit
-from .table import Array, ArrayPair, Names, finite_rows
+from .table import Array, ArrayMap, ArrayPair, Names, finite_rows
 
 _FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
 _TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # their columns are no other group's
 Verdict = tuple[float, str]  # how well columns obey a part's physics, and in words
-Judge = Callable[[Sequence[str]], Verdict]
+Judge = Callable[[Names], Verdict]
 
 
 # When numbers speak for a part, and their score beside a name's (4 for the likeliest).
@@ -52,7 +52,7 @@ class Numbers:
         data: columns (N,) by name.
     """
 
-    def __init__(self, t: Array, data: Mapping[str, Array]) -> None:
+    def __init__(self, t: Array, data: ArrayMap) -> None:
         order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
         self.order = order[max(0, (len(order) - _MOST_ROWS) // 2) :][:_MOST_ROWS]
         self.t = t[self.order]
@@ -61,34 +61,30 @@ class Numbers:
         self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
         self._rows: dict[Names, ArrayPair] = {}
-        self.attitude: Sequence[str] = ()  # a quaternion, whose tilt drives the position
+        self.attitude: Names = ()  # a quaternion, whose tilt drives the position
         self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
 
-    def rows(self, columns: Sequence[str]) -> ArrayPair:
+    def rows(self, columns: Names) -> ArrayPair:
         """Return the times (n,) and values (n, k) of the rows with all columns."""
-        if (key := tuple(columns)) not in self._rows:
+        if columns not in self._rows:
             values = np.column_stack([self.data[name][self.order] for name in columns])
             there = finite_rows(values)
-            self._rows[key] = self.t[there], values[there]
-        return self._rows[key]
+            self._rows[columns] = self.t[there], values[there]
+        return self._rows[columns]
 
-    def some(self, columns: Sequence[str]) -> Array:
+    def some(self, columns: Names) -> Array:
         """Return values (n, k) of some rows, spread over all."""
         values = self.rows(columns)[1]
         return values[:: max(1, len(values) // _MOST_SAMPLES)]
 
-    def between(self, t: Array, columns: Sequence[str]) -> Array:
+    def between(self, t: Array, columns: Names) -> Array:
         """Return values (n, k) at times (n,), of lines between the rows."""
         times, values = self.rows(columns)
         if not len(times):
             return np.full((len(t), len(columns)), np.nan)
         return resampled(t, times, values)
 
-    def varies(self, column: str) -> bool:
-        """Return whether a column takes more than a few values: no counter's and no switch's."""
-        return column in self.data and len(np.unique(self.some([column]))) > _LEVELS
-
-    def quaternion(self, columns: Sequence[str]) -> Verdict:
+    def quaternion(self, columns: Names) -> Verdict:
         """Return 1 where columns may be an attitude: three angles are 0, for nothing shows them;
         minus infinite where four columns have another length than 1.
         """
@@ -103,7 +99,7 @@ class Numbers:
         is_one = np.quantile(off, 0.98) < _LENGTH_ERROR[1]
         return (1.0 if is_one else -np.inf), "their length is 1"
 
-    def gravity(self, columns: Sequence[str]) -> Verdict:
+    def gravity(self, columns: Names) -> Verdict:
         """Return 1 where gravity lies along the third of three columns, 0.8 along another."""
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
@@ -113,7 +109,7 @@ class Numbers:
             return 0.0, ""  # another size, a direction, or a turning vector
         return (1.0 if middle.argmax() == 2 else 0.8), f"their size is gravity's, in {unit}"
 
-    def follows_tilt(self, columns: Sequence[str]) -> Verdict:
+    def follows_tilt(self, columns: Names) -> Verdict:
         """Return the correlation of two of three columns' second differences with the tilt; 0 where
         there is little.
         """
@@ -131,7 +127,7 @@ class Numbers:
                 best = max(best, min(correlations))
         return (best if best > _FOLLOWS else 0.0), "their acceleration follows the tilt"
 
-    def moves_together(self, columns: Sequence[str]) -> Verdict:
+    def moves_together(self, columns: Names) -> Verdict:
         """Return 1 where four columns are of one size and move with the specific force."""
         x = self.some(columns)
         x = x[np.any(x != 0.0, axis=1)]
@@ -142,7 +138,7 @@ class Numbers:
         together &= any(correlation(total, felt) > _FELT for felt in self.felt)
         return float(together), "they move together with the specific force"
 
-    def feel(self, accelerometer: Sequence[str], position: Sequence[str]) -> None:
+    def feel(self, accelerometer: Names, position: Names) -> None:
         """Keep likely specific forces: an accelerometer's size, else accelerations."""
         if accelerometer:
             self.felt = [np.linalg.norm(self.between(self.clock, accelerometer), axis=1)]
@@ -230,8 +226,14 @@ def candidates(
             named |= set(group.columns)
     if part != "commands" and not commanded:
         wanted, width = WORDS["not_measured"], 4 if part in ("attitude", "motors") else 3
-        loose = [n for n in names if n.column not in named and numbers.varies(n.column)]
-        measured = tuple(name.column for name in loose if not re.search(wanted, name.base))
+        # with more than a few values: no counter's and no switch's
+        measured = tuple(
+            n.column
+            for n in names
+            if n.column not in named
+            and len(np.unique(numbers.some((n.column,)))) > _LEVELS
+            and not re.search(wanted, n.base)
+        )
         for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
     likeliest: dict[Names, ColumnCandidate] = {}

@@ -24,13 +24,13 @@ Other columns are ignored. The vehicle's name stands in a header, so the table h
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from .table import Array, Data, Mask, NamedArrays, Names, Values, finite_rows, median_step
+from .table import Array, ArrayMap, Data, Mask, NamedArrays, Names, Values, finite_rows, median_step
 from .tables import write_table
 from .what_flew import UNSTATED, WhatFlew
 
@@ -93,8 +93,8 @@ class FlightLog:
     name: str = ""
     source: str = ""
     notes: Names = ()
-    valid: Mask = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
-    extra: Mapping[str, Array] = field(default_factory=dict)
+    valid: Mask = field(default_factory=lambda: np.empty(0, dtype=bool))
+    extra: ArrayMap = field(default_factory=dict)
     commanded: bool = False
     command: Array | None = None
     vehicle: str = ""
@@ -136,6 +136,9 @@ class FlightLog:
     def period(self) -> float:
         """Median time step, s."""
         return median_step(self.t)
+
+
+Logs = Sequence[FlightLog]
 
 
 def time_notes(t: Array) -> Names:

@@ -68,7 +68,7 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, Na
         elif field == "gyro":
             turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
             shares = gyro_shares(t, measured, *pose, turns)
-            doubt = sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
+            doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
             fast = np.quantile(np.abs(measured), 0.99) > MAGNITUDES.fastest_gyro
             alone = GYRO_READINGS[0].says if fast else ""
         else:
@@ -82,8 +82,8 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, Na
                     "were turned into body axes by the attitude"
                 )
             otherwise = "contradict the position's acceleration and gravity"
-            doubt = sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
-            alone = sensor_doubt(_gravity_shares(measured, gravity), _BY_GRAVITY, "")
+            doubt = _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
+            alone = _sensor_doubt(_gravity_shares(measured, gravity), _BY_GRAVITY, "")
         if doubt:
             notes.append(f"{columns} {doubt}. They were left out")
             left_out: Data = {field: None}
@@ -98,7 +98,7 @@ def is_stuck(measured: Array) -> bool:
     return len(measured) >= LEAST_SAMPLES and bool(np.all(np.ptp(measured, axis=0) == 0.0))
 
 
-def sensor_doubt(
+def _sensor_doubt(
     shares: Sequence[float] | None, readings: Sequence[SensorReading], otherwise: str
 ) -> str:
     """Return the words on a wrong sensor, or nothing.
@@ -218,7 +218,7 @@ def gravity_doubt(force: Array, gravity: float) -> str:
     )
     if size < 0.5 * gravity:
         otherwise += " (an acceleration without gravity is none)"
-    return sensor_doubt(_gravity_shares(force, gravity), _BY_GRAVITY, otherwise)
+    return _sensor_doubt(_gravity_shares(force, gravity), _BY_GRAVITY, otherwise)
 
 
 def _gravity_shares(force: Array, gravity: float) -> list[float]:

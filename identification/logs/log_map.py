@@ -64,7 +64,7 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .table import Array, Data, NamedNumbers, Names, Pair
+from .table import Array, ArrayMap, Data, NamedNumbers, Names, Pair
 from .what_flew import ORDERS, Order, rotor_order
 
 MAPS = Path(__file__).parent / "maps"  # the kit's own maps
@@ -171,7 +171,7 @@ class TimeColumn:
         """The columns of the table."""
         return tuple(filter(None, (self.column, self.nanoseconds)))
 
-    def raw(self, columns: Mapping[str, Array]) -> Array:
+    def raw(self, columns: ArrayMap) -> Array:
         """Return times (N,) in its unit."""
         raw = columns[self.column]
         if not self.nanoseconds:

@@ -108,7 +108,7 @@ def thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
     return usual if np.isfinite(usual := usual_thrust(thrust)) else 1.0
 
 
-def carrying_units(thrust: float) -> list[str]:
+def _carrying_units(thrust: float) -> list[str]:
     """Return the units of rotor speeds able to carry the vehicle, by the median thrust by weight of
     the numbers as rad/s.
     """
@@ -120,7 +120,7 @@ def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     """Return a doubt on rotor speeds in rad/s by a median thrust by weight, or nothing."""
     if within(thrust, MAGNITUDES.flies):
         return ""
-    for unit in carrying_units(thrust):
+    for unit in _carrying_units(thrust):
         name, factor = _SPEEDS[unit]
         what = f"divide by {1 / factor:.4g}" if factor < 1 else f"multiply by {factor:.4g}"
         return (
@@ -186,7 +186,7 @@ def motor_unit(
     if vehicle is not None and not commanded:
         there = values[finite_rows(values)]
         carrying = [
-            u for u in carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
+            u for u in _carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
         ]
     # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
     doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""

@@ -11,7 +11,7 @@ unless the numbers contradict the name.
 
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 
@@ -50,7 +50,7 @@ from .log_map import (
 )
 from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .table import Array, Data, NamedArrays, Names, Table
+from .table import Array, ArrayMap, Data, NamedArrays, Names, Table
 from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
@@ -143,7 +143,7 @@ def _numbers_of(table: Table, names: Sequence[Name]) -> NamedArrays:
     return {}
 
 
-def _time_column(names: Sequence[Name], data: Mapping[str, Array]) -> Name | None:
+def _time_column(names: Sequence[Name], data: ArrayMap) -> Name | None:
     """Return the column of the time: by name, else the first increasing column."""
     there = [name for name in names if name.column in data]
     for name in named_alone(there, "time"):
@@ -363,7 +363,7 @@ class _Guessing:
         if self.ranking is None:
             self.sections["body"] = axes
 
-    def gyro_fits(self, columns: Sequence[str], unit: str = "") -> RankedFits | None:
+    def gyro_fits(self, columns: Names, unit: str = "") -> RankedFits | None:
         """Return fits of columns to the pose's turns, by each unit and body axes; None: no pose, or
         too short a pose. Another unit than a named one has a penalty.
         """
@@ -382,7 +382,7 @@ class _Guessing:
         ranked = sorted(fits, key=lambda fit: -fit.score)
         return RankedFits(ranked, "attitude's rate is left unexplained") if fits else None
 
-    def turns_alike(self, columns: Sequence[str]) -> Verdict:
+    def turns_alike(self, columns: Names) -> Verdict:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
         otherwise.
         """

@@ -204,7 +204,7 @@ class ColumnReading:
         ]
 
 
-def _combined(matrix: Array, columns: Sequence[str]) -> str:
+def _combined(matrix: Array, columns: Names) -> str:
     """Return the products of a matrix's rows and columns in words, up to one positive factor."""
     rows = []
     for row in np.round(matrix, 6):
@@ -284,9 +284,7 @@ def log_readings(has_pose: bool) -> list[ColumnReading]:
     return [DECLARED, *_weighed(others, OTHER), *both]
 
 
-def table_readings(
-    orders: Sequence[str], units: Sequence[str], length: str, hint: str
-) -> list[ColumnReading]:
+def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[ColumnReading]:
     """Return the readings of a table's pose within a map's words.
 
     Args:

@@ -20,6 +20,7 @@ Names = tuple[str, ...]  # of columns, logs or effects; sentences
 Pair = tuple[float, float]  # low and high, or a value and its standard deviation
 Values = Mapping[str, float]  # numbers by name
 NamedArrays = dict[str, Array]
+ArrayMap = Mapping[str, Array]
 NamedNumbers = dict[str, float]
 ArrayPair = tuple[Array, Array]
 Data = dict[str, Any]  # plain values by name

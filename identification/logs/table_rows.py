@@ -5,7 +5,6 @@ much.
 """
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from ...runtime.errors import InputError
 from .channels import ChannelGroup
 from .log_map import UNITS, Columns, LogMap
-from .table import Array, Mask, Table
+from .table import Array, ArrayMap, Mask, Table
 
 _STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
 # s to interpolate: the lag of a small vehicle's motors, with hardly a change of speed. And steps of
@@ -27,9 +26,7 @@ _DENSE = 0.5  # share of the rows; a channel with more counts as one of every ro
 _FEWEST = 10  # samples of a channel to decide on its rows
 
 
-def rows_of(
-    table: Table, columns: Mapping[str, Array], log_map: LogMap
-) -> tuple[ChannelGroup, list[str]]:
+def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGroup, list[str]]:
     """Return the map's columns, as written, and notes.
 
     Raises:

@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from subprocess import PIPE
@@ -34,6 +34,7 @@ from .table import (
     TEXT_SUFFIXES,
     WHAT,
     Array,
+    ArrayMap,
     Data,
     Table,
     file_kind,
@@ -72,7 +73,7 @@ def open_table(path: Path) -> Table:
     return _open_parquet(path) if name.endswith(".parquet") else open_text(path)
 
 
-def write_table(columns: Mapping[str, Array], path: Path) -> None:
+def write_table(columns: ArrayMap, path: Path) -> None:
     """Write columns (rows,) to a CSV, gzipped CSV or Parquet file; numbers read back exactly, NaN
     as an empty field.
 
@@ -95,7 +96,7 @@ def write_table(columns: Mapping[str, Array], path: Path) -> None:
         temporary.write_bytes(gzip.compress(data, 6, mtime=0) if kind == ".csv.gz" else data)
 
 
-def write_csv(columns: Mapping[str, Array], path: Path) -> None:
+def write_csv(columns: ArrayMap, path: Path) -> None:
     """Write columns (rows,) of results to a CSV file: numbers with nine significant digits, the
     first column's, the time, exactly.
 
@@ -105,9 +106,7 @@ def write_csv(columns: Mapping[str, Array], path: Path) -> None:
     write_text(_csv_text(columns, "nan", "{:.9g}".format), path)
 
 
-def _csv_text(
-    columns: Mapping[str, Array], missing: str = "", form: Callable[[float], str] = repr
-) -> str:
+def _csv_text(columns: ArrayMap, missing: str = "", form: Callable[[float], str] = repr) -> str:
     texts = [
         [missing if x != x else form(x) if i else repr(x) for x in column.tolist()]
         for i, column in enumerate(columns.values())

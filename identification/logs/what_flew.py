@@ -8,7 +8,7 @@ An order gives the motor of each of the kit's rotors: 1 front-left, 2 rear-left,
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
@@ -17,7 +17,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from .column_names import WORDS
-from .table import Array, Pair, Table, finite_rows
+from .table import ArrayMap, Names, Pair, Table, finite_rows
 
 Order = tuple[int, int, int, int]
 
@@ -61,7 +61,7 @@ def rotor_order(value: object) -> Order:
     )
 
 
-def order_words(order: Order, named: Sequence[str] = PLACES) -> str:
+def order_words(order: Order, named: Names = PLACES) -> str:
     """Return an order in words, by the places of the kit's rotors."""
     places = sorted(zip(order, named, strict=True))
     return f"motors {', '.join(f'{motor} {place}' for motor, place in places)}"
@@ -106,9 +106,7 @@ class WhatFlew:
 UNSTATED = WhatFlew()
 
 
-def more_rotors(
-    columns: Sequence[str], source: Table | Mapping[str, Array], are_speeds: bool = False
-) -> str:
+def more_rotors(columns: Names, source: Table | ArrayMap, are_speeds: bool = False) -> str:
     """Return words on more than four rotors, or nothing: columns go on with the numbers of four
     motors', and turn as they do. Without a motor's name an output may be a servo's, and counts if a
     sum of the four: all are mixed of thrust, roll, pitch and yaw.
@@ -141,7 +139,7 @@ def more_rotors(
     return f"{len(turning)} rotors turn ({', '.join(turning)}); expected the four of a quadrotor"
 
 
-def _numbered_on(columns: Sequence[str], others: Sequence[str]) -> list[str]:
+def _numbered_on(columns: Names, others: Sequence[str]) -> list[str]:
     """Return the other columns with the next numbers up in the four columns' names."""
     for numbers in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
         if len({match[0] for match in numbers}) == len(columns):
@@ -169,8 +167,8 @@ def order_by_places(places: Sequence[Pair], vehicle: Vehicle | None = None) -> O
         vehicle: with rotors wherever its file has them; None: one in each quadrant.
     """
     rotors = _QUADRANTS if vehicle is None else vehicle.positions[:, :2].tolist()
-    motors = np.arctan2(*np.array(places, dtype=np.float64).T[::-1])
-    wanted = np.arctan2(*np.array(rotors, dtype=np.float64).T[::-1])
+    motors = np.arctan2(*np.transpose(places)[::-1])
+    wanted = np.arctan2(*np.transpose(rotors)[::-1])
     off = np.abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
     nearest = [int(i) for i in np.argmin(off, axis=1)]
     if sorted(nearest) != [0, 1, 2, 3] or off.min(axis=1).max() > _APART:

@@ -2,14 +2,13 @@
 alone.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Mocap, Vehicle
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import FlightLog, Logs
 from ..logs.table import Array
 from .inertial_signals import imu_noise, pose_rate, reads_imu
 from .smoothing import CUTOFFS, high_pass, robust_std, turned
@@ -70,9 +69,7 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
     )
 
 
-def noisy_logs(
-    logs: Sequence[FlightLog], vehicle: Vehicle, hidden: bool = False
-) -> list[FlightLog]:
+def noisy_logs(logs: Logs, vehicle: Vehicle, hidden: bool = False) -> list[FlightLog]:
     """Return logs with their own noise added once more: any change of a result is made by noise.
 
     ``hidden``: a filter took the noise out of the logs' upper band, and only a part of it shows.

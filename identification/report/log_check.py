@@ -147,6 +147,6 @@ def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
     try:
         doubts += screen_log(log, vehicle)[1]
     except InputError as error:
-        where = f"{log.source}: "
-        doubts.append(f"a diagnosis refuses it: {str(error).removeprefix(where)}")
+        said = str(error).removeprefix(f"{log.source}: ")
+        doubts.append(f"a diagnosis refuses it: {said}")
     return doubts

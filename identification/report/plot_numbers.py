@@ -349,8 +349,8 @@ class Bar(NamedTuple):
     width: float
 
 
-def candidate_bars(diagnosis: Diagnosis, most: int = 14) -> list[Bar]:
-    """Return the ranking of the tried effects: the best ``most``, named effects, and effects
+def candidate_bars(diagnosis: Diagnosis) -> list[Bar]:
+    """Return the ranking of the tried effects: the best 14, named effects, and effects
     indistinguishable from a named one.
     """
     rivals = {x for effect in diagnosis.effects for x in effect.indistinguishable_from}
@@ -358,7 +358,7 @@ def candidate_bars(diagnosis: Diagnosis, most: int = 14) -> list[Bar]:
         "named" if x.named else "rival" if x.name in rivals else "" for x in diagnosis.candidates
     ]
     ranked = zip(diagnosis.candidates, kinds, strict=True)
-    shown = [(x, kind) for i, (x, kind) in enumerate(ranked) if i < most or kind]
+    shown = [(x, kind) for i, (x, kind) in enumerate(ranked) if i < 14 or kind]
     gains = np.nan_to_num([x.gain for x, _ in shown], posinf=0.0, neginf=0.0)
     high, low = np.max(gains, initial=0.05), max(np.min(gains, initial=0.0), -0.25)
     places = 100.0 * (np.maximum([*gains, 0.0], low) - low) / (high - low)

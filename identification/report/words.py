@@ -58,7 +58,7 @@ def in_words(names: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
-def in_unit(value: float, unit: str) -> str:
+def _in_unit(value: float, unit: str) -> str:
     """Return a number with its unit, plain or milli."""
     factor, unit = scale_of([value], unit)
     return f"{rounded(factor * value, 2)}{SPACE}{unit}"
@@ -164,14 +164,14 @@ def _disturbances(diagnosis: Diagnosis) -> str:
         if own:
             largest = max(own, key=lambda gusts: gusts.rms)
             time = f"correlation time {rounded(largest.time, 2)}{SPACE}s"
-            stated.append(f"{in_unit(largest.rms, unit)} rms ({time})")
+            stated.append(f"{_in_unit(largest.rms, unit)} rms ({time})")
     return f", with disturbances of up to {in_words(stated)}" if stated else ""
 
 
 def _transient(diagnosis: Diagnosis) -> str:
     """Return when the clearest transient disturbance was, and how strong."""
     largest = diagnosis.pushes[0]
-    size = in_unit(largest.peak, "Nm" if largest.channel.startswith("tau") else "N")
+    size = _in_unit(largest.peak, "Nm" if largest.channel.startswith("tau") else "N")
     where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
     return f"{size} in {largest.channel} at {rounded(largest.t)}{SPACE}s{where}"
 

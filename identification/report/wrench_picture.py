@@ -110,7 +110,7 @@ def _draw_vectors(
         panel.fill_between(t, low[:, i], high[:, i], color=colour, alpha=0.18, lw=0)
         if truth is not None:
             true = f"true {name}"
-            rmse = float(np.sqrt(np.mean(np.square(mean[:, i] - truth[:, i]))))
+            rmse = np.sqrt(np.mean(np.square(mean[:, i] - truth[:, i])))
             name += f" (RMSE {rmse:.3g} {unit})"
         panel.plot(t, mean[:, i], color=colour, lw=1.1, label=name)
         if truth is not None:

@@ -1,30 +1,30 @@
 """The vehicle made of estimates, and the flights to add for missing ones."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, Vehicle
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import Logs
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
 from .model import inertia_of
 from .motors import MotorResponse
 from .parameters import FURTHER
-from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate
+from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate, Estimated
 from .solve import VehicleFit
 
 
 def vehicle_of(
     name: str,
     fit: VehicleFit,
-    estimates: Mapping[str, Estimate],
+    estimates: Estimated,
     geometry: Geometry,
-    logs: Sequence[FlightLog],
+    logs: Logs,
     voltage: float,
     step: float,
     motors: MotorResponse | None = None,
@@ -84,7 +84,7 @@ def vehicle_of(
     return replace(vehicle, mocap=mocap)
 
 
-def _uncertainty(estimates: Mapping[str, Estimate], arm: float, commands: bool) -> Uncertainty:
+def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertainty:
     """Return the standard deviations of the 95 % intervals, thrust's with the spread from day to
     day. The deviation of the given mass is not known.
     """
@@ -114,7 +114,7 @@ def _shown(estimate: Estimate | None) -> float:
     return estimate.value
 
 
-def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
+def _effects(estimates: Estimated) -> Sequence[EffectSetting]:
     out = []
     for role in dict.fromkeys(further.role for further in FURTHER.values() if further.role):
         effect = effect_of(role)
@@ -131,7 +131,7 @@ def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     return out
 
 
-def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
+def advice_of(estimates: Estimated) -> list[str]:
     """Return the flights or arguments to add for quantities missing from the logs."""
     lag = effect_of(Role.LAG)
     climb = "Climb hard and let the vehicle sink: the thrust curve is known where it flew."

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import FlightLog, Logs
 from ..logs.streams import MOTOR_RATES
 from ..logs.table import Data, Pair, median_step
 from ..motion.signals import log_signals
@@ -75,7 +75,7 @@ class Sources:
     velocity: bool
 
 
-def sources_of(logs: Sequence[FlightLog]) -> Sources:
+def sources_of(logs: Logs) -> Sources:
     """Return the sensors common to all logs.
 
     Raises:
@@ -119,7 +119,7 @@ def _is_fast(log: FlightLog, channel: str) -> bool:
     return MOTOR_RATES.serves(log.rates.get(channel, np.inf), MOTOR_RATES.torque_hz)
 
 
-def rounding_step(logs: Sequence[FlightLog]) -> float:
+def rounding_step(logs: Logs) -> float:
     """Return the step (rad/s) of rounded rotor speeds, from the numbers themselves; 0 where
     rounding does not matter.
     """
@@ -142,7 +142,7 @@ def speed_noise(pieces: Sequence[MotionPiece]) -> float:
     return math.sqrt(float(np.median(powers))) if powers else 0.0
 
 
-def pieces_of(logs: Sequence[FlightLog], windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
+def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     """Return all unbroken pieces of the logs in flight, and their sensors.
 
     Args:

@@ -15,7 +15,7 @@ import numpy as np
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import ModelStatus, Standing, Vehicle
 from ...runtime.arrays import Array, Index
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import Logs
 from ..prediction import QUANTITIES, PredictionErrors, errors_of_models
 from .channels import MotionPiece
 from .model import coefficients
@@ -50,7 +50,7 @@ class HeldOut:
 
 def held_out(
     pieces: Sequence[MotionPiece],
-    logs: Sequence[FlightLog],
+    logs: Logs,
     fit: VehicleFit,
     vehicle_of: Callable[[VehicleFit], Vehicle],
 ) -> HeldOut:
@@ -129,7 +129,7 @@ def judged(errors: Mapping[str, Sequence[PredictionErrors]]) -> HeldOut:
     force = bool(np.any(ends(chosen)[:, moving] > still[:, moving]))
     if force and not refuted:
         chosen = 3
-    status = status_of(force, refuted)
+    status = _status_of(force, refuted)
     kept = {where: each[chosen] for where, each in errors.items()}
     if force and refuted:
         kept = {where: replace(of, model=of.still) for where, of in kept.items()}
@@ -137,7 +137,7 @@ def judged(errors: Mapping[str, Sequence[PredictionErrors]]) -> HeldOut:
     return HeldOut(kept, simplest, status, further, _reason(errors) if refuted else "")
 
 
-def status_of(force: bool, torque: bool) -> ModelStatus:
+def _status_of(force: bool, torque: bool) -> ModelStatus:
     """Return the status of a vehicle whose force or torque is refuted."""
     words: tuple[Standing, Standing] = ("identified", "refuted")
     return ModelStatus(words[force], words[torque])
@@ -176,7 +176,7 @@ def _by_balance(fit: VehicleFit, fold: Index) -> HeldOut:
         "not identifiable: torques leave more of the turning of held-out blocks than no model "
         f"({np.sum(left[3:]) / np.sum(total[3:]):.2g} times its power)"
     )
-    return HeldOut({}, {}, status_of(force, torque), why=why if torque else "")
+    return HeldOut({}, {}, _status_of(force, torque), why=why if torque else "")
 
 
 def powers(

@@ -17,7 +17,8 @@ from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import Logs
+from ..logs.magnitudes import motor_doubts
 from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Pieces, Sources, pieces_of, rounding_step, speed_noise
@@ -28,7 +29,7 @@ from .geometry import SPIN, Geometry
 from .held_out import HeldOut, held_out, warnings_of, without_further
 from .motors import motor_response
 from .parameters import FORCE_BIAS, FURTHER, first_model
-from .plausible import check_rotors, check_thrust
+from .plausible import check_thrust
 from .result import IDENTIFIED, NOTHING, REFUTED, Estimate, Identified, told
 from .solve import Interval, VehicleFit, nearest_body, score_tests, solve
 from .spectra import BAND
@@ -50,7 +51,7 @@ WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 
 @one_thread()
 def identify(
-    logs: Sequence[FlightLog],
+    logs: Logs,
     mass: float,
     geometry: Geometry,
     windows: Sequence[Pair] | None = None,
@@ -76,7 +77,9 @@ def identify(
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
-    check_rotors(logs)
+    for log in logs:
+        for wrong in motor_doubts(log):
+            raise InputError(f"{log.name}: {wrong}")
     notes = []
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"

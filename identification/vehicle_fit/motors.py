@@ -46,11 +46,12 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
         best = np.linalg.lstsq(x, target, rcond=None)[0]
         return best, target - x @ best
 
-    def misfit(log_lag: float) -> float:
-        return float(np.sum(np.square(fitted(float(np.exp(log_lag)))[1])))
-
-    bounds = tuple(np.log(_LAGS))
-    likeliest = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-3})
+    likeliest = minimize_scalar(
+        lambda log_lag: np.sum(np.square(fitted(float(np.exp(log_lag)))[1])),
+        bounds=tuple(np.log(_LAGS)),
+        method="bounded",
+        options={"xatol": 1e-3},
+    )
     lag = float(np.exp(likeliest.x))
     best, residual = fitted(lag)
     step = 0.01 * lag

@@ -1,28 +1,13 @@
-"""Rotor speeds that no quadrotor has: equal columns, uneven rotors, an impossible thrust."""
+"""Rotor speeds that no quadrotor has: an impossible thrust."""
 
 import math
-from collections.abc import Iterable
 
 from ...runtime.errors import InputError
-from ..logs.flight_log import FlightLog
-from ..logs.magnitudes import motor_doubts
 
 # thrust over air density, disc area and squared tip speed: propellers of 0.03 to 5 kg have 0.005 to
 # 0.03; a radius known by the arm alone may be off by a factor of 1.4, thrust then by 4
 _THRUST_COEFFICIENTS = (0.002, 0.1)
 _AIR_DENSITY = 1.225  # kg/m3
-
-
-def check_rotors(logs: Iterable[FlightLog]) -> None:
-    """Check that four rotors carry each log's vehicle.
-
-    Raises:
-        InputError: two rotors have the same values in every row, medians a factor of 2 apart, or
-            speeds at which no rotor carries a drone.
-    """
-    for log in logs:
-        for doubt in motor_doubts(log):
-            raise InputError(f"{log.name}: {doubt}")
 
 
 def check_thrust(k: float, radius: float, log: str) -> None:

@@ -38,12 +38,15 @@ class Estimate:
     how: str  # channels, assumption, or reason not to know
 
 
+Estimated = Mapping[str, Estimate]  # by name
+
+
 @dataclass(frozen=True, eq=False)
 class Identified:
     """A vehicle from its logs."""
 
     vehicle: Vehicle
-    estimates: Mapping[str, Estimate]  # keys: names
+    estimates: Estimated  # keys: names
     sources: Sources
     pieces: tuple[MotionPiece, ...]
     fit: VehicleFit

@@ -112,7 +112,7 @@ def read(
         )
     if lost:
         notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
-    fields = dict(zip(keep, rows.T.astype(np.float64), strict=True))
+    fields = dict(zip(keep, rows.T.astype(float), strict=True))
     return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
 
 
@@ -223,7 +223,7 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
             )
         return low, high, "motorOutput of the header"
     least, most = (
-        whole_number(headers.get(name, ""), 1, 10**9) for name in ("minthrottle", "maxthrottle")
+        _whole_number(headers.get(name, ""), 1, 10**9) for name in ("minthrottle", "maxthrottle")
     )
     if least and most and least < most:
         return float(least), float(most), "minthrottle and maxthrottle of the header"
@@ -240,20 +240,20 @@ def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
         InputError: the option is none.
     """
     if option:
-        if (poles := whole_number(option, 2, 999)) and poles % 2 == 0:
+        if (poles := _whole_number(option, 2, 999)) and poles % 2 == 0:
             return poles, "as the reader's option says"
         raise InputError(
             f"{path}: reader option {option!r}; expected the motors' number of magnet poles, even, "
             "such as betaflight:14"
         )
-    if poles := whole_number(stated, 2, 100):
+    if poles := _whole_number(stated, 2, 100):
         return poles, "motor_poles of the header"
     return _POLES, "assumed; betaflight:NUMBER says another"
 
 
 def _one_g(t: Array, force: list[Array], headers: Headers) -> tuple[float, str]:
     """Return the accelerometer's counts of 1 g, and words on whence they are known."""
-    if stated := whole_number(headers.get("acc_1G", ""), 1, 10**6):
+    if stated := _whole_number(headers.get("acc_1G", ""), 1, 10**6):
         return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
     length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
     middle = np.nanmedian(length) if np.isfinite(length).any() else 0.0
@@ -264,7 +264,7 @@ def _one_g(t: Array, force: list[Array], headers: Headers) -> tuple[float, str]:
     )
 
 
-def whole_number(text: str, least: int, most: int) -> int | None:
+def _whole_number(text: str, least: int, most: int) -> int | None:
     """Return a header's whole number; None: no whole number between two limits."""
     if not text.lstrip("-").isdecimal() or len(text) > 10:
         return None
@@ -295,7 +295,7 @@ def _layout(path: Path, headers: Headers, names: list[str]) -> Layout:
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
 
     def number(text: str, default: int) -> int:
-        stated = whole_number(text, -999_999_999, 999_999_999)
+        stated = _whole_number(text, -999_999_999, 999_999_999)
         return default if stated is None else stated
 
     top, _, bottom = headers.get("P interval", "1/1").rpartition("/")

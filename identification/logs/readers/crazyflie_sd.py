@@ -75,9 +75,9 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     for rows in runs:
         if len(rows) < 2:
             continue
-        t = _TIMES[version][1] * rows["time"].astype(np.float64)
+        t = _TIMES[version][1] * rows["time"].astype(float)
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-            columns = {name: rows[name].astype(np.float64) for name in (rows.dtype.names or ())[2:]}
+            columns = {name: rows[name].astype(float) for name in (rows.dtype.names or ())[2:]}
         events.append(ChannelGroup(t, columns))
     if not events:
         raise InputError(f"{path}: no event twice; expected at least two samples")

@@ -37,11 +37,8 @@ from ..flight_log import FlightLog
 from ..log_map import shipped_map, stated
 from ..mapped_log import recording_of
 from ..streams import Recording
-from ..table import Array, NamedArrays, NamedNumbers, one_line
+from ..table import Array, ArrayMap, NamedArrays, NamedNumbers, Values, one_line
 from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
-
-Fields = Mapping[str, Array]  # (N,) of an instance of a topic, by name
-Parameters = Mapping[str, float]
 
 BEGINS = rb"ULog\x01\x12\x35"
 WHAT = "a PX4 log (ULog)"
@@ -151,7 +148,7 @@ def channels(
     return recording
 
 
-def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], NamedNumbers, bool]:
+def read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, bool]:
     """Return the topics of the map, the parameters at the log's start, and whether the file is
     damaged. A topic's instances are mappings from field to column.
 
@@ -173,13 +170,13 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], NamedNumbers, bool]:
                 file.seek(place)
                 place += _MESSAGE + int.from_bytes(file.read(2), "little")
         is_damaged = bool(parsed.file_corruption) or place != size
-    topics: dict[str, list[Fields]] = {}
+    topics: dict[str, list[ArrayMap]] = {}
     for data in parsed.data_list:
         if "timestamp" in data.data:
             where, count = f"{path}: topic {data.name}", len(data.data["timestamp"])
             check_count(where, count, LIMITS.table_rows, "messages")
             with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-                fields = {name: x.astype(np.float64) for name, x in data.data.items()}
+                fields = {name: x.astype(float) for name, x in data.data.items()}
             topics.setdefault(data.name, []).append(fields)
     parameters = {
         name: float(value)
@@ -189,7 +186,7 @@ def read_ulog(path: Path) -> tuple[dict[str, list[Fields]], NamedNumbers, bool]:
     return topics, parameters, is_damaged
 
 
-def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[ChannelGroup]:
+def _samples(topic: str, fields: ArrayMap, outputs: Outputs) -> Iterator[ChannelGroup]:
     """Yield the columns of a topic's instance, as the map names them: none of an unused topic; two
     groups of an inertial sensor, for the times of gyro and accelerometer.
     """
@@ -207,7 +204,7 @@ def _samples(topic: str, fields: Fields, outputs: Outputs) -> Iterator[ChannelGr
     yield ChannelGroup(t, unified(topic, columns), topic)
 
 
-def unified(topic: str, fields: Fields) -> NamedArrays:
+def unified(topic: str, fields: ArrayMap) -> NamedArrays:
     """Return a topic's columns by the map's names; none of an unused topic."""
     columns = dict(fields)
     if topic == "esc_status":
@@ -242,7 +239,7 @@ def unified(topic: str, fields: Fields) -> NamedArrays:
     return columns
 
 
-def _sensor(topic: str, t: Array, fields: Fields, field: str, gained: str) -> ChannelGroup:
+def _sensor(topic: str, t: Array, fields: ArrayMap, field: str, gained: str) -> ChannelGroup:
     """Return a gyro or an accelerometer at its own times, as far as the topic has it."""
     source = field if topic == "sensor_combined" else gained
     names = {f"{field}[{i}]": f"{source}[{i}]" for i in range(3)}
@@ -313,7 +310,7 @@ def _fields(name: str, formats: Mapping[str, Any], known: dict[str, int], depth:
     return known[name]
 
 
-def what_flew(parameters: Parameters, statuses: Sequence[Fields]) -> WhatFlew:
+def what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
     """Return a log's statements on its vehicle.
 
     Args:
@@ -338,7 +335,7 @@ def what_flew(parameters: Parameters, statuses: Sequence[Fields]) -> WhatFlew:
     return WhatFlew(airframe, "parameter CA_ROTOR_COUNT" if count else by, count or None)
 
 
-def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
+def motor_order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Order, str]:
     """Return PX4's motor of each of the vehicle's rotors, and a note on the source: the positions
     CA_ROTORn_PX and PY, the airframe's, else PX4's quad x.
 
@@ -368,7 +365,7 @@ def motor_order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> 
     return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
 
 
-def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Outputs:
+def outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outputs:
     """Return the motors' outputs, and their values for commands 0 and 1. Shares count as they are.
     DShot and UAVCAN, by parameters or by numbers beyond pulses, have the protocol's range. Pulses
     have each output's own parameter, the bank's, or PX4's default.
@@ -427,7 +424,7 @@ def outputs_of(path: Path, sent: Sequence[Fields], parameters: Parameters) -> Ou
     return Outputs(slots, np.full(4, low), np.full(4, high), words)
 
 
-def shares_of_outputs(columns: Fields, outputs: Outputs) -> NamedArrays:
+def shares_of_outputs(columns: ArrayMap, outputs: Outputs) -> NamedArrays:
     """Return each output's values (N,) as 0 to 1, other outputs' in the motors' range; nothing if a
     motor's output never changes.
     """
@@ -443,7 +440,7 @@ def shares_of_outputs(columns: Fields, outputs: Outputs) -> NamedArrays:
     }
 
 
-def _of_motors(columns: Fields, slots: Sequence[int]) -> Array | None:
+def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> Array | None:
     """Return the values of the motors' outputs (N, 4). None: one is missing or never changes, as of
     a servo, or of an unused bank.
     """
