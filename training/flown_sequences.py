@@ -24,7 +24,7 @@ class Flights:
             another episode.
         lesson: inputs and taught quantities: a ``FanHindsight``, or an object with its constants
             and methods.
-        config: ``rounds``, ``wander`` (``size`` and ``time``, s, of an error of the commands).
+        wander: an error of the commands: a share of the largest, and s that it lasts.
         seed: the run's.
     """
 
@@ -32,10 +32,11 @@ class Flights:
         self,
         envs: list[Any],
         lesson: Any,
-        config: dict[str, Any],
+        wander: tuple[float, float],
         seed: int,
     ) -> None:
-        self._envs, self._lesson, self._wander = envs, lesson, config["wander"]
+        self._envs, self._lesson = envs, lesson
+        self._size, self._lasts = wander[0] * lesson.largest, wander[1]
         self._seed, self._rng = seed, np.random.default_rng(seed)
         self._flown: list[Sequences] = []
         self.episodes = 0
@@ -55,7 +56,7 @@ class Flights:
         """
         for env in self._envs:
             n = env.num_envs
-            size = self._wander["size"] * self._rng.random(n)
+            size = self._size * self._rng.random(n)
             if network is not None:
                 size *= self._rng.random(n) >= _CALM
             self._flown.append(self._fly(env, network, shares, size[:, None]))
@@ -66,7 +67,7 @@ class Flights:
     ) -> Sequences:
         lesson, n, state = self._lesson, env.num_envs, None
         shape = n, env.single_action_space.shape[0]
-        keep = np.exp(-lesson.period / self._wander["time"])
+        keep = np.exp(-lesson.period / self._lasts)
         off, flying = size * self._rng.standard_normal(shape), np.ones(n, dtype=np.bool_)
         seen, kept = [], [flying]
         seeds = [training_seed(self._seed, 0, self.episodes + i) for i in range(n)]

@@ -157,13 +157,11 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
     """
     given = _fit_of(task) | changed
     lesson, envs, quantities, mirrored = _lesson(task, scenario, given["episodes"])
-    size, lasts = given["wander"]
     torch.manual_seed(seed)
     shape, shares = (given["cell"], given["state"], given["net"], _ACTIVATION), _shares(task)
     taught = 4 if task == FAN_PLANE else 3
     network = TaughtNetwork(quantities, taught, *shape)
-    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
-    flights = Flights(envs, lesson, wander, seed)
+    flights = Flights(envs, lesson, given["wander"], seed)
     order = torch.Generator().manual_seed(seed)
     whitened = task != FAN_PLANE
     for flown in _rounds(network, flights, shares, given, order, mirrored, whitened):
@@ -185,9 +183,7 @@ def linear(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy:
     """Return a linear law of a task in the wind; arguments as of ``teach``."""
     given = _LINEAR | changed
     lesson, envs, _, _ = _lesson(task, scenario, given["episodes"])
-    size, lasts = _FIT[WIND]["wander"]
-    wander = {"wander": {"size": size * lesson.largest, "time": lasts}}
-    law, flights = LinearLaw(), Flights(envs, lesson, wander, seed)
+    law, flights = LinearLaw(), Flights(envs, lesson, _FIT[WIND]["wander"], seed)
     for number in range(given["rounds"]):
         flights.fly(law if number else None, _shares(task))
         law.fit(flights.sequences())
@@ -213,25 +209,20 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="folder; default: that of the kit's policies")
     given = parser.parse_args()
     torch.set_num_threads(1)
-    began, task = time.process_time(), given.task
-    usual = BASE if given.kind == "linear" else MIX
-    kind, scenario = _fit_of(task)["cell"], given.scenario or usual
+    began, task, linearly = time.process_time(), given.task, given.kind == "linear"
+    scenario = given.scenario or (BASE if linearly else MIX)
     if task in (FAN, FAN_PLANE):
+        if linearly:
+            parser.error("--kind linear: expected a task in the wind")
         scenario = "wide" if task == FAN else BASE
     asked = {name: getattr(given, name) for name in ("rounds", "episodes", "epochs")}
     changed = {name: count for name, count in asked.items() if count is not None}
-    if given.kind == "linear":
-        if task in (FAN, FAN_PLANE):
-            parser.error("--kind linear: expected a task in the wind")
-        kind = "linear"
-        policy: TaskPolicy | TrainedPolicy = linear(task, scenario, given.seed, **changed)
-    else:
-        policy = teach(task, scenario, given.seed, **changed)
+    policy = (linear if linearly else teach)(task, scenario, given.seed, **changed)
     policies = Path("training/policies")
     out, start = (policies, "") if task == FAN else (policies / "tasks", f"{task}-")
     out = given.out or out
     out.mkdir(parents=True, exist_ok=True)
-    path = out / f"{start}{kind}-{given.seed}.npz"
+    path = out / f"{start}{policy.card['algorithm']}-{given.seed}.npz"
     rmse, lost, _ = validate(policy, TASKS[task].environment(BASE), VALIDATION)
     policy.card |= {
         "validation": {"episodes": VALIDATION, "rmse_m": round(rmse, 5), "lost": lost},
