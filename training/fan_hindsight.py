@@ -5,11 +5,6 @@ gives the best command of each decision in view of the fan's coming places. The 
 commands, given the observations so far, is the best causal command (certainty equivalence): a
 recurrent network fitted to them learns this mean. Two more quantities are taught, for the network's
 memory alone: the fan's offset and its velocity.
-
-Decisions count up to a loss at ``L`` = 2.5 m: without them the network would learn from vehicles on
-the right way alone, and trust any way. The regulator's cost is the offset's square, ``x^2``, and
-has no loss. So a decision weighs as the curvature of ``-L^2 log(1 - x^2 / L^2)`` over the curvature
-of ``x^2``, at the offset where its command acts.
 """
 
 from typing import Any
@@ -17,26 +12,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..controllers.axis_models import PLACE, SET_POINT, SPEED, tilting
+from ..controllers.axis_models import PLACE, SET_POINT, tilting
 from ..controllers.features import Features, History
 from ..controllers.flight import FlightGains
 from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ..controllers.preview import Oracle, lasting, preview
-from ..envs.fan_tracking import LOST_OFFSET, FanTrackingEnv
+from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.lanes.vector import TaskLanes
 
 Array = NDArray[np.float64]
 Frames = NDArray[np.float32]
 
 AHEAD = 24  # decisions, of which a command knows the fan's places
-_KNOWN = 10  # of them the fan's path must have for a command to count
-_COMING = 0.6  # s, until what is commanded moves the vehicle
-_NEAREST = 0.75  # share of the square of the offset of a loss from which a weight grows no more
+_COUNTS = 10  # of them the vehicle must have flown for a command to count
 _LEAD = 2.0  # 1/s, gain of the law with sight of the fan that flies the first round
 _VELOCITY = 3  # decisions, over which the fan's velocity is taught
 _ALONG_Y = 1
-# of 21 episodes so many fly in each scenario
-MIX = {"base": 4, "fast": 3, "varied": 4, "far": 6} | dict.fromkeys(
+# of nineteen episodes so many fly in each scenario
+MIX = {"base": 4, "fast": 3, "varied": 4, "far": 4} | dict.fromkeys(
     ("static", "noisy", "gusty", "slow-filter"), 1
 )
 FEATURES = Features(("torque_z", "force_x", "force_y", "velocity_y", "command", "path_y"), 3)
@@ -71,9 +64,6 @@ class FanHindsight:
     def begin(self, envs: TaskLanes, leads: bool) -> None:
         """Start an episode in each of ``envs``."""
         self._envs = envs
-        # taken now: after a loss of its vehicle an environment goes on with another path
-        ticks = envs.task.decision_ticks * np.arange(self.decisions + 1)
-        self._fan: Array = envs.episodes.paths[:, np.maximum(ticks - 1, 0), 0].T
         self._history = History(FEATURES, envs.num_envs)
         self._flown: list[tuple[Array, ...]] = []
 
@@ -86,7 +76,7 @@ class FanHindsight:
         else:
             self._history.restart(frames, list(range(len(frames))))
             self._set_point: Array = own.copy()
-        self._flown.append((self._own(infos), _felt(infos)))
+        self._flown.append((self._own(infos), _felt(infos), fan.copy()))
         wanted = infos["fan_velocity"] + _LEAD * (fan - own)
         return self._history.flat(), wanted[:, None]
 
@@ -98,12 +88,11 @@ class FanHindsight:
         middle = up[:, y] / up[:, 2], turning, turned, truth["integral"][:, y]
         return np.column_stack([infos["y"], truth["velocity"][:, y], *middle, self._set_point])
 
-    def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the best command, the fan's offset (m) and its velocity (m/s), (decisions, n, 3),
-        and weights (decisions, n), 1 on the axis.
+        and weights (decisions, n).
         """
-        own, felt = (np.array(each) for each in zip(*self._flown, strict=True))
-        fan = self._fan
+        own, felt, fan = (np.array(each) for each in zip(*self._flown, strict=True))
         now = np.arange(self.decisions)
         later = np.minimum(now[:, None] + np.arange(AHEAD + 1), self.decisions)
         off = own[:-1].copy()
@@ -115,10 +104,9 @@ class FanHindsight:
         velocity = moves[:, :_VELOCITY].mean(axis=1) / self.period
         best = np.clip(best, -self._limit, self._limit)
         truth = np.stack([best, -off[..., PLACE], velocity], axis=-1)
-        counts = kept[:-1] & (now + _KNOWN <= self.decisions)[:, None]
-        coming = off[..., PLACE] + _COMING * off[..., SPEED]
-        share = np.minimum((coming / LOST_OFFSET) ** 2, _NEAREST)
-        return truth, counts * (1.0 + share) / (1.0 - share) ** 2
+        return truth, kept[np.minimum(now + _COUNTS, self.decisions)] & (
+            now + _COUNTS <= self.decisions
+        )[:, None]
 
 
 def _felt(infos: dict[str, Any]) -> Array:
