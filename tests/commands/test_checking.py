@@ -23,7 +23,8 @@ def run(capsys, *arguments):
 
 
 def test_check_proposes_a_map_and_writes_the_log_by_it(tmp_path, written, capsys):
-    theirs, map_file = save(written, tmp_path / "theirs.csv"), tmp_path / "map.yaml"
+    theirs = save(written, tmp_path / "theirs.csv")
+    map_file = tmp_path / "map.yaml"
     found = run(
         capsys, "check", theirs, "--vehicle", "ardrone2", "--write-map", map_file, "--out", tmp_path
     )
@@ -71,7 +72,9 @@ def test_positions_without_an_attitude_are_a_channel_and_an_imu_is_checked(tmp_p
 
 def test_a_map_with_something_missing_is_written_and_finished_by_hand(tmp_path, capsys):
     """Four columns that do not move: nothing shows that they are rotors, or in which unit."""
-    log, path, map_file = flight("ardrone2", "excite", 1, 12.0), tmp_path / "a.csv", tmp_path / "m"
+    log = flight("ardrone2", "excite", 1, 12.0)
+    path = tmp_path / "a.csv"
+    map_file = tmp_path / "m"
     columns = [log.t, *log.position.T, *log.quaternion.T, *np.full((4, len(log.t)), 380.0)]
     names = "time,x,y,z,qw,qx,qy,qz,aft_1,aft_2,aft_3,aft_4"
     np.savetxt(path, np.column_stack(columns), delimiter=",", header=names, comments="")

@@ -83,7 +83,8 @@ def test_an_axis_moves_as_the_vehicle_in_mujoco_does(axis, pushed):
     if pushed == "set point":
         model = model.with_set_point()
     A, B, D = model.held(TICK)
-    command, push = 0.0, np.zeros(D.shape[1])
+    command = 0.0
+    push = np.zeros(D.shape[1])
     if pushed == "action":
         command = loop.action[axis] = 0.5
     elif pushed == "set point":
@@ -93,7 +94,10 @@ def test_an_axis_moves_as_the_vehicle_in_mujoco_does(axis, pushed):
     else:
         push[1] = 0.01
         loop.applied[3 + (1, 0)[axis]] = (1, -1)[axis] * 0.01
-    x, start, there, expected = np.zeros(len(A)), loop.position[axis], [], []
+    x = np.zeros(len(A))
+    start = loop.position[axis]
+    there = []
+    expected = []
     for _ in range(160):
         loop.run(np.zeros((1, loop.noise_size)))
         x = A @ x + B[:, 0] * command + D @ push
@@ -233,7 +237,8 @@ def test_a_vehicle_that_sinks_keeps_three_tenths_of_its_weight_to_steer_with():
 
 
 def test_a_steady_turn_about_the_vertical_costs_a_tilted_vehicle_the_gyroscopic_torque_alone():
-    tilted, turning = flight_record(VEHICLE)[0], flight_record(VEHICLE)[0]
+    tilted = flight_record(VEHICLE)[0]
+    turning = flight_record(VEHICLE)[0]
     q = Rotation.from_euler("zyx", [0.7, 0.1, -0.2])
     rate = q.inv().apply([0.0, 0.0, 1.5])
     tilted["setpoint"][9] = turning["setpoint"][9] = 0.7
@@ -283,7 +288,8 @@ def test_a_vehicle_held_for_long_is_not_thrown_on():
     """Held 1 m low and 1 rad off for a minute: the integrals push by 2 m/s2 and 4 rad/s2. Let go,
     it rises 0.36 m too far.
     """
-    c, x = flight_record(VEHICLE)[0], np.zeros(STATE_SIZE)
+    c = flight_record(VEHICLE)[0]
+    x = np.zeros(STATE_SIZE)
     x[3], c["setpoint"][2], c["setpoint"][9] = 1.0, 1.0, 1.0
 
     def pushed():
@@ -292,9 +298,11 @@ def test_a_vehicle_held_for_long_is_not_thrown_on():
 
     for _ in range(60 * 200):
         fly(c, x, 0.005)
-    x[2], c["setpoint"][9] = 1.0, 0.0
+    x[2] = 1.0
+    c["setpoint"][9] = 0.0
     assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)
-    x[2], highest = 0.0, 0.0
+    x[2] = 0.0
+    highest = 0.0
     for _ in range(10 * 200):
         x[9] += 0.005 * pushed()[0]
         x[2] += 0.005 * x[9]

@@ -33,7 +33,8 @@ def test_the_map_is_what_the_environment_s_jet_does_to_the_vehicle():
         env.reset(seed=seed)
         for _ in range(12):
             info = env.step(np.zeros(1, dtype=np.float32))[-1]
-            offset, jet = env.loop.position[1] - info["fan_y"], env.loop.jet[[5, 0, 1]]
+            offset = env.loop.position[1] - info["fan_y"]
+            jet = env.loop.jet[[5, 0, 1]]
             shown = [np.interp(offset, offsets, table.mean[a]) for a in range(3)]
             felt.append((np.sign(offset) * jet[0], jet[1], np.sign(offset) * shown[0], shown[1]))
     torque, force, shown_torque, shown_force = np.mean(felt, axis=0)
@@ -60,7 +61,8 @@ class Blind:
 
     def __init__(self, pilot):
         self.pilot = pilot
-        self.brief, self.reset = pilot.brief, pilot.reset
+        self.brief = pilot.brief
+        self.reset = pilot.reset
 
     def __call__(self, observation, info=None):
         return self.pilot(observation)
@@ -146,13 +148,20 @@ def test_the_command_is_the_first_of_those_that_are_best(law, axis):
     """Least squares over 40 commands at once, with the cost of what is left after them, agree with
     the regulator for any start and any disturbance of 12 decisions.
     """
-    count, horizon, effort, rng = 12, 40, 1e-4, np.random.default_rng(0)
+    count = 12
+    horizon = 40
+    effort = 1e-4
+    rng = np.random.default_rng(0)
     A, B, D = law.steps(load_vehicle("ardrone2"))[axis]
     n = len(A)
-    x, d = rng.standard_normal(n), rng.standard_normal((count, D.shape[1]))
+    x = rng.standard_normal(n)
+    d = rng.standard_normal((count, D.shape[1]))
     weights = [np.diag(np.sqrt(np.r_[1.0, np.full(n - 1, 1e-9)]))] * horizon
     weights[-1] = np.linalg.cholesky(regulator(A, B, effort)[1]).T
-    free, moved, rows, right = x, np.zeros((n, horizon)), [], []
+    free = x
+    moved = np.zeros((n, horizon))
+    rows = []
+    right = []
     for k, weight in enumerate(weights):
         free = A @ free + (D @ d[k] if k < count else 0.0)
         moved = A @ moved
@@ -168,7 +177,8 @@ def test_the_command_is_the_first_of_those_that_are_best(law, axis):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_who_foresees_nothing_is_told_what_everybody_is(task):
-    plain, knowing = TASKS[task].environment("base"), TASKS[task].environment("base")
+    plain = TASKS[task].environment("base")
+    knowing = TASKS[task].environment("base")
     knowing.foresight = 3
     action = np.full(plain.action_size, 0.2, dtype=np.float32)
     for seen, told in (
@@ -182,9 +192,11 @@ def test_who_foresees_nothing_is_told_what_everybody_is(task):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_what_the_oracle_is_told_is_true(task):
-    env, R = TASKS[task].environment("base"), np.empty((3, 3))
+    env = TASKS[task].environment("base")
+    R = np.empty((3, 3))
     env.foresight = 4
-    infos, jets = [env.reset(seed=900_200)[1]], []
+    infos = [env.reset(seed=900_200)[1]]
+    jets = []
     for k in range(12):
         *_, info = env.step(np.full(env.action_size, 0.3 * (-1) ** (k // 3), dtype=np.float32))
         infos.append(info)

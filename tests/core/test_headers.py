@@ -56,7 +56,8 @@ def test_the_core_is_the_compiled_python_to_the_bit(gate):
     # through gaps, outliers, restarts and overflows
     kept = FILTER.fields["gated"][1]
     for seed in range(3):
-        core, old = begun(gate), begun(gate)
+        core = begun(gate)
+        old = begun(gate)
         seen = set()
         for sample in zip(*flight_with_faults(seed), strict=True):
             seen.add(core.step(*sample).status)

@@ -27,7 +27,8 @@ VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005
 # a tilted vehicle that moves, turns and has four different rotors
 R = Rotation.from_euler("zyx", [2.0, 0.2, -0.3]).as_matrix()
-V, OMEGA = np.array([1.5, -0.7, 0.4]), np.array([0.5, -1.0, 2.0])
+V = np.array([1.5, -0.7, 0.4])
+OMEGA = np.array([0.5, -1.0, 2.0])
 W = np.array([380.0, 400.0, 420.0, 410.0])
 
 
@@ -41,10 +42,12 @@ def wrench(
 ):
     """Force (world) and torque (body) of a vehicle's effects in the state above."""
     bundle = compile_effects(vehicle)
-    out, state = np.full(6, np.nan), np.full(STATE_SIZE, np.nan)
+    out = np.full(6, np.nan)
+    state = np.full(STATE_SIZE, np.nan)
     state[ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = acceleration
     effects = bundle.wrench_models, bundle.wrench_coefficients, bundle.constants
-    place, wind = np.asarray(position, float), np.asarray(wind, float)
+    place = np.asarray(position, float)
+    wind = np.asarray(wind, float)
     body = body_record(bundle.vehicle)[0]
     effect_wrench(*effects, body, place, R, V, omega, speeds, wind, 11.0, 0.0, state, out)
     return out[:3], out[3:]
@@ -55,7 +58,8 @@ class Called:
 
     def __init__(self, vehicle, kind):
         bundle = compile_effects(vehicle)
-        models, size = getattr(bundle, f"{kind}_models"), getattr(bundle, f"{kind}_memory")
+        models = getattr(bundle, f"{kind}_models")
+        size = getattr(bundle, f"{kind}_memory")
         memory = np.zeros((len(models), size))
         self.given = models, getattr(bundle, f"{kind}_coefficients"), bundle.constants, memory
 
@@ -149,7 +153,8 @@ def test_an_effect_acts_at_each_rotor(name, size, law, com):
 
 BLOWN = np.array([2.0, -1.0, 0.3])  # m/s
 TURN = Rotation.from_rotvec([0.03, -0.05, 0])
-THRUST, ROTOR_TORQUE = np.array([0.0, 0.0, np.sum(VEHICLE.k * W**2)]), VEHICLE.rotor_wrench(W)[1:]
+THRUST = np.array([0.0, 0.0, np.sum(VEHICLE.k * W**2)])
+ROTOR_TORQUE = VEHICLE.rotor_wrench(W)[1:]
 ACCELERATION = np.array([100.0, -50.0, 20.0, 300.0])
 
 
@@ -249,7 +254,8 @@ def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
 
 
 def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart():
-    kp, kw = 5e-4, 2e-4
+    kp = 5e-4
+    kw = 2e-4
     u = R.T @ (V - WIND)
     direction = VEHICLE.positions[:, :2] / np.linalg.norm(
         VEHICLE.positions[:, :2], axis=1, keepdims=True
@@ -297,9 +303,12 @@ def test_wind_blows_through_declared_drag_whatever_its_place_in_the_list():
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
 def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
-    fan, com = Fan(turbulence=0.0), np.array([0.01, 0.0, -0.02])
-    position, where = np.array([2.1, 0.3, 1.1]), np.array([0.5, -0.4, 0.0])
-    out, turn = np.zeros(6), Rotation.from_euler("z", heading).as_matrix()
+    fan = Fan(turbulence=0.0)
+    com = np.array([0.01, 0.0, -0.02])
+    position = np.array([2.1, 0.3, 1.1])
+    where = np.array([0.5, -0.4, 0.0])
+    out = np.zeros(6)
+    turn = Rotation.from_euler("z", heading).as_matrix()
     record = fan_record(fan, VEHICLE.positions, PERIOD)
     jet_wrench(
         record[0],
@@ -321,7 +330,8 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
 
 
 def test_motor_lag_is_the_exact_exponential_however_a_time_is_cut_up():
-    tau, rng = 0.035, np.random.default_rng(0)
+    tau = 0.035
+    rng = np.random.default_rng(0)
     rotors = Rotors(setting("motor_lag", tau=tau))
     assert_array_equal(rotors([400.0] * 4), [400.0] * 4)  # starts at the first rates
     times = rng.uniform(0.001, 0.01, 20)
@@ -364,7 +374,8 @@ def test_latency_is_a_pure_delay_between_samples_too(d, dt, count):
 
 @pytest.mark.parametrize("d", [0.0013, 0.0125, 0.0311])
 def test_latency_takes_nothing_from_what_falls_between_samples(d):
-    rotors, phase = Rotors(setting("latency", d=d)), 2.0 * np.pi * 8.0 * PERIOD * np.arange(80)
+    rotors = Rotors(setting("latency", d=d))
+    phase = 2.0 * np.pi * 8.0 * PERIOD * np.arange(80)
     out = np.array([rotors(400.0 + 10.0 * np.sin(x + np.arange(4.0))) for x in phase])
     wanted = 400.0 + 10.0 * np.sin(phase[:, None] - 2.0 * np.pi * 8.0 * d + np.arange(4.0))
     assert_allclose(
@@ -377,7 +388,8 @@ def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
     out = [rotors([600.0 * (k > 20)] * 4)[0] for k in range(40)]
     assert min(out) == 0.0
     assert max(out) == 600.0
-    rotors, t = Rotors(setting("latency", d=0.0125)), 0.0
+    rotors = Rotors(setting("latency", d=0.0125))
+    t = 0.0
     for k in range(60):
         dt = 0.03 if k % 4 == 0 else PERIOD
         t += dt
@@ -387,7 +399,8 @@ def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
 
 def test_latency_draws_a_line_where_samples_are_six_times_as_far_apart_as_others():
     """A cubic through such four would swing between them."""
-    rotors, times = Rotors(setting("latency", d=0.0125)), np.cumsum([0.03, PERIOD] * 20)
+    rotors = Rotors(setting("latency", d=0.0125))
+    times = np.cumsum([0.03, PERIOD] * 20)
     speeds = 400.0 + 10.0 * np.random.default_rng(0).standard_normal(len(times))
     steps = np.diff(times, prepend=0.0)
     late = [rotors(w * np.ones(4), dt=dt)[0] for w, dt in zip(speeds, steps, strict=True)]

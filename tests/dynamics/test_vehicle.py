@@ -111,11 +111,14 @@ def test_a_measured_vehicle_has_the_digits_that_are_known():
 
 
 def test_mixing_is_the_paper_s():
-    k, p = np.array([8e-6, 8.2e-6, 7.9e-6, 8.1e-6]), np.array([2e-7, 2.2e-7, 1.9e-7, 2.1e-7])
+    k = np.array([8e-6, 8.2e-6, 7.9e-6, 8.1e-6])
+    p = np.array([2e-7, 2.2e-7, 1.9e-7, 2.1e-7])
     vehicle = parse_vehicle(yaml.safe_dump({**GOOD, "k": k.tolist(), "p": p.tolist()}))
     assert_array_equal(vehicle.inertia, np.diag(GOOD["inertia"]))
     W = np.array([400.0, 410.0, 395.0, 420.0])
-    c, M, arm = k * W**2, p * W**2, GOOD["arm_l"]
+    c = k * W**2
+    M = p * W**2
+    arm = GOOD["arm_l"]
     expected = [
         c.sum(),  # (1)
         arm * (c[0] + c[1] - c[2] - c[3]),  # (8)

@@ -31,7 +31,8 @@ TOLERANCE_OF_TASKS = {"observation": 2e-5, "wrench": 1e-6, "error": 1e-8}
     ("task", "scenario"), [(task, name) for task in TASKS for name in TASKS[task].scenarios]
 )
 def test_trajectories_are_those_of_the_environments_version(task, scenario):
-    now, golden = trajectory(task, scenario), KEPT[task]["scenarios"][scenario]
+    now = trajectory(task, scenario)
+    golden = KEPT[task]["scenarios"][scenario]
     tolerances = TOLERANCE if task == "FanTracking" else TOLERANCE_OF_TASKS
     for name, tolerance in tolerances.items():
         assert_allclose(

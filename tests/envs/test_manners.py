@@ -36,7 +36,9 @@ def seen(**kwargs):
 
 def test_views_are_the_frame_over_fixed_scales_a_part_of_it_and_the_last_ones():
     """The history begins full."""
-    frames, history, scaled = seen(), seen(observe="history"), seen(normalize=True)
+    frames = seen()
+    history = seen(observe="history")
+    scaled = seen(normalize=True)
     assert_array_equal(scaled, frames / np.float32(SCALES))
     assert 0.05 < np.abs(scaled[:, [0, 5, 6, 7]]).mean() < 2.0
     assert_array_equal(seen(observe="wrench-without-fx"), frames[:, 1:])
@@ -110,7 +112,8 @@ def test_gymnasium_s_checker_finds_nothing_and_spaces_are_scaled(task):
 @pytest.mark.parametrize("plant", ["single", "mujoco", "lanes"])
 def test_an_old_id_is_the_new_one_in_si_units_which_info_has(task, plant):
     kind = TASKS[task].environment
-    scales, largest = np.array(kind.scales, dtype=np.float32), np.float32(kind.largest_action)
+    scales = np.array(kind.scales, dtype=np.float32)
+    largest = np.float32(kind.largest_action)
 
     def made(name, **given):
         if plant == "single":
@@ -120,9 +123,11 @@ def test_an_old_id_is_the_new_one_in_si_units_which_info_has(task, plant):
     name = f"windwrench/{task}-v"
     with pytest.warns(DeprecationWarning, match=f"{name}0 is kept until 3.0; take {name}1 with"):
         old = made(f"{name}0")
-    plain, scaled = made(f"{name}1", normalize=False), made(f"{name}1")
+    plain = made(f"{name}1", normalize=False)
+    scaled = made(f"{name}1")
     seed = 4 if plant == "single" else [4, 5]
-    (a, _), (b, told) = plain.reset(seed=seed), scaled.reset(seed=seed)
+    a, _ = plain.reset(seed=seed)
+    b, told = scaled.reset(seed=seed)
     assert_array_equal(old.reset(seed=seed)[0], a)
     assert_array_equal(told["observation"], a)
     assert_array_equal(told["command"], 0.0)

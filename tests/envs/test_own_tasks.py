@@ -19,7 +19,9 @@ from windwrench.training.training_envs import MixedFanTracking
 class Land(windwrench.envs.Task):
     """From 1.5 m to .3 m within 10 s, softly, in the scenario's winds."""
 
-    decision_hz, action, episode_s = 25, "acceleration", 0.4
+    decision_hz = 25
+    action = "acceleration"
+    episode_s = 0.4
 
     def start(self, rng, n):
         down = np.zeros((n, 4001, 3))
@@ -51,7 +53,8 @@ WAYS = {
 
 def flown(envs, decisions, seed=5):
     """Observations, rewards, ends and an own entry of ``info`` of an environment's decisions."""
-    rows, infos = [], {}
+    rows = []
+    infos = {}
     rng = np.random.default_rng(0)
     envs.reset(seed=seed)
     for _ in range(decisions):
@@ -67,7 +70,8 @@ def test_a_task_of_ten_lines_flies_alike_in_each_way_and_is_truncated(way):
     env = gym.make("me/Land-v0")
     frame, _ = env.reset(seed=5)
     assert frame.shape == (6,)
-    rng, alone = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    alone = []
     for _ in range(10):
         action = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)[0]
         frame, reward, lost, over, info = env.step(action)
@@ -92,7 +96,8 @@ def test_gymnasium_s_and_sb3_s_checkers_find_nothing_wrong_with_a_task_of_one_s_
 class Mine(WindHoverEnv):
     """One override each."""
 
-    largest_action, decision_hz = 6.0, 50.0
+    largest_action = 6.0
+    decision_hz = 50.0
 
     def start(self, rng, n):
         start = super().start(rng, n)
@@ -110,7 +115,8 @@ class Mine(WindHoverEnv):
 
 @pytest.mark.parametrize("plant", ["mujoco", "lanes"])
 def test_what_a_subclass_overrides_of_the_kit_s_task_holds_in_many_as_in_a_single_one(plant):
-    single, many = Mine(), Mine.vector(2, plant=plant)
+    single = Mine()
+    many = Mine.vector(2, plant=plant)
     frame, _ = single.reset(seed=4)
     frames, infos = many.reset(seed=4)
     assert infos["trajectory"].tolist() == ["higher"] * 2

@@ -50,7 +50,8 @@ class Bench:
         """Hold rotor speeds (4,) for some ticks; return position, attitude, velocity and body rate
         after each (n, 13).
         """
-        rows, rotors = np.empty((ticks, 13)), np.asarray(command, float)
+        rows = np.empty((ticks, 13))
+        rotors = np.asarray(command, float)
         motion = self.data.qpos, self.data.qvel
         xfrc = self.data.xfrc_applied[self.model.body("vehicle").id]
         for k in range(ticks):
@@ -76,7 +77,8 @@ def test_a_torque_step_turns_it_as_a_rigid_body(axis):
 
 def test_the_motors_follow_their_commands_with_the_stated_lag():
     bench = Bench(settings=replace(QUIET, motor_lag=0.04))
-    command, logged = np.array([500.0, 400.0, 300.0, HOVER]), []
+    command = np.array([500.0, 400.0, 300.0, HOVER])
+    logged = []
     for _ in range(30):
         bench.run(command, 1)
         logged.append(bench.plant["z"][:4].copy())
@@ -108,7 +110,8 @@ def test_a_recorded_rotor_speed_is_rounded_once():
         reported.append(loop.unrounded.copy())
 
     log = record_flight(vehicle, (late,), seconds=3.0, seed=4, push=watch)["rotor_speeds"][1:-1]
-    before, after = np.array(reported)[1:-1], np.array(reported)[2:]
+    before = np.array(reported)[1:-1]
+    after = np.array(reported)[2:]
     # as it is at the pose's instant, between two ticks
     assert np.max(np.abs(log - (0.25 * before + 0.75 * after))) < 2.0 + 1e-9
     assert np.max(np.abs(log / 4.0 - np.round(log / 4.0))) < 1e-9
@@ -116,8 +119,10 @@ def test_a_recorded_rotor_speed_is_rounded_once():
 
 def test_the_disturbance_has_its_declared_size_and_lasts_as_long_as_it_says():
     """100 s on six axes: 0.03 N and 0.01 Nm, a correlation of 1/e after 0.3 s."""
-    settings, rng = PlantSettings(), np.random.default_rng(0)
-    bench, disturbed = Bench(settings=settings), np.empty((20_000, 6))
+    settings = PlantSettings()
+    rng = np.random.default_rng(0)
+    bench = Bench(settings=settings)
+    disturbed = np.empty((20_000, 6))
     for row in disturbed:
         disturb(bench.plant, rng.standard_normal(NOISE))
         row[:] = bench.plant["disturbance"]

@@ -100,7 +100,8 @@ def ticking(settings, ticks, **given):
 
 @pytest.mark.parametrize("ticks", [0, 1, 4, 20])
 def test_rotors_follow_commands_and_a_pose_is_one_of_so_many_ticks_ago(ticks):
-    late, largest = 0.005 * ticks, VEHICLE.omega_max
+    late = 0.005 * ticks
+    largest = VEHICLE.omega_max
     flown = [
         (np.clip(loop.command, 0, largest), loop.unrounded.copy(), before, loop.sample[4:7].copy())
         for loop, before in ticking(replace(QUIET, actuator_delay=late, pose_delay=late), 60)
@@ -111,7 +112,8 @@ def test_rotors_follow_commands_and_a_pose_is_one_of_so_many_ticks_ago(ticks):
 
 
 def test_an_accelerometer_tells_what_it_felt_so_many_ticks_ago():
-    felt, told = [], []
+    felt = []
+    told = []
     for loop, _ in ticking(replace(QUIET, imu_delay=0.015), 40, accelerometer=(0.0, 0.0)):
         record = loop.record[0]
         felt.append(record["plant"]["rotation"].T @ loop.world.xfrc[:3] / VEHICLE.mass)

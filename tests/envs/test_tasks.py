@@ -32,7 +32,8 @@ def test_the_docstring_s_tables_are_the_spaces(cls):
     table = cls.__doc__.partition("## Observation space")[2].partition("##")[0]
     rows = re.findall(r"^\s+\| (\d+)(?:-(\d+))? *\|(.*)\|", table, re.M)
     for row in rows:
-        first, last = int(row[0]), int(row[1] or row[0])
+        first = int(row[0])
+        last = int(row[1] or row[0])
         limits[first : last + 1] = float(row[2].split("|")[1])
     assert rows
     assert_array_equal(env.observation_space.high, limits.astype(np.float32))
@@ -53,7 +54,8 @@ def test_the_rewards_are_as_stated(name, weight, width, actions):
     for action in np.array(actions):
         _, reward, _, _, info = env.step(action)
         if name == "FanTracking":
-            action, error = np.float32(np.minimum(action, 1.0)), info["y"] - info["fan_y"]
+            action = np.float32(np.minimum(action, 1.0))
+            error = info["y"] - info["fan_y"]
         else:
             target = info["fan"] if name == "FanTracking2D" else info["reference"]
             error = np.linalg.norm(info["position"] - target)
@@ -136,7 +138,8 @@ def test_a_filter_whose_state_is_no_number_starts_over():
 
 
 def test_a_generator_that_is_put_in_is_drawn_from():
-    env, twin = FanTrackingEnv(), FanTrackingEnv()
+    env = FanTrackingEnv()
+    twin = FanTrackingEnv()
     env.reset(seed=1)
     twin.reset(seed=1)
     env.np_random, other = (np.random.Generator(np.random.SFC64(4)) for _ in range(2))

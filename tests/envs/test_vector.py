@@ -30,7 +30,8 @@ from windwrench.runtime.vector_lanes import WIDTH
 )
 def test_the_bits_depend_on_neither_number_nor_threads(given, threads):
     given = {"scenario": "varied", "max_episode_steps": 7, **given}
-    many, decisions = 2 * WIDTH + 1 if "plant" in given else 5, 9
+    many = 2 * WIDTH + 1 if "plant" in given else 5
+    decisions = 9
     alone = fly(make(many, **given), decisions)
     for other in (make(2, **given), make(many, threads=threads, **given)):
         count = other.num_envs
@@ -40,7 +41,8 @@ def test_the_bits_depend_on_neither_number_nor_threads(given, threads):
 @pytest.mark.parametrize("plant", ["mujoco", "lanes"])
 def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it runs
-    envs, healthy = make(3, plant, threads=2), make(3, plant)
+    envs = make(3, plant, threads=2)
+    healthy = make(3, plant)
     actions = np.zeros((3, 1), np.float32)
     for one in (envs, healthy):
         one.reset(seed=0)
@@ -90,7 +92,8 @@ def test_bad_actions_are_named_and_nothing_flies(actions):
 
 
 def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():
-    envs, calls = make(1), []
+    envs = make(1)
+    calls = []
 
     def clock():
         calls.append(0)
@@ -169,7 +172,8 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
     vehicle = replace(load_vehicle("ardrone2"), inertia=inertia, com=np.array([0.02, -0.03, 0.01]))
     blocks = LoopBlocks(1, ClosedLoop(vehicle))
     rng = np.random.default_rng(0)
-    start, wrench = rng.normal(0, 5, (6, WIDTH)), rng.normal(0, 0.02, (6, WIDTH))
+    start = rng.normal(0, 5, (6, WIDTH))
+    wrench = rng.normal(0, 0.02, (6, WIDTH))
     blocks.loops["qpos"][0], blocks.loops["qpos"][0, 3] = 0.0, 1.0
     blocks.loops["qvel"][0], blocks.loops["xfrc"][0] = start, wrench
     fly_on(blocks.loops.ctypes.data, round(SUBSTEPS / TICK), TICK / SUBSTEPS)

@@ -36,7 +36,8 @@ def measured_spectra(fields, heading):
     """
     along = np.array([math.cos(heading), math.sin(heading), 0.0])
     axes = np.array([along, [-along[1], along[0], 0.0], [0.0, 0.0, 1.0]])
-    points, window = LINE[:, None] * along, np.hanning(len(LINE))[:, None]
+    points = LINE[:, None] * along
+    window = np.hanning(len(LINE))[:, None]
     power = np.zeros((len(LINE) // 2 + 1, 3))
     for field in fields:
         values = field.velocity(points, 0.0) @ axes.T
@@ -75,7 +76,8 @@ def test_low_altitude_is_the_specification_s_worked_out():
 
 
 def test_the_air_keeps_its_volume():
-    field, step = Turbulence(1, 1.0, 2.0, (4, 0, 0)), 1e-4
+    field = Turbulence(1, 1.0, 2.0, (4, 0, 0))
+    step = 1e-4
     points = np.random.default_rng(1).uniform(-2, 2, (10, 3))
     slopes = [
         (field.velocity(points + d, 0.0) - field.velocity(points - d, 0.0))[:, i] / (2 * step)
@@ -113,7 +115,9 @@ def test_a_wall_adds_momentum_and_turns_with_its_direction():
         wall = FanWall([*speeds, 0, 0, 0, 0], 2, 3, turbulence=0.0, **given)
         return wall.velocity([point], 0.0)[0]
 
-    one, other, both = blown((4, 0)), blown((0, 3)), blown((4, 3))
+    one = blown((4, 0))
+    other = blown((0, 3))
+    both = blown((4, 3))
     assert both[0] == pytest.approx(math.hypot(one[0], other[0]))
     assert_allclose(both[1:], one[1:] + other[1:])
     turned = blown((4, 3), (-0.4, 2.0, 0.9), direction=(0, 1, 0))
@@ -157,7 +161,8 @@ def test_a_wind_of_one_s_own_flies_as_a_grid():
         *((points, points, (time, time)) for time in (0.0, 0.3, 1.7)),
         ([[5.0, 0.0, 1.0]], [[1.0, 0.0, 1.0]], (9.0, 2.0)),  # beyond the ends
     ):
-        seen, expected = grid.velocity(there, when[0]), Vortex().velocity(at, when[1])
+        seen = grid.velocity(there, when[0])
+        expected = Vortex().velocity(at, when[1])
         assert_allclose(seen, expected, atol=1e-12)
 
 
@@ -203,8 +208,10 @@ def wind(x, y, z):
 
 def wrench(y, yaw=np.pi, velocity=(0.0, 0.0, 0.0)):
     """Force and torque (6,), world, on a level vehicle at 2.3 m that faces the fan."""
-    out, place = np.full(6, np.nan), np.array([2.3, y, FAN.height])
-    attitude, motion = Rotation.from_euler("z", yaw).as_matrix(), np.array([*velocity, 0, 0, 0.0])
+    out = np.full(6, np.nan)
+    place = np.array([2.3, y, FAN.height])
+    attitude = Rotation.from_euler("z", yaw).as_matrix()
+    motion = np.array([*velocity, 0, 0, 0.0])
     jet_wrench(RECORD, JET, place, attitude, motion, np.zeros(3), np.empty(3), out)
     return out
 

@@ -23,7 +23,8 @@ from windwrench.envs.wind import (
 rng = np.random.default_rng(3)
 PLACE, VELOCITY, RATE = rng.normal(size=(3, 2, 3))
 ROTATION = Rotation.random(2, rng)
-ARM, DRAG = 0.1, 0.02
+ARM = 0.1
+DRAG = 0.02
 
 
 class Sheared:
@@ -71,7 +72,8 @@ def expected(time):
 class Leaf:
     """Zeros with JAX's ``at[:].set``."""
 
-    shape, set = (2, 1, 3), staticmethod(np.asarray)
+    shape = (2, 1, 3)
+    set = staticmethod(np.asarray)
     at = property(lambda self: self)
 
     def __getitem__(self, key):
@@ -96,7 +98,8 @@ def test_crazyflow_gets_force_and_torque_of_all_worlds():
 
 
 def test_pybullet_drones_get_force_and_torque(monkeypatch):
-    forces, torques = [], []
+    forces = []
+    torques = []
     bullet = SimpleNamespace(
         WORLD_FRAME=2,
         applyExternalForce=lambda *given: forces.append(np.hstack(given)),
@@ -122,6 +125,7 @@ def test_pybullet_drones_get_force_and_torque(monkeypatch):
     for i, body in enumerate(env.DRONE_IDS):
         assert_allclose(forces[i], [body, -1, *force[i], *PLACE[i], 2, 1])
         assert_allclose(torques[i], [body, -1, *torque[i], 2, 1])
-    env.PYB_STEPS_PER_CTRL, env.CTRL_FREQ = 5, 48
+    env.PYB_STEPS_PER_CTRL = 5
+    env.CTRL_FREQ = 48
     with pytest.raises(InputError, match="expected ctrl_freq equal to pyb_freq, got 48 and 240 Hz"):
         blow_pybullet_drones(env, drag)

@@ -85,7 +85,9 @@ def test_after_a_gap_it_is_honest_at_any_heading(turning, through_a_gap):
     full filter do, and what is estimated lies within them from the first pose on.
     """
     full, constant, _ = through_a_gap
-    rise, first, last = 200, constant[GAP[0] - 1], constant[GAP[-1] - 1]
+    rise = 200
+    first = constant[GAP[0] - 1]
+    last = constant[GAP[-1] - 1]
     assert all(np.isnan(e.nis) for e in constant[GAP[0] - 1 : GAP[-1]])
     assert_array_equal(first.force, last.force)
     assert np.linalg.norm(last.position - first.position) > 0.01
@@ -120,8 +122,10 @@ def test_it_knows_the_declared_effects():
 
 
 def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
-    full, constant = WrenchUKF(VEHICLE, ANISOTROPIC), ConstantGainFilter(VEHICLE, ANISOTROPIC)
-    rng, steps = np.random.default_rng(0), 3000
+    full = WrenchUKF(VEHICLE, ANISOTROPIC)
+    constant = ConstantGainFilter(VEHICLE, ANISOTROPIC)
+    rng = np.random.default_rng(0)
+    steps = 3000
     speeds = VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, np.zeros(3))
     position = [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal((steps, 3))
     attitude = np.column_stack([np.ones(steps), 0.0025 * rng.standard_normal((steps, 3))])

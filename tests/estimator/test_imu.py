@@ -16,8 +16,10 @@ from windwrench.estimator.error_state import displace
 from windwrench.estimator.imu import expected_imu
 
 VEHICLE = load_vehicle("ardrone2")
-FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])
-GYRO, ACCELEROMETER = 0.005, 0.05
+FORCE = np.array([0.3, -0.2, -0.1])
+TORQUE = np.array([0.0, 0.0, 0.02])
+GYRO = 0.005
+ACCELEROMETER = 0.05
 
 
 @pytest.fixture(scope="module")
@@ -31,12 +33,14 @@ def errors(flight, imu, attitude=True):
     tuning = UKFTuning(position_noise=0.01, attitude_noise=0.05, **noise)
     ukf = WrenchUKF(VEHICLE, tuning, PERIOD)
     flights.begin(ukf, flight)
-    rng, rows = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    rows = []
     for k in range(1, len(flight["rotors"])):
         seen = flight["quaternion"][k] if attitude else None
         e = ukf.step(flight["rotors"][k], flight["position"][k], seen)
         if imu:
-            R, gyro = matrix(flight["true_q"][k]), GYRO * rng.standard_normal(3)
+            R = matrix(flight["true_q"][k])
+            gyro = GYRO * rng.standard_normal(3)
             up = R @ [0, 0, VEHICLE.k @ flight["rotors"][k] ** 2]
             felt = R.T @ (up + FORCE) / VEHICLE.mass + ACCELEROMETER * rng.standard_normal(3)
             e = ukf.correct_imu(flight["omega"][k] + gyro, felt)
@@ -46,7 +50,8 @@ def errors(flight, imu, attitude=True):
 
 
 def test_an_imu_sharpens_every_part_of_the_estimate_and_replaces_an_attitude(yawing):
-    without, with_imu = errors(yawing, False), errors(yawing, True)
+    without = errors(yawing, False)
+    with_imu = errors(yawing, True)
     assert np.all(with_imu < [0.5, 0.2, 0.2] * without)
     assert np.all(errors(yawing, True, attitude=False) < [0.05, 0.002, 0.01])
 
@@ -104,14 +109,19 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     tuning = UKFTuning.for_vehicle(vehicle, period)
     f = fly(started(flight, tuning, period, vehicle), flight, 40)
     f.predict(flight.rotor_speeds[40])
-    P, x = f.covariance_with_biases, f.estimate.state
+    P = f.covariance_with_biases
+    x = f.estimate.state
     b = np.concatenate([f.gyro_bias, f.accelerometer_bias])
     z = np.concatenate([flight.gyro[40], flight.accelerometer[40]])
 
     # h and its Jacobian by the error state, from the filter's own model, at the estimate
-    record, point, out = f.record[0], np.zeros(20), np.zeros((2, 6))
-    H, columns = np.zeros((6, 24)), 1e-6 * np.eye(18)
-    rho, q = np.zeros(3), np.zeros(4)
+    record = f.record[0]
+    point = np.zeros(20)
+    out = np.zeros((2, 6))
+    H = np.zeros((6, 24))
+    columns = 1e-6 * np.eye(18)
+    rho = np.zeros(3)
+    q = np.zeros(4)
     for j in range(18):
         for s, sign in enumerate((1.0, -1.0)):
             displace(x, columns[j], sign, rho, q, point)
@@ -120,12 +130,15 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     H[:, 18:] = np.eye(6)
     expected_imu(record, x, out[0])
     # the noise of a step: torque n_m and thrust n_c in body axes, through centre of mass and mass
-    R, com = record["centre_rotation"].copy(), vehicle.com
-    GQ, DQ = np.zeros((24, 6)), np.zeros((6, 6))
+    R = record["centre_rotation"].copy()
+    com = vehicle.com
+    GQ = np.zeros((24, 6))
+    DQ = np.zeros((6, 6))
     for n in range(3):
         alpha = np.linalg.inv(vehicle.inertia)[:, n] * tuning.motor_torque_noise
         centre = np.cross(com, alpha)
-        GQ[3:6, n], DQ[3:6, n] = period * alpha, centre
+        GQ[3:6, n] = period * alpha
+        DQ[3:6, n] = centre
         GQ[9:12, n], GQ[6:9, n] = period * R @ centre, period**2 / 2 * R @ centre
         push = np.eye(3)[n] * tuning.thrust_noise / vehicle.mass
         GQ[9:12, 3 + n], GQ[6:9, 3 + n] = period * R @ push, period**2 / 2 * R @ push
@@ -149,7 +162,8 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
 
 def test_pose_and_imu_of_one_moment_may_come_in_either_order():
     flight = drawn(80)
-    one, other = fly(started(flight), flight, 80), fly(started(flight), flight, 80, first="pose")
+    one = fly(started(flight), flight, 80)
+    other = fly(started(flight), flight, 80, first="pose")
     apart = started(flight)
     for k in range(80):
         apart.predict(flight.rotor_speeds[k])
@@ -170,7 +184,8 @@ def consistency(vehicle, rate, pose_hz, fine, runs, seconds):
     dt = 1.0 / rate
     tuning = UKFTuning.for_vehicle(vehicle, dt * fine)
     drawn_with = UKFTuning.for_vehicle(vehicle, dt)
-    steps, every = round(seconds * rate), rate // pose_hz
+    steps = round(seconds * rate)
+    every = rate // pose_hz
     found = np.empty((4, runs, steps))
     for r in range(runs):
         flight = drawn(steps, dt, r, drawn_with, vehicle, angular_velocity=(0.0, 0.0, 1.0))
@@ -263,15 +278,15 @@ def test_an_accelerometer_says_nothing_while_the_rotors_are_unknown():
 
 def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
     flight = drawn(50)
-    f, g = started(flight), fly(started(flight), flight, 5)
+    f = started(flight)
+    g = fly(started(flight), flight, 5)
     flight.begin(g)
     for k in range(50):
-        speeds, x, q = (
-            flight.rotor_speeds[k],
-            flight.measured_position[k],
-            flight.measured_quaternion[k],
-        )
-        one, other = f.step(speeds, x, q), g.step(speeds, x, q)
+        speeds = flight.rotor_speeds[k]
+        x = flight.measured_position[k]
+        q = flight.measured_quaternion[k]
+        one = f.step(speeds, x, q)
+        other = g.step(speeds, x, q)
         # nor do biases that nothing measures change the pose's part
         assert_array_equal(one.state, other.state)
         assert_array_equal(one.covariance, other.covariance)
@@ -310,7 +325,9 @@ def test_the_gate_keeps_faults_of_an_imu_out(shaking, constant):
     bad[count] += shaking * np.random.default_rng(1).standard_normal((100, 3))
     bad[count, 0] += constant
     spoiled = replace(flight, accelerometer=bad)
-    gated, open_, clean = started(flight, gate=0.999), started(flight), started(flight)
+    gated = started(flight, gate=0.999)
+    open_ = started(flight)
+    clean = started(flight)
     errors = []
     for f, seen in ((gated, spoiled), (open_, spoiled), (clean, flight)):
         worst = 0.0
@@ -350,19 +367,20 @@ def hovering(gate=None):
 @pytest.mark.parametrize("likelier", [0, 1])
 def test_of_two_sensors_that_are_unlikely_together_alone_the_likelier_counts(likelier):
     """Gates of 0.999: 16.3 for one sensor, 22.5 for both."""
-    expected, off = np.array([[0.0] * 3, [0.0, 0.0, 9.81]]), np.eye(3)[0]
-    wanted, read = [15.0, 15.0], expected.copy()
+    expected = np.array([[0.0] * 3, [0.0, 0.0, 9.81]])
+    off = np.eye(3)[0]
+    wanted = [15.0, 15.0]
+    read = expected.copy()
     wanted[likelier] = 9.0
     for sensor in (0, 1):
         alone = [None, None]
         alone[sensor] = expected[sensor] + off
         size = np.sqrt(wanted[sensor] / hovering().correct_imu(*alone).nis)
         read[sensor] = expected[sensor] + size * off
-    f, g = hovering(0.999), hovering()
-    both, one = (
-        f.correct_imu(*read),
-        g.correct_imu(*(read[0], None) if likelier == 0 else (None, read[1])),
-    )
+    f = hovering(0.999)
+    g = hovering()
+    both = f.correct_imu(*read)
+    one = g.correct_imu(*(read[0], None) if likelier == 0 else (None, read[1]))
     assert (f.imu_refused, both.nis > 22.5) == (1, True)
     assert_allclose(both.state[:19], one.state[:19], atol=1e-12)
 

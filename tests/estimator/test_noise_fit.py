@@ -118,13 +118,17 @@ def test_bounds_hold_where_there_is_no_noise_to_find():
 
 
 def test_lost_held_and_wild_poses_change_little(fits):
-    clean, (t, speeds, position, quaternion) = fits[0], flight(seed=0)
+    clean = fits[0]
+    t, speeds, position, quaternion = flight(seed=0)
     rng = np.random.default_rng(1)
     wild = rng.choice(len(t), len(t) // 100, replace=False)
     position[wild] += rng.uniform(-0.3, 0.3, (len(wild), 3))
-    position[700:760], quaternion[700:760] = np.nan, np.nan  # lost for 0.3 s
-    position[1500:1700], quaternion[1500:1700] = np.nan, np.nan  # for 1 s: the filter starts anew
-    position[2500:2560], quaternion[2500:2560] = position[2499], quaternion[2499]  # held
+    position[700:760] = np.nan  # lost for 0.3 s
+    quaternion[700:760] = np.nan
+    position[1500:1700] = np.nan  # for 1 s: the filter starts anew
+    quaternion[1500:1700] = np.nan
+    position[2500:2560] = position[2499]  # held
+    quaternion[2500:2560] = quaternion[2499]
     spoiled = fit_noise(VEHICLE, t, speeds, position, quaternion)
     assert 25 <= spoiled.outliers <= 60
     apart = (logarithms(spoiled.tuning) - logarithms(clean.tuning)) / clean.deviation
@@ -171,14 +175,15 @@ def test_rise_times_are_those_of_the_filter():
     assert force[0] > 2.0 * (2.2 * PERIOD * 0.003 / 0.02)  # the pose's noise is what slows it down
     ukf = WrenchUKF(VEHICLE, quick, PERIOD)
     ukf.reset((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
-    speeds, push, position, velocity = np.full(4, VEHICLE.hover_rate), 0.2, 1.0, 0.0
+    speeds = np.full(4, VEHICLE.hover_rate)
+    push = 0.2
+    position = 1.0
+    velocity = 0.0
     seen = []
     for k in range(800):
         a = push / VEHICLE.mass if k >= 400 else 0.0
-        position, velocity = (
-            position + PERIOD * (velocity + 0.5 * PERIOD * a),
-            velocity + PERIOD * a,
-        )
+        position = position + PERIOD * (velocity + 0.5 * PERIOD * a)
+        velocity = velocity + PERIOD * a
         seen.append(ukf.step(speeds, (0.0, 0.0, position), (1.0, 0.0, 0.0, 0.0)).force[2])
     seen = np.array(seen[400:])
     measured = PERIOD * (np.argmax(seen > 0.9 * push) - np.argmax(seen > 0.1 * push))

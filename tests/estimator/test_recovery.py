@@ -48,8 +48,12 @@ class Flight:
         """``turn`` (rad) is by how much the filter's start is off; ``noise``, in declared
         deviations, that of poses.
         """
-        self.noise, self.rng = noise, np.random.default_rng(0)
-        self.vehicle, self.dt, self.gate, self.imu = VEHICLES[vehicle], dt, gate, imu
+        self.noise = noise
+        self.rng = np.random.default_rng(0)
+        self.vehicle = VEHICLES[vehicle]
+        self.dt = dt
+        self.gate = gate
+        self.imu = imu
         self.estimator = FILTERS[kind](self.vehicle, period=dt, gate=gate)
         self.speeds = hover(self.vehicle)
         self.position = np.array([0.0, 0.0, HEIGHT])
@@ -69,8 +73,10 @@ class Flight:
 
     def noisy(self, position, quaternion):
         """Return a pose with noise."""
-        mocap, (moved, turned) = self.vehicle.mocap, self.noise * self.rng.standard_normal((2, 3))
-        turn, seen = np.array([1.0, *(0.5 * mocap.sigma_att_rad * turned)]), np.empty(4)
+        mocap = self.vehicle.mocap
+        moved, turned = self.noise * self.rng.standard_normal((2, 3))
+        turn = np.array([1.0, *(0.5 * mocap.sigma_att_rad * turned)])
+        seen = np.empty(4)
         quaternion_multiply(turn, np.array(quaternion), seen)
         return position + mocap.sigma_pos_m * moved, seen / np.linalg.norm(seen)
 
@@ -211,7 +217,8 @@ def test_the_wrench_is_right_again_after_two_rise_times(life, noise):
 
 def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
     """Poses that jump by 10 m each are not believed before ``give_up``, 1.5 s."""
-    flight, rng = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True), np.random.default_rng(0)
+    flight = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True)
+    rng = np.random.default_rng(0)
     flight.recover(RISE)
     said = []
     for _ in range(400):
@@ -227,7 +234,8 @@ def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
 def test_what_is_claimed_widens_while_poses_are_refused():
     flight = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True)
     calm = flight.recover(RISE)
-    away, said = np.array([3.0, 0.0, HEIGHT]), []
+    away = np.array([3.0, 0.0, HEIGHT])
+    said = []
     for _ in range(100):
         said.append(flight.feed(flight.speeds, away, STILL, 0.005))
     forces = np.array([e.std_force[0] for e in said])
@@ -243,7 +251,8 @@ def test_what_is_claimed_widens_while_poses_are_refused():
 
 def test_a_bias_stays_within_its_bound():
     """An accelerometer that shows 7.6 m/s2 too much is no sensor with a bias."""
-    vehicle, tuning = VEHICLES["ardrone2"], UKFTuning()
+    vehicle = VEHICLES["ardrone2"]
+    tuning = UKFTuning()
     ukf = WrenchUKF(vehicle, tuning)
     ukf.reset([0.0, 0.0, 1.0], STILL)
     for _ in range(1000):
@@ -261,8 +270,10 @@ def test_a_burst_of_bad_poses_costs_what_a_gap_costs(burst):
     none is believed, and those that are back are, at once, though they are far from what is
     expected.
     """
-    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(3)
-    begin, end = 400, 500
+    vehicle = VEHICLES["ardrone2"]
+    rng = np.random.default_rng(3)
+    begin = 400
+    end = 500
     poses = pushed(vehicle, 0.4, 700, 350)
     poses += 0.001 * rng.standard_normal(poses.shape)
     drawn = rng.standard_normal((end - begin, 3))
@@ -272,7 +283,8 @@ def test_a_burst_of_bad_poses_costs_what_a_gap_costs(burst):
     away = 0.1 * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
     turned = [0.0, 1.0, 0.0, 0.0] if burst == "upside down" else STILL
     seen = [(pose, STILL) for pose in poses]
-    gone, bad = seen.copy(), seen.copy()
+    gone = seen.copy()
+    bad = seen.copy()
     gone[begin:end] = [(None, None)] * (end - begin)
     bad[begin:end] = [(pose, turned) for pose in poses[begin:end] + away]
     unseen, hit = (along(WrenchUKF(vehicle, gate=0.9999), vehicle, each) for each in (gone, bad))
@@ -289,10 +301,15 @@ def test_poses_of_a_blurred_clock_are_not_held_out(late, seed):
     """At 1.5 m/s one pose in fifty is measured some milliseconds before its time stamp: it is off
     by just more than a vehicle can move. Those after it are good, and believed soon.
     """
-    vehicle, rng, dt, speed = VEHICLES["crazyflie"], np.random.default_rng(seed), 0.004, 1.5
+    vehicle = VEHICLES["crazyflie"]
+    rng = np.random.default_rng(seed)
+    dt = 0.004
+    speed = 1.5
     ukf = WrenchUKF(vehicle, UKFTuning.for_vehicle(vehicle, dt), period=dt, gate=0.9999)
     ukf.reset([0, 0, 1], STILL, velocity=[speed, 0, 0])
-    speeds, said, hit = np.full(4, vehicle.hover_rate), [], 0
+    speeds = np.full(4, vehicle.hover_rate)
+    said = []
+    hit = 0
     for k in range(1, 1500):
         lag = late * rng.exponential() if rng.random() < 0.02 else 0.0
         hit += lag > 0.0
@@ -306,7 +323,8 @@ def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
     """The first pose after half a second is off and likely, so it is believed; those that follow
     have jumped then, until they have lasted. Attitudes without a position come between them.
     """
-    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(0)
+    vehicle = VEHICLES["ardrone2"]
+    rng = np.random.default_rng(0)
     position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((700, 3))
     position[400] += [0.29, -0.29, 0.29]
     poses = [(None if k > 400 and k % 25 == 0 else x, STILL) for k, x in enumerate(position)]
@@ -323,7 +341,9 @@ def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
 
 def test_a_doubted_wrench_may_be_none_at_all():
     vehicle = VEHICLES["ardrone2"]
-    ukf, speeds, q = WrenchUKF(vehicle), hover(vehicle), STILL
+    ukf = WrenchUKF(vehicle)
+    speeds = hover(vehicle)
+    q = STILL
     ukf.reset([0, 0, 1], q)
     for _ in range(2000):
         ukf.step(0.0 * speeds, [0, 0, 1], q)  # a force of a weight, which never acted
@@ -354,7 +374,9 @@ def test_rates_do_not_run_away_where_positions_alone_are_measured():
 
 def test_what_happened_is_said():
     vehicle = VEHICLES["ardrone2"]
-    ukf, speeds, q = WrenchUKF(vehicle, gate=0.999), hover(vehicle), STILL
+    ukf = WrenchUKF(vehicle, gate=0.999)
+    speeds = hover(vehicle)
+    q = STILL
     ukf.reset([0, 0, 1], q)
     assert [ukf.step(speeds, [0, 0, 1], q).status for _ in range(400)][-1] == "tracking"
     assert ukf.step(speeds).status == "coasting"
@@ -385,8 +407,10 @@ def noisy_hover(kind, vehicle, dt, gate, noise, seconds, lost=(0.0, 0.0), seed=0
     """Yield the estimates of a hover whose poses have ``noise`` (2,) times the declared deviations
     of attitude and position, and are missing between two times.
     """
-    vehicle, rng = VEHICLES[vehicle], np.random.default_rng(seed)
-    mocap, estimator = vehicle.mocap, FILTERS[kind](vehicle, period=dt, gate=gate)
+    vehicle = VEHICLES[vehicle]
+    rng = np.random.default_rng(seed)
+    mocap = vehicle.mocap
+    estimator = FILTERS[kind](vehicle, period=dt, gate=gate)
     estimator.reset([0.0, 0.0, HEIGHT], STILL)
     for k in range(round(seconds / dt)):
         position = [0.0, 0.0, HEIGHT] + noise[1] * mocap.sigma_pos_m * rng.standard_normal(3)
@@ -436,7 +460,8 @@ def test_a_gust_is_no_noise():
     """Half a weight that sets in at once moves the innovations for a second, and hardly what poses
     add to each other.
     """
-    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(1)
+    vehicle = VEHICLES["ardrone2"]
+    rng = np.random.default_rng(1)
     position = pushed(vehicle, 0.5, 1000, 400)
     position += vehicle.mocap.sigma_pos_m * rng.standard_normal((1000, 3))
     said = along(WrenchUKF(vehicle), vehicle, position)
@@ -448,7 +473,9 @@ def test_what_an_unlikely_pose_leaves_is_forgotten_in_the_patience():
     """A tilt of 2 degrees goes on from the pose before: the variances widen by its NIS, and 1/e of
     that is left after 0.6 s.
     """
-    vehicle, half, place = VEHICLES["ardrone2"], np.radians(1.0), [0.0, 0.0, HEIGHT]
+    vehicle = VEHICLES["ardrone2"]
+    half = np.radians(1.0)
+    place = [0.0, 0.0, HEIGHT]
     poses = [(place, STILL)] * 721
     poses[600] = place, [np.cos(half), np.sin(half), 0.0, 0.0]
     said = along(WrenchUKF(vehicle, gate=0.99), vehicle, poses)

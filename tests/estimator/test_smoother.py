@@ -61,7 +61,8 @@ def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
         found = ukf.smooth(covariance=True)
         for k in range(steps):
             e = found.at(1 + k)
-            error, P = state_error(e, run.state[k]), e.covariance
+            error = state_error(e, run.state[k])
+            P = e.covariance
             for n, part in enumerate(parts.values()):
                 nees[n, r, k] = error[part] @ np.linalg.solve(P[part, part], error[part])
     for dof, values in zip(parts, nees, strict=True):
@@ -95,9 +96,12 @@ def test_a_link_is_cut_where_there_is_no_joint_distribution():
     """As between a covariance and one that was held at a bound."""
     rng = np.random.default_rng(0)
     A = rng.standard_normal((18, 18))
-    P, F = A @ A.T + np.eye(18), np.eye(18) + 0.1 * rng.standard_normal((18, 18))
-    G, K = np.empty((18, 18)), np.empty((18, 18))
-    C, after = P @ F.T, F @ P @ F.T + np.eye(18)
+    P = A @ A.T + np.eye(18)
+    F = np.eye(18) + 0.1 * rng.standard_normal((18, 18))
+    G = np.empty((18, 18))
+    K = np.empty((18, 18))
+    C = P @ F.T
+    after = F @ P @ F.T + np.eye(18)
     link_back = rauch_tung_striebel.link_back.py_func  # nobody calls it compiled by itself
     link_back(P, C, after, G, K)
     gain = C @ np.linalg.inv(after)
@@ -124,8 +128,10 @@ def test_blocks_change_nothing(block, monkeypatch):
 def test_unlikely_poses_widen_what_is_smoothed_before_and_after():
     """A pose that stands still for 0.4 s at 1.5 m/s: without the widening z is 37."""
     flown = record_flight(VEHICLE, (), "circle", 6.0)
-    x, q = flown["position"], flown["quaternion"]
-    x[800:880], q[800:880] = x[800], q[800]
+    x = flown["position"]
+    q = flown["quaternion"]
+    x[800:880] = x[800]
+    q[800:880] = q[800]
     ukf = RecordingUKF(VEHICLE, gate=0.9999)
     ukf.reset(x[0], q[0])
     for k in range(1, len(x)):
@@ -144,7 +150,8 @@ def test_covariances_stay_positive_definite_whatever_was_flown(seed):
     _, speeds, x, q = model_log(400, seed)
     x += np.cumsum(rng.choice([0.0, 1.0], (400, 1), p=[0.98, 0.02]) * rng.normal(0, 2, (400, 3)), 0)
     lost = slice(150, 150 + 40 * (seed + 1))
-    x[lost], q[lost] = np.nan, np.nan
+    x[lost] = np.nan
+    q[lost] = np.nan
     t = np.cumsum(rng.choice([0.001, 0.005, 0.02], 400))
     found = smooth(t, speeds, x, q, covariance=True)
     assert np.isfinite(found.state[:, :19]).all()

@@ -62,7 +62,8 @@ def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_
         assert np.abs(e.covariance - slow.covariance).max() < 1e-9
     found = fast.smooth(covariance=True)
     for k, (state, P) in enumerate(slow.smoothed()):
-        e, size = found.at(k), np.sqrt(np.diag(P))
+        e = found.at(k)
+        size = np.sqrt(np.diag(P))
         assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
         assert np.abs((e.covariance - P) / np.outer(size, size)).max() < 1e-7
 
@@ -115,7 +116,9 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
     x[3:7] = Rotation.random(rng=rng).as_quat(scalar_first=True)
     x[7:10], x[10:13] = rng.standard_normal(3), rate * rng.standard_normal(3)
     x[13:16], x[16:19] = 0.05 * rng.standard_normal(3), rng.standard_normal(3)
-    speeds, numeric, size = np.array([350.0, 380.0, 360.0, 400.0]), np.empty((18, 18)), 1e-5
+    speeds = np.array([350.0, 380.0, 360.0, 400.0])
+    numeric = np.empty((18, 18))
+    size = 1e-5
     start = x[KIT_ORDER]
 
     def stepped(error):

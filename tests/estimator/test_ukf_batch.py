@@ -18,7 +18,8 @@ from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF, Wrenc
 from windwrench.estimator.estimate import REJECTED
 
 VEHICLE = load_vehicle("ardrone2")
-COUNT, STEPS = 11, 150  # more than are side by side at once
+COUNT = 11  # more than are side by side at once
+STEPS = 150
 NAMES = ("rotors", "position", "quaternion")
 
 
@@ -112,7 +113,9 @@ def test_it_starts_from_what_is_given_and_coasts_as_single_filters_do(common, ea
     """One may spin too fast for the series of sine and cosine; the attitude's variance is held
     where nobody measures an attitude, which only some of those side by side need.
     """
-    batch, single, q = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE), [1, 0, 0, 0]
+    batch = WrenchUKFBatch(VEHICLE, 3)
+    single = WrenchUKF(VEHICLE)
+    q = [1, 0, 0, 0]
     places = [[0, 0, n + 1] for n in range(3)]
     speeds = np.full((3, 4), 1.05 * VEHICLE.hover_rate)
     batch.reset(places, q, **common, **each)
@@ -136,7 +139,8 @@ ARGUMENTS = np.array([380.0, 390.0, 400.0, 410.0]), np.array([0.01, 0.0, 1.0]), 
 @pytest.mark.parametrize("kind", [WrenchUKF, ConstantGainFilter])
 @pytest.mark.parametrize("speed", [1e9, 1e150])
 def test_one_rotor_speed_that_no_vehicle_has_changes_nothing(kind, speed):
-    clean, spoiled = kind(VEHICLE), kind(VEHICLE)
+    clean = kind(VEHICLE)
+    spoiled = kind(VEHICLE)
     clean.reset(*POSE)
     spoiled.reset(*POSE)
     odd = HOVER.copy()
@@ -171,7 +175,8 @@ def test_steps_and_episodes_hold_on_to_nothing():
     """Bytes that a filter and environments hold after five times as many steps: the least of three
     times, since a leak grows in each.
     """
-    ukf, envs = WrenchUKF(VEHICLE), FanTrackingEnv.vector(2, scenario="base")
+    ukf = WrenchUKF(VEHICLE)
+    envs = FanTrackingEnv.vector(2, scenario="base")
     ukf.reset(*POSE)
 
     def work():
@@ -237,11 +242,14 @@ def test_a_copy_and_an_estimate_go_their_own_way(count, duplicate):
         return estimator.correct_imu([0.1, 0.2, 0.3], [0.3, -0.2, 9.9])
 
     first = go_on(one)
-    state, covariance, other = first.state.copy(), one.covariance, duplicate(one)
+    state = first.state.copy()
+    covariance = one.covariance
+    other = duplicate(one)
     second = go_on(one)
     assert not np.array_equal(second.state, state)
     assert_array_equal(second.state, one.estimate.state)
-    after, biases = one.covariance, None if count else one.covariance_with_biases
+    after = one.covariance
+    biases = None if count else one.covariance_with_biases
     go_on(one)
     assert_array_equal(first.state, state)
     assert_array_equal(other.covariance, covariance)

@@ -22,7 +22,8 @@ from windwrench.evaluation.statistics import (
 )
 
 RNG = np.random.default_rng(5)
-X, Y = RNG.normal(1.0, 0.3, (5, 12)), RNG.normal(0.8, 0.3, (4, 12))
+X = RNG.normal(1.0, 0.3, (5, 12))
+Y = RNG.normal(0.8, 0.3, (4, 12))
 
 
 def covered(intervals):
@@ -31,7 +32,8 @@ def covered(intervals):
 
 
 def test_probability_of_improvement_counts_all_pairs_of_runs_task_by_task():
-    a, b = X.round(1), Y.round(1)  # with ties
+    a = X.round(1)
+    b = Y.round(1)  # with ties
     pairs = [
         (a[i, k] > b[j, k]) + 0.5 * (a[i, k] == b[j, k])
         for i, j, k in itertools.product(range(5), range(4), range(12))
@@ -94,7 +96,8 @@ def test_hierarchical_draws_have_the_variance_of_crossed_policies_and_episodes(p
 
 def test_the_hierarchical_interval_covers_other_policies_and_other_episodes():
     def interval(k):
-        rng, sizes = np.random.default_rng(k), {(8, 1): 0.3, (1, 40): 1.0, (8, 40): 0.5}
+        rng = np.random.default_rng(k)
+        sizes = {(8, 1): 0.3, (1, 40): 1.0, (8, 40): 0.5}
         scores = 2.0 + sum(rng.normal(0.0, sigma, shape) for shape, sigma in sizes.items())
         return hierarchical_bootstrap(mean, scores, resamples=400, seed=k)
 

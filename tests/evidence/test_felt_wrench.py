@@ -35,7 +35,8 @@ def test_a_row_compares_each_observation_with_the_one_that_has_more():
 @pytest.mark.parametrize("observation", OBSERVATIONS)
 def test_a_law_answers_a_change_of_the_wrench_only_where_it_sees_the_wrench(observation):
     policy = trained(LAW, "FanTracking", "base", observation, 0, 8)
-    env, commands = task_of("FanTracking").make("base", observation=observation), set()
+    env = task_of("FanTracking").make("base", observation=observation)
+    commands = set()
     env.reset(seed=0)
     for felt in (0.0, 0.1):
         env.many.state.estimate.force[:] += felt

@@ -17,9 +17,11 @@ from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
 
 VEHICLE = load_vehicle("ardrone2")
-WEIGHT, ARM = VEHICLE.weight, VEHICLE.arm_l
+WEIGHT = VEHICLE.weight
+ARM = VEHICLE.arm_l
 LARGEST = 0.3  # parts of weight (times the arm, for torque) that a disturbance reaches in flight
-CUTOFF, EDGE = 4.0, 200  # Hz, samples
+CUTOFF = 4.0  # Hz
+EDGE = 200  # samples
 DISTURBANCES = sorted({**OUTSIDERS, **HELD_BACK})
 # sizes of each; ``python -m tests.evidence.test_practice_flights`` writes them anew
 GOLDEN = ROOT / "tests" / "golden" / "disturbances.json"

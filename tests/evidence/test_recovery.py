@@ -58,7 +58,8 @@ def test_poses_are_as_noisy_as_said(noise):
 
 
 def test_what_happens_to_poses_happens_to_them_alone():
-    flight, rng = exact_flight("crazyflie@100", 3.0), np.random.default_rng(0)
+    flight = exact_flight("crazyflie@100", 3.0)
+    rng = np.random.default_rng(0)
     during = slice(100, 200)
     for event in EVENTS:
         position, quaternion = befall(event, 100, 200, flight.position, flight.attitude, rng)
@@ -135,12 +136,14 @@ def test_wrong_attitudes_are_got_over_without_a_gate():
 
 def test_a_filter_that_knows_the_noise_is_told_it():
     words = ("ukf", "crazyflie@100", "x3", "nothing", "no-gate")
-    told, learned = fly_combination(words, told=True).error, fly_combination(words).error
+    told = fly_combination(words, told=True).error
+    learned = fly_combination(words).error
     assert 0.8 * learned < told < learned  # what is learned of the noise is nearly as good
 
 
 def test_wrong_attitudes_are_as_wrong_as_said():
-    attitude, seen = exact_flight("crazyflie@100", 1.0).attitude, set()
+    attitude = exact_flight("crazyflie@100", 1.0).attitude
+    seen = set()
     for seed in range(30):
         words, wrong = turned(np.random.default_rng(seed), attitude)
         off = np.degrees((wrong * attitude.inv()).magnitude())

@@ -27,7 +27,8 @@ class Ours:
         self.data.qpos[:], self.speeds = pose, self.vehicle.hover_rate
 
     def step(self, command, wrench):
-        data, self.speeds = self.data, command + np.exp(-TICK / OURS) * (self.speeds - command)
+        data = self.data
+        self.speeds = command + np.exp(-TICK / OURS) * (self.speeds - command)
         thrust, *torque = self.vehicle.rotor_wrench(self.speeds)
         turn = matrix_of(data.qpos[3:])
         data.xfrc_applied[-1] = wrench + np.hstack([turn[:, 2] * thrust, turn @ torque])
@@ -56,8 +57,10 @@ def test_a_simulator_obeys_its_published_vehicle(name):
         peer = PEERS[name]()
     except InputError as error:
         pytest.skip(str(error))
-    vehicle, facing_back = peer.vehicle, np.array([2.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0])
-    hover, push = np.full(4, vehicle.hover_rate), 0.1 * vehicle.weight * np.arange(1.0, 4.0)
+    vehicle = peer.vehicle
+    facing_back = np.array([2.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0])
+    hover = np.full(4, vehicle.hover_rate)
+    push = 0.1 * vehicle.weight * np.arange(1.0, 4.0)
     peer.start(facing_back)
     _, velocity, speeds = peer.step(hover, np.hstack([push, 0.01 * push]))
     turned = 0.01 * push * [-1.0, -1.0, 1.0] / np.diag(vehicle.inertia)

@@ -292,7 +292,8 @@ def _spoiled_parquet(draw, data):
     """Take a column of a Parquet file away, give it twice, cut it or change its type."""
     table = parquet.read_table(io.BytesIO(data))
     i = draw(places(table.column_names))
-    name, count = table.column_names[i], table.num_rows
+    name = table.column_names[i]
+    count = table.num_rows
     how = draw(st.sampled_from(("away", "twice", "cut", "type")))
     if how == "away":
         table = table.remove_column(i)
@@ -309,7 +310,8 @@ def _spoiled_parquet(draw, data):
 
 
 _BYTES = (spoiled_bytes,)
-_CELLS, _WORDS = (spoiled_table, spoiled_bytes), (spoiled_text, spoiled_bytes)
+_CELLS = (spoiled_table, spoiled_bytes)
+_WORDS = (spoiled_text, spoiled_bytes)
 _PARQUET = (_spoiled_parquet, spoiled_bytes)
 _BAGS = {"rosbag 1": "bag", "rosbag 2, SQLite": "db3", "rosbag 2, MCAP": "mcap"}
 
@@ -325,9 +327,11 @@ def _form_of_log(name, file, good, ways, reader=None, vehicle="ardrone2", beside
 
 def forms():
     """Return every form of input by its name."""
-    log, flown = _form_of_log, ("record", "--seconds", "1", "--out", "out", "--vehicle")
+    log = _form_of_log
+    flown = ("record", "--seconds", "1", "--out", "out", "--vehicle")
     sd = "crazyflie_sd", "crazyflie"
-    own, packed = partial(_own_log, "log.csv"), (_zipped(spoiled_table), spoiled_bytes)
+    own = partial(_own_log, "log.csv")
+    packed = (_zipped(spoiled_table), spoiled_bytes)
     scored = ("benchmark", "--episodes", "1", "--out", "out", "--controllers")
     found = [
         log("CSV", "log.csv", own, _CELLS),

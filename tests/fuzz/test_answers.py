@@ -56,8 +56,10 @@ def rows_lost(log, counted):
     return replace(kept, t=log.t[: len(kept.t)]) if counted else kept
 
 
-ALL, LATER = slice(None), slice(1200, None)
-SPEEDS, PLACE = "rotor_speeds", "position"
+ALL = slice(None)
+LATER = slice(1200, None)
+SPEEDS = "rotor_speeds"
+PLACE = "position"
 FAULTS = {
     "rotors swapped": (put(SPEEDS, ALL, [0, 2], lambda x: x[:, [2, 0]]), ROTORS),
     "a rotor's column twice": (put(SPEEDS, ALL, 1, lambda x: x[:, 3]), ROTORS),

@@ -39,7 +39,8 @@ def test_a_nanobench_flight_lacks_the_lift_of_a_full_battery(name, logs):
     assert any("voltage" in note for note in log.notes)
     assert screen_log(log, VEHICLE)[1] == ()
     series = estimate_log(log, VEHICLE)
-    settled, weight = series.t > 2.0, VEHICLE.weight
+    settled = series.t > 2.0
+    weight = VEHICLE.weight
     assert np.isfinite(series.nis[1:]).all()
     assert -0.85 * weight < series.force[settled, 2].mean() < -0.65 * weight
     assert np.abs(series.force[settled, :2]).max() < 0.25 * weight

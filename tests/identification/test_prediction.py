@@ -60,7 +60,8 @@ def residual_rms(log):
     ],
 )
 def test_a_log_without_its_sensing_effects_leaves_the_residual_of_a_clean_flight(clean, effects):
-    floor, log = residual_rms(clean), fly(**effects)
+    floor = residual_rms(clean)
+    log = fly(**effects)
     before = residual_rms(log) / floor
     after = residual_rms(undo_log_sensing(log, VEHICLE.with_effects(*settings(effects)))) / floor
     assert np.max(before) > 2.0
@@ -105,7 +106,8 @@ def test_the_missing_effect_brings_prediction_back_to_the_flight(name, trajector
 def test_predictions_start_where_a_whole_horizon_follows(clean):
     log = without_pose(clean, slice(2000, 2100))
     made = predict(log, VEHICLE, horizon_s=0.25, every=7)
-    n, steps = len(made.start), 50
+    n = len(made.start)
+    steps = 50
     assert made.period == pytest.approx(0.005)
     assert (
         made.position.shape == made.velocity.shape == made.angular_velocity.shape == (n, steps, 3)
@@ -142,7 +144,8 @@ def test_nothing_after_a_start_changes_its_prediction(kind):
     elif kind == "wrong inertia":
         vehicle = replace(VEHICLE, inertia=2.0 * VEHICLE.inertia)
     for k in (20, 300, 900):
-        later, rng = np.arange(len(log.t)) > k, np.random.default_rng(k)
+        later = np.arange(len(log.t)) > k
+        rng = np.random.default_rng(k)
         moved = {"position": log.position + rng.normal(0.0, 5.0, 3)}
         moved["quaternion"] = np.roll(log.quaternion, 1, axis=1)
         for sensor in ("gyro", "accelerometer"):
@@ -154,7 +157,8 @@ def test_nothing_after_a_start_changes_its_prediction(kind):
         known = before.start <= k
         assert known.any()
         for name in ("position", "velocity", "quaternion", "angular_velocity"):
-            x, y = getattr(before, name), getattr(after, name)
+            x = getattr(before, name)
+            y = getattr(after, name)
             assert_allclose(x[known], y[known], rtol=0.0, atol=1e-9)
             assert np.abs(x[~known] - y[~known]).max() > 0.1
 
@@ -170,7 +174,8 @@ def test_a_log_that_ends_after_a_horizon_has_the_same_predictions():
 def test_a_state_is_taken_as_it_is():
     """Without thrust, and about a principal axis, what follows is known exactly."""
     rng = np.random.default_rng(0)
-    n, period = 400, 0.01
+    n = 400
+    period = 0.01
     t = period * np.arange(n) + rng.uniform(-1e-4, 1e-4, n)
     log = resting(t, rotor_speeds=np.zeros((n, 4)), name="falling")
     state = rng.normal(size=(n, 13))
@@ -209,7 +214,8 @@ def test_a_state_of_another_form_is_refused(clean):
 @pytest.mark.parametrize(("inertia", "most"), [(1.0, 0.045), (1.6, 0.2)])
 def test_a_start_knows_the_flight_whatever_the_model(inertia, most):
     """The angular velocity of a differentiated pose has 1.4 rad/s of noise."""
-    log, vehicle = imu_flight(VEHICLE), replace(VEHICLE, inertia=inertia * VEHICLE.inertia)
+    log = imu_flight(VEHICLE)
+    vehicle = replace(VEHICLE, inertia=inertia * VEHICLE.inertia)
     (signals,) = log_signals(log)
     velocity = low_pass(signals.velocity, 4.0, signals.period)
     for known in (log, replace(log, gyro=None, accelerometer=None)):

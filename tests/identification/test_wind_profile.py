@@ -25,7 +25,8 @@ from windwrench.identification.wind_profile import _curve
 
 VEHICLE = load_vehicle("ardrone2")
 # neither strength nor radius nor distance of the kit's own fan
-FAN, DISTANCE = Fan(speed=4.6, radius=0.37), 2.05
+FAN = Fan(speed=4.6, radius=0.37)
+DISTANCE = 2.05
 PLACE = np.arange(-1.5, 1.5, 0.02)
 JET = 0.03 * PLACE / 0.46 * np.exp(0.5 - 0.5 * (PLACE / 0.46) ** 2)
 
@@ -57,9 +58,11 @@ def test_the_jet_of_a_sweep_has_its_shape(swept):
 
 
 def test_the_law_follows_slower_fans_and_loses_faster_ones(swept):
-    law, fastest = Admittance(swept.law["gain"]), swept.law["fastest_fan_m_s"]
+    law = Admittance(swept.law["gain"])
+    fastest = swept.law["fastest_fan_m_s"]
     assert fastest < swept.law["bound_m_s"]
-    env, reach = make_env(FAN, DISTANCE), np.array(swept.shape.edges) - swept.shape.axis
+    env = make_env(FAN, DISTANCE)
+    reach = np.array(swept.shape.edges) - swept.shape.axis
     slower, faster = (
         sum(follows(env, law, share * fastest, seed, reach) for seed in range(1_068_000, 1_068_008))
         for share in (0.75, 1.6)
@@ -79,7 +82,8 @@ def test_intervals_of_correlated_errors_hold_95_percent_of_the_places():
     for seed in range(40):
         rng = np.random.default_rng(seed)
         t = np.arange(200 * 20) / 20.0
-        place, second = 1.5 * np.sin(0.05 * t), t.astype(int)
+        place = 1.5 * np.sin(0.05 * t)
+        second = t.astype(int)
         noise = np.zeros(len(t))
         for k in range(1, len(t)):  # 0.5 s
             noise[k] = 0.905 * noise[k - 1] + 0.425 * rng.standard_normal()
@@ -135,7 +139,8 @@ def test_in_calm_air_the_bound_is_the_fastest_fan():
 
 def test_margins_tell_where_the_loop_begins_to_swing():
     loop = following_loop(VEHICLE.inertia[2, 2], FilterNoise())
-    line, shape = 0.1 * PLACE, shape_of(PLACE, JET)
+    line = 0.1 * PLACE
+    shape = shape_of(PLACE, JET)
     crossings = np.linspace(1.0, 6.0, 101)
     critical = crossings[np.argmax([loop.margins(c)[0] < 0.0 for c in crossings])]
     gains = np.array([0.8, 1.2]) * critical / 0.1

@@ -103,7 +103,8 @@ def test_a_log_is_the_calls_of_a_filter(with_imu):
     log.position[300:320] += 0.2
     if with_imu:
         gyro, force = 0.02 * rng.standard_normal((2, 400, 3)) + np.array([[0.0], [9.81]])[:, None]
-        gyro[::3], force[::2] = np.nan, np.nan
+        gyro[::3] = np.nan
+        force[::2] = np.nan
         log = replace(log, gyro=gyro, accelerometer=force * [0.0, 0.0, 1.0])
     found = estimate_log(log, VEHICLE)
     ukf = WrenchUKF(VEHICLE, None, log.period, GATE)
@@ -157,7 +158,8 @@ def test_wild_poses_are_refused_and_said(smooth):
 def test_smoothing_is_the_filters_nis_with_a_narrower_band():
     lost = slice(400, 440)
     log = held_flight(0.005 * np.arange(1200), lost=lost)
-    filtered, smoothed = estimate_log(log, VEHICLE), estimate_log(log, VEHICLE, smooth=True)
+    filtered = estimate_log(log, VEHICLE)
+    smoothed = estimate_log(log, VEHICLE, smooth=True)
     assert np.allclose(filtered.nis, smoothed.nis, equal_nan=True)
     assert np.allclose(filtered.force[-1], smoothed.force[-1])
     inner = slice(100, -100)
@@ -317,7 +319,9 @@ def test_a_tuning_needs_poses(flown):
 def test_the_force_is_the_posterior_of_a_walk():
     """Far from the ends, where the start is forgotten, a dense solution says the same."""
     rng = np.random.default_rng(0)
-    n, walk, variance = 400, 0.01, 1.0
+    n = 400
+    walk = 0.01
+    variance = 1.0
     y = np.cumsum(np.sqrt(walk) * rng.standard_normal(n)) + rng.standard_normal(n)
     found, std = _two_sided(y[:, None], np.zeros((n, 1, 1)), np.eye(1), np.diag([walk]), variance)
     between = np.diff(np.eye(n), axis=0)

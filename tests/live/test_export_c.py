@@ -76,7 +76,8 @@ FLOWN = [
 )
 def test_c_and_python_agree_along_a_flight_with_faults(estimator, name, gate, imu, tmp_path):
     exported = export_c(vehicle_of(name), estimator, gate=gate)
-    c, python = CompiledFilter(exported, tmp_path), exported.filter
+    c = CompiledFilter(exported, tmp_path)
+    python = exported.filter
     worst = compare(c, python, flight(name, QUICK, imu=imu), 4)
     assert worst["restarts"] > (0 if gate else 2) or "brisk" not in name
     assert_same(worst)
@@ -101,7 +102,8 @@ SUFFERED = ("world_tilt:ax=0.03,ay=-0.05", "marker_offset:mx=0.03,mz=0.05", "att
 )
 def test_c_undoes_what_is_declared_of_pose_and_battery(estimator, effects, part, size, tmp_path):
     """A filter without the effect reads another position (m) or force (N) from the same flight."""
-    model, flown = vehicle_of(TURNING), flight(TURNING, QUICK)
+    model = vehicle_of(TURNING)
+    flown = flight(TURNING, QUICK)
     if part == "force":  # of a battery that runs down
         volts = 12.4 - 0.003 * np.arange(QUICK)
         volts[:100], volts[150:200] = 11.1, np.nan
@@ -142,7 +144,8 @@ def test_c_and_python_agree_along_hostile_sequences(
     if precision == "double":
         code = re.sub(r"/\*.*?\*/", "", exported.files["windwrench_filter.c"], flags=re.S)
         assert not re.search(r"\bfloat\b|[0-9.][fF]\b|sqrtf", code)
-    c, restarts = CompiledFilter(exported, tmp_path), 0.0
+    c = CompiledFilter(exported, tmp_path)
+    restarts = 0.0
     for seed in seeds:
         flown = hostile(vehicle, seed)
         if not imu:
@@ -253,8 +256,10 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             c[: len(effect.coefficients)] = effect.vector(parse_setting(name, model).coefficients)
             state = rng.uniform(0.2, 2.0, STATE_SIZE)
             state[18:22] = rng.uniform(300.0, 500.0, 4)
-            rotors, memory = rng.uniform(300.0, 500.0, ROTORS_SIZE), np.zeros(112)
-            rotors[4:], memory[:5] = (0.005, 10.0, 2.0), (1.0, 410.0, 420.0, 430.0, 440.0)
+            rotors = rng.uniform(300.0, 500.0, ROTORS_SIZE)
+            memory = np.zeros(112)
+            rotors[4:] = (0.005, 10.0, 2.0)
+            memory[:5] = (1.0, 410.0, 420.0, 430.0, 440.0)
             sample = rng.uniform(0.2, 2.0, SAMPLE_SIZE)
             sample[7:11] /= np.linalg.norm(sample[7:11])
             sample[12:16] = 1.0, 1.0, 1.0, rng.choice([-1.0, 1.0])
@@ -277,7 +282,8 @@ def test_effects_in_c_are_those_in_python(tmp_path):
 def commands(c, seen):
     """The commands (n,) of the C along observations (n, 8)."""
     c.c.ww_policy_init(c._policy)
-    e, out = c.estimate, []
+    e = c.estimate
+    out = []
     for row in seen:
         e.force[:], e.torque[:], e.velocity[1] = row[:3], row[3:6], row[VELOCITY_Y]
         out.append(c.policy(e))
@@ -287,8 +293,10 @@ def commands(c, seen):
 def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
     policy = exportable_policy("sac-0")
     c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
-    python, rng = load_policy(POLICY), np.random.default_rng(0)
-    force, torque = rng.normal(0.3, 0.3, (50, 3)), rng.normal(0.0, 0.03, (50, 3))
+    python = load_policy(POLICY)
+    rng = np.random.default_rng(0)
+    force = rng.normal(0.3, 0.3, (50, 3))
+    torque = rng.normal(0.0, 0.03, (50, 3))
     seen = np.column_stack([force, torque, np.full(50, 0.2), np.zeros(50)])
     wanted = np.zeros(51)
     for k in range(50):
@@ -335,7 +343,8 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
         assert board.ram <= ram
         assert board.ram + board.stack <= 16_384
         assert np.median(board.predict + board.correct) <= instructions
-        c, python = CompiledFilter(exported, tmp_path / f"{estimator}-here"), exported.filter
+        c = CompiledFilter(exported, tmp_path / f"{estimator}-here")
+        python = exported.filter
         begin(python, flown)
         for k in range(begin(c, flown) + 1, len(flown["dt"])):
             take(c, flown, k)
@@ -370,7 +379,8 @@ class Streams:
         self.asked = 0  # uniform numbers since normal ones
 
     def _uniform(self, stream, count):
-        out, x = np.empty(count), self.state[stream]
+        out = np.empty(count)
+        x = self.state[stream]
         for i in range(count):
             x ^= (x << 13) & 0xFFFFFFFF
             x ^= x >> 17
@@ -417,7 +427,8 @@ def c(tmp_path_factory):
 
 def fans(count, decisions, rng):
     t = 0.005 * np.arange(decisions * TICKS)
-    start, speed = rng.uniform(-0.3, 0.3, (count, 1)), rng.uniform(0.05, 0.35, (count, 1))
+    start = rng.uniform(-0.3, 0.3, (count, 1))
+    speed = rng.uniform(0.05, 0.35, (count, 1))
     return start + 0.8 * np.sin(speed / 0.8 * t)
 
 

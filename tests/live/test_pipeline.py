@@ -123,14 +123,16 @@ def test_a_second_clock_is_brought_to_the_first():
     other = Pipeline(rate_hz=100.0).take(split(flown, sensor_clock=86_400.0))
     assert [one.session.clocks.count for one in (same, other)] == [1, 2]
     # brought over by the least delays, which differ by what the poses' is longer: 6 ms
-    a, b = same.outputs[-1].estimate, other.outputs[-1].estimate
+    a = same.outputs[-1].estimate
+    b = other.outputs[-1].estimate
     assert np.abs(a.force - b.force).max() < 0.05
 
 
 def test_a_vehicle_that_boots_again_goes_on_with_the_stream():
     """Its clock begins at 0 again; the stream's time goes on, and the filter restarts."""
     flown = flight()
-    before, after = whole(flown)[:600], whole(flown, start=104.0)[700:]
+    before = whole(flown)[:600]
+    after = whole(flown, start=104.0)[700:]
     for sample in after:
         sample.stamp -= round(3.4 * SECOND)
     live = Pipeline().take([*before, *after])
@@ -241,7 +243,8 @@ def test_inertial_rows_between_poses(tmp_path):
     flown = flight(4.0, "gentle", imu=True)
     samples = whole(flown)
     for k, sample in enumerate(samples):
-        sample.gyro, sample.accelerometer = flown["gyro"][k], flown["accelerometer"][k]
+        sample.gyro = flown["gyro"][k]
+        sample.accelerometer = flown["accelerometer"][k]
         if k % 2:
             sample.position = sample.quaternion = None
     live = Pipeline().take(samples)

@@ -110,7 +110,8 @@ class Sender(Running):
     """Sends datagrams to a session that listens, and reads its answers."""
 
     def __init__(self, **options):
-        self.port, self.answers = free_port(), []
+        self.port = free_port()
+        self.answers = []
         super().__init__(f"udp-json://127.0.0.1:{self.port}?reply=1", **options)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
@@ -205,7 +206,8 @@ def test_a_socket_for_each_message_is_one_sender():
 
 
 def test_two_senders_on_one_port_are_told_by_their_addresses():
-    sender, flown = Sender(), as_objects(flight())
+    sender = Sender()
+    flown = as_objects(flight())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         for k, one in enumerate(flown[:100]):

@@ -18,7 +18,9 @@ SPELLS = (
     *("random attitudes", "random poses"),
 )
 GATE = 0.9999
-LONGEST, SOON, BEGUN = 3.0, 2.0, 4.0  # s: of a spell, until all is right, until the first one
+LONGEST = 3.0  # s, of a spell
+SOON = 2.0  # s, until all is right
+BEGUN = 4.0  # s, until the first one
 KEPT = 50  # rows from one copy of a filter to the next
 SEED = 1
 
@@ -39,7 +41,8 @@ def calm(name, imu, kind, noise):
     rate = 200 // FLIGHTS[name][4]
     flown = flight(name, 15 * rate, SEED, faults=False, imu=imu, noise=noise)
     begin(estimator, flown)
-    said, copies = [None], {}
+    said = [None]
+    copies = {}
     for k in range(1, len(flown["dt"])):
         take(estimator, flown, k)
         said.append(seen(estimator))
@@ -70,7 +73,8 @@ def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count, noise):
         parts = (flown[name] for name in ("position", "quaternion", "rotor_speeds"))
         away = befall(spell, when, *parts, rng)
         flown["quaternion"] /= np.linalg.norm(flown["quaternion"], axis=1, keepdims=True)
-        estimator, end = copy.copy(copies[k]), when.stop + round(SOON * rate)
+        estimator = copy.copy(copies[k])
+        end = when.stop + round(SOON * rate)
         for row in range(k + 1, end):
             take(estimator, flown, row)
         status, position, wrench, std = seen(estimator)

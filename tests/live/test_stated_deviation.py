@@ -24,10 +24,12 @@ from windwrench.live.messages import Row
 from windwrench.live.tallies import Tallies
 
 VEHICLE = load_vehicle("ardrone2")
-COUNT, STEPS = 20, 1000
+COUNT = 20
+STEPS = 1000
 LOOKED_AT = slice(499, STEPS, 100)  # 2.5 to 5 s
 SAMPLE = "rotor_speeds", "position", "quaternion"
-WRENCH, STATED = ("torque", "force"), ("std_torque", "std_force")
+WRENCH = ("torque", "force")
+STATED = ("std_torque", "std_force")
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +109,8 @@ def test_errors_of_drawn_vehicles_are_as_large_as_it_says(way, flights, tmp_path
     found = np.array(WAYS[way](tmp_path)(flights))[:, LOOKED_AT]
     true = np.array([np.hstack([flown[name] for name in WRENCH])[LOOKED_AT] for flown in flights])
     z = (found[..., :6] - true) / found[..., 6:]
-    torque, force = np.mean(z[..., :3] ** 2), np.mean(z[..., 3:] ** 2)
+    torque = np.mean(z[..., :3] ** 2)
+    force = np.mean(z[..., 3:] ** 2)
     print(f"{way}: mean square of z: torque {torque:.2f}, force {force:.2f}; {abs(z).max():.1f}")
     assert 0.4 < torque < 1.2
     assert 0.4 < force < 1.2

@@ -21,7 +21,8 @@ class Literal(ReferenceUKF):
         after = self.process(points, steps[:, 18:], np.asarray(rotor_speeds))
         _, ahead, back = np.split(difference(after, after[0]), [1, 31])
         slopes = (ahead - back).T / 2e-6
-        F, B = slopes[:, :18], slopes[:, 18:]
+        F = slopes[:, :18]
+        B = slopes[:, 18:]
         self.covariance = F @ self.covariance @ F.T + B @ self.Q @ B.T
         self.state = after[0]
 

@@ -79,7 +79,8 @@ def the_map_of_the_jet(figures):
         assert figures[f"correlation_{name}"] >= 0.95
     assert figures["torque_z_antisymmetry"] > 0.95
     assert figures["force_x_symmetry"] > 0.99
-    peak, on_axis = "torque_peak_Nm", "force_x_on_axis_N"
+    peak = "torque_peak_Nm"
+    on_axis = "force_x_on_axis_N"
     assert figures[f"profile_{peak}"] == pytest.approx(figures[f"true_jet_{peak}"], rel=0.2)
     assert figures[f"profile_{on_axis}"] == pytest.approx(figures[f"true_{on_axis}"], abs=0.03)
     offsets = figures["true_jet_torque_peak_offset_m_by_fan_radius"]
@@ -88,7 +89,8 @@ def the_map_of_the_jet(figures):
 
 
 def the_fan_is_caught_and_followed(figures):
-    (capture,), (track,) = figures["capture"], figures["tracking"]
+    (capture,) = figures["capture"]
+    (track,) = figures["tracking"]
     assert capture["captured"] == 1.0
     assert 0.5 < capture["median_time_s"] < 6.0
     assert capture["rmse_last_10_s_m"] < 0.3
@@ -122,7 +124,8 @@ CLAIMS = {
 def test_a_figure_shows_what_the_paper_says(name, monkeypatch):
     if name == "fig3":
         pytest.importorskip("sklearn", reason="pip install 'windwrench[reproduction]'")
-    module, shares = import_module(f"windwrench.reproduction.{name}"), []
+    module = import_module(f"windwrench.reproduction.{name}")
+    shares = []
     seeds, settings, constants = SHORT[name]
     for constant, value in constants.items():
         monkeypatch.setattr(module, constant, value)

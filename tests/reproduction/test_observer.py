@@ -10,7 +10,8 @@ from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.reproduction import NonlinearObserver
 
 VEHICLE = load_vehicle("ardrone2")
-FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])  # of yawing_flight
+FORCE = np.array([0.3, -0.2, -0.1])  # of yawing_flight
+TORQUE = np.array([0.0, 0.0, 0.02])
 
 
 def loaded_hover(observer, steps, force, torque):
@@ -41,7 +42,8 @@ def errors_along(flight, missing=()):
 
 
 def test_steady_state_is_exact_after_a_rise_of_a_second():
-    force, torque = np.array([0.4, -0.3, 0.5]), np.array([0.02, -0.01, 0.015])
+    force = np.array([0.4, -0.3, 0.5])
+    torque = np.array([0.02, -0.01, 0.015])
     forces, torques, e = loaded_hover(NonlinearObserver(VEHICLE), 3000, force, torque)
     assert_allclose(forces[-1], force, atol=1e-9)
     assert_allclose(torques[-1], torque, atol=1e-9)

@@ -60,7 +60,8 @@ def run(package, program=None, **options):
 
 def edit(path, old, new):
     """Change a file and leave its size and its time as they were."""
-    found, text = path.stat(), path.read_text()
+    found = path.stat()
+    text = path.read_text()
     assert old in text
     assert len(old) == len(new)
     path.write_text(text.replace(old, new))
@@ -174,7 +175,8 @@ def test_without_any_place_it_is_compiled_at_each_start(package):
 
 def as_anyone():
     """Have root write no more than permissions say, in this process."""
-    drop, may_write_all = 24, 1
+    drop = 24
+    may_write_all = 1
     assert ctypes.CDLL(None).prctl(drop, may_write_all, 0, 0, 0) == 0
 
 

@@ -26,7 +26,8 @@ from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 
 GOLDEN = ROOT / "tests" / "golden" / "python_errors.json"
 CASES = json.loads(GOLDEN.read_text(encoding="utf-8"))
-VEHICLE, POSE = load_vehicle("ardrone2"), ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
+VEHICLE = load_vehicle("ardrone2")
+POSE = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
 SPEEDS = np.full(4, VEHICLE.hover_rate)
 GIVEN = dict(np=np, replace=replace, VEHICLE=VEHICLE, POSE=POSE, SPEEDS=SPEEDS)
 GIVEN |= dict(EffectSetting=EffectSetting, Stage=Stage, Uniform=Uniform)

@@ -41,7 +41,8 @@ def forms(kind, letter):
 
 def logs():
     """Return tables, each with one mistake, and logs that end too early."""
-    good, packed = table(), io.BytesIO()
+    good = table()
+    packed = io.BytesIO()
     with gzip.GzipFile(fileobj=packed, mode="wb", mtime=0) as file:
         file.write(good.encode())
     in_ms = {(i, "t"): f"{10 * i}" for i in range(60)}

@@ -38,6 +38,8 @@ def resting(t, **columns):
 
 def without_pose(log, rows):
     """Return a log whose poses are lost in some rows: a slice, or a mask (N,)."""
-    pose, valid = np.column_stack([log.position, log.quaternion]), log.valid.copy()
-    pose[rows], valid[rows] = np.nan, False
+    pose = np.column_stack([log.position, log.quaternion])
+    valid = log.valid.copy()
+    pose[rows] = np.nan
+    valid[rows] = False
     return replace(log, position=pose[:, :3], quaternion=pose[:, 3:], valid=valid)

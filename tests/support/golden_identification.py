@@ -32,7 +32,8 @@ def failing_flight():
     """An IMU flight whose rotor 3 loses 40 % of its thrust at 9 s, without the loop's answer."""
     log, speeds = inertial_flights([3])[0]
     lost = np.where(log.t > 9.0, 0.4, 0.0) * 6.0e-6 * speeds[:, 2] ** 2
-    force, rate = log.accelerometer.copy(), log.gyro.copy()
+    force = log.accelerometer.copy()
+    rate = log.gyro.copy()
     force[:, 2] -= lost / MASS
     turn = np.column_stack([ARM * lost / 3.0e-3, -ARM * lost / 3.6e-3, -0.02 * lost / 6.0e-3])
     rate += np.cumsum(turn * (log.t < 9.4)[:, None], axis=0) * log.period

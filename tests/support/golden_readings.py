@@ -112,7 +112,8 @@ def _fields(guess):
 
 
 def _table(name):
-    path, said = path_of(name), {}
+    path = path_of(name)
+    said = {}
     for way, model in (("alone", None), ("vehicle", vehicle_of(path))):
         try:
             guess = guess_map(open_table(path), model)

@@ -33,7 +33,8 @@ WITH_EFFECTS = load_vehicle("ardrone2").with_effects(
 
 def drawn(vehicle, rng):
     """Return a vehicle as it may be where ``vehicle`` is declared."""
-    known, normal = vehicle.uncertainty, rng.standard_normal
+    known = vehicle.uncertainty
+    normal = rng.standard_normal
     command = 1.0 + known.command * normal() if vehicle.omega_source == "commanded" else 1.0
     return replace(
         vehicle,

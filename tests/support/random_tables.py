@@ -156,7 +156,8 @@ def _pose(log, columns, world, body, pick):
         template = pick(_QUATERNIONS if pick((True, True, False)) else _NUMBERED)
         out["attitude"] = Attitude(_add(columns, template, q, order), order=order, sense=sense)
         return out
-    euler, unit = pick(("zyx", "zyx", "xyz")), pick(("deg", "rad"))
+    euler = pick(("zyx", "zyx", "xyz"))
+    unit = pick(("deg", "rad"))
     angles = rotation.as_euler(euler.upper())[:, [euler.index(axis) for axis in "xyz"]]
     angles *= 1.0 if unit == "rad" else 180.0 / np.pi
     names = _add(columns, pick(_ANGLES), angles, ("roll", "pitch", "yaw"), unit)

@@ -40,13 +40,16 @@ def rotor_effects(vehicle, drag=0.0, ground=0.0):
     com = compile_effects(vehicle).vehicle.com
 
     def wrench(x, q, v, w, W):
-        C, force, torque = matrix(q), np.zeros(3), np.zeros(3)
+        C = matrix(q)
+        force = np.zeros(3)
+        torque = np.zeros(3)
         for corner, rate, k in zip(CORNERS, W, vehicle.k, strict=True):
             r = vehicle.arm_l * corner
             ratio = ground * (vehicle.rotor_radius / (4 * (x + C @ r)[2])) ** 2
             lift = k * rate**2 * (1 / (1 - ratio) - 1)
             f = [0, 0, lift] - rate * drag * (C.T @ v + np.cross(w, r)) * [1, 1, 0]
-            force, torque = force + C @ f, torque + np.cross(r - com, f)
+            force = force + C @ f
+            torque = torque + np.cross(r - com, f)
         return force, torque
 
     return wrench

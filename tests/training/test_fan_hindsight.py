@@ -35,11 +35,13 @@ def test_what_is_taught_is_the_oracle_s_command():
     """Of the first episode once more, one environment by itself, at the commands that were seen."""
     flights = flown(FanHindsight(), "base", 0.1)
     assert flights.seen.shape == (250, 8, FEATURES.size)
-    env, oracle = FanTrackingEnv("base"), Oracle(foresight=24)
+    env = FanTrackingEnv("base")
+    oracle = Oracle(foresight=24)
     oracle.largest = 2.5
     env.foresight = oracle.foresight
     observation, info = env.reset(seed=training_seed(3, 0, 0))
-    wanted, offsets = [], []
+    wanted = []
+    offsets = []
     for k in range(100):
         seen = FEATURES.frames(observation[None])[0]
         assert_allclose(flights.seen[k, 0, -6:-1], seen[:5], atol=1e-3)

@@ -67,7 +67,8 @@ def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
     train(config, "base", 3, tmp_path / "parts")
     for name in ("best.npz", "last.npz", "best.json", "last.json"):
         assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
-    a, b = read_progress(tmp_path / "whole"), read_progress(tmp_path / "parts")
+    a = read_progress(tmp_path / "whole")
+    b = read_progress(tmp_path / "parts")
     assert (a.steps, a.rmse_m) == (b.steps, b.rmse_m) == ([120, 240], b.rmse_m)
 
 
@@ -79,7 +80,8 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
     learner.learn(120)
     policy = TrainedPolicy(card_of(config, "base", 0, 120), weights_of(learner, algorithm))
     policy.reset()
-    rng, state = np.random.default_rng(0), None
+    rng = np.random.default_rng(0)
+    state = None
     for _ in range(5):
         x = rng.normal(size=features_of(config).size).astype(np.float32)
         expected, state = learner.predict(
@@ -136,7 +138,8 @@ def test_sequences_in_one_call_are_those_of_sb3_contrib(starts):
     from windwrench.training.fast_lstm import FastLstmPolicy
 
     torch.manual_seed(0)
-    lstm, count = torch.nn.LSTM(3, 5), len(starts) // 4
+    lstm = torch.nn.LSTM(3, 5)
+    count = len(starts) // 4
     states = torch.randn(1, count, 5), torch.randn(1, count, 5)
     given = torch.randn(len(starts), 3), states, torch.tensor(starts, dtype=torch.float32), lstm
     ours, then = FastLstmPolicy._process_sequence(*given)
@@ -261,10 +264,12 @@ def away(seed):
 
 def lone_flight(seed, commands):
     """Features, rewards and losses of a single environment, computed by itself."""
-    env, history = FanTrackingEnv("static"), History(FEATURES, 1)
+    env = FanTrackingEnv("static")
+    history = History(FEATURES, 1)
     observation, info = env.reset(seed=seed)
     history.restart(FEATURES.frames(observation[None]))
-    seen, rewards = [history.flat()[0]], []
+    seen = [history.flat()[0]]
+    rewards = []
     for command in commands:
         observation, reward, lost, _, info = env.step(np.array([command], dtype=np.float32))
         history.push(FEATURES.frames(observation[None]))
@@ -277,7 +282,8 @@ def lone_flight(seed, commands):
 
 def test_each_environment_ends_by_itself_with_its_own_last_observation():
     limit = 30
-    env, direction = make(3, limit), away(seed_of(1, 0))
+    env = make(3, limit)
+    direction = away(seed_of(1, 0))
     first, _, lost = lone_flight(seed_of(1, 0), [direction] * limit)
     assert lost
     gone = len(first) - 1
@@ -330,7 +336,9 @@ def test_rewards_are_weighted_terms():
 
 
 class Rates(WindHoverEnv):
-    vehicle, action, observation = "crazyflie", "rates", "pose"
+    vehicle = "crazyflie"
+    action = "rates"
+    observation = "pose"
 
 
 def test_vehicle_action_and_observation_of_a_class_hold_and_sb3_trains_on_its_lanes():

@@ -113,7 +113,8 @@ def test_what_is_no_rotors_change_is_told_from_one(place, moved):
 def test_a_weak_rotor_and_a_weight_are_named_at_their_place(rotor):
     rng = np.random.default_rng(2)
     left, front = MIX[:2, rotor]
-    weak, weight = 0.08 * MIX[:, rotor], 0.1 * np.array([left, front, 0, 1])
+    weak = 0.08 * MIX[:, rotor]
+    weight = 0.1 * np.array([left, front, 0, 1])
     places = [compare(drawn(rng, 3, x), drawn(rng, 3)) for x in [weak] * 8 + [weight] * 8]
     assert np.mean([c.place == ROTORS[rotor] for c in places]) > 0.8
     assert not any(c.sure and c.place != ROTORS[rotor] for c in places)
@@ -142,7 +143,8 @@ def test_simulated_changes_are_named_without_a_true_model(effects, place, tmp_pa
 
 def test_another_battery_voltage_makes_the_total_less_certain():
     rng = np.random.default_rng(7)
-    after, before = drawn(rng, 3, (0.0, 0.0, 0.0, 0.13)), drawn(rng, 3)
+    after = drawn(rng, 3, (0.0, 0.0, 0.0, 0.13))
+    before = drawn(rng, 3)
     assert compare(after, before).places["all rotors"] > 0.8
     low = [replace(trim, voltage=10.5) for trim in after]
     high = [replace(trim, voltage=12.0) for trim in before]

@@ -18,7 +18,8 @@ from windwrench.identification.logs.streams import Stream
 
 def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
     rng = np.random.default_rng(0)
-    t, u = np.arange(0.0, seconds, 1.0 / rate), np.arange(0.0, seconds, 1.0 / command_rate)
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    u = np.arange(0.0, seconds, 1.0 / command_rate)
     streams = {
         "gyro": 0.01 * rng.standard_normal((len(t), 3)),
         "accelerometer": np.tile([0.0, 0.0, 9.81], (len(t), 1)),

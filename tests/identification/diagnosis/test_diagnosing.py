@@ -321,7 +321,8 @@ def test_the_error_is_that_of_test_logs_where_they_are_given():
 
 
 def test_sensor_noise_is_read_off_the_log():
-    log, rng = fly(), np.random.default_rng(0)
+    log = fly()
+    rng = np.random.default_rng(0)
     noise = sensor_noise(log, VEHICLE)
     assert noise.position == pytest.approx(0.001, rel=0.05)
     assert noise.attitude == pytest.approx(0.005, rel=0.05)

@@ -34,7 +34,8 @@ def by_numbers(normal, right, low, high):
     def density(z):
         return math.exp(right * z - 0.5 * normal * z * z - 0.5 * z * z)
 
-    low, high = max(low, -12.0), min(high, 12.0)
+    low = max(low, -12.0)
+    high = min(high, 12.0)
     share = quad(lambda z: math.exp(-0.5 * z * z), low, high)[0]
     return math.log(quad(density, low, high)[0] / share)
 
@@ -53,7 +54,8 @@ def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
 
 def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
     rng = np.random.default_rng(2)
-    x, noise = rng.standard_normal((40, 100, 3)), rng.standard_normal((40, 100))
+    x = rng.standard_normal((40, 100, 3))
+    noise = rng.standard_normal((40, 100))
     alike = np.repeat(rng.standard_normal((40, 5)), 20, axis=1)  # one error for 20 samples
     slow = np.repeat(rng.standard_normal((40, 5, 3)), 20, axis=1)
 
@@ -67,9 +69,11 @@ def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
 
 def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
     rng = np.random.default_rng(4)
-    x, y = rng.standard_normal((200, 4)), rng.standard_normal(200)
+    x = rng.standard_normal((200, 4))
+    y = rng.standard_normal(200)
     y += 0.4 * x[:, 3]
-    normal, right = x.T @ x, x.T @ y
+    normal = x.T @ x
+    right = x.T @ y
 
     def evidence(columns, size):
         at = np.array(columns)
@@ -97,7 +101,9 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     """A flight in which thrust and attitude are what the forces ask for; rotors by commands."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)
-    rate, size, phase = (0.9, 1.4, 0.5), (1.2, 0.7, 0.4), (0.0, 0.6, 1.1)
+    rate = (0.9, 1.4, 0.5)
+    size = (1.2, 0.7, 0.4)
+    phase = (0.0, 0.6, 1.1)
     angle = [np.outer(t, [w, 1.7 * w]) + p for w, p in zip(rate, phase, strict=True)]
     place = [s * np.sin(a) @ [1.0, 0.5] for s, a in zip(size, angle, strict=True)]
     place = np.column_stack(place) + np.array([0.0, 0.0, 2.0])
@@ -159,7 +165,8 @@ def test_in_still_air_nothing_is_sure():
 @pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 2, 3), marks=pytest.mark.slow)])
 def test_a_drag_that_nobody_declared_is_sure(seeds):
     """On five of six flights; on one the gust looks like a part that swings."""
-    bare, sure = replace(VEHICLE, effects=()), 0
+    bare = replace(VEHICLE, effects=())
+    sure = 0
     for seed in seeds:
         found = diagnose([flown(seed=seed)], bare)
         drags = [e for e in found.effects if e.name in ("body_drag", "rotor_drag")]
@@ -213,12 +220,12 @@ def test_noise_without_memory_only_scales():
 
 def test_a_column_of_factors_is_their_product_a_part_at_a_time():
     rng = np.random.default_rng(3)
-    z, turned, part = rng.normal(size=50), rng.normal(size=(50, 3)), rng.normal(size=(50, 4))
-    force, torque, share = (
-        Product(1.7, z, turned, slice(3)),
-        Product(0.3, z, None, slice(4, 5)),
-        Product(1.0, z, part),
-    )
+    z = rng.normal(size=50)
+    turned = rng.normal(size=(50, 3))
+    part = rng.normal(size=(50, 4))
+    force = Product(1.7, z, turned, slice(3))
+    torque = Product(0.3, z, None, slice(4, 5))
+    share = Product(1.0, z, part)
     dense = np.zeros((2, 50, 6))
     dense[0, :, :3], dense[1, :, 4] = 1.7 * z[:, None] * turned, 0.3 * z
     for rows in (slice(None), slice(7, 31)):

@@ -139,7 +139,8 @@ def test_moments_of_another_flight_show_no_delay():
     assert turning_delay([], model) is None
 
 
-TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down
+TAU = 0.03  # s: 22 ms up, 38 ms down
+APART = 0.008
 
 
 def unevenly_lagging(commanded):

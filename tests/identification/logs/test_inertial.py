@@ -120,7 +120,8 @@ def test_gravity_left_out_and_a_gyro_that_stands_still_are_told():
 
 def test_leaps_and_gaps_of_the_pose_are_no_sensors_fault():
     log = flight()
-    position, quaternion = log.position.copy(), log.quaternion.copy()
+    position = log.position.copy()
+    quaternion = log.quaternion.copy()
     position[400:] += 5.0
     quaternion[700] = [0.0, 1.0, 0.0, 0.0]
     position[900:1000] = quaternion[900:1000] = np.nan
@@ -131,7 +132,8 @@ def test_leaps_and_gaps_of_the_pose_are_no_sensors_fault():
 def test_a_sensor_faster_than_the_pose_has_rows_of_its_own(tmp_path):
     log = flight(rate=1000.0)
     every = np.arange(len(log.t)) % 10 == 0
-    position, quaternion = log.position.copy(), log.quaternion.copy()
+    position = log.position.copy()
+    quaternion = log.quaternion.copy()
     position[~every] = quaternion[~every] = np.nan
     log = replace(log, position=position, quaternion=quaternion, valid=every)
     write_log(log, tmp_path / "flight.csv")

@@ -76,7 +76,8 @@ def table_of(columns, path):
     return path
 
 
-_QUATERNION, _SENSORS = "qw qx qy qz", "vx vy vz ax ay az gx gy gz"
+_QUATERNION = "qw qx qy qz"
+_SENSORS = "vx vy vz ax ay az gx gy gz"
 NAMES = f"t x y z {_QUATERNION} {_SENSORS} "  # and four motors behind
 _PX4 = "/fmu/out/vehicle_odometry"
 _VICON = "/vicon/drone/transform"
@@ -110,7 +111,8 @@ _VICON = "/vicon/drone/transform"
 )
 def test_parts_are_found_by_what_their_numbers_obey(tmp_path, flown, names):
     columns = columns_of(flown, names, is_ned=True)
-    listed, found = list(columns), guessed(table_of(columns, tmp_path / "a.csv"), "ardrone2")
+    listed = list(columns)
+    found = guessed(table_of(columns, tmp_path / "a.csv"), "ardrone2")
     log_map = found.log_map
     assert not found.missing
     assert (log_map.world, log_map.body) == ("ned", "frd")

@@ -82,7 +82,8 @@ def test_a_log_as_text(read, tmp_path):
     messages = parm(), *POSE, imu(T), current, (name, letters, sent)
     path = tmp_path / "2014-01-01.log"
     path.write_text(dataflash_text(messages) + "\r\nIMU, 11")  # and the last line is cut
-    log, binary = read_log(path), read(*messages[:-1], rcou(T))
+    log = read_log(path)
+    binary = read(*messages[:-1], rcou(T))
     assert "reader ardupilot_bin" in log.source
     assert_allclose(log.command, binary.command, atol=1e-9)
     assert_allclose(log.position, binary.position, atol=1e-6)
@@ -134,7 +135,8 @@ def test_without_a_position_the_imu_is_read(read):
 
 def test_places_on_the_globe_become_metres(read):
     position, _ = ned(T)
-    lat, lng = 52.0, 10.0
+    lat = 52.0
+    lng = 10.0
     place = {
         "TimeUS": micro(T),
         "Lat": lat + np.degrees(position[:, 0] / 6_378_137.0),

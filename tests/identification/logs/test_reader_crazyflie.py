@@ -88,7 +88,8 @@ def test_a_log_before_2021(write):
 
 
 def test_set_points_become_rotor_speeds(write):
-    path, vehicle = write(IMU), load_vehicle("crazyflie")
+    path = write(IMU)
+    vehicle = load_vehicle("crazyflie")
     log = read_log(path)  # the log names its vehicle
     assert log.vehicle == "crazyflie"
     counts = OURS * vehicle.voltage_ref / 4.2
@@ -172,5 +173,6 @@ def test_real_logs_turn_as_their_motors_say(number, axes):
     torque = command @ np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1]]).T
     for axis in axes:
         delay = 40 if axis < 2 else 0
-        a, b = turn[flying][delay:, axis], torque[flying][: flying.sum() - delay, axis]
+        a = turn[flying][delay:, axis]
+        b = torque[flying][: flying.sum() - delay, axis]
         assert np.corrcoef(a, b)[0, 1] > 0.85

@@ -186,7 +186,8 @@ def test_without_a_pose_the_inertial_sensors_are_read(read, topic):
 
 @pytest.mark.parametrize("pose", [mocap, onboard])
 def test_a_slow_pose_stands_in_rows_of_the_inertial_sensors(read, pose):
-    slow, times = 0.1 * np.arange(40), np.arange(-0.2, 4.2, 0.004)
+    slow = 0.1 * np.arange(40)
+    times = np.arange(-0.2, 4.2, 0.004)
     sensors = {"sensor_combined": sensor_combined(times), "esc_status": esc(times)}
     log = read(pose(slow) | sensors)
     assert log.valid.sum() == len(slow)

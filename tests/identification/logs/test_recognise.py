@@ -73,7 +73,8 @@ def test_a_table_whose_guess_leaves_no_doubt_is_read_at_once(tmp_path):
     path = DATA / "flights" / "labelled_01.csv.gz"
     if not path.exists():
         pytest.skip(f"{path} is not here")
-    log, vehicle = read_log(path), load_vehicle(DATA / "flights" / "vehicle.yaml")
+    log = read_log(path)
+    vehicle = load_vehicle(DATA / "flights" / "vehicle.yaml")
     down = [1.0, -1.0, -1.0]
     columns = {
         "time_ms": 1e3 * log.t,

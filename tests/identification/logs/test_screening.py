@@ -207,7 +207,8 @@ PARTS = ("clock jump", "rows cut out")
 @pytest.mark.parametrize("kind", TORN)
 def test_a_torn_log_is_refused_and_an_estimate_needs_less(kind):
     make, expected = TORN[kind]
-    log, said = make(flight()), f"flight.csv: .*{expected}"
+    log = make(flight())
+    said = f"flight.csv: .*{expected}"
     with refused(said):
         screen_log(log, VEHICLE)
     if kind in (*ENOUGH, *PARTS):
@@ -238,8 +239,10 @@ def test_a_frozen_pose_counts_as_none():
     log = flight()
     frozen = (log.t >= 5.0) & (log.t <= 6.0)
     first = int(np.argmax(frozen))
-    position, quaternion = log.position.copy(), log.quaternion.copy()
-    position[frozen], quaternion[frozen] = position[first], quaternion[first]
+    position = log.position.copy()
+    quaternion = log.quaternion.copy()
+    position[frozen] = position[first]
+    quaternion[frozen] = quaternion[first]
     log = replace(log, position=position, quaternion=quaternion)
     checked, notes = screen_log(log, VEHICLE, None)
     assert any("pose is frozen for 0.995 s from t = 5.005 s (1 such" in note for note in notes)
@@ -251,7 +254,8 @@ def test_a_frozen_pose_counts_as_none():
 
 def test_rotors_that_stop_or_race_are_named():
     log = flight()
-    stopped, racing = log.rotor_speeds.copy(), log.rotor_speeds.copy()
+    stopped = log.rotor_speeds.copy()
+    racing = log.rotor_speeds.copy()
     stopped[(log.t > 7.0) & (log.t < 8.0), 2] = 0.0
     racing[[700, 1500], 1] = 4e4
     for speeds, words in (

@@ -82,7 +82,8 @@ def test_slow_rotors_tell_no_torque_and_no_effect(rate, force, flown, tmp_path):
         screen_log(log, VEHICLE)
     with refused(said):
         diagnose([log], VEHICLE)
-    series, told = estimate_log(log, VEHICLE), estimate_log(replace(log, rates={}), VEHICLE)
+    series = estimate_log(log, VEHICLE)
+    told = estimate_log(replace(log, rates={}), VEHICLE)
     assert np.isnan(series.torque).all()
     assert np.isnan(series.std_torque).all()
     assert np.array_equal(series.force, told.force)

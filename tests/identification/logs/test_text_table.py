@@ -76,7 +76,9 @@ def test_latin_letters_of_an_old_encoding_are_read(opened):
 
 
 def test_three_hours_at_200_hz_are_within_the_limits():
-    rows, columns, characters = 3 * 3600 * 200, 20, 7.5e8
+    rows = 3 * 3600 * 200
+    columns = 20
+    characters = 7.5e8
     assert rows < LIMITS.table_rows
     assert rows * columns < LIMITS.table_numbers
     assert characters < LIMITS.table_text

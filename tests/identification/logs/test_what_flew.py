@@ -223,7 +223,8 @@ def test_a_log_of_motor_requests_alone_serves_to_compare(tmp_path):
 def test_whether_anything_flew():
     """By the motors and what was measured, whatever the vehicle."""
     t = 0.01 * np.arange(2000)
-    hover, still = np.full((2000, 4), 390.0), np.zeros((2000, 3))
+    hover = np.full((2000, 4), 390.0)
+    still = np.zeros((2000, 3))
     turned = np.tile([1.0, 0.0, 0.0, 0.0], (2000, 1))
     noise = np.random.default_rng(0).standard_normal((2000, 3))
     moving = 0.3 * np.sin(np.outer(t, [0.5, 0.7, 0.9]))

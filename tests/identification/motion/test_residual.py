@@ -45,7 +45,9 @@ def flown():
 def test_the_residual_is_newton_and_euler(flown):
     body = compile_effects(AMENDED).vehicle
     rotors = body.rotor_wrench(flown.rotor_speeds)
-    R, omega, alpha = flown.rotation, flown.angular_velocity, flown.angular_acceleration
+    R = flown.rotation
+    omega = flown.angular_velocity
+    alpha = flown.angular_acceleration
     centre = np.cross(alpha, body.com) + np.cross(omega, np.cross(omega, body.com))
     acceleration = (
         flown.acceleration
@@ -79,7 +81,9 @@ def test_the_size_of_white_noise_is_read_behind_a_high_pass_and_through_outliers
 @pytest.mark.parametrize("lag", [0.004, 0.03, 0.2])
 def test_a_first_order_lag_has_made_63_per_cent_of_a_step_after_its_time(lag):
     """At rest before the step, and each sample held over the period that ends there."""
-    period, rest, step = 0.005, np.array([300.0, -1.0]), np.array([100.0, 2.0])
+    period = 0.005
+    rest = np.array([300.0, -1.0])
+    step = np.array([100.0, 2.0])
     x = rest + np.outer(np.arange(200) >= 20, step)
     since = np.maximum(period * (np.arange(200) - 19), 0.0)
     made = rest + np.outer(1.0 - np.exp(-since / lag), step)
@@ -127,7 +131,8 @@ def test_noise_that_a_filter_hid_is_what_the_vehicle_states_of_its_motion_captur
     own, hidden, added
 ):
     """In units of the vehicle's."""
-    log, stated = still_log(200.0), VEHICLE.mocap.sigma_pos_m
+    log = still_log(200.0)
+    stated = VEHICLE.mocap.sigma_pos_m
     noise = np.random.default_rng(1).standard_normal(log.position.shape)
     log = replace(log, position=own * stated * noise)
     (noisier,) = noisy_logs([log], VEHICLE, hidden)
@@ -137,7 +142,8 @@ def test_noise_that_a_filter_hid_is_what_the_vehicle_states_of_its_motion_captur
 def test_an_imu_at_1_khz_tells_as_much_as_one_of_half_its_noise_at_250_hz():
     found = []
     for rate, size in ((1000.0, 2.0), (250.0, 1.0)):
-        rng, log = np.random.default_rng(0), still_log(rate, 8.0)
+        rng = np.random.default_rng(0)
+        log = still_log(rate, 8.0)
         position = np.full_like(log.position, np.nan)
         tenth = slice(None, None, round(rate / 10.0))
         position[tenth] = 0.002 * rng.standard_normal(position[tenth].shape)
@@ -218,8 +224,10 @@ def test_a_rotor_s_own_lag_is_no_filter(vehicle, trajectory):
     assert note.startswith("the rotor speeds were filtered before the log was written")
 
 
-PERIOD, GRAVITY = 0.005, 9.81
-GYRO_BIAS, FORCE_BIAS = np.array([0.01, -0.02, 0.015]), np.array([0.05, -0.1, 0.08])
+PERIOD = 0.005
+GRAVITY = 9.81
+GYRO_BIAS = np.array([0.01, -0.02, 0.015])
+FORCE_BIAS = np.array([0.05, -0.1, 0.08])
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,8 @@ def diagnosis():
     made = made_diagnosis(trace)
     (drag,) = made.effects
     unit = "N/(rad/s m/s)"
-    std, units = {"kdx": 3e-6, "kdy": 4e-6}, dict.fromkeys(DRAG, unit)
+    std = {"kdx": 3e-6, "kdy": 4e-6}
+    units = dict.fromkeys(DRAG, unit)
     drag = replace(drag, coefficients=DRAG, std=std, units=units)
     return replace(
         made,
@@ -80,7 +81,8 @@ def hard(diagnosis):
             "com_offset", {"cx": 0.00612}, {"cx": 0.0002}, {"cx": "m"}, False, (), {"share": 0.2}
         ),
     ]
-    trace, signature = diagnosis.traces[0], diagnosis.signatures[0]
+    trace = diagnosis.traces[0]
+    signature = diagnosis.signatures[0]
     return replace(
         diagnosis,
         verdict="partly explained",
@@ -184,7 +186,8 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.tags, self.words = [], []
+        self.tags = []
+        self.words = []
         self.feed(text)
         self.text = " ".join(" ".join(self.words).split())
 

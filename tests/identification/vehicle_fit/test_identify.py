@@ -186,7 +186,8 @@ def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
 
 def test_tapers_lose_what_the_intervals_add():
     """A regression of white noise on white noise, of density 0.01: its variance by its weight."""
-    rng, off = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    off = []
     for noise in rng.standard_normal((2000, 500, 2)):
         (s,) = segments_of(noise, 0.01, 0, np.inf)
         x, y = np.moveaxis(s.columns * np.sqrt(s.weight)[:, None], 2, 0)
@@ -257,7 +258,8 @@ def test_the_simplest_model_that_is_not_worse_stands(whole, keeps_rate, simplest
 
 
 def test_a_vehicle_that_is_refuted_keeps_its_motion(commanded):
-    log, status = commanded[0], ModelStatus("refuted", "refuted")
+    log = commanded[0]
+    status = ModelStatus("refuted", "refuted")
     path = predict(log, replace(CRAZYFLIE, status=status), every=200)
     state = causal_states(log, CRAZYFLIE)[path.start]
     ahead = path.period * np.arange(1, path.velocity.shape[1] + 1)[:, None]
@@ -319,7 +321,9 @@ def test_rotors_in_another_order_are_refused(inertial):
 
 def test_turning_is_compared_with_torque_at_its_own_delay():
     """60 ms of 4 to 7 Hz are more than a quarter of a turn: at no delay all looks opposed."""
-    rng, period, late = np.random.default_rng(3), 0.01, 6
+    rng = np.random.default_rng(3)
+    period = 0.01
+    late = 6
     n = 3000
     band = butter(2, [8.0 * period, 14.0 * period], btype="bandpass", output="sos")
     turn = sosfiltfilt(band, rng.standard_normal((n, 3)), axis=0) * [3.0, 3.0, 1.0]
@@ -328,7 +332,8 @@ def test_turning_is_compared_with_torque_at_its_own_delay():
     square = np.maximum((FULL * HOVER) ** 2 + (np.linalg.pinv(mixing) @ torque / K).T, 0.0)
     still, force = np.zeros((2, n, 3))
     force[:, 2] = K / MASS * square.sum(axis=1)
-    t, rate = period * np.arange(n), period * np.cumsum(turn, axis=0)
+    t = period * np.arange(n)
+    rate = period * np.cumsum(turn, axis=0)
     piece = MotionPiece(0, t, period, force, turn, rate, still, np.sqrt(square), None, None)
     drive = Drive(GIVEN.positions, SPIN)
     sources = Sources("accelerometer", "gyro", "rotor speeds", True)
@@ -376,7 +381,8 @@ def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
         EffectSetting("body_drag", {"cx": 4e-4, "cy": 6e-4}),
     )
     it = found(*effects)
-    v, speed = it.vehicle, 3.0
+    v = it.vehicle
+    speed = 3.0
     set_to = dict(re.findall(r"param set (\S+) (\S+)", EXPORTS["px4"](it)))
     predicted = float(set_to["EKF2_MCOEF"]) * speed
     predicted += 0.5 * 1.225 * speed**2 / float(set_to["EKF2_BCOEF_Y"])
@@ -389,7 +395,8 @@ def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
 
 
 def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
-    full, bend = 0.15, 0.7
+    full = 0.15
+    bend = 0.7
     it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)), commands=True)
     text = EXPORTS["px4"](it)
     set_to = {k: float(x) for k, x in re.findall(r"param set (\S+) (\S+)", text)}
@@ -404,7 +411,8 @@ def test_rotorpy_makes_the_same_forces_and_torques():
     it = found(EffectSetting("rotor_drag", {"kdx": 2e-6, "kdy": 3e-6}))
     names = {"np": np}
     exec(EXPORTS["rotorpy"](it), names)
-    p, v = names["quad_params"], it.vehicle
+    p = names["quad_params"]
+    v = it.vehicle
     speeds = np.array([1500.0, 1600.0, 1700.0, 1800.0])
     thrust = v.k * speeds**2
     place = np.array(list(p["rotor_pos"].values()))

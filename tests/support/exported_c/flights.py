@@ -53,8 +53,10 @@ def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
     )
     rng = np.random.default_rng(seed)
     rows = slice(0, steps * every, every)
-    position, quaternion = log["position"][rows].copy(), log["quaternion"][rows].copy()
-    n, period = len(position), every / 200.0
+    position = log["position"][rows].copy()
+    quaternion = log["quaternion"][rows].copy()
+    n = len(position)
+    period = every / 200.0
     if noise > 1.0:
         _disturb(position, quaternion, model.mocap, noise, np.random.default_rng((seed, 1)))
     out = {
@@ -71,7 +73,8 @@ def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
     k = round(0.5 / period) if faults else n
     while k < n:
         if rng.random() < _FAULT * period / 0.005:
-            kind, length = str(rng.choice(list(_SIZES))), float(rng.choice(_LENGTHS))
+            kind = str(rng.choice(list(_SIZES)))
+            length = float(rng.choice(_LENGTHS))
             rows = slice(k, min(k + max(1, round(length / period)), n))
             befall(kind, rows, position, quaternion, out["rotor_speeds"], rng, _SIZES[kind])
             k = rows.stop

@@ -58,7 +58,8 @@ def befall(kind, when, x, q, W, rng, size=None):
         q[when] = rng.standard_normal((count, 4))
         x[when] += (kind == "random poses") * (size or 1.0) * rng.standard_normal((count, 3))
     elif kind == "frozen":
-        x[when], q[when] = x[when.start], q[when.start]
+        x[when] = x[when.start]
+        q[when] = q[when.start]
     elif kind == "not a number":
         for values in (x, q, W):
             values[when][rng.random((count, values.shape[1])) < 0.2] = np.nan
