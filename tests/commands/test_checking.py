@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.random_tables import flight, random_table, save
@@ -14,7 +15,7 @@ from windwrench.runtime.errors import InputError
 
 @pytest.fixture(scope="module")
 def written():
-    return random_table(flight("ardrone2", "excite", 1, 12.0), np.random.default_rng(4), 0.0)
+    return random_table(flight("ardrone2", "excite", 1, 12.0), default_rng(4), 0.0)
 
 
 def run(capsys, *arguments):

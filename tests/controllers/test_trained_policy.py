@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from windwrench.controllers.features import Features
@@ -66,7 +67,7 @@ def test_a_held_command_changes_every_other_decision():
 
 def recurrent(cell, seen=1, state=4, size=1):
     """Random weights of a cell with a state of some numbers, and a linear layer."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     rows = state * {"lstm": 4, "gru": 3}[cell]
     shapes = {
         f"{cell}_input": (rows, seen),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.flights import PERIOD, yawing_flight
 from windwrench import _core
@@ -29,7 +30,7 @@ def flight_with_faults(seed):
     rotors, position, quaternion = (
         flight[name][1:].copy() for name in ("rotors", "position", "quaternion")
     )
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     count = len(rotors)
     for what, chance in ((rotors, 0.02), (position, 0.05), (quaternion, 0.05)):
         what[rng.random(count) < chance] = np.nan
@@ -78,7 +79,7 @@ def test_single_precision_follows_double():
     apart = []
     for sample in zip(*flight, strict=True):
         double, single = (batch.step(*sample) for batch in batches)
-        apart.append(np.abs(double.force - single.force).max() / double.std_force.min())
+        apart.append(abs(double.force - single.force).max() / double.std_force.min())
     # before the first restart; each of the two then has a way of its own for a moment
     assert max(apart[:110]) < 0.02
     assert np.median(apart) < 0.02
@@ -98,7 +99,7 @@ def flown(tmp_path_factory):
     rotors, position, quaternion = flight_with_faults(8)
     ukf = begun()
     felt = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, VEHICLE.gravity], (len(rotors), 1))
-    felt[:, :6] += 0.01 * np.random.default_rng(8).standard_normal((len(rotors), 6))
+    felt[:, :6] += 0.01 * default_rng(8).standard_normal((len(rotors), 6))
     rows = np.column_stack([rotors, position, quaternion, felt])
     given = ukf.record.tobytes()[: _core.FILTER_SIZE] + rows.tobytes()
     ended = subprocess.run([folder / "flight"], input=given, capture_output=True, check=False)
@@ -123,4 +124,4 @@ def test_lanes_are_the_single_filter_to_the_bit(flown):
 def test_an_imu_in_single_precision_follows_double(flown):
     double, single = flown[0][4:]
     assert np.isfinite(double).all()
-    assert np.abs(double[:100] - single[:100]).max() < 0.02
+    assert abs(double[:100] - single[:100]).max() < 0.02

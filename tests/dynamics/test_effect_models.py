@@ -5,6 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
@@ -148,7 +150,7 @@ def test_an_effect_acts_at_each_rotor(name, size, law, com):
     vehicle = replace(VEHICLE, ceiling_z=0.35)
     got = wrench(vehicle.with_effects(offset(com), EffectSetting(name, size)), wind=WIND)
     assert_wrench(got, *at_rotors(law, com, WIND))
-    assert np.linalg.norm(got[1]) > 0.0
+    assert norm(got[1]) > 0.0
 
 
 BLOWN = np.array([2.0, -1.0, 0.3])  # m/s
@@ -185,7 +187,7 @@ ACCELERATION = np.array([100.0, -50.0, 20.0, 300.0])
         (  # its change against still air
             {"wind": {"wx": 2.0, "wy": -1.0, "wz": 0.3, "cd": 0.04}},
             {},
-            0.04 * (np.linalg.norm(BLOWN - V) * (BLOWN - V) + np.linalg.norm(V) * V),
+            0.04 * (norm(BLOWN - V) * (BLOWN - V) + norm(V) * V),
             np.zeros(3),
         ),
         ({"wind": {"cd": 0.04}}, {}, np.zeros(3), np.zeros(3)),
@@ -222,10 +224,8 @@ def test_ground_effect_stays_finite_on_the_floor_and_fades_far_from_it():
     thrust = float(np.sum(VEHICLE.k * W**2))
     ceiling = replace(setting("ceiling_effect", rho=3.0), ceiling_z=2.6)
     for touching in (wrench(vehicle, (0, 0, 0.0)), wrench(ceiling, (0, 0, 2.6))):
-        assert 0.0 < np.linalg.norm(touching[0]) <= thrust * (1 + 1e-12)
-    heights = [
-        np.linalg.norm(wrench(vehicle, (0, 0, z))[0]) for z in (0.15, 0.2, 0.3, 0.5, 1.0, 3.0)
-    ]
+        assert 0.0 < norm(touching[0]) <= thrust * (1 + 1e-12)
+    heights = [norm(wrench(vehicle, (0, 0, z))[0]) for z in (0.15, 0.2, 0.3, 0.5, 1.0, 3.0)]
     assert all(low > high for low, high in pairwise(heights))
     assert heights[-1] < 1e-3 * thrust
     no_ceiling = setting("ceiling_effect", rho=3.0)
@@ -240,7 +240,7 @@ def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
         lambda i, u: -W[i] * np.array([k_d, k_d, k_z]) * u + [0, 0, k_h * (u[0] ** 2 + u[1] ** 2)],
         wind=WIND,
     )
-    force = force - R @ (np.linalg.norm(air) * c_D * air)
+    force = force - R @ (norm(air) * c_D * air)
     for r, rate in zip(VEHICLE.positions, W, strict=True):
         torque = torque - k_flap * rate * np.cross(air + np.cross(OMEGA, r), [0, 0, 1])
     effects = {
@@ -257,9 +257,7 @@ def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart(
     kp = 5e-4
     kw = 2e-4
     u = R.T @ (V - WIND)
-    direction = VEHICLE.positions[:, :2] / np.linalg.norm(
-        VEHICLE.positions[:, :2], axis=1, keepdims=True
-    )
+    direction = VEHICLE.positions[:, :2] / norm(VEHICLE.positions[:, :2], axis=1, keepdims=True)
     leads = direction @ u[:2]
     assert leads.min() < 0.0 < leads.max()
     # the induced velocity of momentum theory, and by how far it leans towards the followers
@@ -326,12 +324,12 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
     got = wrench(moved, turn @ position + where)
     assert_allclose(got[0], turn @ out[:3], rtol=1e-10)
     assert_allclose(R @ got[1], turn @ out[3:], rtol=1e-10)
-    assert np.linalg.norm(out[:3]) > 0.1
+    assert norm(out[:3]) > 0.1
 
 
 def test_motor_lag_is_the_exact_exponential_however_a_time_is_cut_up():
     tau = 0.035
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     rotors = Rotors(setting("motor_lag", tau=tau))
     assert_array_equal(rotors([400.0] * 4), [400.0] * 4)  # starts at the first rates
     times = rng.uniform(0.001, 0.01, 20)
@@ -401,7 +399,7 @@ def test_latency_draws_a_line_where_samples_are_six_times_as_far_apart_as_others
     """A cubic through such four would swing between them."""
     rotors = Rotors(setting("latency", d=0.0125))
     times = np.cumsum([0.03, PERIOD] * 20)
-    speeds = 400.0 + 10.0 * np.random.default_rng(0).standard_normal(len(times))
+    speeds = 400.0 + 10.0 * default_rng(0).standard_normal(len(times))
     steps = np.diff(times, prepend=0.0)
     late = [rotors(w * np.ones(4), dt=dt)[0] for w, dt in zip(speeds, steps, strict=True)]
     assert_allclose(late, np.interp(times - 0.0125, times, speeds), rtol=1e-12)
@@ -431,12 +429,10 @@ def test_an_attitude_gain_scales_the_tilt_and_nothing_else():
     _, position, q = Sensing(setting("attitude_gain", g=g), 1.0)(W, POSE, Q)
     z = rotation_of(q).as_matrix()[:, 2]
     assert np.arccos(z[2]) == pytest.approx((1 + g) * np.arccos(R[2, 2]), rel=1e-12)
-    assert_allclose(z[:2] / np.linalg.norm(z[:2]), R[:2, 2] / np.linalg.norm(R[:2, 2]), rtol=1e-12)
+    assert_allclose(z[:2] / norm(z[:2]), R[:2, 2] / norm(R[:2, 2]), rtol=1e-12)
     # what is left after the tilt is taken off, the turn about the vertical, is the same
     level = [
-        Rotation.from_rotvec(
-            -np.cross([0, 0, 1], up) / np.linalg.norm(up[:2]) * np.arccos(up[2])
-        ).as_matrix()
+        Rotation.from_rotvec(-np.cross([0, 0, 1], up) / norm(up[:2]) * np.arccos(up[2])).as_matrix()
         @ A
         for up, A in ((z, rotation_of(q).as_matrix()), (R[:, 2], R))
     ]
@@ -465,7 +461,7 @@ def test_an_estimator_undoes_a_sensing_effect(effects):
 @pytest.mark.parametrize("dt", [0.02, -0.02, 0.0125, -0.0125])
 def test_a_clock_offset_delays_pose_or_rates_and_an_estimator_the_other(dt):
     clock, undo = (Sensing(setting("clock_offset", dt=dt), way) for way in (1.0, -1.0))
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     for k in range(40):
         t = k * PERIOD
         true = 400.0 + t * np.arange(4.0), np.array([t, -t, 1.0]), Rotation.from_euler("z", 3.0 + t)

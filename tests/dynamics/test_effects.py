@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.own_effects import HOSE, joined
 from tests.support.parameters import mostly_slow
@@ -91,7 +92,7 @@ def test_the_estimator_explains_an_effect_that_the_plant_flies_once_it_is_declar
 def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
     """The load and its thread there share nothing with the effect's equation."""
     load = SuspendedLoad(mass=0.03, length=0.3, anchor=(0.0, 0.0, 0.0), drag=0.03)
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     t = TICK * np.arange(2401)
     setpoints = draw_trajectory("excite", rng, t)
     samples = np.empty((len(t), 11))

@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 import yaml
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.data_paths import data_file
@@ -130,7 +131,7 @@ def test_mixing_is_the_paper_s():
 
 
 def test_rotor_speeds_invert_the_rotor_wrench_and_clip_what_no_rotor_can_give():
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     for W in rng.uniform(200, 600, (50, 4)):
         wrench = VEHICLE.rotor_wrench(W)
         assert_allclose(VEHICLE.rotor_speeds(wrench[0], wrench[1:]), W, rtol=1e-10)

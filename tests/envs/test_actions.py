@@ -8,6 +8,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 import windwrench  # noqa: F401  registers the environments
@@ -143,7 +145,7 @@ def test_a_small_and_a_large_vehicle_find_the_task_as_hard_as_the_standard_one(t
             for _ in range(250):
                 *_, lost, _, info = env.step(np.zeros(env.action_space.shape, np.float32))
                 assert not lost
-                size = [np.linalg.norm(info[name]) for name in ("force", "torque")]
+                size = [norm(info[name]) for name in ("force", "torque")]
                 rows.append([*(size / scale), info.get("error", abs(info.get("offset", 0.0)))])
         felt[vehicle.name] = np.sqrt(np.mean(np.square(rows), axis=0))
     for name in ("crazyflie", "large"):
@@ -153,7 +155,7 @@ def test_a_small_and_a_large_vehicle_find_the_task_as_hard_as_the_standard_one(t
 
 
 def numbers(envs, decisions, seed=3):
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     rows = []
     envs.reset(seed=seed)
     shape = 2, *envs.action_space.shape[-1:]

@@ -17,8 +17,8 @@ from tests.support.vector_flights import fly_alone
 from windwrench.envs import FanTrackingEnv
 from windwrench.evaluation.tasks import TASKS
 
-KEPT = json.loads(GOLDEN_TASKS.read_text(encoding="utf-8"))
-KEPT["FanTracking"] = json.loads(GOLDEN.read_text(encoding="utf-8"))
+KEPT = json.loads(GOLDEN_TASKS.read_bytes())
+KEPT["FanTracking"] = json.loads(GOLDEN.read_bytes())
 # Not bit for bit: compilers of other processors contract and order sums otherwise, and the loop's
 # feedback lets that grow within 3 s, to some 1e-12 on most and, between two that were tried, to
 # 1.5e-8 in the wrench and 4e-10 in y and reward (scenario noisy). Observations are of single

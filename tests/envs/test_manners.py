@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal, assert_equal
 
 from tests.support.vector_flights import fly_alone, make, make_single
@@ -20,7 +21,7 @@ from windwrench.envs.fan_tracking import FRAMES, SCALES
 from windwrench.envs.scenarios import Variation
 from windwrench.evaluation.tasks import TASKS
 
-ACTIONS = np.random.default_rng(1).uniform(-0.6, 0.6, (12, 1)).astype(np.float32)
+ACTIONS = default_rng(1).uniform(-0.6, 0.6, (12, 1)).astype(np.float32)
 
 
 def seen(**kwargs):
@@ -90,7 +91,7 @@ def test_the_stated_distribution_is_the_one_drawn_from():
     env.reset(seed=0)
     assert env.loop.model.body_mass.sum() == pytest.approx(1.3 * env.vehicle.mass)
     assert env.loop.position[0] == pytest.approx(2.5, abs=0.3)  # it drifts while the filter settles
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     drawn = [Variation().draw(rng)["mass"] for _ in range(200)]
     assert 0.93 <= min(drawn) < 0.94
     assert 1.06 < max(drawn) <= 1.07
@@ -131,7 +132,7 @@ def test_an_old_id_is_the_new_one_in_si_units_which_info_has(task, plant):
     assert_array_equal(old.reset(seed=seed)[0], a)
     assert_array_equal(told["observation"], a)
     assert_array_equal(told["command"], 0.0)
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     for _ in range(6):
         action = rng.uniform(-1.0, 1.0, scaled.action_space.shape).astype(np.float32)
         a, reward, *_ = plain.step(largest * action)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TransformReward
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 import windwrench
@@ -55,7 +56,7 @@ def flown(envs, decisions, seed=5):
     """Observations, rewards, ends and an own entry of ``info`` of an environment's decisions."""
     rows = []
     infos = {}
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     envs.reset(seed=seed)
     for _ in range(decisions):
         actions = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
@@ -70,7 +71,7 @@ def test_a_task_of_ten_lines_flies_alike_in_each_way_and_is_truncated(way):
     env = gym.make("me/Land-v0")
     frame, _ = env.reset(seed=5)
     assert frame.shape == (6,)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     alone = []
     for _ in range(10):
         action = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)[0]

@@ -6,6 +6,8 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from numpy.linalg import eigvalsh, norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -113,14 +115,14 @@ def test_a_recorded_rotor_speed_is_rounded_once():
     before = np.array(reported)[1:-1]
     after = np.array(reported)[2:]
     # as it is at the pose's instant, between two ticks
-    assert np.max(np.abs(log - (0.25 * before + 0.75 * after))) < 2.0 + 1e-9
-    assert np.max(np.abs(log / 4.0 - np.round(log / 4.0))) < 1e-9
+    assert np.max(abs(log - (0.25 * before + 0.75 * after))) < 2.0 + 1e-9
+    assert np.max(abs(log / 4.0 - np.round(log / 4.0))) < 1e-9
 
 
 def test_the_disturbance_has_its_declared_size_and_lasts_as_long_as_it_says():
     """100 s on six axes: 0.03 N and 0.01 Nm, a correlation of 1/e after 0.3 s."""
     settings = PlantSettings()
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     bench = Bench(settings=settings)
     disturbed = np.empty((20_000, 6))
     for row in disturbed:
@@ -143,7 +145,7 @@ def test_a_battery_sags_by_a_twentieth_under_twice_the_hover_s_load():
 
 def sensed(quaternion, count=400):
     bench = Bench(settings=replace(QUIET, sensor_noise=True), quaternion=quaternion)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     rows = np.empty((count, 7))
     for row in rows:
         sense(bench.plant, bench.data.qpos, rng.standard_normal(NOISE))
@@ -157,7 +159,7 @@ def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backw
     assert rows[:, 3].min() >= 0.0
     flips = np.count_nonzero(np.diff(np.sign(rows[:, 6])))
     assert flips > 50  # of 400 samples; noise alone decides the sign
-    assert_allclose(np.linalg.norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
+    assert_allclose(norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
 
 
 def test_the_pose_has_the_noise_that_the_vehicle_s_motion_capture_states():
@@ -170,13 +172,13 @@ def test_the_pose_has_the_noise_that_the_vehicle_s_motion_capture_states():
 
 def test_the_filter_flies_on_through_dropouts():
     loop = ClosedLoop(VEHICLE, settings=PlantSettings(dropout=0.3))
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     loop.reset(rng, np.array([0.0, 0.0, 1.5]), math.pi)
     loop.run(rng.standard_normal((2000, NOISE)))
     assert loop.healthy()
     assert_allclose(loop.position, [0, 0, 1.5], atol=0.05)
     assert_allclose(loop.state[:3], loop.position, atol=0.01)
-    assert np.linalg.eigvalsh(loop.covariance)[0] > 0
+    assert eigvalsh(loop.covariance)[0] > 0
 
 
 def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
@@ -195,7 +197,7 @@ def test_every_trajectory_is_flown_without_touching_the_ground(trajectory):
     assert columns["position"][:, 2].min() > 0.05
     assert np.all(np.isfinite(columns["position"]))
     assert np.abs(columns["force"]).max() < 0.1  # the background only
-    assert np.all(np.abs(columns["voltage"] / 11.1 - 1.0) < 0.15)
+    assert np.all(abs(columns["voltage"] / 11.1 - 1.0) < 0.15)
 
 
 @pytest.mark.parametrize("vehicle", ["ardrone2", "crazyflie", "hummingbird"])

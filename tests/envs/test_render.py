@@ -97,7 +97,7 @@ def drawn(tmp_path_factory):
 
 def changed(a, b):
     """Share of the pixels that differ visibly."""
-    return np.mean(np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 20)
+    return np.mean(abs(a.astype(int) - b.astype(int)).max(axis=2) > 20)
 
 
 def test_a_picture_has_the_size_asked_for_and_shows_the_vehicle_where_it_is_and_the_fan(drawn):

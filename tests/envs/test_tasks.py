@@ -7,6 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import SFC64, random
 from numpy.testing import assert_allclose, assert_array_equal
 
 import windwrench  # noqa: F401  registers the environments
@@ -58,7 +60,7 @@ def test_the_rewards_are_as_stated(name, weight, width, actions):
             error = info["y"] - info["fan_y"]
         else:
             target = info["fan"] if name == "FanTracking2D" else info["reference"]
-            error = np.linalg.norm(info["position"] - target)
+            error = norm(info["position"] - target)
         assert info.get("error", info.get("offset")) == pytest.approx(error)
         assert info["reward_change"] == pytest.approx(-weight * np.sum((action - last) ** 2))
         assert info["reward_tracking"] == pytest.approx(1 / (1 + (error / width) ** 2))
@@ -111,10 +113,10 @@ def test_an_episode_and_numpy_s_global_random_state_leave_each_other_alone():
     env = FanTrackingEnv("varied")
     first = fly_alone(env, 15, 5)
     np.random.seed(123)  # noqa: NPY002
-    expected = np.random.random(3)  # noqa: NPY002
+    expected = random(3)  # noqa: NPY002
     np.random.seed(123)  # noqa: NPY002
     assert_array_equal(fly_alone(env, 15, 5), first)
-    assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
+    assert_array_equal(random(3), expected)  # noqa: NPY002
 
 
 def test_after_a_bad_fan_path_which_is_named_there_is_no_step():
@@ -142,7 +144,7 @@ def test_a_generator_that_is_put_in_is_drawn_from():
     twin = FanTrackingEnv()
     env.reset(seed=1)
     twin.reset(seed=1)
-    env.np_random, other = (np.random.Generator(np.random.SFC64(4)) for _ in range(2))
+    env.np_random, other = (np.random.Generator(SFC64(4)) for _ in range(2))
     env.step(STILL)
     twin.step(STILL)
     assert not np.array_equal(env.loop.state, twin.loop.state)

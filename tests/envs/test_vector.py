@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from numba import njit
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.vector_flights import TASKS, fly, make, make_single
@@ -115,7 +116,7 @@ def test_side_by_side_is_single_bit_for_bit_and_lanes_to_rounding(task, scenario
     many = fly(make(3, "mujoco", task, scenario=scenario), 6)
     alone = [lambda: make_single(task, scenario=scenario)] * 3
     assert_array_equal(fly(gym.vector.SyncVectorEnv(alone), 6), many)
-    difference = np.abs(fly(make(3, "lanes", task, scenario=scenario), 6) - many)
+    difference = abs(fly(make(3, "lanes", task, scenario=scenario), 6) - many)
     size = alone[0]().observation_space.shape[0]  # of a frame, which is of single precision
     assert difference[..., :size].max() < 2e-5
     assert difference[..., size:].max() < 1e-6
@@ -153,7 +154,7 @@ ENDING = {"scenario": "fast", "max_episode_steps": 7}
 def test_lanes_fly_what_mujoco_does(count, decisions, given, apart):
     """A second of each scenario, all that can be set, and episodes that end and begin."""
     ours, theirs = (fly(make(count, plant, **given), decisions) for plant in ("lanes", "mujoco"))
-    assert np.abs(ours - theirs).max() < apart
+    assert abs(ours - theirs).max() < apart
 
 
 @njit
@@ -171,7 +172,7 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
     inertia = np.array([[2.2, 0.3, -0.2], [0.3, 3.0, 0.1], [-0.2, 0.1, 4.0]]) * 1e-3
     vehicle = replace(load_vehicle("ardrone2"), inertia=inertia, com=np.array([0.02, -0.03, 0.01]))
     blocks = LoopBlocks(1, ClosedLoop(vehicle))
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     start = rng.normal(0, 5, (6, WIDTH))
     wrench = rng.normal(0, 0.02, (6, WIDTH))
     blocks.loops["qpos"][0], blocks.loops["qpos"][0, 3] = 0.0, 1.0

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal, assert_equal
 from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
@@ -78,7 +79,7 @@ def test_low_altitude_is_the_specification_s_worked_out():
 def test_the_air_keeps_its_volume():
     field = Turbulence(1, 1.0, 2.0, (4, 0, 0))
     step = 1e-4
-    points = np.random.default_rng(1).uniform(-2, 2, (10, 3))
+    points = default_rng(1).uniform(-2, 2, (10, 3))
     slopes = [
         (field.velocity(points + d, 0.0) - field.velocity(points - d, 0.0))[:, i] / (2 * step)
         for i, d in enumerate(step * np.eye(3))
@@ -105,7 +106,7 @@ def test_a_gust_comes_and_goes_by_its_cosine():
 
 def test_one_fan_of_a_wall_is_the_fan_of_the_environment():
     wall = FanWall([FAN.speed], 1, 1, radius=FAN.radius, hub_radius=FAN.hub_radius, turbulence=0.0)
-    points = np.random.default_rng(3).uniform([0.1, -1.5, 0.0], [6.0, 1.5, 2.5], (50, 3))
+    points = default_rng(3).uniform([0.1, -1.5, 0.0], [6.0, 1.5, 2.5], (50, 3))
     expected = [wind(*point) for point in points]
     assert_allclose(wall.velocity(points, 3.0), expected, atol=1e-12)
 
@@ -138,7 +139,7 @@ def test_a_wash_carries_its_vehicle():
 
 def test_winds_add_up():
     parts = Uniform((1, 2, 3)), Shear((4, 0, 0)), Turbulence(0, 1.0, 2.0, (4, 0, 0))
-    points = np.random.default_rng(5).uniform(-2, 2, (4, 3))
+    points = default_rng(5).uniform(-2, 2, (4, 3))
     whole = parts[0] + parts[1] + parts[2]
     assert isinstance(whole, Wind)
     assert_allclose(
@@ -156,7 +157,7 @@ class Vortex:
 
 def test_a_wind_of_one_s_own_flies_as_a_grid():
     grid = on_grid(Vortex(), (-1, -1, 0), (1, 1.1, 2), 0.5, times=[0.0, 1.0, 2.0])
-    points = np.random.default_rng(6).uniform([-1, -1, 0], [1, 1.1, 2], (30, 3))
+    points = default_rng(6).uniform([-1, -1, 0], [1, 1.1, 2], (30, 3))
     for there, at, when in (
         *((points, points, (time, time)) for time in (0.0, 0.3, 1.7)),
         ([[5.0, 0.0, 1.0]], [[1.0, 0.0, 1.0]], (9.0, 2.0)),  # beyond the ends

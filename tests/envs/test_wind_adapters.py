@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -20,7 +21,7 @@ from windwrench.envs.wind import (
     pyflyt_wind_type,
 )
 
-rng = np.random.default_rng(3)
+rng = default_rng(3)
 PLACE, VELOCITY, RATE = rng.normal(size=(3, 2, 3))
 ROTATION = Rotation.random(2, rng)
 ARM = 0.1
@@ -37,9 +38,9 @@ class Sheared:
 
 def test_pyflyt_and_rotorpy_get_the_same_field():
     wind = Turbulence(0, 1.0, 2.0, (4, 0, 0))
-    points = np.random.default_rng(7).uniform(-1, 1, (5, 3))
+    points = default_rng(7).uniform(-1, 1, (5, 3))
     # as Aviary makes and asks for it
-    field = pyflyt_wind_type(wind)(np_random=np.random.default_rng(0))
+    field = pyflyt_wind_type(wind)(np_random=default_rng(0))
     for one in (field, PyFlytWind(wind)):
         assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
     wind = FanWall(np.full(9, 4.0))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -73,7 +74,7 @@ def test_nees_of_a_known_error():
 def test_band_holds_the_mean_as_often_as_it_says():
     low, high = chi2_band(6, 100)
     assert (low, high) == pytest.approx((5.341, 6.697), abs=2e-3)
-    means = np.random.default_rng(0).chisquare(6, (4000, 100)).mean(axis=1)
+    means = default_rng(0).chisquare(6, (4000, 100)).mean(axis=1)
     assert np.mean((means > low) & (means < high)) == pytest.approx(0.95, abs=0.015)
 
 
@@ -86,7 +87,7 @@ def test_intervals_hold_what_they_say(source):
     tuning = UKFTuning()
     error = np.empty((3, runs, 6))
     for r in range(runs):
-        rng = np.random.default_rng(r)
+        rng = default_rng(r)
         true = drawn(vehicle, rng)
         sway = 1.0 + rng.uniform(0.0, 0.3) * np.sin(0.015 * np.arange(steps) + rng.uniform(0, 6))
         speeds = np.tile(true.hover_rate * np.sqrt(sway)[:, None], 4)
@@ -112,12 +113,12 @@ def test_intervals_hold_on_flights_of_another_model(name):
     vehicle = load_vehicle(name)
     inside = {"hover": [], "circle": [], "fast": [], "excite": []}
     for seed, trajectory in enumerate(15 * list(inside)):
-        true = drawn(vehicle, np.random.default_rng((7, seed)))
+        true = drawn(vehicle, default_rng((7, seed)))
         flown = record_flight(true, trajectory=trajectory, seconds=20.0, seed=7000 + seed)
         log = FlightLog(**flown, name="flight", source="flight")
         series = estimate_log(log, vehicle, tuning=tune_to_log(log, vehicle).tuning)
         rows = np.arange(800, len(log.t), 200)
-        off = np.abs(series.force - flown["force"])[rows]
+        off = abs(series.force - flown["force"])[rows]
         std = series.std_force[rows]
         inside[trajectory].append(np.mean(off < 1.96 * std))
     shares = {trajectory: np.mean(of) for trajectory, of in inside.items()}

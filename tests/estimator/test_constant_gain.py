@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.flights import fly, yawing_flight
@@ -22,9 +24,7 @@ DEVIATION = {
 
 def largest_differences(a, b):
     return {
-        name: max(
-            np.abs(getattr(x, name) - getattr(y, name)).max() for x, y in zip(a, b, strict=True)
-        )
+        name: max(abs(getattr(x, name) - getattr(y, name)).max() for x, y in zip(a, b, strict=True))
         for name in DEVIATION
     }
 
@@ -90,7 +90,7 @@ def test_after_a_gap_it_is_honest_at_any_heading(turning, through_a_gap):
     last = constant[GAP[-1] - 1]
     assert all(np.isnan(e.nis) for e in constant[GAP[0] - 1 : GAP[-1]])
     assert_array_equal(first.force, last.force)
-    assert np.linalg.norm(last.position - first.position) > 0.01
+    assert norm(last.position - first.position) > 0.01
     deviations = [np.sqrt(np.diag(e[GAP[-1] - 1].covariance)) for e in (full, constant)]
     ratio = deviations[1] / deviations[0]
     assert np.all((ratio[6:] > 0.4) & (ratio[6:] < 1.6))  # it does not know of the tilt
@@ -105,7 +105,7 @@ def test_after_a_gap_it_is_honest_at_any_heading(turning, through_a_gap):
         scores = []
         for k in range(GAP[-1], GAP[-1] + 2 * rise):
             std = np.sqrt(np.diag(constant[k].covariance))[row : row + 3]
-            scores.append(np.abs(getattr(constant[k], name) - truth[name][k + 1]) / std)
+            scores.append(abs(getattr(constant[k], name) - truth[name][k + 1]) / std)
         assert np.sqrt(np.mean(np.square(scores))) < 1.5, name
         assert np.max(scores[-1]) < 3.0, name
 
@@ -124,12 +124,12 @@ def test_it_knows_the_declared_effects():
 def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
     full = WrenchUKF(VEHICLE, ANISOTROPIC)
     constant = ConstantGainFilter(VEHICLE, ANISOTROPIC)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     steps = 3000
     speeds = VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, np.zeros(3))
     position = [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal((steps, 3))
     attitude = np.column_stack([np.ones(steps), 0.0025 * rng.standard_normal((steps, 3))])
-    attitude /= np.linalg.norm(attitude, axis=1, keepdims=True)
+    attitude /= norm(attitude, axis=1, keepdims=True)
     found = []
     for f in (full, constant):
         f.reset([0, 0, 1], [1, 0, 0, 0])

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import eigvalsh, inv, solve
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support import flights
@@ -33,7 +35,7 @@ def errors(flight, imu, attitude=True):
     tuning = UKFTuning(position_noise=0.01, attitude_noise=0.05, **noise)
     ukf = WrenchUKF(VEHICLE, tuning, PERIOD)
     flights.begin(ukf, flight)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     rows = []
     for k in range(1, len(flight["rotors"])):
         seen = flight["quaternion"][k] if attitude else None
@@ -135,7 +137,7 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     GQ = np.zeros((24, 6))
     DQ = np.zeros((6, 6))
     for n in range(3):
-        alpha = np.linalg.inv(vehicle.inertia)[:, n] * tuning.motor_torque_noise
+        alpha = inv(vehicle.inertia)[:, n] * tuning.motor_torque_noise
         centre = np.cross(com, alpha)
         GQ[3:6, n] = period * alpha
         DQ[3:6, n] = centre
@@ -147,17 +149,17 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     cross = P @ H.T + GQ @ DQ.T
     S = H @ P @ H.T + H @ GQ @ DQ.T + (H @ GQ @ DQ.T).T + DQ @ DQ.T + np.diag(noise)
     innovation = z - out[0] - b
-    expected = cross @ np.linalg.solve(S, innovation)
+    expected = cross @ solve(S, innovation)
 
     after = f.correct_imu(flight.gyro[40], flight.accelerometer[40])
     deviation = np.sqrt(np.diagonal(P))
     step = -error_of(f, x, b[:3], b[3:])
-    assert np.max(np.abs(step - expected) / deviation) < 2e-3
+    assert np.max(abs(step - expected) / deviation) < 2e-3
     assert np.max(np.abs(expected) / deviation) > 0.1
-    left = P - cross @ np.linalg.solve(S, cross.T)
+    left = P - cross @ solve(S, cross.T)
     scale = np.sqrt(np.outer(np.diagonal(left), np.diagonal(left)))
-    assert np.max(np.abs(f.covariance_with_biases - left) / scale) < 5e-3
-    assert after.nis == pytest.approx(innovation @ np.linalg.solve(S, innovation), rel=2e-3)
+    assert np.max(abs(f.covariance_with_biases - left) / scale) < 5e-3
+    assert after.nis == pytest.approx(innovation @ solve(S, innovation), rel=2e-3)
 
 
 def test_pose_and_imu_of_one_moment_may_come_in_either_order():
@@ -199,7 +201,7 @@ def consistency(vehicle, rate, pose_hz, fine, runs, seconds):
             error = error_of(f, flight.state[k], flight.gyro_bias[k], flight.accelerometer_bias[k])
             found[0, r, k] = nis
             for i, rows in ((1, slice(15, 18)), (2, slice(0, 18)), (3, slice(0, 24))):
-                found[i, r, k] = error[rows] @ np.linalg.solve(P[rows, rows], error[rows])
+                found[i, r, k] = error[rows] @ solve(P[rows, rows], error[rows])
     return found.mean(axis=(1, 2)), [chi2_band(dof, runs) for dof in (6, 3, 18, 24)]
 
 
@@ -235,8 +237,8 @@ def test_biases_are_found_and_cost_nothing():
     turn = np.array([0.0, 0.02, 0.0])
     biased = replace(flight, gyro=flight.gyro + turn, accelerometer=flight.accelerometer - 0.1)
     f, g = (fly(started(each, tuning), each, 1200) for each in (biased, flight))
-    assert np.all(np.abs(f.gyro_bias - turn) < 4 * f.gyro_bias_std)
-    assert np.all(np.abs(f.accelerometer_bias + 0.1) < 4 * f.accelerometer_bias_std)
+    assert np.all(abs(f.gyro_bias - turn) < 4 * f.gyro_bias_std)
+    assert np.all(abs(f.accelerometer_bias + 0.1) < 4 * f.accelerometer_bias_std)
     assert np.all(f.gyro_bias_std < 0.002)
     assert np.all(f.accelerometer_bias_std < 0.02)
     assert_allclose(f.estimate.force, g.estimate.force, atol=0.003)
@@ -322,7 +324,7 @@ def test_the_gate_keeps_faults_of_an_imu_out(shaking, constant):
     flight = drawn(500)
     bad = flight.accelerometer.copy()
     count = slice(200, 300)  # 0.5 s
-    bad[count] += shaking * np.random.default_rng(1).standard_normal((100, 3))
+    bad[count] += shaking * default_rng(1).standard_normal((100, 3))
     bad[count, 0] += constant
     spoiled = replace(flight, accelerometer=bad)
     gated = started(flight, gate=0.999)
@@ -334,14 +336,14 @@ def test_the_gate_keeps_faults_of_an_imu_out(shaking, constant):
         for k in range(500):
             fly(f, seen, 1, after=k)
             if k >= 200:
-                worst = max(worst, np.max(np.abs(f.estimate.force - flight.force[k])))
+                worst = max(worst, np.max(abs(f.estimate.force - flight.force[k])))
         errors.append(worst)
     assert gated.imu_refused > 90
     assert open_.imu_refused == 0
     assert errors[0] < 2.0 * errors[2]
     assert errors[1] > 5.0 * errors[2]
     deviation = np.sqrt(np.diagonal(gated.covariance)[15:18])
-    assert np.all(np.abs(gated.estimate.force - flight.force[-1]) < 5 * deviation)
+    assert np.all(abs(gated.estimate.force - flight.force[-1]) < 5 * deviation)
 
 
 def test_a_gate_leaves_the_gyro_in_where_the_accelerometer_saturates():
@@ -409,7 +411,7 @@ def test_a_bias_that_jumps_is_found_again_through_the_gate():
 
 
 def test_whatever_an_imu_says_numbers_stay_finite():
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     for gate in (None, 0.999):
         f = WrenchUKF(VEHICLE, gate=gate)
         f.reset([0, 0, 1], [1, 0, 0, 0])
@@ -422,6 +424,6 @@ def test_whatever_an_imu_says_numbers_stay_finite():
             J = f.covariance_with_biases
             assert np.isfinite(J).all()
             scale = 1.0 / np.sqrt(np.diagonal(J))
-            assert np.linalg.eigvalsh(J * np.outer(scale, scale))[0] > 0
+            assert eigvalsh(J * np.outer(scale, scale))[0] > 0
             assert np.isfinite(f.estimate.state[:19]).all()
             assert np.isfinite(f.accelerometer_bias).all()

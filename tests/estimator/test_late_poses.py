@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.flights import PERIOD, yawing_flight
@@ -103,7 +104,7 @@ def measured(flight, stamps, parts):
     an IMU's.
     """
     out = []
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     for t, part in zip(stamps, parts, strict=True):
         if part == 5:
             out.append((t, "correct_imu", (0.1 * rng.standard_normal(3), [0.0, 0.0, 9.81])))

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm, slogdet
+from numpy.random import default_rng
 
 from tests.support.model_flights import WITH_EFFECTS, simulate_model
 from windwrench.dynamics import InputError, load_vehicle
@@ -98,7 +100,7 @@ def test_the_likelihood_is_that_of_the_filters_own_steps():
         before = ukf.predict(0.5 * (speeds[k - 1] + speeds[k])).covariance
         nis = ukf.correct(position[k], quaternion[k]).nis
         S = before[np.ix_(seen, seen)] + noise
-        expected.append(-0.5 * (nis + np.linalg.slogdet(2.0 * np.pi * S)[1]))
+        expected.append(-0.5 * (nis + slogdet(2.0 * np.pi * S)[1]))
     late = t[1:] > t[0] + 0.2
     assert np.allclose(found.log_likelihood, np.array(expected)[late], rtol=0, atol=1e-6)
 
@@ -114,13 +116,13 @@ def test_bounds_hold_where_there_is_no_noise_to_find():
     assert np.isnan(fit.deviation[6:]).all()
     estimate = truth.fly(WrenchUKF(VEHICLE, fit.tuning, PERIOD))[-1]
     assert np.isfinite(estimate.covariance).all()
-    assert np.linalg.norm(estimate.force - truth.force[-1]) < 0.05
+    assert norm(estimate.force - truth.force[-1]) < 0.05
 
 
 def test_lost_held_and_wild_poses_change_little(fits):
     clean = fits[0]
     t, speeds, position, quaternion = flight(seed=0)
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     wild = rng.choice(len(t), len(t) // 100, replace=False)
     position[wild] += rng.uniform(-0.3, 0.3, (len(wild), 3))
     position[700:760] = np.nan  # lost for 0.3 s
@@ -158,7 +160,7 @@ def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
     log = flight(seconds=30.0)
     fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=2000))
     assert fit.after.poses == len(log[0]) - 200  # figures are those of the whole log
-    assert np.all(np.abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation)
+    assert np.all(abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation)
 
 
 def test_declared_effects_are_part_of_the_model():

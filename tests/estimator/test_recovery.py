@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.linalg import cholesky, norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c.hostile import KINDS, befall
@@ -49,7 +51,7 @@ class Flight:
         deviations, that of poses.
         """
         self.noise = noise
-        self.rng = np.random.default_rng(0)
+        self.rng = default_rng(0)
         self.vehicle = VEHICLES[vehicle]
         self.dt = dt
         self.gate = gate
@@ -78,7 +80,7 @@ class Flight:
         turn = np.array([1.0, *(0.5 * mocap.sigma_att_rad * turned)])
         seen = np.empty(4)
         quaternion_multiply(turn, np.array(quaternion), seen)
-        return position + mocap.sigma_pos_m * moved, seen / np.linalg.norm(seen)
+        return position + mocap.sigma_pos_m * moved, seen / norm(seen)
 
     def check(self, estimate):
         """Numbers are finite and the covariance is one."""
@@ -87,17 +89,17 @@ class Flight:
         assert np.isfinite(P).all()
         # of the correlations: variances of 1e-9 and 1e4 stand side by side
         scale = 1.0 / np.sqrt(np.diag(P))
-        np.linalg.cholesky(P * scale[:, None] * scale)
+        cholesky(P * scale[:, None] * scale)
 
     def suffer(self, kind, samples, size, seed):
         """Feed one fault."""
-        rng = np.random.default_rng(seed)
+        rng = default_rng(seed)
         step = float(rng.choice([self.dt, 1e-3, 0.01, 0.1]))
         if kind == "long gap":
             self.check([self.estimator.step(self.speeds) for _ in range(6000)][-1])
         rows = [np.tile(x, (samples, 1)) for x in (self.position, STILL, self.speeds)]
         away = befall(kind, slice(0, samples), *rows, rng, size)
-        rows[1] /= np.linalg.norm(rows[1], axis=1, keepdims=True)
+        rows[1] /= norm(rows[1], axis=1, keepdims=True)
         if kind == "jump for good":
             self.position = self.position + away
         for position, quaternion, speeds in zip(*rows, strict=True):
@@ -218,7 +220,7 @@ def test_the_wrench_is_right_again_after_two_rise_times(life, noise):
 def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
     """Poses that jump by 10 m each are not believed before ``give_up``, 1.5 s."""
     flight = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     flight.recover(RISE)
     said = []
     for _ in range(400):
@@ -271,7 +273,7 @@ def test_a_burst_of_bad_poses_costs_what_a_gap_costs(burst):
     expected.
     """
     vehicle = VEHICLES["ardrone2"]
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     begin = 400
     end = 500
     poses = pushed(vehicle, 0.4, 700, 350)
@@ -280,7 +282,7 @@ def test_a_burst_of_bad_poses_costs_what_a_gap_costs(burst):
     away = {"one offset": drawn[:1], "each its own": drawn, "upside down": np.zeros((1, 3))}.get(
         burst, drawn[[0] * 40 + [1] * 60]
     )
-    away = 0.1 * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    away = 0.1 * away / np.maximum(norm(away, axis=1, keepdims=True), 1e-9)
     turned = [0.0, 1.0, 0.0, 0.0] if burst == "upside down" else STILL
     seen = [(pose, STILL) for pose in poses]
     gone = seen.copy()
@@ -302,7 +304,7 @@ def test_poses_of_a_blurred_clock_are_not_held_out(late, seed):
     by just more than a vehicle can move. Those after it are good, and believed soon.
     """
     vehicle = VEHICLES["crazyflie"]
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     dt = 0.004
     speed = 1.5
     ukf = WrenchUKF(vehicle, UKFTuning.for_vehicle(vehicle, dt), period=dt, gate=0.9999)
@@ -324,7 +326,7 @@ def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
     have jumped then, until they have lasted. Attitudes without a position come between them.
     """
     vehicle = VEHICLES["ardrone2"]
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((700, 3))
     position[400] += [0.29, -0.29, 0.29]
     poses = [(None if k > 400 and k % 25 == 0 else x, STILL) for k, x in enumerate(position)]
@@ -358,10 +360,10 @@ def test_rates_do_not_run_away_where_positions_alone_are_measured():
     """
     vehicle = VEHICLES["crazyflie"]
     for seed in range(5):
-        rng = np.random.default_rng(seed)
+        rng = default_rng(seed)
         position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((177, 3))
         turns = np.column_stack([np.ones(177), 0.0025 * rng.standard_normal((177, 3))])
-        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        turns /= norm(turns, axis=1, keepdims=True)
         poses = [
             (x, q if k < 127 else None)
             for k, (x, q) in enumerate(zip(position, turns, strict=True))
@@ -369,7 +371,7 @@ def test_rates_do_not_run_away_where_positions_alone_are_measured():
         poses[50:125] = [(None, None)] * 75
         said = along(WrenchUKF(vehicle, period=0.02, gate=0.9999), vehicle, poses)
         assert said[-1].restarts == 1
-        assert max(np.linalg.norm(e.angular_velocity) for e in said[127:]) < 20.0
+        assert max(norm(e.angular_velocity) for e in said[127:]) < 20.0
 
 
 def test_what_happened_is_said():
@@ -408,7 +410,7 @@ def noisy_hover(kind, vehicle, dt, gate, noise, seconds, lost=(0.0, 0.0), seed=0
     of attitude and position, and are missing between two times.
     """
     vehicle = VEHICLES[vehicle]
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     mocap = vehicle.mocap
     estimator = FILTERS[kind](vehicle, period=dt, gate=gate)
     estimator.reset([0.0, 0.0, HEIGHT], STILL)
@@ -461,7 +463,7 @@ def test_a_gust_is_no_noise():
     add to each other.
     """
     vehicle = VEHICLES["ardrone2"]
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     position = pushed(vehicle, 0.5, 1000, 400)
     position += vehicle.mocap.sigma_pos_m * rng.standard_normal((1000, 3))
     said = along(WrenchUKF(vehicle), vehicle, position)

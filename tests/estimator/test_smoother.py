@@ -5,6 +5,8 @@
 
 import numpy as np
 import pytest
+from numpy.linalg import eigvalsh, inv, solve
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
@@ -64,7 +66,7 @@ def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
             error = state_error(e, run.state[k])
             P = e.covariance
             for n, part in enumerate(parts.values()):
-                nees[n, r, k] = error[part] @ np.linalg.solve(P[part, part], error[part])
+                nees[n, r, k] = error[part] @ solve(P[part, part], error[part])
     for dof, values in zip(parts, nees, strict=True):
         low, high = chi2_band(abs(dof), runs, 0.999)
         assert low <= values.mean() <= high
@@ -94,7 +96,7 @@ def test_nothing_is_smoothed_across_a_restart():
 
 def test_a_link_is_cut_where_there_is_no_joint_distribution():
     """As between a covariance and one that was held at a bound."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     A = rng.standard_normal((18, 18))
     P = A @ A.T + np.eye(18)
     F = np.eye(18) + 0.1 * rng.standard_normal((18, 18))
@@ -104,7 +106,7 @@ def test_a_link_is_cut_where_there_is_no_joint_distribution():
     after = F @ P @ F.T + np.eye(18)
     link_back = rauch_tung_striebel.link_back.py_func  # nobody calls it compiled by itself
     link_back(P, C, after, G, K)
-    gain = C @ np.linalg.inv(after)
+    gain = C @ inv(after)
     assert np.allclose(G.T, gain)
     assert np.allclose(K, P - gain @ C.T, atol=1e-9)
     link_back(P, C, 0.5 * after, G, K)
@@ -137,7 +139,7 @@ def test_unlikely_poses_widen_what_is_smoothed_before_and_after():
     for k in range(1, len(x)):
         ukf.step(flown["rotor_speeds"][k], x[k], q[k])
     found = ukf.smooth(covariance=True)
-    z = np.abs(found.force - flown["force"]) / found.std_force
+    z = abs(found.force - flown["force"]) / found.std_force
     assert z[800:].max() < 6.0
     assert z[700:800].max() < 6.0
     diagonal = np.diagonal(found.covariance, axis1=1, axis2=2)
@@ -146,7 +148,7 @@ def test_unlikely_poses_widen_what_is_smoothed_before_and_after():
 
 @pytest.mark.parametrize("seed", [0, 2, 5])
 def test_covariances_stay_positive_definite_whatever_was_flown(seed):
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     _, speeds, x, q = model_log(400, seed)
     x += np.cumsum(rng.choice([0.0, 1.0], (400, 1), p=[0.98, 0.02]) * rng.normal(0, 2, (400, 3)), 0)
     lost = slice(150, 150 + 40 * (seed + 1))
@@ -156,5 +158,5 @@ def test_covariances_stay_positive_definite_whatever_was_flown(seed):
     found = smooth(t, speeds, x, q, covariance=True)
     assert np.isfinite(found.state[:, :19]).all()
     scale = 1.0 / found.std
-    eigenvalues = np.linalg.eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :])
+    eigenvalues = eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :])
     assert eigenvalues.min() > 0

@@ -9,6 +9,8 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from numpy.linalg import eigvalsh, norm
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.flights import yawing_flight
@@ -39,7 +41,7 @@ def samples():
     """
     flights = [yawing_flight(VEHICLE, STEPS, seed=seed) for seed in range(COUNT)]
     rotors, position, quaternion = (np.stack([f[name] for f in flights], axis=1) for name in NAMES)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     rotors[1:][rng.random((STEPS - 1, COUNT)) < 0.02] = np.nan
     position[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = np.nan
     quaternion[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = np.nan
@@ -132,7 +134,7 @@ def test_it_starts_from_what_is_given_and_coasts_as_single_filters_do(common, ea
 
 HOVER = np.full(4, VEHICLE.hover_rate)
 POSE = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]
-QUATERNION = np.array([0.5, 0.1, -0.2, 0.8]) / np.linalg.norm([0.5, 0.1, -0.2, 0.8])
+QUATERNION = np.array([0.5, 0.1, -0.2, 0.8]) / norm([0.5, 0.1, -0.2, 0.8])
 ARGUMENTS = np.array([380.0, 390.0, 400.0, 410.0]), np.array([0.01, 0.0, 1.0]), QUATERNION
 
 
@@ -168,7 +170,7 @@ def test_the_covariance_stays_positive_with_a_noise_of_nanometres(noise):
         estimate = one.step(HOVER, *(POSE if not 50 < k < 250 else (None, None)))
         size = np.sqrt(np.diag(estimate.covariance))
         assert size.min() > 0.0
-        assert np.linalg.eigvalsh(estimate.covariance / np.outer(size, size))[0] > -1e-12
+        assert eigvalsh(estimate.covariance / np.outer(size, size))[0] > -1e-12
 
 
 def test_steps_and_episodes_hold_on_to_nothing():

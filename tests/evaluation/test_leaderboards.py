@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.alike import assert_alike, strict_json
 from tests.support.parameters import mostly_slow
@@ -18,7 +19,7 @@ from windwrench.evaluation.submission import results_hash, write_submission
 from windwrench.evaluation.tables import markdown, rows_of, summary, write_leaderboard
 from windwrench.evaluation.tasks import TASKS, short_names
 
-GOLDEN = json.loads((ROOT / "tests" / "golden" / "leaderboards.json").read_text(encoding="utf-8"))
+GOLDEN = json.loads((ROOT / "tests" / "golden" / "leaderboards.json").read_bytes())
 EPISODES = 2
 SEED = 3
 # of every row of ``leaderboard.json``, in this order
@@ -157,7 +158,7 @@ def test_the_first_seconds_do_not_rank_and_the_rest_of_a_lost_episode_counts():
 def test_the_activity_is_that_of_the_reward_and_the_bound_is_seen():
     known = TASKS["WindHover"]
     env = known.make("base")
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     terms = []
 
     def shaken(observation, info):
@@ -221,7 +222,7 @@ def test_a_submission_says_what_flew_and_its_hash_is_of_the_results(tmp_path, fl
 
 
 def test_policies_of_a_kind_stand_together_and_their_losses_show(tmp_path):
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     policies = [f"gru-{k}" for k in range(3)]
     levels = {"hover": 0.2, "pid": 0.1, "pid-force": 0.08, "oracle": 0.07}
     levels |= dict(zip(policies, (0.05, 0.06, 0.07), strict=True))

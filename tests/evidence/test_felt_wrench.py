@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from windwrench.envs import OBSERVATIONS
@@ -13,7 +14,7 @@ from windwrench.evidence.felt_wrench import LAW, change, rows, trained
 
 
 def test_a_change_is_paired_over_the_episodes():
-    hard = 10.0 ** np.random.default_rng(0).uniform(-1.0, 1.0, (1, 40))
+    hard = 10.0 ** default_rng(0).uniform(-1.0, 1.0, (1, 40))
     found = change(1.1 * hard, hard)
     assert_allclose([found["change"], *found["ci95"]], 0.1)
     assert np.ptp(change(1.1 * hard[:, ::-1], hard)["ci95"]) > 0.2

@@ -5,6 +5,7 @@ simulator that is installed obeys its published vehicle.
 import mujoco
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.rotation import matrix_of
@@ -76,6 +77,6 @@ def test_a_simulator_obeys_its_published_vehicle(name):
 
 
 def test_clear_pairs_that_turn_round_are_counted():
-    noise = 0.01 * np.random.default_rng(0).standard_normal((3, 40))
+    noise = 0.01 * default_rng(0).standard_normal((3, 40))
     found = ranking(np.array([[1], [2], [2]]) + noise, np.array([[2], [1], [3]]) + noise)
     assert (found["pairs"], found["clear_pairs"], found["clear_pairs_reversed"]) == (3, 2, 1)

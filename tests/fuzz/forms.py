@@ -229,7 +229,7 @@ def _use_policy(path):
     attacker's would.
     """
     if path.suffix == ".npz":
-        card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        card = json.loads(path.with_suffix(".json").read_bytes())
         card["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
         path.with_suffix(".json").write_text(json.dumps(card), encoding="utf-8")
     command = load_policy(path)(np.zeros(8), {})

@@ -79,7 +79,7 @@ def test_a_diagnosis_of_one_flight_explains_another(logs):
     assert row["before_rms"][2] > 10 * row["after_rms"][2]
     assert row["norm_before"] > 10 * row["norm_after"]
     assert np.all(np.array(row["before_std"]) > 3.5 * np.array(row["after_std"]))
-    assert np.all(np.abs(np.array(linear_drag(found)) - 0.0100) < 0.0025)  # N per m/s
+    assert np.all(abs(np.array(linear_drag(found)) - 0.0100) < 0.0025)  # N per m/s
     named = {e.name: e for e in found.effects}
     assert 0.8 < named["battery_sag"].coefficients["n"] < 2.5
     delay = named["latency"]

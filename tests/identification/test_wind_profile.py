@@ -4,6 +4,7 @@ flies as the task does, and no law where there is no jet.
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from windwrench.controllers import Admittance
@@ -80,7 +81,7 @@ def test_a_flight_in_still_air_has_no_law():
 def test_intervals_of_correlated_errors_hold_95_percent_of_the_places():
     inside = []
     for seed in range(40):
-        rng = np.random.default_rng(seed)
+        rng = default_rng(seed)
         t = np.arange(200 * 20) / 20.0
         place = 1.5 * np.sin(0.05 * t)
         second = t.astype(int)
@@ -91,7 +92,7 @@ def test_intervals_of_correlated_errors_hold_95_percent_of_the_places():
         means = y.reshape(200, 20).mean(axis=1)
         at = PLACE[(place.min() < PLACE) & (place.max() > PLACE)]
         mean, std, draws, samples = _curve(place, second, means, at)
-        inside.append(np.mean(np.abs(mean - np.interp(at, PLACE, JET)) < 1.96 * std))
+        inside.append(np.mean(abs(mean - np.interp(at, PLACE, JET)) < 1.96 * std))
         assert samples < 200
         assert_allclose(draws.std(axis=0).mean(), std.mean(), rtol=0.25)
     assert 0.9 < np.mean(inside) < 0.99
@@ -149,6 +150,6 @@ def test_margins_tell_where_the_loop_begins_to_swing():
     assert offsets[1] > 0.3
     # a delay as long as the margin leaves none
     margin, delay = loop.margins(1.5)
-    crossed = _OMEGA[np.flatnonzero(np.abs(1.5 * loop.response) >= 1.0)[-1]]
+    crossed = _OMEGA[np.flatnonzero(abs(1.5 * loop.response) >= 1.0)[-1]]
     assert margin == pytest.approx(delay * crossed)
     assert np.all(np.diff(RISE_TIMES) > 0.0)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.live import stream
 from tests.live.stream import (
@@ -37,7 +38,7 @@ def times_of(flown, ours, jitter=JITTER, bursts=(), in_order=False):
     """When messages come, s on our clock, with their kinds and rows: rotor speeds of each row, a
     pose of every second. ``ours`` makes our time of the sender's.
     """
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     found = []
     for k, t in enumerate(flown["t"]):
         for kind in ("motors", "pose")[: 2 - k % 2]:
@@ -270,7 +271,7 @@ def test_poses_that_are_too_late_are_told_with_their_share():
 
 @pytest.mark.parametrize("rate", [0.3, 0.9, 1.0, 1.5])
 def test_the_line_of_a_clock_is_below_its_messages(rate):
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     line = ClockLine(round(0.01 * SECOND), 7 * SECOND, SECOND)
     for t in np.arange(0.0, 20.0, 0.01):
         delay = 0.005 + rng.exponential(0.01)

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c import firmware
@@ -84,7 +86,7 @@ def test_c_and_python_agree_along_a_flight_with_faults(estimator, name, gate, im
     if imu:
         e = c.estimate
         for name in ("gyro_bias", "accelerometer_bias"):
-            difference = np.abs(np.array(getattr(e, name)) - getattr(python, name))
+            difference = abs(np.array(getattr(e, name)) - getattr(python, name))
             assert np.all(difference < LARGEST * getattr(python, f"{name}_std"))
         assert e.imu_refused == python.imu_refused > 0
 
@@ -113,7 +115,7 @@ def test_c_undoes_what_is_declared_of_pose_and_battery(estimator, effects, part,
     assert_same(compare(c, exported.filter, flown, 10))
     compare(c, plain.filter, flown, 1000)
     apart = getattr(plain.filter.estimate, part) - getattr(exported.filter.estimate, part)
-    assert np.linalg.norm(apart) > size
+    assert norm(apart) > size
 
 
 HOSTILE = [
@@ -165,7 +167,7 @@ def test_good_poses_restart_c_as_rarely_as_python(estimator, gate, tmp_path):
     exported = export_c(good.vehicle, estimator, good.rate, gate=gate)
     c = CompiledFilter(exported, tmp_path)
     for noise, errors in QUIET_NOISES.items():
-        position, attitude = measured(good, errors, np.random.default_rng(0))
+        position, attitude = measured(good, errors, default_rng(0))
         flown = {
             "dt": np.full(len(position), 1.0 / good.rate),
             "rotor_speeds": good.rotor_speeds,
@@ -248,7 +250,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
     run("gcc", "-std=c99", "-O1", "-shared", "-fPIC", "effects.c", "-o", "e.so", "-lm", cwd=folder)
     library = ctypes.CDLL(str(folder / "e.so"))
     vehicle = compile_effects(model).constants
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     for name in names:
         effect = get(name)
         for _ in range(5):
@@ -261,7 +263,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             rotors[4:] = (0.005, 10.0, 2.0)
             memory[:5] = (1.0, 410.0, 420.0, 430.0, 440.0)
             sample = rng.uniform(0.2, 2.0, SAMPLE_SIZE)
-            sample[7:11] /= np.linalg.norm(sample[7:11])
+            sample[7:11] /= norm(sample[7:11])
             sample[12:16] = 1.0, 1.0, 1.0, rng.choice([-1.0, 1.0])
             third, fourth = {
                 "wrench": (state, np.zeros(6)),
@@ -294,7 +296,7 @@ def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
     policy = exportable_policy("sac-0")
     c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
     python = load_policy(POLICY)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     force = rng.normal(0.3, 0.3, (50, 3))
     torque = rng.normal(0.0, 0.03, (50, 3))
     seen = np.column_stack([force, torque, np.full(50, 0.2), np.zeros(50)])
@@ -355,7 +357,7 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
             parts = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
             mine = np.concatenate([getattr(e, name) for name in parts])
             assert board.status[k - 1] == e.status
-            assert np.all(np.abs(board.estimates[k - 1] - mine) < LARGEST * std)
+            assert np.all(abs(board.estimates[k - 1] - mine) < LARGEST * std)
 
 
 def test_names_cannot_end_the_comment_that_holds_them(tmp_path):
@@ -433,7 +435,7 @@ def fans(count, decisions, rng):
 
 
 def test_given_the_same_random_numbers_it_commands_the_same(c):
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     seen = observations(fans(6, 60, rng), BRIEFING, rng)
     apart = []
     for one in seen.astype(np.float32):
@@ -442,7 +444,7 @@ def test_given_the_same_random_numbers_it_commands_the_same(c):
         law.reset()
         python = np.array([float(law(row)[0]) for row in one])
         assert np.ptp(python) > 0.2
-        apart.append(np.abs(commands(c, one) - python))
+        apart.append(abs(commands(c, one) - python))
     apart = np.array(apart)
     assert np.max(apart[:, :6]) < 1e-4
     # where rounding once draws another particle than Python does, commands go on a little apart

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.live.stream import VEHICLE, as_objects, flight, send_odometry, send_rotors
 from windwrench.live.filtering import LiveSettings
@@ -35,7 +36,7 @@ class Attacked:
     def __init__(self, text):
         self.source = make_source(text, VEHICLE, None, Tallies())
         self.session = Session(self.source, LiveSettings(wait=0.0, rate_hz=200.0))
-        self.rng = np.random.default_rng(5)
+        self.rng = default_rng(5)
 
     def any(self, values=NUMBERS):
         return values[self.rng.integers(len(values))]

@@ -135,7 +135,7 @@ def test_a_flight_with_faults():
     assert counts == {"lost": 20, "doubled": 1}
     assert not pilot.failed
     found = np.mean([o.estimate.force for o in pilot.outputs if o.t > 6.0], axis=0)
-    assert np.abs(found - flight()["force"][1200:1400].mean(axis=0)).max() < 0.1
+    assert abs(found - flight()["force"][1200:1400].mean(axis=0)).max() < 0.1
 
 
 def test_of_two_vehicles_at_one_address_one_is_listened_to():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.live.stream import VEHICLE, Pipeline, flight, log_of
@@ -95,7 +96,7 @@ def test_late_doubled_and_reordered_messages_end_as_if_in_order(seed):
     """Rotor speeds come in order, poses within the horizon: the filter ends where all in order
     leads to. It begins with the pose that comes first; what was measured before that is too late.
     """
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     flown = flight()
     samples = split(flown)[:600]
     poses = [s for s in samples if s.kind == "pose"]
@@ -125,7 +126,7 @@ def test_a_second_clock_is_brought_to_the_first():
     # brought over by the least delays, which differ by what the poses' is longer: 6 ms
     a = same.outputs[-1].estimate
     b = other.outputs[-1].estimate
-    assert np.abs(a.force - b.force).max() < 0.05
+    assert abs(a.force - b.force).max() < 0.05
 
 
 def test_a_vehicle_that_boots_again_goes_on_with_the_stream():
@@ -166,7 +167,7 @@ def test_a_fault_of_the_stream_is_counted_and_the_force_is_right_after_it(fault,
     assert live.outputs[-1].t == pytest.approx(8.0, abs=0.03)
     assert {o.estimate.status for o in live.outputs if o.t > 5.5} == {"tracking"}
     found = np.mean([o.estimate.force for o in live.outputs if o.t > 7.0], axis=0)
-    assert np.abs(found - flown["force"][1400:].mean(axis=0)).max() < 0.1
+    assert abs(found - flown["force"][1400:].mean(axis=0)).max() < 0.1
 
 
 def test_measured_rotor_speeds_are_waited_for():

@@ -7,6 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 
 from tests.support.exported_c.compiled import begin, take
 from tests.support.exported_c.flights import FLIGHTS, flight, vehicle_of
@@ -62,7 +64,7 @@ def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count, noise):
     flights = flights if count > 10 else flights[2:4]
     wrong = []
     for i in range(count):
-        rng = np.random.default_rng((SEED, i))
+        rng = default_rng((SEED, i))
         name, imu = flights[int(rng.integers(len(flights)))]
         sound, rate, said, copies = calm(name, imu, kind, noise)
         rows = len(said) - (LONGEST + SOON) * rate
@@ -72,15 +74,15 @@ def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count, noise):
         spell = str(rng.choice(SPELLS))
         parts = (flown[name] for name in ("position", "quaternion", "rotor_speeds"))
         away = befall(spell, when, *parts, rng)
-        flown["quaternion"] /= np.linalg.norm(flown["quaternion"], axis=1, keepdims=True)
+        flown["quaternion"] /= norm(flown["quaternion"], axis=1, keepdims=True)
         estimator = copy.copy(copies[k])
         end = when.stop + round(SOON * rate)
         for row in range(k + 1, end):
             take(estimator, flown, row)
         status, position, wrench, std = seen(estimator)
         _, right, usual, _ = said[end - 1]
-        misses = np.abs(wrench - usual) / std
-        off = float(np.linalg.norm(position - right - (spell == "jump for good") * away))
+        misses = abs(wrench - usual) / std
+        off = float(norm(position - right - (spell == "jump for good") * away))
         if status != "tracking" or off > 0.1 or misses.max() > 4.0:
             wrong.append((i, name, imu, spell, when, status, off, misses.round(1)))
     assert not wrong

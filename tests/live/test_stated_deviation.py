@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c.compiled import CompiledFilter, begin, needs, take
@@ -36,7 +37,7 @@ STATED = ("std_torque", "std_force")
 def flights():
     """Circles of drawn vehicles, measured with the declared noise."""
     return [
-        record_flight(drawn(VEHICLE, np.random.default_rng(seed)), (), "circle", 5.0, seed)
+        record_flight(drawn(VEHICLE, default_rng(seed)), (), "circle", 5.0, seed)
         | {"dt": np.full(STEPS + 1, 0.005)}
         for seed in range(COUNT)
     ]

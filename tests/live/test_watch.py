@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.commands.conftest import call, recorded
@@ -81,7 +82,7 @@ def test_a_log_with_another_noise_is_told(tmp_path, call, monkeypatch):
 @pytest.mark.parametrize("times", [1.0, 3.0])
 def test_noise_that_is_three_times_the_declared_is_found(times):
     flown = dict(flight(20.0, "gentle"))
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     more = np.sqrt(times**2 - 1.0) * NOISE
     flown["position"] = flown["position"] + rng.normal(0.0, more, flown["position"].shape)
     live = Pipeline().take(whole(flown))

@@ -147,11 +147,11 @@ def test_the_mixture_finds_the_three_wrenches():
     estimates, added = fig3.fly_loads(load_vehicle("ardrone2"), (True, True, True), 1, 90.0)
     found = fig3.fit_clusters(estimates)
     for target, real, cluster in zip(fig3.TARGETS, added, found, strict=True):
-        off = np.abs(cluster.mean - target)
+        off = abs(cluster.mean - target)
         assert np.all(off < cluster.std)
         assert np.all(off < [0.02, 0.003])
         assert np.all(cluster.std < [0.05, 0.02])
-        assert np.all(np.abs(cluster.mean - target - real) < [0.005, 0.001])
+        assert np.all(abs(cluster.mean - target - real) < [0.005, 0.001])
         assert cluster.own > 0.99
 
 
@@ -196,7 +196,7 @@ def test_a_result_is_a_table_its_figures_and_a_picture(tmp_path):
     write_result("fig0", "A title", 3, small_result(), tmp_path)
     names = sorted(p.name for p in tmp_path.iterdir())
     assert names == ["fig0.csv.gz", "fig0.json", "fig0.png", "fig0.svg"]
-    kept = json.loads((tmp_path / "fig0.json").read_text())
+    kept = json.loads((tmp_path / "fig0.json").read_bytes())
     assert kept["figures"] == {"value": 1.0, "gone": None}
     assert kept["commit"] == commit()
     table = gzip.decompress((tmp_path / "fig0.csv.gz").read_bytes())

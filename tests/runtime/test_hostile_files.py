@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.fuzz.spoiling import LAUGHS
@@ -300,7 +301,7 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
 
 
 def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     rows = 1000
     table = rng.standard_normal((rows, len(REQUIRED)))
     table[:, 0], table[:, 4:8], table[:, 8:] = 0.01 * np.arange(rows), (1, 0, 0, 0), 300.0

@@ -25,7 +25,7 @@ from windwrench.envs.wind import Uniform
 from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 
 GOLDEN = ROOT / "tests" / "golden" / "python_errors.json"
-CASES = json.loads(GOLDEN.read_text(encoding="utf-8"))
+CASES = json.loads(GOLDEN.read_bytes())
 VEHICLE = load_vehicle("ardrone2")
 POSE = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
 SPEEDS = np.full(4, VEHICLE.hover_rate)

@@ -2,7 +2,7 @@
 has, after the format's description in Betaflight's documentation.
 """
 
-import numpy as np
+from numpy.random import default_rng
 
 # field: predictor and encoding in I frames, predictor and encoding in P frames
 FIELDS = {
@@ -41,7 +41,7 @@ def flight(count=400, seed=0):
     """Rows of a flight at 1 kHz: half a second on the ground, then all fields wander, now and then
     by a leap.
     """
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     values = dict.fromkeys(FIELDS, 0) | {
         "accSmooth[2]": 2048,
         "rcCommand[3]": 1200,

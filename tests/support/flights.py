@@ -1,6 +1,8 @@
 """Flights for the tests, drawn from equations of motion that share no code with the package."""
 
 import numpy as np
+from numpy.linalg import inv, norm
+from numpy.random import default_rng
 
 PERIOD = 0.005
 
@@ -51,7 +53,7 @@ def yawing_flight(
     A feedback on the true state gives the rotor speeds; truth is integrated in fine substeps.
     Returns a dict of arrays.
     """
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     force = np.asarray(force, float)
     torque = np.asarray(torque, float)
     x = np.array([0.0, 0.0, 1.5])
@@ -60,8 +62,8 @@ def yawing_flight(
     w = np.array([0.0, 0.0, yaw_rate])
     turns = vehicle.arm_l * vehicle.k * [[1, 1, -1, -1], [-1, 1, 1, -1]]
     mixing = np.array([vehicle.k, *turns, vehicle.p * [1, -1, 1, -1]])
-    unmixing = np.linalg.inv(mixing)
-    inverse = np.linalg.inv(vehicle.inertia)
+    unmixing = inv(mixing)
+    inverse = inv(vehicle.inertia)
     names = ("rotors", "position", "quaternion", "velocity", "omega", "true_q", "true_x")
     out = {name: [] for name in names}
     for k in range(steps):
@@ -70,7 +72,7 @@ def yawing_flight(
         speed = [1.3 * np.cos(1.3 * t), 0.72 * np.cos(0.9 * t + 1), 0.14 * np.cos(0.7 * t)]
         a = 4 * (target - x) + 3.5 * (speed - v) + [0, 0, vehicle.gravity] - force / vehicle.mass
         R = matrix(q)
-        up = a / np.linalg.norm(a)
+        up = a / norm(a)
         tilt = R.T @ cross(R[:, 2], up)
         rate = np.array([0, 0, yaw_rate * (1 + 0.5 * np.sin(1.1 * t))])
         alpha = 110 * tilt * [1, 1, 0] - 18 * (w - rate) * [1, 1, 0.4]

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from numpy.random import default_rng
 
 from tests.identification.comparison.test_change import drawn
 from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
@@ -71,7 +72,7 @@ def said(found):
 def made():
     """Return all that is kept, as plain data."""
     one = inertial_flights([0])[0][0]
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     changes = {
         str(moved): compare(drawn(rng, 2, moved), drawn(rng, 3))
         for moved in ((0.0, 0.0, 0.0, 0.0), (0.08, -0.08, 0.08, 0.08), (0.1, 0.0, 0.0, 0.1))

@@ -10,6 +10,7 @@ import json
 
 import gymnasium
 import numpy as np
+from numpy.random import default_rng
 
 import windwrench  # noqa: F401 - registers the environments
 from tests.support.paths import ROOT
@@ -31,7 +32,7 @@ def trajectory(task, scenario):
     env = TASKS[task].environment(scenario)
     is_fan = task == "FanTracking"
     seed, place = (SEED, "y") if is_fan else (SEED_OF_TASKS, "error")
-    drawn = np.random.default_rng(seed).uniform(-0.5, 0.5, (DECISIONS, *env.action_space.shape))
+    drawn = default_rng(seed).uniform(-0.5, 0.5, (DECISIONS, *env.action_space.shape))
     pilot = make_controller("admittance")
     pilot.reset()
     observation, info = env.reset(seed=seed)

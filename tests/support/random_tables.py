@@ -6,6 +6,7 @@ The writing shares no code with the reading: what it writes comes from the map's
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import default_rng
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import load_vehicle
@@ -55,7 +56,7 @@ def flight(vehicle, trajectory, seed, seconds=20.0):
     fastest).
     """
     c = record_flight(load_vehicle(vehicle), (), trajectory, seconds, seed, imu=True)
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     c["accelerometer"] += 0.1 * rng.standard_normal(c["accelerometer"].shape)
     c["gyro"] += 0.01 * rng.standard_normal(c["gyro"].shape)
     return FlightLog(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from windwrench.controllers.preview import Oracle
@@ -74,7 +75,7 @@ def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
     network = TaughtNetwork(FEATURES.size, 3, cell, 5, [7], "tanh")
     shares = np.array([[0.4, 1.0, 0.3]], dtype=np.float32)
     policy = TrainedPolicy(_card(FAN, cell, "wide", 0, 0), network.policy_weights(shares))
-    frames = np.random.default_rng(0).normal(size=(9, FEATURES.size)).astype(np.float32)
+    frames = default_rng(0).normal(size=(9, FEATURES.size)).astype(np.float32)
     with torch.no_grad():
         means, _, _ = network(torch.from_numpy(frames)[:, None])
     expected = np.clip(means[:, 0].numpy() @ shares[0], -1.0, 1.0)
@@ -83,7 +84,7 @@ def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
 
 def test_the_mean_of_what_is_hidden_is_learned():
     """A random walk seen through noise: the network must come to the error of the Kalman filter."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     walk = np.cumsum(0.3 * rng.normal(size=(60, 256, 1)), axis=0).astype(np.float32)
     seen = walk + rng.normal(size=walk.shape).astype(np.float32)
     torch.manual_seed(0)
@@ -101,7 +102,7 @@ def test_the_mean_of_what_is_hidden_is_learned():
 
 def test_the_left_is_learned_from_the_right():
     """Episodes in which what is hidden is positive alone teach what it is where it is negative."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     hidden = np.repeat(rng.uniform(0.5, 1.5, (1, 128, 1)), 20, axis=0).astype(np.float32)
     seen = np.concatenate([hidden, np.ones_like(hidden)], axis=2)
     torch.manual_seed(0)
@@ -111,7 +112,7 @@ def test_the_left_is_learned_from_the_right():
     fit(network, episodes, 40, 16, (0.02, 0.0), torch.Generator().manual_seed(0), mirrored)
     with torch.no_grad():
         mean, _, _ = network(torch.from_numpy(seen * mirrored))
-    assert np.abs(mean.numpy() + hidden)[5:].mean() < 0.05
+    assert abs(mean.numpy() + hidden)[5:].mean() < 0.05
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
@@ -51,7 +52,7 @@ def test_lanes_tell_how_late_their_answers_are():
 def test_hindsight_knows_what_came_beside_the_model(late):
     """Of a flight of the linear model itself with any commands and disturbances."""
     oracle = WindOracle()
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     count = 30
     lesson = WindLesson("WindHover", limit=np.inf)
     lesson._late = np.full(2, late)
@@ -77,7 +78,7 @@ def test_hindsight_knows_what_came_beside_the_model(late):
 def test_a_policy_sees_what_its_network_saw_whitened():
     torch.manual_seed(0)
     network = TaughtNetwork(27, 3, "gru", 8, [5], "tanh")
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     mixed = np.diag(np.full(27, 0.01)) + 0.1 * rng.standard_normal((1, 27))
     seen = (rng.standard_normal((40, 6, 27)) @ mixed + 1.0).astype(np.float32)
     network.whiten(seen)
@@ -95,7 +96,7 @@ def test_a_policy_sees_what_its_network_saw_whitened():
 
 def test_a_linear_policy_learns_a_lagging_answer_and_flies_as_it_was_fitted():
     """The answer is a low-pass of the position error, of four decisions."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     law = LinearLaw()
     seen = rng.standard_normal((120, 8, 27)).astype(np.float32)
     kept = seen[0]

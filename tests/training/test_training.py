@@ -11,6 +11,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.training.tiny import TINY
@@ -80,7 +81,7 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
     learner.learn(120)
     policy = TrainedPolicy(card_of(config, "base", 0, 120), weights_of(learner, algorithm))
     policy.reset()
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     state = None
     for _ in range(5):
         x = rng.normal(size=features_of(config).size).astype(np.float32)
@@ -104,7 +105,7 @@ def test_a_run_says_beside_the_policy_what_it_was_and_another_is_refused(tmp_pat
     assert card["config"]["learner"]["gamma"] == 0.9
     assert card["versions"]["stable-baselines3"] == sb3.__version__
     assert card["seeds"]["training"][1] < card["seeds"]["validation"][0]
-    kept = json.loads((tmp_path / "training.json").read_text())
+    kept = json.loads((tmp_path / "training.json").read_bytes())
     assert kept["config"] == card["config"]
     assert any((tmp_path / "tensorboard").iterdir()) or (tmp_path / "progress.csv").exists()
 

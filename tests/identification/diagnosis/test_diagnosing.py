@@ -10,6 +10,7 @@ from operator import attrgetter
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.data_paths import data_file
 from tests.support.flown import settings, without_pose
@@ -322,7 +323,7 @@ def test_the_error_is_that_of_test_logs_where_they_are_given():
 
 def test_sensor_noise_is_read_off_the_log():
     log = fly()
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     noise = sensor_noise(log, VEHICLE)
     assert noise.position == pytest.approx(0.001, rel=0.05)
     assert noise.attitude == pytest.approx(0.005, rel=0.05)
@@ -340,7 +341,7 @@ def test_sensor_noise_is_read_off_the_log():
 @pytest.mark.slow
 def test_flights_of_another_simulator(name):
     folder = data_file("flights")
-    label = json.loads((folder / "labels.json").read_text())[f"{name}.csv.gz"]
+    label = json.loads((folder / "labels.json").read_bytes())[f"{name}.csv.gz"]
     vehicle = load_vehicle(folder / "vehicle.yaml")
     found = diagnose([read_log(folder / f"{name}.csv.gz", None, vehicle)], vehicle)
     truth = {e["name"]: e for e in label["effects"] if e["name"] != "OUT_OF_LIBRARY"}

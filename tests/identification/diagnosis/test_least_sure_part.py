@@ -88,7 +88,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "random", ())
     (down,) = (push for push in found.pushes if push.channel == "Fz")
-    near = np.abs(flown.log.t - down.t) < 0.3
+    near = abs(flown.log.t - down.t) < 0.3
     truth = flown.log.force[:, 2]
     assert truth[near].min() == pytest.approx(truth.min(), rel=0.1)
     assert down.peak == pytest.approx(truth.min(), rel=0.3)

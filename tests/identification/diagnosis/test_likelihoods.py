@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm, slogdet, solve
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
@@ -53,7 +55,7 @@ def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
 
 
 def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     x = rng.standard_normal((40, 100, 3))
     noise = rng.standard_normal((40, 100))
     alike = np.repeat(rng.standard_normal((40, 5)), 20, axis=1)  # one error for 20 samples
@@ -68,7 +70,7 @@ def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
 
 
 def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     x = rng.standard_normal((200, 4))
     y = rng.standard_normal(200)
     y += 0.4 * x[:, 3]
@@ -80,7 +82,7 @@ def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
         own = np.array([1.0, 1.0, size])[: len(at)]
         inner = normal[np.ix_(at, at)] * own[:, None] * own + np.eye(len(at))
         b = right[at] * own
-        return 0.5 * b @ np.linalg.solve(inner, b) - 0.5 * np.linalg.slogdet(inner)[1]
+        return 0.5 * b @ solve(inner, b) - 0.5 * slogdet(inner)[1]
 
     sizes = (0.1, 1.0)
     products = np.block([[normal, right[:, None]], [right, 0.0]])
@@ -99,7 +101,7 @@ VEHICLE = replace(load_vehicle("ardrone2"), effects=(LAW,))
 
 def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1):
     """A flight in which thrust and attitude are what the forces ask for; rotors by commands."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)
     rate = (0.9, 1.4, 0.5)
     size = (1.2, 0.7, 0.4)
@@ -111,12 +113,12 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     gust = 3e-4 * VEHICLE.weight * np.cumsum(rng.standard_normal(place.shape), axis=0)
     gust -= np.linspace(0.0, 1.0, len(t))[:, None] * gust[-1]
     past = np.array(wind) - speed
-    air = np.linalg.norm(past, axis=1)[:, None] * DRAG * past
+    air = norm(past, axis=1)[:, None] * DRAG * past
     need = VEHICLE.mass * np.gradient(speed, t, axis=0) + [0.0, 0.0, VEHICLE.weight] - air - gust
-    thrust = np.linalg.norm(need, axis=1)
+    thrust = norm(need, axis=1)
     z = need / thrust[:, None]
     y = np.cross(z, [1.0, 0.0, 0.0])
-    y /= np.linalg.norm(y, axis=1)[:, None]
+    y /= norm(y, axis=1)[:, None]
     rotation = np.stack([np.cross(y, z), y, z], axis=2)
     turned = Rotation.from_rotvec(pose_noise * rng.standard_normal(place.shape))
     q = (Rotation.from_matrix(rotation) * turned).as_quat(scalar_first=True)
@@ -194,7 +196,7 @@ def test_the_accelerometer_is_read_beside_the_pose():
 
 
 def test_the_noise_of_an_autoregression_is_found():
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     lag = np.array([[0.7, 0.2], [0.0, 0.4]])
     root = np.array([[1.0, 0.0], [0.8, 0.5]])
     x = np.zeros((20000, 2))
@@ -219,7 +221,7 @@ def test_noise_without_memory_only_scales():
 
 
 def test_a_column_of_factors_is_their_product_a_part_at_a_time():
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     z = rng.normal(size=50)
     turned = rng.normal(size=(50, 3))
     part = rng.normal(size=(50, 4))

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import inv, solve
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
@@ -48,7 +50,7 @@ def moved(state, push):
 @pytest.fixture(scope="module")
 def search():
     """Return a search on 30 s of a pose that moves by what TRUE says."""
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     n = 3000
     jumps = np.zeros((n, 6, 1))
     jumps[:, 2, 0] = 0.3 * rng.standard_normal(n)
@@ -121,7 +123,7 @@ def test_the_gains_are_those_of_the_riccati_equation():
         R = np.diag(TRUE.pose[pair] ** 2)
         P = solve_discrete_are(F.T, H.T, Q, R)
         S = H @ P @ H.T + R
-        K = P @ H.T @ np.linalg.inv(S)
+        K = P @ H.T @ inv(S)
         assert_allclose(found.covariance[np.ix_(pair, pair)], S, rtol=1e-6, atol=1e-15)
         for i, axis in enumerate(pair):
             own = np.column_stack([K[3 * i : 3 * i + 3, i], K[3 * i : 3 * i + 3, 1 - i]])
@@ -172,7 +174,7 @@ def test_gyroscopic_torques_grow_with_the_rate():
     rate = np.array([0.3, -0.7, 1.9])
     found = gyration(replace(VEHICLE, inertia=J), rate[None])[0]
     for i, step in enumerate(1e-4 * np.eye(3)):
-        there, here = (np.linalg.solve(J, np.cross(w, J @ w)) for w in (rate + step, rate - step))
+        there, here = (solve(J, np.cross(w, J @ w)) for w in (rate + step, rate - step))
         assert_allclose(found[:, i], (here - there) / 2e-4, atol=1e-9)
 
 

@@ -36,7 +36,7 @@ def numbers(found):
 
 def assert_kept(name, found):
     """Assert that a ranking is the one that was kept, to what optimisers leave."""
-    kept = json.loads(GOLDEN.read_text(encoding="utf-8"))[name]
+    kept = json.loads(GOLDEN.read_bytes())[name]
     assert_alike(json.loads(json.dumps(numbers(found))), kept, name, rel=1e-3, least=1e-6)
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -39,7 +40,7 @@ def hover(load, seed):
     """Return a hover in gusts of a vehicle that carries a load: its loop answers them by thrust and
     by tilt, of which the motion capture sees 0.3 degrees too much or too little.
     """
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     push = gusts(rng, np.array([0.04, 0.04, 0.06]), 0.5)
     seen = gusts(rng, np.full(2, 0.006), 0.1)
     position = np.zeros_like(push)

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import lstsq
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.flown import VEHICLE, resting
@@ -53,7 +55,7 @@ def test_a_simulator_may_have_no_noise(trajectory, missing):
 @pytest.mark.parametrize("turns", [0.0, 1e-9])
 def test_a_still_flight_without_noise_is_diagnosed(turns):
     """Columns that do not vary carry nothing; what is known to the last digit is no more."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     count = 3001
     place = [0.0, 0.0, 1.0] + 1e-9 * rng.standard_normal((count, 3))
     attitude = [1.0, 0.0, 0.0, 0.0] + turns * rng.standard_normal((count, 4))
@@ -142,7 +144,7 @@ def test_a_disturbance_that_thrust_answers_by_its_change_counts_as_one(weak):
     columns = answered(rows, followers(rows), disturbance)
     X = np.stack([x[rows.fit, 2] for x in columns.values()], axis=1)
     y = disturbance[rows.fit, 2]
-    left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    left = y - X @ lstsq(X, y, rcond=None)[0]
     assert left.std() < 0.1 * y.std()
 
 

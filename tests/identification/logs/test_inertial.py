@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -22,7 +23,7 @@ FRD = np.array([1.0, -1.0, -1.0])
 
 def flight(seconds=6.0, rate=200.0, moving=1.0, noise=0.003, bias=0.1, seed=0):
     """A log with a biased, noisy IMU in every row."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)
     position, angles = _path(t, moving)
     turn = Rotation.from_euler("ZYX", angles)

@@ -7,6 +7,7 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.outcomes import noted, refused
@@ -54,7 +55,7 @@ def assert_same(found, true):
 )
 def test_any_convention_and_its_map_give_the_same_flight(tmp_path, flown, seed):
     """Separators, decimal commas, units, frames, quaternion and Euler orders, rotor orders."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     first = int(rng.integers(0, len(flown.t) - 60))
     rows = np.zeros(len(flown.t), bool)
     rows[first : first + 50] = True

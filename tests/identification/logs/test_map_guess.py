@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.outcomes import refused
@@ -35,7 +36,7 @@ def guessed(path, name=""):
 
 def test_the_map_that_is_written_is_the_map_that_was_guessed(tmp_path, flown):
     for seed in range(4):
-        written = random_table(flown, np.random.default_rng(seed))
+        written = random_table(flown, default_rng(seed))
         found = guessed(save(written, tmp_path / "table.csv"))
         text = map_yaml(found)
         again = parse_map(yaml.safe_load(text), "map")
@@ -213,7 +214,7 @@ def test_motion_capture_with_y_up(tmp_path, flown):
 
 def test_more_than_four_rotors_that_move_are_refused(tmp_path, flown):
     columns = columns_of(flown, NAMES + "w1 w2 w3 w4")
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     good = guessed(table_of(columns, tmp_path / "quad.csv")).log_map
     columns |= {"w5": columns["w1"] + rng.standard_normal(len(flown.t)), "w6": columns["w2"]}
     path = table_of(columns, tmp_path / "hexa.csv")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
 from numpy.testing import assert_allclose
 from scipy.signal import butter, filtfilt
 
@@ -164,7 +165,7 @@ def test_real_logs_turn_as_their_motors_say(number, axes):
     assert not log.has_pose
     assert 980.0 < 1.0 / log.period < 1030.0
     assert not noted(log, "damaged")
-    still = np.linalg.norm(log.accelerometer[log.command.max(axis=1) == 0.0], axis=1)
+    still = norm(log.accelerometer[log.command.max(axis=1) == 0.0], axis=1)
     assert_allclose(np.median(still), 9.81, atol=0.3)
     b, a = butter(2, 8.0 / 500.0)
     turn = np.gradient(filtfilt(b, a, np.nan_to_num(log.gyro), axis=0), log.t, axis=0)

@@ -9,6 +9,8 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -98,7 +100,7 @@ def test_an_undeclared_effect_is_no_wrong_convention(effect):
 
 def test_a_quiet_hover_decides_nothing():
     """Without excitation no order of rotors explains more than another."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     t = np.arange(0.0, 15.0, 0.005)
     attitude = Rotation.from_rotvec(0.005 * rng.standard_normal((len(t), 3))).as_quat(
         scalar_first=True
@@ -126,13 +128,13 @@ def test_short_measured_flights_pass_where_short_is_enough(number):
 
 def jumped_clock(log):
     k = len(log.t) // 2
-    speed = np.linalg.norm(np.gradient(log.position, log.t, axis=0), axis=1)
+    speed = norm(np.gradient(log.position, log.t, axis=0), axis=1)
     k += int(np.argmax(np.convolve(speed[k:], np.ones(21) / 21, "same")[200:-200])) + 200
     return replace(log, t=log.t + np.where(np.arange(len(log.t)) >= k, 5.0, 0.0))
 
 
 def uneven_clock(log):
-    step = np.random.default_rng(0).choice([0.0005, 0.005, 0.02], len(log.t), p=[0.4, 0.4, 0.2])
+    step = default_rng(0).choice([0.0005, 0.005, 0.02], len(log.t), p=[0.4, 0.4, 0.2])
     return replace(log, t=np.cumsum(step))
 
 
@@ -222,11 +224,11 @@ def test_a_torn_log_is_refused_and_an_estimate_needs_less(kind):
 
 def test_a_gap_that_leaves_enough_is_a_note():
     log = flight(seconds=20.0)
-    _, (note,) = screen_log(without_pose(log, np.abs(log.t - 10.0) < 2.0), VEHICLE)
+    _, (note,) = screen_log(without_pose(log, abs(log.t - 10.0) < 2.0), VEHICLE)
     assert note.startswith("the pose is lost in 1 run(s)")
     assert "16 of 20 s of flight" in note
     # a gap in which the vehicle flew on is no jump of the clock
-    screen_log(with_rows(log, np.abs(log.t - 10.0) > 0.5), VEHICLE)
+    screen_log(with_rows(log, abs(log.t - 10.0) > 0.5), VEHICLE)
 
 
 def test_two_seconds_and_a_hover_are_enough_for_an_estimate():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.flown import VEHICLE, recorded
 from tests.support.outcomes import refused
@@ -18,7 +19,7 @@ PERIOD = 0.005  # s
 
 def walk(rate, seconds=20.0, seed=0):
     """Times and values (n, 4) of a random walk that was sampled at a rate."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)
     return t, 400.0 + np.cumsum(rng.normal(size=(len(t), 4)), axis=0)
 
@@ -46,7 +47,7 @@ def test_a_channel_that_is_held_or_drawn_in_lines_keeps_its_own_rate(rate):
 @pytest.mark.parametrize("step", [1e-6, 0.3, 3.0])
 def test_a_rounded_channel_is_as_fast_as_its_rows(step):
     t = np.arange(0.0, 20.0, PERIOD)
-    noise = np.random.default_rng(1).normal(size=(len(t), 4))
+    noise = default_rng(1).normal(size=(len(t), 4))
     slow = 400.0 + 10.0 * np.sin(np.pi * t[:, None] + np.arange(4))
     for values in (slow, slow + noise, np.full((len(t), 4), 400.0)):
         assert source_rate(t, step * np.round(values / step)) == pytest.approx(1.0 / PERIOD)

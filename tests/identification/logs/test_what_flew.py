@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.dataflash_writer import dataflash, imu, parm
@@ -226,7 +227,7 @@ def test_whether_anything_flew():
     hover = np.full((2000, 4), 390.0)
     still = np.zeros((2000, 3))
     turned = np.tile([1.0, 0.0, 0.0, 0.0], (2000, 1))
-    noise = np.random.default_rng(0).standard_normal((2000, 3))
+    noise = default_rng(0).standard_normal((2000, 3))
     moving = 0.3 * np.sin(np.outer(t, [0.5, 0.7, 0.9]))
     way = still + np.outer(t, [0.3, 0.0, 0.0])
 

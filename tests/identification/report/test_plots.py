@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.browser import look, needs_browser
@@ -53,13 +54,13 @@ def test_a_flight_of_a_minute_is_carried_whole():
     assert time["effects"] == ["rotor_drag", "wind"]
     for i, channel in enumerate(time["channels"]):
         factor = FACTORS[channel["unit"]]
-        assert np.abs(times(channel, time["pieces"]) - trace.t).max() < 1e-4
+        assert abs(times(channel, time["pieces"]) - trace.t).max() < 1e-4
         series = [channel["before"], channel["after"], *channel["parts"]]
         truth = [trace.before, trace.after, *(trace.parts[name] for name in time["effects"])]
         for packed, x in zip(series, truth, strict=True):
             x = factor * x[:, i]
             assert (packed is None) == (not x.any())
-            assert packed is None or np.abs(unpacked(packed) - x).max() <= 1e-4 * np.abs(x).max()
+            assert packed is None or abs(unpacked(packed) - x).max() <= 1e-4 * np.abs(x).max()
 
 
 SPIKES = (("before", 12_345, 0, 7.0), ("before", 100_001, 4, -8.0), ("after", 170_000, 2, 9.0))
@@ -73,7 +74,7 @@ def test_a_spike_of_any_channel_stays():
     for side, _, i, size in SPIKES:
         channel = plots[i].packed
         drawn = FACTORS[channel["unit"]] * size
-        assert np.abs(unpacked(channel[side]) - drawn).min() <= 1e-4 * abs(drawn)
+        assert abs(unpacked(channel[side]) - drawn).min() <= 1e-4 * abs(drawn)
     kept = telling_samples(trace, 0, 150)
     assert 12_345 in kept
     assert (kept[0], kept[-1]) == (0, len(trace.t) - 1)
@@ -169,7 +170,7 @@ def test_keys_zoom_and_switches_in_a_browser(tmp_path, width, dark):
     # one cursor: a key on one plot, the values of all six at the same time
     seconds = {re.search(r"t = ([\d.]+) s", text)[1] for text in done["linked"]}
     assert len(seconds) == 1
-    i = int(np.argmin(np.abs(trace.t - float(seconds.pop()))))
+    i = int(np.argmin(abs(trace.t - float(seconds.pop()))))
     for k, text in enumerate(done["linked"]):
         told = re.findall(r"(?:before|after) (−?[\d.]+)", text)
         values = [float(value.replace("−", "-")) for value in told]
@@ -206,7 +207,7 @@ def test_cursors_over_a_long_flight_say_one_time(tmp_path):
 
 def test_a_line_of_many_rows_is_drawn_by_its_extremes():
     rows = 1_000_003
-    values = np.random.default_rng(1).normal(size=(rows, 2))
+    values = default_rng(1).normal(size=(rows, 2))
     values[777_777, 0], values[rows - 1, 1] = 50.0, -50.0
     shown = log_channels._extremes(values)
     assert np.all(np.diff(shown) > 0)

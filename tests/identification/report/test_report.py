@@ -178,7 +178,7 @@ def test_a_coefficient_is_as_precise_as_it_is_known(value, std, text):
 
 
 def test_the_sentences_are_those_kept():
-    assert said() == json.loads(GOLDEN.read_text(encoding="utf-8"))
+    assert said() == json.loads(GOLDEN.read_bytes())
 
 
 class Page(HTMLParser):

@@ -1,6 +1,7 @@
 """Flights for the tests: a rigid body with an IMU, integrated here, and the plant's."""
 
 import numpy as np
+from numpy.random import default_rng
 
 from windwrench.identification.logs.flight_log import FlightLog
 
@@ -24,7 +25,7 @@ def inertial_flights(seeds, seconds=15.0, lag=0.05, rate=250):
     n = round(seconds / dt)
     t = dt * np.arange(n)
     hover = np.sqrt(MASS * 9.81 / (4 * K))
-    rngs = [np.random.default_rng(seed) for seed in seeds]
+    rngs = [default_rng(seed) for seed in seeds]
 
     def swing(size, low, high):
         waves = []

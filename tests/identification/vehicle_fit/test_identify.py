@@ -7,6 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm, pinv
+from numpy.random import default_rng
 from scipy.signal import butter, sosfiltfilt
 
 from tests.identification.vehicle_fit.flown import (
@@ -76,7 +78,7 @@ def check(found, name, truth, within):
 
 def test_results_are_those_kept():
     """All that identification says of made flights: predictions, changes and faults beside."""
-    assert_alike(json.loads(json.dumps(made())), json.loads(GOLDEN.read_text(encoding="utf-8")))
+    assert_alike(json.loads(json.dumps(made())), json.loads(GOLDEN.read_bytes()))
 
 
 def test_commanded_speeds_show_the_vehicle_and_its_lag(commanded):
@@ -114,7 +116,7 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from():
 
 def test_noise_of_rotor_speeds_is_no_torque():
     """Of 2 % of the speed, which makes more torque than the flight: inertia came out double."""
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
 
     def shaken(log):
         return 1.0 + 0.02 * rng.standard_normal(log.rotor_speeds.shape)
@@ -186,12 +188,12 @@ def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
 
 def test_tapers_lose_what_the_intervals_add():
     """A regression of white noise on white noise, of density 0.01: its variance by its weight."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     off = []
     for noise in rng.standard_normal((2000, 500, 2)):
         (s,) = segments_of(noise, 0.01, 0, np.inf)
         x, y = np.moveaxis(s.columns * np.sqrt(s.weight)[:, None], 2, 0)
-        off.append(np.vdot(x, y).real / np.linalg.norm(x))
+        off.append(np.vdot(x, y).real / norm(x))
     assert np.var(off) == pytest.approx(0.01 * LOSS, rel=0.08)  # 1.17: 1 would be off
 
 
@@ -321,7 +323,7 @@ def test_rotors_in_another_order_are_refused(inertial):
 
 def test_turning_is_compared_with_torque_at_its_own_delay():
     """60 ms of 4 to 7 Hz are more than a quarter of a turn: at no delay all looks opposed."""
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     period = 0.01
     late = 6
     n = 3000
@@ -329,7 +331,7 @@ def test_turning_is_compared_with_torque_at_its_own_delay():
     turn = sosfiltfilt(band, rng.standard_normal((n, 3)), axis=0) * [3.0, 3.0, 1.0]
     mixing = np.array([Y, -X, -REACH * SPIN])
     torque = INERTIA @ np.roll(turn, -late, axis=0).T
-    square = np.maximum((FULL * HOVER) ** 2 + (np.linalg.pinv(mixing) @ torque / K).T, 0.0)
+    square = np.maximum((FULL * HOVER) ** 2 + (pinv(mixing) @ torque / K).T, 0.0)
     still, force = np.zeros((2, n, 3))
     force[:, 2] = K / MASS * square.sum(axis=1)
     t = period * np.arange(n)

@@ -139,10 +139,10 @@ def differences(c, python):
             turn = r[0] * q[1:] - q[0] * r[1:] - np.cross(q[1:], r[1:])
             difference = 2.0 * np.abs(turn)
         else:
-            difference = np.abs(np.array(getattr(e, name), dtype=float) - getattr(p, name))
+            difference = abs(np.array(getattr(e, name), dtype=float) - getattr(p, name))
         out[name] = float(np.max(difference / std[k]))
         mine = np.array(getattr(e, f"std_{name}"), dtype=float)
-        out["std"] = max(out.get("std", 0.0), float(np.max(np.abs(mine / stated[k] - 1.0))))
+        out["std"] = max(out.get("std", 0.0), float(np.max(abs(mine / stated[k] - 1.0))))
     same = STATUSES[e.status] == p.status and e.restarts == p.restarts
     out["status"] = 0.0 if same else 1.0
     return out
