@@ -35,8 +35,7 @@ def test_check_proposes_a_map_and_writes_the_log_by_it(tmp_path, written, capsys
     assert all(field["why"] for field in found["fields"])
     ours = tmp_path / "ours.csv.gz"
     run(capsys, "check", theirs, "--map", map_file, "--write", ours, "--out", tmp_path / "by_map")
-    log = read_log(ours)
-    assert_allclose(log.position, written.log.position, atol=1e-9)
+    assert_allclose(read_log(ours).position, written.log.position, atol=1e-9)
     again = run(capsys, "check", ours, "--out", tmp_path / "again")
     assert again["read_by"] == "this kit's own format"
     assert again["vehicle"] == "ardrone2"
@@ -66,8 +65,7 @@ def test_positions_without_an_attitude_are_a_channel_and_an_imu_is_checked(tmp_p
     rows = np.column_stack([t, position, sensors, speeds])
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=names, comments="")
     found = run(capsys, "check", tmp_path / "a.csv", "--vehicle", "ardrone2", "--out", tmp_path)
-    channels = found["channels"]
-    assert channels["position"]["rate_hz"] == pytest.approx(5.0)
+    assert found["channels"]["position"]["rate_hz"] == pytest.approx(5.0)
     assert any("ax, ay, az look like g" in text for text in found["doubts"])
 
 

@@ -108,7 +108,7 @@ def test_an_episode_is_drawn_and_its_time_series_written(call, tmp_path):
     assert {p.name for p in out.iterdir()} == {"fly.png", "fly.csv", "run.json"}
     flight = np.genfromtxt(out / "fly.csv", delimiter=",", names=True)
     assert len(flight) == 250
-    assert np.all(np.diff(flight["t"]) > 0.0)
+    assert (np.diff(flight["t"]) > 0.0).all()
     assert np.hypot(flight["qw"], flight["qz"]) == pytest.approx(1.0, abs=0.02)
     assert abs(flight["px"] - 2.3).max() < 0.5
     # what is felt is what acts, but for noise and the filter's delay

@@ -40,8 +40,7 @@ def test_the_example_is_a_measured_flight_with_its_licence():
         log = read_log(example.log)
         assert log.t[-1] == pytest.approx(18.0, abs=0.05)
         assert log.voltage[-1] < log.voltage[0]  # as is said to be known
-        notice = example.log.with_name("LICENSE").read_text()
-        assert "Syed Izzat Ullah" in notice
+        assert "Syed Izzat Ullah" in example.log.with_name("LICENSE").read_text()
         assert "BSD 3-Clause" in example.source
         assert example.log.stat().st_size < 150_000
 

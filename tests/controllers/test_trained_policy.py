@@ -113,8 +113,7 @@ def test_a_policy_of_another_task_is_refused(tmp_path):
 
 
 def test_a_shipped_policy_of_two_axes_flies_better_than_hover():
-    known = TASKS["FanTracking2D"]
-    env = known.environment("base")
+    env = TASKS["FanTracking2D"].environment("base")
     seeds = range(910_000, 910_004)
     least, learned = (
         np.mean([fly_episode(env, make_pilot(name, "FanTracking2D"), k).rmse for k in seeds])

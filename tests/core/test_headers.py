@@ -9,13 +9,12 @@ import pytest
 from numpy.random import default_rng
 
 from tests.support.flights import PERIOD, yawing_flight
+from tests.support.vehicles import VEHICLE
 from windwrench import _core
-from windwrench.dynamics import load_vehicle
 from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 from windwrench.estimator.filter_record import FILTER
 from windwrench.estimator.ukf import step
 
-VEHICLE = load_vehicle("ardrone2")
 STEPS = 400
 COMPILER = shutil.which("g++") or shutil.which("clang++")
 PLAIN = ["-std=c++17", "-ffp-contract=off", "-fno-exceptions", "-fno-rtti"]

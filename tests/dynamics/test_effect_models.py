@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting, InputError
 from windwrench.dynamics.effects import compile_effects
 from windwrench.dynamics.effects.base import (
     ROTOR_ACCELERATION,
@@ -25,7 +26,6 @@ from windwrench.dynamics.mean_jet import jet_table
 from windwrench.dynamics.motion import body_record, effect_wrench
 from windwrench.envs.fan import Fan, fan_record, jet_wrench
 
-VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005
 # a tilted vehicle that moves, turns and has four different rotors
 R = Rotation.from_euler("zyx", [2.0, 0.2, -0.3]).as_matrix()
@@ -228,8 +228,7 @@ def test_ground_effect_stays_finite_on_the_floor_and_fades_far_from_it():
     heights = [norm(wrench(vehicle, (0, 0, z))[0]) for z in (0.15, 0.2, 0.3, 0.5, 1.0, 3.0)]
     assert all(low > high for low, high in pairwise(heights))
     assert heights[-1] < 1e-3 * thrust
-    no_ceiling = setting("ceiling_effect", rho=3.0)
-    assert_array_equal(wrench(no_ceiling, (0, 0, 2.4))[0], 0.0)
+    assert_array_equal(wrench(setting("ceiling_effect", rho=3.0), (0, 0, 2.4))[0], 0.0)
 
 
 def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
@@ -286,10 +285,8 @@ def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart(
 )
 def test_a_central_model_is_that_of_rotors_drawn_into_the_centre(name, size):
     drawn = replace(VEHICLE, rotor_positions=np.zeros((4, 3)))
-    vehicle = setting(name, **size)
-    expected = wrench(drawn.with_effects(*vehicle.effects))
-    got = wrench(setting(name, **size, central=1.0))
-    assert_wrench(got, *expected)
+    expected = wrench(drawn.with_effects(*setting(name, **size).effects))
+    assert_wrench(wrench(setting(name, **size, central=1.0)), *expected)
 
 
 def test_wind_blows_through_declared_drag_whatever_its_place_in_the_list():

@@ -9,6 +9,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.data_paths import data_file
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import (
     EffectSetting,
     InputError,
@@ -28,7 +29,6 @@ GOOD = {
     "k": [8e-6, 8.1e-6, 7.9e-6, 8e-6],
     "p": [2e-7, 2.1e-7, 1.9e-7, 2e-7],
 }
-VEHICLE = load_vehicle("ardrone2")
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -47,8 +47,7 @@ def test_the_measured_flights_vehicle_loads():
     assert vehicle.mass == 0.46
     assert vehicle.mocap.sigma_pos_m == 0.001  # the file says "nominal 0.001"
     assert vehicle.ceiling_z == 2.6
-    default = load_vehicle("ardrone2")
-    assert_array_equal(np.sign(vehicle.mixing), np.sign(default.mixing))
+    assert_array_equal(np.sign(vehicle.mixing), np.sign(VEHICLE.mixing))
 
 
 def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
@@ -98,7 +97,7 @@ def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
 
 def test_a_measured_vehicle_has_the_digits_that_are_known():
     vehicle = replace(
-        load_vehicle("ardrone2"),
+        VEHICLE,
         k=np.full(4, 8.0481234567e-6),
         mocap=Mocap(200.00000000000426, 0.0004993438472289853, 0.005072951427662196),
         effects=(EffectSetting("com_offset", {"cx": 0.0123456789, "cy": -0.000123456}),),

@@ -13,6 +13,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 import windwrench  # noqa: F401  registers the environments
+from tests.support.sizes import rms
 from tests.support.vector_flights import TASKS
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.rotation import quaternion_to_matrix
@@ -147,7 +148,7 @@ def test_a_small_and_a_large_vehicle_find_the_task_as_hard_as_the_standard_one(t
                 assert not lost
                 size = [norm(info[name]) for name in ("force", "torque")]
                 rows.append([*(size / scale), info.get("error", abs(info.get("offset", 0.0)))])
-        felt[vehicle.name] = np.sqrt(np.mean(np.square(rows), axis=0))
+        felt[vehicle.name] = rms(rows, axis=0)
     for name in ("crazyflie", "large"):
         force, torque, error = felt[name] / felt["ardrone2"]
         assert (force, error) == (pytest.approx(1.0, abs=0.25), pytest.approx(1.0, abs=0.35))

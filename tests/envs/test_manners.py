@@ -41,7 +41,7 @@ def test_views_are_the_frame_over_fixed_scales_a_part_of_it_and_the_last_ones():
     history = seen(observe="history")
     scaled = seen(normalize=True)
     assert_array_equal(scaled, frames / np.float32(SCALES))
-    assert 0.05 < np.abs(scaled[:, [0, 5, 6, 7]]).mean() < 2.0
+    assert 0.05 < abs(scaled[:, [0, 5, 6, 7]]).mean() < 2.0
     assert_array_equal(seen(observe="wrench-without-fx"), frames[:, 1:])
     padded = np.concatenate([np.repeat(frames[:1], FRAMES - 1, axis=0), frames])
     for k, row in enumerate(history):

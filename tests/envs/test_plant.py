@@ -11,6 +11,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from tests.support.sizes import rms
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.mean_jet import jet_table
 from windwrench.envs.closed_loop import ClosedLoop
@@ -115,8 +116,8 @@ def test_a_recorded_rotor_speed_is_rounded_once():
     before = np.array(reported)[1:-1]
     after = np.array(reported)[2:]
     # as it is at the pose's instant, between two ticks
-    assert np.max(abs(log - (0.25 * before + 0.75 * after))) < 2.0 + 1e-9
-    assert np.max(abs(log / 4.0 - np.round(log / 4.0))) < 1e-9
+    assert abs(log - (0.25 * before + 0.75 * after)).max() < 2.0 + 1e-9
+    assert abs(log / 4.0 - np.round(log / 4.0)).max() < 1e-9
 
 
 def test_the_disturbance_has_its_declared_size_and_lasts_as_long_as_it_says():
@@ -130,7 +131,7 @@ def test_the_disturbance_has_its_declared_size_and_lasts_as_long_as_it_says():
         row[:] = bench.plant["disturbance"]
     sizes = np.repeat([settings.disturbance_force, settings.disturbance_torque], 3)
     unit = disturbed[1000:] / sizes
-    assert np.sqrt(np.mean(unit**2)) == pytest.approx(1.0, abs=0.06)
+    assert rms(unit) == pytest.approx(1.0, abs=0.06)
     later = round(settings.disturbance_time / TICK)
     assert np.mean(unit[later:] * unit[:-later]) == pytest.approx(np.exp(-1.0), abs=0.08)
 
@@ -154,8 +155,7 @@ def sensed(quaternion, count=400):
 
 
 def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backwards():
-    q = Rotation.from_euler("z", math.pi).as_quat(scalar_first=True)
-    rows = sensed(q)
+    rows = sensed(Rotation.from_euler("z", math.pi).as_quat(scalar_first=True))
     assert rows[:, 3].min() >= 0.0
     flips = np.count_nonzero(np.diff(np.sign(rows[:, 6])))
     assert flips > 50  # of 400 samples; noise alone decides the sign
@@ -195,9 +195,9 @@ def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
 def test_every_trajectory_is_flown_without_touching_the_ground(trajectory):
     columns = record_flight(load_vehicle("ardrone2"), (), trajectory, 15.0, 0)
     assert columns["position"][:, 2].min() > 0.05
-    assert np.all(np.isfinite(columns["position"]))
-    assert np.abs(columns["force"]).max() < 0.1  # the background only
-    assert np.all(abs(columns["voltage"] / 11.1 - 1.0) < 0.15)
+    assert np.isfinite(columns["position"]).all()
+    assert abs(columns["force"]).max() < 0.1  # the background only
+    assert (abs(columns["voltage"] / 11.1 - 1.0) < 0.15).all()
 
 
 @pytest.mark.parametrize("vehicle", ["ardrone2", "crazyflie", "hummingbird"])

@@ -118,7 +118,7 @@ def test_a_caption_has_a_colour_for_truth_and_estimate_time_and_error(drawn):
     )
     assert true > estimated > 10  # wide and narrow, as the arrows
     for other in ("later", "farther"):
-        assert np.any(first != pictures[other])
+        assert (first != pictures[other]).any()
 
 
 def test_a_machine_that_cannot_draw_is_told_what_to_install(drawn):

@@ -9,7 +9,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.vector_flights import TASKS, fly, fly_alone, make, make_single
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.envs import SCENARIOS, FanTrackingEnv, Stage
 from windwrench.envs.closed_loop import STAGES, ClosedLoop
 from windwrench.envs.plant import PlantSettings
@@ -30,7 +30,7 @@ def test_stage_by_stage_the_flight_is_that_of_the_compiled_call_bit_for_bit(name
     watch = Stage("watch", lambda loop: seen.append(loop.ticks), before="estimate")
     assert_array_equal(alone(name, stages=[watch]), alone(name))
     assert seen[0] == -300
-    assert np.all(np.diff(seen) == 1)
+    assert (np.diff(seen) == 1).all()
 
 
 def test_so_it_flies_in_a_vector_of_environments():
@@ -80,7 +80,6 @@ def test_stages_run_before_the_one_that_they_name_in_the_order_given():
     assert [name for name in env.loop.stages if name in STAGES] == list(STAGES)
 
 
-VEHICLE = load_vehicle("ardrone2")
 QUIET = PlantSettings(motor_lag=0.0, sensor_noise=False)
 LATE = PlantSettings(
     actuator_delay=0.01, pose_delay=0.015, imu_delay=0.02, dropout=0.2, dropout_burst=0.03

@@ -13,9 +13,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import windwrench  # noqa: F401  registers the environments
 from tests.support.vector_flights import fly_alone
+from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Admittance
 from windwrench.controllers import wind_observation as seen
-from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics import InputError
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs import FanTrackingEnv
 from windwrench.envs.fan_tracking_2d import FanTracking2DEnv
@@ -29,14 +30,11 @@ from windwrench.evaluation.tasks import TASKS
 @pytest.mark.parametrize("cls", [WindHoverEnv, FanTracking2DEnv])
 def test_the_docstring_s_tables_are_the_spaces(cls):
     env = cls()
-    size = env.observation_space.shape[0]
-    limits = np.zeros(size)
+    limits = np.zeros(env.observation_space.shape[0])
     table = cls.__doc__.partition("## Observation space")[2].partition("##")[0]
     rows = re.findall(r"^\s+\| (\d+)(?:-(\d+))? *\|(.*)\|", table, re.M)
     for row in rows:
-        first = int(row[0])
-        last = int(row[1] or row[0])
-        limits[first : last + 1] = float(row[2].split("|")[1])
+        limits[int(row[0]) : int(row[1] or row[0]) + 1] = float(row[2].split("|")[1])
     assert rows
     assert_array_equal(env.observation_space.high, limits.astype(np.float32))
 
@@ -152,7 +150,6 @@ def test_a_generator_that_is_put_in_is_drawn_from():
     assert env.np_random.uniform() == other.uniform()
 
 
-VEHICLE = load_vehicle("ardrone2")
 HEAVY = EffectSetting("mass", {"dm": 0.06})
 
 

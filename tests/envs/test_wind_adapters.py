@@ -63,7 +63,7 @@ def test_a_wind_pushes_and_a_shear_turns():
     calm = WindDrag(Turbulence(0, 1e-12, 1.0, (1, 0, 0)), ARM, DRAG)
     force, torque = calm.wrench(0.0, PLACE, ROTATION, VELOCITY, RATE)
     assert_allclose(force, -4 * DRAG * VELOCITY, atol=1e-10)
-    assert np.all(np.sum(torque * RATE, axis=1) < 0.0)  # drag brakes
+    assert (np.sum(torque * RATE, axis=1) < 0.0).all()  # drag brakes
 
 
 def expected(time):

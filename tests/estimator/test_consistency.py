@@ -17,6 +17,7 @@ from tests.support.model_flights import (
     drawn,
     simulate_model,
 )
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import Uncertainty
 from windwrench.envs.recording import record_flight
@@ -25,8 +26,6 @@ from windwrench.estimator.consistency import chi2_band, nees, state_error
 from windwrench.estimator.model_uncertainty import factors_alone, factors_of
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log, tune_to_log
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 def share_within(values, band):
@@ -96,12 +95,12 @@ def test_intervals_hold_what_they_say(source):
         error[0, r] = np.concatenate([e.torque - run.torque[-1], e.force - run.force[-1]])
         error[1, r] = np.concatenate([e.std_torque, e.std_force])
         error[2, r] = e.std[12:]
-    inside = np.abs(error[0]) < 1.96 * error[1]
+    inside = abs(error[0]) < 1.96 * error[1]
     torque = inside[:, :3].mean()
     force = inside[:, 3:].mean()
     assert 0.925 < torque < 0.975  # of 720: 0.016 is the deviation of a share of 0.95, twice
     assert 0.915 < force < 0.98  # the axes of a force share one error of thrust
-    assert np.mean(np.abs(error[0]) < 1.96 * error[2]) < 0.8  # of noise alone
+    assert np.mean(abs(error[0]) < 1.96 * error[2]) < 0.8  # of noise alone
 
 
 @pytest.mark.slow

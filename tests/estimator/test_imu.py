@@ -11,22 +11,18 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.support import flights
 from tests.support.flights import PERIOD, matrix, yawing_flight
 from tests.support.model_flights import simulate_model
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting, InputError
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.error_state import displace
 from windwrench.estimator.imu import expected_imu
 
-VEHICLE = load_vehicle("ardrone2")
 FORCE = np.array([0.3, -0.2, -0.1])
 TORQUE = np.array([0.0, 0.0, 0.02])
 GYRO = 0.005
 ACCELEROMETER = 0.05
-
-
-@pytest.fixture(scope="module")
-def yawing():
-    return yawing_flight(VEHICLE, 1600, seed=1, sigma_position=0.01, sigma_attitude=0.05)
 
 
 def errors(flight, imu, attitude=True):
@@ -48,14 +44,14 @@ def errors(flight, imu, attitude=True):
             e = ukf.correct_imu(flight["omega"][k] + gyro, felt)
         rate = e.angular_velocity - flight["omega"][k]
         rows.append([e.force - FORCE, e.torque - TORQUE, rate])
-    return np.sqrt(np.mean(np.square(rows[600:]), axis=(0, 2)))
+    return rms(rows[600:], axis=(0, 2))
 
 
-def test_an_imu_sharpens_every_part_of_the_estimate_and_replaces_an_attitude(yawing):
+def test_an_imu_sharpens_every_part_of_the_estimate_and_replaces_an_attitude():
+    yawing = yawing_flight(VEHICLE, 1600, seed=1, sigma_position=0.01, sigma_attitude=0.05)
     without = errors(yawing, False)
-    with_imu = errors(yawing, True)
-    assert np.all(with_imu < [0.5, 0.2, 0.2] * without)
-    assert np.all(errors(yawing, True, attitude=False) < [0.05, 0.002, 0.01])
+    assert (errors(yawing, True) < [0.5, 0.2, 0.2] * without).all()
+    assert (errors(yawing, True, attitude=False) < [0.05, 0.002, 0.01]).all()
 
 
 def test_a_declared_effect_is_in_what_the_accelerometer_should_read():
@@ -237,10 +233,10 @@ def test_biases_are_found_and_cost_nothing():
     turn = np.array([0.0, 0.02, 0.0])
     biased = replace(flight, gyro=flight.gyro + turn, accelerometer=flight.accelerometer - 0.1)
     f, g = (fly(started(each, tuning), each, 1200) for each in (biased, flight))
-    assert np.all(abs(f.gyro_bias - turn) < 4 * f.gyro_bias_std)
-    assert np.all(abs(f.accelerometer_bias + 0.1) < 4 * f.accelerometer_bias_std)
-    assert np.all(f.gyro_bias_std < 0.002)
-    assert np.all(f.accelerometer_bias_std < 0.02)
+    assert (abs(f.gyro_bias - turn) < 4 * f.gyro_bias_std).all()
+    assert (abs(f.accelerometer_bias + 0.1) < 4 * f.accelerometer_bias_std).all()
+    assert (f.gyro_bias_std < 0.002).all()
+    assert (f.accelerometer_bias_std < 0.02).all()
     assert_allclose(f.estimate.force, g.estimate.force, atol=0.003)
 
 
@@ -252,7 +248,7 @@ def test_the_first_gyro_sample_has_a_bias_whenever_it_comes(posed):
     f.reset(*pose)
     f.step(np.full(4, VEHICLE.hover_rate), *(pose if posed else (None, None)))
     e = f.correct_imu(np.zeros(3), None)
-    assert np.all(np.sqrt(np.diag(e.covariance)[3:6]) > 0.09)
+    assert (np.sqrt(np.diag(e.covariance)[3:6]) > 0.09).all()
 
 
 def test_an_accelerometer_says_nothing_while_the_rotors_are_unknown():
@@ -304,7 +300,7 @@ def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
 def test_a_flight_that_begins_anew_has_the_prior_of_the_biases(begun):
     flight = drawn(100)
     f = fly(started(flight), flight, 100)
-    assert np.all(f.gyro_bias_std < 0.1)
+    assert (f.gyro_bias_std < 0.1).all()
     if begun == "by a reset":
         f.reset([0, 0, 1], [1, 0, 0, 0])
         assert f.imu_refused == 0
@@ -336,14 +332,14 @@ def test_the_gate_keeps_faults_of_an_imu_out(shaking, constant):
         for k in range(500):
             fly(f, seen, 1, after=k)
             if k >= 200:
-                worst = max(worst, np.max(abs(f.estimate.force - flight.force[k])))
+                worst = max(worst, abs(f.estimate.force - flight.force[k]).max())
         errors.append(worst)
     assert gated.imu_refused > 90
     assert open_.imu_refused == 0
     assert errors[0] < 2.0 * errors[2]
     assert errors[1] > 5.0 * errors[2]
     deviation = np.sqrt(np.diagonal(gated.covariance)[15:18])
-    assert np.all(abs(gated.estimate.force - flight.force[-1]) < 5 * deviation)
+    assert (abs(gated.estimate.force - flight.force[-1]) < 5 * deviation).all()
 
 
 def test_a_gate_leaves_the_gyro_in_where_the_accelerometer_saturates():

@@ -8,14 +8,15 @@ from numpy.linalg import norm, slogdet
 from numpy.random import default_rng
 
 from tests.support.model_flights import WITH_EFFECTS, simulate_model
-from windwrench.dynamics import InputError, load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import InputError
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band
 from windwrench.estimator.innovations import innovations, pieces_of
 from windwrench.estimator.noise_fit import NoiseFitSettings, consistency_of, fit_noise
 from windwrench.estimator.rise_time import rise_times
 
-VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005
 # white noise as large as the default, walks faster, and no two axes and sensors in proportion
 TRUE = UKFTuning(
@@ -36,8 +37,7 @@ def flight(tuning=TRUE, seconds=20.0, seed=0, vehicle=VEHICLE, whole=False):
     Its rotor speeds hold over a step where the fit takes the mean of two rows; with a rate loop of
     5 / s the difference is about 1 % of one step's motor torque noise.
     """
-    steps = round(seconds / PERIOD)
-    speeds = np.full((steps, 4), vehicle.hover_rate)
+    speeds = np.full((round(seconds / PERIOD), 4), vehicle.hover_rate)
     run = simulate_model(vehicle, tuning, speeds, PERIOD, seed, rate_gain=5.0)
     return (run.log(), run) if whole else run.log()
 
@@ -57,12 +57,12 @@ def fits():
 def test_known_noise_is_found_back_within_its_uncertainty(fits):
     """Over three flights the eight errors in their own deviations are like 24 normal numbers."""
     errors = np.array([(logarithms(fit.tuning) - logarithms(TRUE)) / fit.deviation for fit in fits])
-    assert np.all(np.abs(errors) < 3.5)
-    assert 0.5 < np.sqrt(np.mean(errors**2)) < 1.5
+    assert (np.abs(errors) < 3.5).all()
+    assert 0.5 < rms(errors) < 1.5
     # and that is not little said: pose noise is known to 2 %, walks to 40 %
     for fit in fits:
-        assert np.all(fit.deviation[6:] < 0.02)
-        assert np.all(fit.deviation[:4] < 0.4)
+        assert (fit.deviation[6:] < 0.02).all()
+        assert (fit.deviation[:4] < 0.4).all()
 
 
 def test_nis_is_in_its_band_after_the_fit_and_not_before(fits):
@@ -110,9 +110,9 @@ def test_bounds_hold_where_there_is_no_noise_to_find():
     use = NoiseFitSettings()
     log, truth = flight(quiet, seconds=4.0, whole=True)
     fit = fit_noise(VEHICLE, *log)
-    assert np.all(np.asarray(fit.tuning.position_noise) >= use.position[0] * (1 - 1e-9))
-    assert np.all(np.asarray(fit.tuning.attitude_noise) >= use.attitude[0] * (1 - 1e-9))
-    assert np.all(np.asarray(fit.tuning.thrust_noise) >= use.white[0] * VEHICLE.weight * (1 - 1e-9))
+    assert (np.asarray(fit.tuning.position_noise) >= use.position[0] * (1 - 1e-9)).all()
+    assert (np.asarray(fit.tuning.attitude_noise) >= use.attitude[0] * (1 - 1e-9)).all()
+    assert (np.asarray(fit.tuning.thrust_noise) >= use.white[0] * VEHICLE.weight * (1 - 1e-9)).all()
     assert np.isnan(fit.deviation[6:]).all()
     estimate = truth.fly(WrenchUKF(VEHICLE, fit.tuning, PERIOD))[-1]
     assert np.isfinite(estimate.covariance).all()
@@ -134,7 +134,7 @@ def test_lost_held_and_wild_poses_change_little(fits):
     spoiled = fit_noise(VEHICLE, t, speeds, position, quaternion)
     assert 25 <= spoiled.outliers <= 60
     apart = (logarithms(spoiled.tuning) - logarithms(clean.tuning)) / clean.deviation
-    assert np.all(np.abs(apart) < 2.0)
+    assert (np.abs(apart) < 2.0).all()
     low, high = chi2_band(6, spoiled.after.poses)
     assert low <= spoiled.after.nis <= high
 
@@ -160,7 +160,7 @@ def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
     log = flight(seconds=30.0)
     fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=2000))
     assert fit.after.poses == len(log[0]) - 200  # figures are those of the whole log
-    assert np.all(abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation)
+    assert (abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation).all()
 
 
 def test_declared_effects_are_part_of_the_model():

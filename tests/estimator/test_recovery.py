@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 
 from tests.support.exported_c.hostile import KINDS, befall
 from tests.support.parameters import mostly_slow
+from tests.support.sizes import rms
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.rotation import quaternion_multiply
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
@@ -117,7 +118,7 @@ class Flight:
         assert estimate.status == "tracking"
         wrench = np.concatenate([estimate.torque, estimate.force])
         wrench[5] -= FORCE * self.vehicle.weight
-        assert np.all(np.abs(wrench) < 3.0 * np.sqrt(np.diag(estimate.covariance)[12:18]))
+        assert (np.abs(wrench) < 3.0 * np.sqrt(np.diag(estimate.covariance)[12:18])).all()
 
 
 # what happens, for how many samples, how large (1 mm to 1 km), and a seed
@@ -230,7 +231,7 @@ def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
             break
     assert 295 <= len(said) <= 305
     assert set(said[:-1]) == {"rejected"}
-    assert np.all(e.std[6:9] > 0.1)
+    assert (e.std[6:9] > 0.1).all()
 
 
 def test_what_is_claimed_widens_while_poses_are_refused():
@@ -242,7 +243,7 @@ def test_what_is_claimed_widens_while_poses_are_refused():
         said.append(flight.feed(flight.speeds, away, STILL, 0.005))
     forces = np.array([e.std_force[0] for e in said])
     assert {e.status for e in said} == {"rejected"}
-    assert np.all(np.diff(forces) > 0.0)
+    assert (np.diff(forces) > 0.0).all()
     assert forces[-1] == pytest.approx(0.5 * flight.vehicle.weight, rel=0.1)
     assert said[-1].std[6] == pytest.approx(3.0, rel=0.1)
     assert flight.estimator.dead_reckoning == pytest.approx(0.5)
@@ -326,8 +327,7 @@ def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
     have jumped then, until they have lasted. Attitudes without a position come between them.
     """
     vehicle = VEHICLES["ardrone2"]
-    rng = default_rng(0)
-    position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((700, 3))
+    position = [0.0, 0.0, HEIGHT] + 0.001 * default_rng(0).standard_normal((700, 3))
     position[400] += [0.29, -0.29, 0.29]
     poses = [(None if k > 400 and k % 25 == 0 else x, STILL) for k, x in enumerate(position)]
     poses[300:400] = [(None, None)] * 100
@@ -338,7 +338,7 @@ def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
     assert status[425] == "tracking"
     assert status[426] == "rejected"
     assert said[-1].restarts == 1
-    assert np.all(np.abs([e.force for e in said[601:]]) < 0.03 * vehicle.weight)
+    assert (np.abs([e.force for e in said[601:]]) < 0.03 * vehicle.weight).all()
 
 
 def test_a_doubted_wrench_may_be_none_at_all():
@@ -428,10 +428,9 @@ def test_noise_of_poses_is_learned_of_attitude_and_position_apart(kind, noise):
     said = list(noisy_hover(kind, "ardrone2", 0.005, None, noise, 4.0))
     scales = np.median([e.noise_scales for e in said[400:]], axis=0)
     assert_allclose(scales, noise, rtol=0.08)
-    assert said[-1].noise_scale == pytest.approx(np.sqrt(np.mean(np.square(noise))), rel=0.15)
+    assert said[-1].noise_scale == pytest.approx(rms(noise), rel=0.15)
     assert said[-1].restarts == 0
-    force = np.array([e.force / e.std_force for e in said[400:]])
-    assert np.sqrt(np.mean(np.square(force))) < 1.0
+    assert rms(np.array([e.force / e.std_force for e in said[400:]])) < 1.0
 
 
 def test_the_declared_noise_holds_until_poses_refute_it():
@@ -455,7 +454,7 @@ def test_a_restart_does_not_bring_the_next(kind, gate):
     said = list(noisy_hover(kind, "crazyflie", 0.005, gate, (2.0, 2.0), 7.0, lost=(2.0, 3.0)))
     assert said[-1].restarts <= 2
     force = np.array([e.force for e in said[1000:]])
-    assert np.sqrt(np.mean(np.sum(np.square(force), axis=1))) < 0.05 * VEHICLES["crazyflie"].weight
+    assert np.sqrt(np.mean(np.square(force).sum(axis=1))) < 0.05 * VEHICLES["crazyflie"].weight
 
 
 def test_a_gust_is_no_noise():

@@ -10,14 +10,13 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
-from windwrench.dynamics import load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
 from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning, rauch_tung_striebel, smoother
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.row_steps import steps_between
 from windwrench.estimator.smoother import RecordingUKF
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 def model_log(steps, seed=1):
@@ -86,7 +85,7 @@ def test_nothing_is_smoothed_across_a_restart():
     moved[250:] += [100.0, 0, 0]
     jump = smooth(t, speeds, moved, q, restarted=[250])
     assert np.array_equal(jump.state[:250], whole.state[:250], equal_nan=True)
-    assert np.sqrt(np.mean(np.square(jump.force - whole.force))) < 1e-9
+    assert rms(jump.force - whole.force) < 1e-9
     # of itself, without a gate, the filter restarts at a pose that jumps
     alone = smooth(t, speeds, moved, q)
     assert np.array_equal(np.flatnonzero(np.diff(alone.restarts)), [249])
@@ -158,5 +157,4 @@ def test_covariances_stay_positive_definite_whatever_was_flown(seed):
     found = smooth(t, speeds, x, q, covariance=True)
     assert np.isfinite(found.state[:, :19]).all()
     scale = 1.0 / found.std
-    eigenvalues = eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :])
-    assert eigenvalues.min() > 0
+    assert eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :]).min() > 0

@@ -20,7 +20,8 @@ from tests.support.reference_filters import (
     initial_covariance,
     rotor_effects,
 )
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.filter_record import drive, propagate
@@ -29,7 +30,6 @@ from windwrench.estimator.reference import difference, displaced
 from windwrench.estimator.smoother import RecordingUKF
 from windwrench.runtime.compiled import compiled
 
-VEHICLE = load_vehicle("ardrone2")
 OFFSET = EffectSetting("com_offset", {"cx": 0.01, "cy": -0.006, "cz": 0.02})
 DRAG = EffectSetting("rotor_drag", {"kdx": 1.5e-4, "kdy": 1.5e-4})
 GROUND = EffectSetting("ground_effect", {"rho": 3.0})

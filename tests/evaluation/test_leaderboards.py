@@ -98,8 +98,7 @@ def test_the_number_of_processes_changes_nothing(flown, tmp_path):
     own = f"{tmp_path / 'laws.py'}:Still"
     advanced = []
     (tmp_path / "laws.py").write_text(OWN)
-    laws = ["ratio", own]
-    request = Request(tuple(laws), ("base",), EPISODES, SEED, "FanTracking2D")
+    request = Request(("ratio", own), ("base",), EPISODES, SEED, "FanTracking2D")
     split = fly_all(request, 2, advanced.append)
     assert sum(advanced) == request.flights() == 10
     assert set(split) == {*results, (own, "base")}
@@ -156,8 +155,7 @@ def test_the_first_seconds_do_not_rank_and_the_rest_of_a_lost_episode_counts():
 
 
 def test_the_activity_is_that_of_the_reward_and_the_bound_is_seen():
-    known = TASKS["WindHover"]
-    env = known.make("base")
+    env = TASKS["WindHover"].make("base")
     rng = default_rng(1)
     terms = []
 
@@ -167,7 +165,7 @@ def test_the_activity_is_that_of_the_reward_and_the_bound_is_seen():
     flown = fly_episode(env, shaken, 5, lambda info: terms.append(info["reward_change"]), 60)
     cost = 0.002 * env.largest_action**2  # CHANGE_COST in m/s2
     assert -np.mean(terms) / cost == pytest.approx(flown.command_activity, rel=1e-6)
-    assert flown.saturated_fraction == pytest.approx(np.mean(np.abs(flown.action).max(1) == 1.0))
+    assert flown.saturated_fraction == pytest.approx(np.mean(abs(flown.action).max(1) == 1.0))
     assert 0.1 < flown.saturated_fraction < 0.5
 
 

@@ -170,8 +170,7 @@ def test_registered_laws_and_scenarios_and_a_law_with_gains(tmp_path, monkeypatc
     Request(("me/gentle",), ("me/calm",), 1, 0, "WindHover").check()
     stiff = written(tmp_path, "stiff.yaml", "law: pid\ngains: {kp: 12.5}\n")
     law = make_pilot(stiff, "WindHover")
-    tuned = make_pilot("pid", "WindHover")
-    assert (law.kp, law.ki) == (12.5, tuned.ki)
+    assert (law.kp, law.ki) == (12.5, make_pilot("pid", "WindHover").ki)
     wrong = {"law: pid\ngains: {kq: 1}\n": "unknown gain 'kq'", "law: pod\n": "unknown law 'pod'"}
     for text, words in wrong.items():
         with pytest.raises(InputError, match=rf"wrong\.yaml.*{words}"):

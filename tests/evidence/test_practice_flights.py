@@ -9,7 +9,9 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.paths import ROOT
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import check_setting, get, names
 from windwrench.evidence.trials.outsiders import HELD_BACK, OUTSIDERS
 from windwrench.evidence.trials.practice_flights import SIZES, draw_effect, fly_practice
@@ -17,7 +19,6 @@ from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
 
-VEHICLE = load_vehicle("ardrone2")
 WEIGHT = VEHICLE.weight
 ARM = VEHICLE.arm_l
 LARGEST = 0.3  # parts of weight (times the arm, for torque) that a disturbance reaches in flight
@@ -53,7 +54,7 @@ def disturbed(name):
 
 def spread(truth):
     """Root mean square of each component of a wrench."""
-    return np.sqrt(np.mean(truth**2, axis=0))
+    return rms(truth, axis=0)
 
 
 @pytest.mark.parametrize("name", DISTURBANCES)

@@ -6,6 +6,7 @@ from numpy.linalg import norm
 from numpy.random import default_rng
 from scipy.spatial.transform import Rotation
 
+from tests.support.sizes import rms
 from windwrench.evidence.recovery import (
     EVENTS,
     FILTERS,
@@ -56,7 +57,7 @@ def test_poses_are_as_noisy_as_said(noise):
     turns = (attitude * flight.attitude.inv()).as_rotvec() / flight.vehicle.mocap.sigma_att_rad
     off = (position - flight.position) / flight.vehicle.mocap.sigma_pos_m
     for values in (turns, off):
-        assert np.sqrt(np.mean(values**2)) == pytest.approx(SIZES[noise], rel=0.1)
+        assert rms(values) == pytest.approx(SIZES[noise], rel=0.1)
 
 
 def test_what_happens_to_poses_happens_to_them_alone():
@@ -69,7 +70,7 @@ def test_what_happens_to_poses_happens_to_them_alone():
         turns = Rotation.from_quat(np.nan_to_num(quaternion, nan=1.0), scalar_first=True)
         tilt = (turns * flight.attitude.inv()).magnitude()
         others = np.r_[0:100, 200:300]
-        assert np.all(np.isnan(away[during]) == (event == "gap"))
+        assert (np.isnan(away[during]) == (event == "gap")).all()
         assert np.nanmax(away[during], initial=0.0) == pytest.approx(0.5 * (event == "jump"))
         assert away[others].max() == pytest.approx(0.5 * (event == "jump"))
         assert tilt[others].max() < 1e-6

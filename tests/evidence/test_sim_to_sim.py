@@ -73,7 +73,7 @@ def test_a_simulator_obeys_its_published_vehicle(name):
         for _ in range(4):
             velocity, speeds = peer.step(command, np.zeros(6))[1:]
         assert speeds.argmax() == command.argmax()
-        assert np.all(np.sign(velocity[3:]) == np.sign(vehicle.rotor_wrench(command)[1:]))
+        assert (np.sign(velocity[3:]) == np.sign(vehicle.rotor_wrench(command)[1:])).all()
 
 
 def test_clear_pairs_that_turn_round_are_counted():

@@ -153,8 +153,7 @@ def _log(path, reader=None, vehicle="ardrone2"):
     """Read a log, and estimate the wrench on it where it is short."""
     log = read_log(path, reader, _vehicle(vehicle))
     if len(log.t) <= _LONGEST and log.has_pose and log.has_rotor_speeds:
-        series = estimate_log(log, _vehicle(vehicle))
-        assert np.isfinite(series.force).all()
+        assert np.isfinite(estimate_log(log, _vehicle(vehicle)).force).all()
 
 
 _MAP = (
@@ -173,8 +172,7 @@ def _use_map(path):
 
 
 def _foreign_table():
-    text = _own_log("log.csv").decode()
-    head, _, rest = text.partition("\n")
+    head, _, rest = _own_log("log.csv").decode().partition("\n")
     head = head.replace("omega", "rpm").replace("px", "x").replace("py", "y").replace("pz", "z")
     return f"{head}\n{rest}".encode()
 
@@ -194,8 +192,7 @@ def _folder_bag(path):
 def _use_vehicle(path):
     """Load a vehicle, write it and read it back, and let a filter know it."""
     vehicle = load_vehicle(path)
-    again = parse_vehicle(dump_vehicle(vehicle))
-    assert dump_vehicle(again) == dump_vehicle(vehicle)
+    assert dump_vehicle(parse_vehicle(dump_vehicle(vehicle))) == dump_vehicle(vehicle)
     ukf = WrenchUKF(vehicle, UKFTuning.for_vehicle(vehicle))
     ukf.reset([0, 0, 1], [1, 0, 0, 0])
     ukf.step(np.full(4, min(vehicle.hover_rate, vehicle.omega_max)), [0, 0, 1], [1, 0, 0, 0])
@@ -232,8 +229,7 @@ def _use_policy(path):
         card = json.loads(path.with_suffix(".json").read_bytes())
         card["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
         path.with_suffix(".json").write_text(json.dumps(card), encoding="utf-8")
-    command = load_policy(path)(np.zeros(8), {})
-    assert command.shape == (1,)
+    assert load_policy(path)(np.zeros(8), {}).shape == (1,)
 
 
 def _vehicle_with_effects():

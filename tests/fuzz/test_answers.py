@@ -11,6 +11,7 @@ import pytest
 from numpy.random import default_rng
 
 from tests.support.flown import VEHICLE, recorded
+from tests.support.sizes import rms
 from windwrench.dynamics import InputError
 from windwrench.dynamics.effects import parse_setting
 from windwrench.identification.logs.flight_log import with_rows
@@ -96,7 +97,7 @@ def is_same(series, unspoiled):
     ):
         there = [np.interp(t[compared], unspoiled.t, column) for column in expected.T]
         error = found[compared] - np.column_stack(there)
-        if np.sqrt(np.mean(error**2)) > SAME * scale:
+        if rms(error) > SAME * scale:
             return False
     return True
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded, resting, settings, without_pose
 from tests.support.imu_flights import imu_flight
+from tests.support.sizes import rms
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.plant import PlantSettings
 from windwrench.identification import predict
@@ -46,7 +47,7 @@ def residual_rms(log):
     for signals in log_signals(log):
         edge = round(0.6 / signals.period)
         pieces.append(low_pass(residual_wrench(signals, VEHICLE), 4.0, signals.period)[edge:-edge])
-    return np.sqrt(np.mean(np.concatenate(pieces) ** 2, axis=0))
+    return rms(np.concatenate(pieces), axis=0)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +125,7 @@ def test_predictions_start_where_a_whole_horizon_follows(clean):
     inside = (made.start > 200) & (ends < 1900)
     off = made.position[inside, -1] - log.position[ends[inside]]
     assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 0.02  # the pose's noise is 0.005 m an axis
-    turned = np.abs(np.sum(made.quaternion[inside, -1] * log.quaternion[ends[inside]], axis=1))
+    turned = abs(np.sum(made.quaternion[inside, -1] * log.quaternion[ends[inside]], axis=1))
     assert 2 * np.degrees(np.arccos(np.minimum(turned, 1.0))).mean() < 2.0
     ahead = made.position[:, 1:] - made.position[:, :-1]
     assert_allclose(ahead, 0.005 * made.velocity[:, 1:], atol=2e-3)
@@ -177,8 +178,7 @@ def test_a_state_is_taken_as_it_is():
     """Without thrust, and about a principal axis, what follows is known exactly."""
     rng = default_rng(0)
     n = 400
-    period = 0.01
-    t = period * np.arange(n) + rng.uniform(-1e-4, 1e-4, n)
+    t = 0.01 * np.arange(n) + rng.uniform(-1e-4, 1e-4, n)
     log = resting(t, rotor_speeds=np.zeros((n, 4)), name="falling")
     state = rng.normal(size=(n, 13))
     state[:, 3:7] /= norm(state[:, 3:7], axis=1)[:, None]
@@ -261,8 +261,8 @@ def test_a_turn_at_one_rate_is_no_change():
     turned = np.column_stack([np.cos(half), 0.0 * t, 0.0 * t, np.sin(half)])
     log = resting(t, position=np.outer(t, [1.0, -0.5, 0.2]), quaternion=turned)
     found = prediction_errors([log], VEHICLE)
-    assert np.all(found.still < 2e-3)
-    assert np.all(found.model < 2e-3)
+    assert (found.still < 2e-3).all()
+    assert (found.model < 2e-3).all()
     with pytest.raises(InputError, match=r"flight: expected a pose, unbroken for 4 s"):
         prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [[(0.0, 2.0)]])
 
@@ -274,4 +274,4 @@ def test_models_are_compared_from_the_same_starts(clean):
     kept = prediction_errors([clean], heavy, start_by=VEHICLE)
     assert_array_equal(kept.still, own.still)
     assert kept.model[3] == pytest.approx(own.still[3], rel=1e-3)
-    assert np.all(own.model[:, -1] < kept.model[:, -1])
+    assert (own.model[:, -1] < kept.model[:, -1]).all()

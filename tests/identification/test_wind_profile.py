@@ -7,9 +7,9 @@ import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
+from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Admittance
 from windwrench.controllers.briefing import FilterNoise
-from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.envs.fan import Fan
 from windwrench.evidence.profiled_fans import follows, make_env, recorded, true_profile
 from windwrench.identification.jet_design import (
@@ -24,7 +24,6 @@ from windwrench.identification.jet_design import (
 from windwrench.identification.profile_law import profile_log
 from windwrench.identification.wind_profile import _curve
 
-VEHICLE = load_vehicle("ardrone2")
 # neither strength nor radius nor distance of the kit's own fan
 FAN = Fan(speed=4.6, radius=0.37)
 DISTANCE = 2.05
@@ -44,7 +43,7 @@ def test_the_intervals_of_a_sweep_hold_the_jet(swept):
     assert inside[0] > 0.7
     assert inside[5] > 0.8
     # and they are narrow: a third of the largest torque at most, in the jet
-    jet = np.abs(p.place) < 0.8
+    jet = abs(p.place) < 0.8
     assert np.max((p.high - p.low)[5, jet]) < true[5].max() / 1.5
     assert p.direction == pytest.approx(np.pi / 2, abs=0.03)
     assert p.beside == pytest.approx(DISTANCE, abs=0.05)
@@ -121,8 +120,7 @@ def test_a_jet_has_its_places():
     assert shape.axis == pytest.approx(0.0, abs=1e-6)
     assert_allclose(shape.peaks, (-0.46, 0.46), atol=0.011)
     assert shape.weaker == pytest.approx(0.03, rel=1e-3)
-    fifth = np.interp(np.abs(shape.edges), PLACE, JET) / 0.03
-    assert_allclose(fifth, 0.2, atol=0.02)
+    assert_allclose(np.interp(abs(shape.edges), PLACE, JET) / 0.03, 0.2, atol=0.02)
     assert shape.slope == pytest.approx(0.1, rel=0.1)
 
 
@@ -152,4 +150,4 @@ def test_margins_tell_where_the_loop_begins_to_swing():
     margin, delay = loop.margins(1.5)
     crossed = _OMEGA[np.flatnonzero(abs(1.5 * loop.response) >= 1.0)[-1]]
     assert margin == pytest.approx(delay * crossed)
-    assert np.all(np.diff(RISE_TIMES) > 0.0)
+    assert (np.diff(RISE_TIMES) > 0.0).all()

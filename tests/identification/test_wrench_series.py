@@ -15,7 +15,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from tests.support.flown import without_pose
 from tests.support.imu_flights import imu_flight, pose_removed
-from windwrench.dynamics import InputError, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import InputError
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.estimator import WrenchUKF
 from windwrench.estimator.row_steps import steps_between
@@ -38,7 +39,6 @@ from windwrench.identification.wrench_series import (
 )
 from windwrench.identification.wrench_track import write_mcap
 
-VEHICLE = load_vehicle("ardrone2")
 WRENCH = [f"{kind}{axis}" for kind in "ft" for axis in "xyz"]
 HEADER = ["t", *WRENCH, *(f"std_{name}" for name in WRENCH), "nis", "status"]
 
@@ -132,7 +132,7 @@ def test_a_gap_widens_the_band_and_is_bridged():
     t = 0.005 * np.arange(2000)
     t[1000:] += 1.0
     series = estimate_log(held_flight(t), VEHICLE)
-    assert np.all(series.std[1000, 15:] > 1.05 * series.std[999, 15:])
+    assert (series.std[1000, 15:] > 1.05 * series.std[999, 15:]).all()
     # at its default noise the filter has lost the attitude in a second
     assert (series.restarts[-1], series.status[1000]) == (1, "restarted")
     assert "the filter restarted at t = 6 s: after a gap" in series.notes[0]
@@ -151,10 +151,9 @@ def test_wild_poses_are_refused_and_said(smooth):
     assert "6 of 1200 poses jump from those before and were refused" in series.notes[-1]
     assert counts(series)["rejected"] == 6
     clean = estimate_log(log, VEHICLE, smooth=smooth)
-    assert np.max(abs(series.force - clean.force)) < 0.03
+    assert abs(series.force - clean.force).max() < 0.03
     # no gate: each of them, and each way back, is a jump for good
-    trusting = estimate_log(spoiled, VEHICLE, gate=None)
-    assert trusting.restarts[-1] >= 6
+    assert estimate_log(spoiled, VEHICLE, gate=None).restarts[-1] >= 6
 
 
 def test_smoothing_is_the_filters_nis_with_a_narrower_band():
@@ -326,8 +325,7 @@ def test_the_force_is_the_posterior_of_a_walk():
     y = np.cumsum(np.sqrt(walk) * rng.standard_normal(n)) + rng.standard_normal(n)
     found, std = _two_sided(y[:, None], np.zeros((n, 1, 1)), np.eye(1), np.diag([walk]), variance)
     between = np.diff(np.eye(n), axis=0)
-    precision = np.eye(n) / variance + between.T @ between / walk
-    covariance = inv(precision)
+    covariance = inv(np.eye(n) / variance + between.T @ between / walk)
     inner = slice(150, 250)
     assert_allclose(found[inner, 0, 0], (covariance @ y / variance)[inner], atol=1e-5)
     assert std[0] == pytest.approx(np.sqrt(covariance[200, 200]), rel=1e-4)

@@ -12,6 +12,7 @@ from unittest import mock
 import numpy as np
 
 from tests.support.programs import until
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
@@ -22,7 +23,6 @@ from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 from windwrench.runtime.errors import InputError
 
-VEHICLE = load_vehicle("ardrone2")
 NED = np.array([1.0, -1.0, -1.0])
 HALF = np.array([1.0, 1.0, -1.0, -1.0])
 MOTORS = [3, 1, 0, 2]  # the kit's rotors that are PX4's motors 1 to 4

@@ -18,6 +18,7 @@ from tests.live.stream import (
     send_odometry,
     send_rotors,
 )
+from tests.support.sizes import rms
 from windwrench.live.clock_line import ClockLine
 from windwrench.live.messages import SECOND
 from windwrench.live.sources.open import make_source
@@ -116,7 +117,7 @@ def error_of(live, after=4.0):
     force = live.wrench()[:, 1:4]
     truth = [np.interp(t - t[0], flight()["t"], part) for part in flight()["force"].T]
     wrong = force - np.transpose(truth)
-    return float(np.sqrt(np.mean(np.square(wrong[t - t[0] > after]))))
+    return float(rms(wrong[t - t[0] > after]))
 
 
 SENDERS = [
@@ -281,6 +282,5 @@ def test_the_line_of_a_clock_is_below_its_messages(rate):
         assert line.delay(arrival, stamp) >= 0.0
     assert line.rate == pytest.approx(rate, rel=5e-3)
     assert line.mean_rate == pytest.approx(rate, rel=1e-3)
-    least = 1e-9 * line.arrival_of(stamp) - t
-    assert least == pytest.approx(0.005, abs=0.003)
+    assert 1e-9 * line.arrival_of(stamp) - t == pytest.approx(0.005, abs=0.003)
     assert line.stamp_of(line.arrival_of(stamp)) == pytest.approx(stamp, abs=10)

@@ -29,6 +29,7 @@ from tests.support.exported_c.flights import FLIGHTS, flight, vehicle_of
 from tests.support.exported_c.hostile import PERIOD, hostile
 from tests.support.paths import ROOT
 from tests.support.synthetic_wrench import TICKS, observations
+from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Tracker
 from windwrench.controllers.observation import FORCE_X, TORQUE_Z, VELOCITY_Y
 from windwrench.controllers.trained_policy import load_policy
@@ -87,7 +88,7 @@ def test_c_and_python_agree_along_a_flight_with_faults(estimator, name, gate, im
         e = c.estimate
         for name in ("gyro_bias", "accelerometer_bias"):
             difference = abs(np.array(getattr(e, name)) - getattr(python, name))
-            assert np.all(difference < LARGEST * getattr(python, f"{name}_std"))
+            assert (difference < LARGEST * getattr(python, f"{name}_std")).all()
         assert e.imu_refused == python.imu_refused > 0
 
 
@@ -141,15 +142,14 @@ def test_c_and_python_agree_along_hostile_sequences(
     estimator, gate, imu, precision, seeds, tmp_path
 ):
     """Statuses and counts of restarts at every step, estimates and deviations within rounding."""
-    vehicle = load_vehicle("ardrone2")
-    exported = export_c(vehicle, estimator, rate=1.0 / PERIOD, gate=gate, precision=precision)
+    exported = export_c(VEHICLE, estimator, rate=1.0 / PERIOD, gate=gate, precision=precision)
     if precision == "double":
         code = re.sub(r"/\*.*?\*/", "", exported.files["windwrench_filter.c"], flags=re.S)
         assert not re.search(r"\bfloat\b|[0-9.][fF]\b|sqrtf", code)
     c = CompiledFilter(exported, tmp_path)
     restarts = 0.0
     for seed in seeds:
-        flown = hostile(vehicle, seed)
+        flown = hostile(VEHICLE, seed)
         if not imu:
             del flown["gyro"], flown["accelerometer"]
         worst = compare(c, exported.filter, flown)
@@ -185,9 +185,8 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
     optimises is an error wherever ``CompiledFilter`` compiles.
     """
     compiler = "gcc" if missing("clang") else "clang"
-    model = load_vehicle("ardrone2")
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
-    model = declaring(model, *effects)
+    model = declaring(VEHICLE, *effects)
     few = model.with_effects(model.effects[0])
     names = {"ukf": ("tracker", "sac-0"), "constant-gain": ("lead",)}
     for name in names[estimator]:
@@ -202,7 +201,7 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
 
 def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     needs("nm")
-    model = declaring(load_vehicle("ardrone2"), *exportable_effects())
+    model = declaring(VEHICLE, *exportable_effects())
     allowed = {*(f"{name}f" for name in FUNCTIONS), "memcpy", "memset"}
     folder = write(export_c(model, policy=exportable_policy("sac-0")), tmp_path)
     # a compiler that optimises may make one call of two (sincosf), or none
@@ -220,8 +219,7 @@ def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     ],
 )
 def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, steps, tmp_path):
-    model = declaring(load_vehicle("ardrone2"), "rotor_drag", "motor_lag")
-    exported = export_c(model, estimator)
+    exported = export_c(declaring(VEHICLE, "rotor_drag", "motor_lag"), estimator)
     write(exported, tmp_path)
     shutil.copy(ROOT / "tests/support/exported_c/faults.c", tmp_path)
     speed = float(exported.filter.record[0]["last_speeds"][0])
@@ -239,7 +237,7 @@ def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, steps, 
 
 
 def test_effects_in_c_are_those_in_python(tmp_path):
-    model = replace(load_vehicle("ardrone2"), ceiling_z=3.0)
+    model = replace(VEHICLE, ceiling_z=3.0)
     names = [n for n in exportable_effects() if get(n).kind != "body"]
     assert {"rotor_drag", "body_drag", "inflow_thrust", "motor_lag", "ground_effect"} <= set(names)
     model = declaring(model, *names)
@@ -276,8 +274,8 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             effect.model.ctypes(*pointers)
             getattr(library, f"effect_{name}")(*(ctypes.c_void_p(x.ctypes.data) for x in given))
             which = 3 if effect.kind == "wrench" else 2
-            assert np.any(double[which] != 0.0), name
-            scale = np.abs(double[which]).max()
+            assert (double[which] != 0.0).any(), name
+            scale = abs(double[which]).max()
             assert_allclose(given[which], double[which], rtol=0, atol=1e-5 * scale)
 
 
@@ -293,8 +291,7 @@ def commands(c, seen):
 
 
 def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
-    policy = exportable_policy("sac-0")
-    c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
+    c = CompiledFilter(export_c(VEHICLE, policy=exportable_policy("sac-0")), tmp_path)
     python = load_policy(POLICY)
     rng = default_rng(0)
     force = rng.normal(0.3, 0.3, (50, 3))
@@ -307,8 +304,7 @@ def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
 
 
 def test_the_law_with_lead(tmp_path):
-    policy = exportable_policy("lead")
-    c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
+    c = CompiledFilter(export_c(VEHICLE, policy=exportable_policy("lead")), tmp_path)
     seen = np.zeros((5, 8))
     seen[:, TORQUE_Z] = torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
     seen[:, FORCE_X] = force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
@@ -357,18 +353,17 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
             parts = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
             mine = np.concatenate([getattr(e, name) for name in parts])
             assert board.status[k - 1] == e.status
-            assert np.all(abs(board.estimates[k - 1] - mine) < LARGEST * std)
+            assert (abs(board.estimates[k - 1] - mine) < LARGEST * std).all()
 
 
 def test_names_cannot_end_the_comment_that_holds_them(tmp_path):
-    model = replace(load_vehicle("ardrone2"), name="a*/ #error \n\\ b")
+    model = replace(VEHICLE, name="a*/ #error \n\\ b")
     exported, again = (export_c(model, command="windwrench */\n#error") for _ in range(2))
     assert exported.files == again.files  # the same bytes
     folder = write(exported, tmp_path)
     run("gcc", *STRICT, "-fsyntax-only", "windwrench_filter.c", cwd=folder)
 
 
-VEHICLE = load_vehicle("ardrone2")
 BRIEFING = briefing_of(VEHICLE, UKFTuning.for_vehicle(VEHICLE, 0.005, 0.45), 0.005)
 SEEDS = (2463534242, 1013904223, 362436069, 521288629, 88675123)
 
@@ -430,8 +425,7 @@ def c(tmp_path_factory):
 def fans(count, decisions, rng):
     t = 0.005 * np.arange(decisions * TICKS)
     start = rng.uniform(-0.3, 0.3, (count, 1))
-    speed = rng.uniform(0.05, 0.35, (count, 1))
-    return start + 0.8 * np.sin(speed / 0.8 * t)
+    return start + 0.8 * np.sin(rng.uniform(0.05, 0.35, (count, 1)) / 0.8 * t)
 
 
 def test_given_the_same_random_numbers_it_commands_the_same(c):

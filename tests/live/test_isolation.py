@@ -73,8 +73,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_estimates(tmp_path, size, ou
     assert f"the recording {path}: File too large; {rows} rows" in line
     assert path.exists() == bool(rows)
     if rows:
-        log = read_log(path)
-        assert_allclose(log.t, 0.005 * np.arange(rows))
+        assert_allclose(read_log(path).t, 0.005 * np.arange(rows))
 
 
 def test_a_disk_that_stalls_costs_rows_and_no_estimate(tmp_path, monkeypatch, outputs):

@@ -92,8 +92,7 @@ def test_bad_lines_are_counted_wherever_they_stand(bad):
         lines[k] = lines[k][:20]
     stream = run_text("\n\n".join(lines))  # empty lines are none
     assert not stream.failed
-    found = stream.tallies.counts
-    assert found["malformed"] == len(bad)
+    assert stream.tallies.counts["malformed"] == len(bad)
     assert len(stream.outputs) == len(flight()["t"]) - len(bad)
     said = stream.tallies.news()
     assert len(said) == len(bad)
@@ -189,8 +188,7 @@ def test_senders_of_different_quantities_join():
 
 def test_of_two_vehicles_whose_messages_alternate_one_is_taken_whole():
     """The second's rotor speeds come before the first's: they are not joined with its poses."""
-    tallies = Tallies()
-    senders = Senders("port", tallies)
+    senders = Senders("port", Tallies())
     order = [("a", "position"), ("b", "rotor_speeds"), ("b", "position"), ("a", "rotor_speeds")]
     found = [(who, taken(senders, who, 0.01 * k, what)) for k in range(50) for who, what in order]
     assert len({who for who, is_taken in found[8:] if is_taken}) == 1

@@ -5,11 +5,9 @@ import numpy as np
 from tests.support.flights import PERIOD, begin, fly, yawing_flight
 from tests.support.model_flights import ANISOTROPIC
 from tests.support.reference_filters import as_reference, initial_covariance
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.estimator.reference import ReferenceUKF, difference, displaced
 from windwrench.reproduction import WrenchEKF
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 class Literal(ReferenceUKF):

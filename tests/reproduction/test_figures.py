@@ -148,10 +148,10 @@ def test_the_mixture_finds_the_three_wrenches():
     found = fig3.fit_clusters(estimates)
     for target, real, cluster in zip(fig3.TARGETS, added, found, strict=True):
         off = abs(cluster.mean - target)
-        assert np.all(off < cluster.std)
-        assert np.all(off < [0.02, 0.003])
-        assert np.all(cluster.std < [0.05, 0.02])
-        assert np.all(abs(cluster.mean - target - real) < [0.005, 0.001])
+        assert (off < cluster.std).all()
+        assert (off < [0.02, 0.003]).all()
+        assert (cluster.std < [0.05, 0.02]).all()
+        assert (abs(cluster.mean - target - real) < [0.005, 0.001]).all()
         assert cluster.own > 0.99
 
 

@@ -109,8 +109,7 @@ def test_an_edit_beside_a_users_own_file_counts(package, tmp_path):
 
 
 def test_a_function_of_a_prompt_is_compiled_and_not_kept(package):
-    program = f"exec({CALLEE!r}); print(scaled(4))"
-    assert run(package, program) == "8\n"
+    assert run(package, f"exec({CALLEE!r}); print(scaled(4))") == "8\n"
 
 
 def test_code_not_used_for_longest_is_removed(package):

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 
-VEHICLE = load_vehicle("ardrone2")
 DRAG = {"kdx": 1.2e-4, "kdy": 1.2e-4}
 
 

@@ -86,8 +86,7 @@ def random_table(log, rng, imu_only=0.15):
 
     unit = pick(tuple(_TIME))
     begin = pick((0.0, 12.5, 1.7e9 if unit == "s" else 50.0))
-    template = pick(_TIMES)
-    name = template.format(u=unit)
+    name = pick(_TIMES).format(u=unit)
     columns[name] = (log.t + begin) / _TIME[unit]
     parts = {"time": TimeColumn(name, unit), "world": world, "body": body}
 

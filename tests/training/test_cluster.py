@@ -105,8 +105,7 @@ def test_rllib_knows_the_environment_by_its_name(cluster):
         .training(train_batch_size_per_learner=50, minibatch_size=25, num_epochs=1)
     )
     algorithm = config.build_algo()
-    result = algorithm.train()
-    assert result["env_runners"]["num_env_steps_sampled"] == 50
+    assert algorithm.train()["env_runners"]["num_env_steps_sampled"] == 50
     algorithm.stop()
 
 

@@ -5,6 +5,7 @@ import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.support.sizes import rms
 from windwrench.controllers.preview import Oracle
 from windwrench.controllers.trained_policy import TrainedPolicy
 from windwrench.envs.fan_tracking import FanTrackingEnv
@@ -52,16 +53,15 @@ def test_what_is_taught_is_the_oracle_s_command():
     truth = flights.truth[:100, 0]
     assert_allclose(truth[:, 1], offsets, atol=1e-4)
     # the set point is held to begin where the vehicle is: it has moved while the filter settled
-    assert np.sqrt(np.mean((truth[:, 0] - wanted) ** 2)) < 0.1 * np.std(wanted)
+    assert rms(truth[:, 0] - wanted) < 0.1 * np.std(wanted)
     assert flights.counts.sum(axis=0).tolist() == [241.0] * 8
 
 
 def test_nothing_is_taught_where_the_vehicle_is_lost():
     flights = flown(FanHindsight(), "base", 20.0, 30.0, 0, 16)
-    ended = np.flatnonzero(flights.counts[:200].min(axis=0) == 0.0)
-    assert len(ended) > 0
-    assert np.all(np.diff(flights.counts, axis=0) <= 0.0)  # and never again
-    assert np.abs(flights.truth[..., 1][flights.counts > 0]).max() <= 2.6
+    assert len(np.flatnonzero(flights.counts[:200].min(axis=0) == 0.0)) > 0
+    assert (np.diff(flights.counts, axis=0) <= 0.0).all()  # and never again
+    assert abs(flights.truth[..., 1][flights.counts > 0]).max() <= 2.6
 
 
 def test_a_round_has_all_scenarios_of_the_mix():
@@ -93,10 +93,9 @@ def test_the_mean_of_what_is_hidden_is_learned():
     fit(network, episodes, 25, 32, (0.01, 0.0), torch.Generator().manual_seed(0))
     with torch.no_grad():
         mean, deviation, _ = network(torch.from_numpy(seen))
-    error = np.sqrt(np.mean((mean.numpy() - walk)[20:] ** 2))
+    error = rms((mean.numpy() - walk)[20:])
     # the Riccati equation of the walk: p = (p + q) / (p + q + 1), q = 0.09
-    best = np.sqrt((-0.09 + np.sqrt(0.09**2 + 4 * 0.09)) / 2)
-    assert error < 1.25 * best
+    assert error < 1.25 * np.sqrt((-0.09 + np.sqrt(0.09**2 + 4 * 0.09)) / 2)
     assert np.exp(deviation[20:].numpy()).mean() == pytest.approx(error, rel=0.2)
 
 

@@ -76,8 +76,7 @@ def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
 @pytest.mark.parametrize("algorithm", LEARNERS)
 def test_the_shipped_policy_does_what_the_learner_would(algorithm):
     config = tiny(algorithm)
-    env = make_env(config)
-    learner = make_learner(config, env, 0)
+    learner = make_learner(config, make_env(config), 0)
     learner.learn(120)
     policy = TrainedPolicy(card_of(config, "base", 0, 120), weights_of(learner, algorithm))
     policy.reset()

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from tests.support.data_paths import excerpt
 from tests.support.flown import VEHICLE, recorded
+from tests.support.sizes import rms
 from windwrench.cli import app
 from windwrench.identification.comparison.change import NOWHERE, SOMETHING_ELSE, compare
 from windwrench.identification.comparison.sessions import FLIGHT_STD, SESSION_STD, difference
@@ -74,7 +75,7 @@ def test_a_session_ends_where_the_battery_was_changed():
         found = difference([after], known)
         return np.sqrt(np.exp(found.log) @ found.variance)
 
-    assert np.all(std([12.4, 12.0, 12.4, 12.0]) < 0.95 * std([12.4, 12.2, 12.0, 11.8]))
+    assert (std([12.4, 12.0, 12.4, 12.0]) < 0.95 * std([12.4, 12.2, 12.0, 11.8])).all()
 
 
 def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
@@ -91,8 +92,8 @@ def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
             share = np.exp(found.log)
             size = np.sqrt(share @ found.variance)
             scores.append(share @ found.mean / size)
-            assert np.all(size < 2.5 * np.array(FLIGHT_STD)) == (day == "mon")
-        assert 0.8 < np.sqrt(np.mean(np.square(scores))) < 1.2
+            assert (size < 2.5 * np.array(FLIGHT_STD)).all() == (day == "mon")
+        assert 0.8 < rms(scores) < 1.2
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from numpy.random import default_rng
 
 from tests.support.data_paths import data_file
 from tests.support.flown import settings, without_pose
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
 from windwrench.evidence.trials.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
@@ -22,8 +23,6 @@ from windwrench.identification.diagnosis.settings import DiagnosisSettings
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.sensor_noise import sensor_noise, with_noise
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 @cache
@@ -297,7 +296,7 @@ def test_no_flight_keeps_step_with_what_is_held_out():
     """
     number = np.arange(400)
     held = number % 4 == held_out(number)
-    assert np.all(held.reshape(-1, 4).sum(axis=1) == 1)
+    assert (held.reshape(-1, 4).sum(axis=1) == 1).all()
     for period in range(2, 14):
         share = np.bincount(number % period, held) / np.bincount(number % period)
         assert np.all((share > 0.05) & (share < 0.5)), period

@@ -138,12 +138,8 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     return replace(log, accelerometer=noisy, gyro=np.zeros_like(felt))
 
 
-@pytest.fixture(scope="module")
-def windy():
-    return diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
-
-
-def test_a_wind_is_named_and_no_tilt(windy):
+def test_a_wind_is_named_and_no_tilt():
+    windy = diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
     found = {e.name: e for e in windy.effects}
     assert "wind" in found
     assert "world_tilt" not in found
@@ -191,8 +187,7 @@ def test_the_accelerometer_is_read_beside_the_pose():
     # its bias is in its channels, and only there; the gust is in both
     off = (left[:, 3:] - left[:, :3]).mean(axis=0)
     assert_allclose(off, [0.15, -0.1, 0.2], atol=0.01)
-    both = np.corrcoef(left[:, 0], left[:, 3])[0, 1]
-    assert both > 0.85
+    assert np.corrcoef(left[:, 0], left[:, 3])[0, 1] > 0.85
 
 
 def test_the_noise_of_an_autoregression_is_found():
@@ -204,12 +199,10 @@ def test_the_noise_of_an_autoregression_is_found():
         x[k] = lag @ x[k - 1] + root @ rng.standard_normal(2)
     begins = np.arange(len(x)) == 0
     begins[5000] = True
-    fit = np.arange(len(x)) % 400 < 300
-    found = fitted_noise(x, begins, fit, np.zeros(2))
+    found = fitted_noise(x, begins, np.arange(len(x)) % 400 < 300, np.zeros(2))
     assert_allclose(found.lags[0], lag, atol=0.06)
     assert_allclose(found.covariance, root @ root.T, atol=0.06)
-    white = found.white(x)[found.known]
-    assert_allclose(np.cov(white.T), np.eye(2), atol=0.15)
+    assert_allclose(np.cov(found.white(x)[found.known].T), np.eye(2), atol=0.15)
     assert not found.known[:3].any()
     assert not found.known[5000:5003].any()
 

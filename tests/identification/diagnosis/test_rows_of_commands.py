@@ -71,7 +71,7 @@ def test_thrust_at_a_command_is_a_nuisance_by_its_differences_between_flights():
     logs = [hover(0.0, seed) for seed in range(2)]
     one, two = (row_nuisances(Rows(RegressedFlights(x, STATED), {})) for x in (logs[:1], logs))
     assert not one["thrust 0"].any()
-    assert np.abs(two["thrust 0"]).max() > 0.4 * THRUST_STD * STATED.gravity
+    assert abs(two["thrust 0"]).max() > 0.4 * THRUST_STD * STATED.gravity
     assert_allclose(two["thrust 0"], -two["thrust 1"], atol=1e-12)
 
 

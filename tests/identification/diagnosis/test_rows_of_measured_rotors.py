@@ -78,7 +78,7 @@ def test_rows_hold_forces_and_torques(offset):
     assert rows.channels == 6
     without = rows.residual({})
     found = rows.residual({"com_offset": dict(OFFSET.coefficients)})
-    assert np.mean(np.square(found[:, 4])) < 0.2 * np.mean(np.square(without[:, 4]))
+    assert np.square(found[:, 4]).mean() < 0.2 * np.square(without[:, 4]).mean()
     column = rows.columns({}, [("com_offset", "cx")])["com_offset", "cx"]
     assert_allclose(without - found, 0.01 * column, atol=0.03 * abs(without).max())
 

@@ -12,12 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.hostile_conventions import scaled
 from tests.support.outcomes import noted
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.inertial import check_inertial
 from windwrench.identification.logs.reading import read_log
 
-VEHICLE = load_vehicle("ardrone2")
 FRD = np.array([1.0, -1.0, -1.0])
 
 
@@ -141,5 +140,4 @@ def test_a_sensor_faster_than_the_pose_has_rows_of_its_own(tmp_path):
     read = read_log(tmp_path / "flight.csv", vehicle=VEHICLE)
     assert read.notes == ()  # no pose was lost between two poses
     assert_array_equal(read.gyro, log.gyro)
-    thinned = with_rows(read, every)
-    assert_array_equal(thinned.accelerometer, log.accelerometer[every])
+    assert_array_equal(with_rows(read, every).accelerometer, log.accelerometer[every])

@@ -94,8 +94,7 @@ def table(path, columns, count=40):
 def test_a_map_file_is_taken_by_read_log(tmp_path):
     """Betaflight's motor 1 is the rear right one, the kit's rotor 3."""
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD))
-    path = table(tmp_path / "a.csv", {"m1": 3000.0})
-    log = read_log(path, map=tmp_path / "map.yaml")
+    log = read_log(table(tmp_path / "a.csv", {"m1": 3000.0}), map=tmp_path / "map.yaml")
     assert_allclose(log.rotor_speeds[0] * 30 / np.pi, [3600, 3600, 3000, 3600])
 
 
@@ -164,8 +163,7 @@ def test_channels_in_rows_of_their_own_meet_at_the_poses_times(tmp_path, own, st
 
 def test_rows_of_one_time_are_one_row(tmp_path):
     t = [f"{0.01 * (k // 2):.2f}" for k in range(80)]
-    path = table(tmp_path / "a.csv", {"t": t, **apart(1)}, 80)
-    found = mapped(path)
+    found = mapped(table(tmp_path / "a.csv", {"t": t, **apart(1)}, 80))
     assert len(found.t) == 40
     assert found.valid.all()
     assert noted(found, "joined")

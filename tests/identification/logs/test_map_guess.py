@@ -30,8 +30,7 @@ def flown():
 
 
 def guessed(path, name=""):
-    table = open_table(path)
-    return guess_map(table, load_vehicle(name) if name else None)
+    return guess_map(open_table(path), load_vehicle(name) if name else None)
 
 
 def test_the_map_that_is_written_is_the_map_that_was_guessed(tmp_path, flown):
@@ -208,7 +207,7 @@ def test_motion_capture_with_y_up(tmp_path, flown):
     assert (found.log_map.world, found.log_map.body) == ("y_up", "y_up")
     log = map_table(open_table(path), found.log_map)
     assert_allclose(log.position, flown.position, atol=1e-9)
-    alike = np.abs(np.sum(log.quaternion * flown.quaternion, axis=1))
+    alike = abs(np.sum(log.quaternion * flown.quaternion, axis=1))
     assert_allclose(alike, 1.0, atol=1e-9)
 
 

@@ -21,11 +21,10 @@ from tests.support.dataflash_writer import (
     xkq,
 )
 from tests.support.outcomes import noted, refused
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.identification.logs.readers.ardupilot_bin import read_dataflash
 from windwrench.identification.logs.reading import read_log
 
-VEHICLE = load_vehicle("ardrone2")
 T = 5.0 + 0.02 * np.arange(300)
 SLOW = T[::5]
 FAST = 5.0 + 0.0025 * np.arange(2400)

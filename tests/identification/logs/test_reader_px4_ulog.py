@@ -24,10 +24,8 @@ from tests.support.ulog_writer import (
     stamps,
     ulog_bytes,
 )
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.identification.logs.reading import read_log
-
-VEHICLE = load_vehicle("ardrone2")
 
 pytest.importorskip("pyulog", reason="pip install 'windwrench[logs]'")
 
@@ -227,8 +225,7 @@ def test_bad_pulse_limits_are_named(read):
     topics = MOCAP | {"actuator_outputs": fields}
     with refused("expected MIN below MAX"):
         read(topics, {"PWM_MAIN_MIN2": 2100})
-    log = read(topics, {"THR_MDL_FAC": np.nan})
-    assert noted(log, "f = 0;", "1000 to 2000 us")
+    assert noted(read(topics, {"THR_MDL_FAC": np.nan}), "f = 0;", "1000 to 2000 us")
 
 
 LONG = odometry(T) | {"float q": 2 * odometry(T)["float q"]}

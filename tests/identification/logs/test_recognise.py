@@ -35,8 +35,7 @@ BEGINNINGS = {
 @pytest.mark.parametrize("name", ["a", "a.csv", "a.BIN", "a.bag"])
 def test_the_first_bytes_decide_whatever_the_name(tmp_path, begins, name):
     (tmp_path / name).write_bytes(begins + bytes(20))
-    found = reader_by_content(tmp_path / name)
-    assert found.name == BEGINNINGS[begins]
+    assert reader_by_content(tmp_path / name).name == BEGINNINGS[begins]
     with pytest.raises(InputError):  # that reader's own words
         read_log(tmp_path / name)
 

@@ -19,6 +19,7 @@ from tests.support.flown import VEHICLE, recorded, without_pose
 from tests.support.hostile_conventions import permuted
 from tests.support.outcomes import refused
 from tests.support.parameters import mostly_slow
+from tests.support.sizes import rms
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.evidence.trials.practice_flights import practise
@@ -335,7 +336,7 @@ def test_a_clean_flight_and_a_rotor_at_its_limit_are_not_noted():
 def test_commands_that_run_seconds_late_are_named_by_the_thrust_alone():
     """No torque is known of a collective command; the force along the thrust axis is enough."""
     log = flight("gentle", seconds=25.0)
-    collective = np.sqrt(np.mean(np.square(log.rotor_speeds), axis=1))
+    collective = rms(log.rotor_speeds, axis=1)
     on_time = replace(log, rotor_speeds=np.tile(collective[:, None], 4), commanded=True)
     screen_log(on_time, VEHICLE)
     late = np.interp(log.t - 2.25, log.t, collective)

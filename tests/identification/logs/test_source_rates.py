@@ -8,6 +8,7 @@ from numpy.random import default_rng
 
 from tests.support.flown import VEHICLE, recorded
 from tests.support.outcomes import refused
+from tests.support.sizes import rms
 from windwrench.identification import diagnose, read_log
 from windwrench.identification.logs.flight_log import write_log
 from windwrench.identification.logs.screening import screen_log
@@ -56,16 +57,10 @@ def test_a_rounded_channel_is_as_fast_as_its_rows(step):
 def test_what_lies_between_samples_is_bounded_by_their_neighbours():
     times, values = walk(200.0, seconds=100.0)
     lines = in_lines(times, values, 4.0)
-    left = np.sqrt(np.mean(np.square(values - lines), axis=0))
+    left = rms(values - lines, axis=0)
     bound = between_samples(times, lines, 4.0)
-    assert np.all(left < bound)
-    assert np.all(bound < 3.0 * left)
-
-
-@pytest.fixture(scope="module")
-def flown():
-    """A simulated flight of 14 s at 200 Hz."""
-    return recorded(seconds=14.0, seed=3)
+    assert (left < bound).all()
+    assert (bound < 3.0 * left).all()
 
 
 def with_rotors_at(rate, log):
@@ -74,9 +69,9 @@ def with_rotors_at(rate, log):
 
 
 @pytest.mark.parametrize(("rate", "force"), [(4.0, True), (30.0, False)])
-def test_slow_rotors_tell_no_torque_and_no_effect(rate, force, flown, tmp_path):
+def test_slow_rotors_tell_no_torque_and_no_effect(rate, force, tmp_path):
     path = tmp_path / "slow.csv"
-    write_log(with_rotors_at(rate, flown), path)
+    write_log(with_rotors_at(rate, recorded(seconds=14.0, seed=3)), path)
     log = read_log(path)
     said = rf"rotor speeds come {rate:g} times a second; expected at least 45"
     with refused(said):

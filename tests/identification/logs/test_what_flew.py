@@ -112,8 +112,7 @@ def test_a_battery_that_is_not_connected_has_no_voltage(px4):
 def test_a_file_that_ends_within_a_message_says_so(px4):
     path = px4(PULSES[:, :4], MAV_TYPE=2)
     assert not noted(read_log(path), "was cut")
-    data = path.read_bytes()
-    path.write_bytes(data[:-3])
+    path.write_bytes(path.read_bytes()[:-3])
     assert noted(read_log(path), "was cut")
 
 

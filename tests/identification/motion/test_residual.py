@@ -13,6 +13,7 @@ from scipy.signal import butter, sosfilt, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded, resting
+from tests.support.sizes import rms
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle, preset_names
 from windwrench.dynamics.effects import compile_effects
 from windwrench.evidence.trials.logged_poses import FILTERS
@@ -38,13 +39,8 @@ AMENDED = VEHICLE.with_effects(
 )
 
 
-@pytest.fixture(scope="module")
-def flown():
-    (signals,) = log_signals(fly_practice(VEHICLE, seconds=6.0, seed=1))
-    return signals
-
-
-def test_the_residual_is_newton_and_euler(flown):
+def test_the_residual_is_newton_and_euler():
+    (flown,) = log_signals(fly_practice(VEHICLE, seconds=6.0, seed=1))
     body = compile_effects(AMENDED).vehicle
     rotors = body.rotor_wrench(flown.rotor_speeds)
     R = flown.rotation
@@ -122,8 +118,7 @@ def test_a_declared_clock_offset_delays_the_voltage_and_takes_the_first_poses_af
     late = VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": -0.02}))
     undone = undo_log_sensing(log, late)
     assert_allclose(undone.voltage[4:], log.voltage[:-4], rtol=1e-9)
-    unseen = np.flatnonzero(~undone.valid)
-    assert_array_equal(unseen, [*range(4), *range(1000, 1104)])
+    assert_array_equal(np.flatnonzero(~undone.valid), [*range(4), *range(1000, 1104)])
 
 
 @pytest.mark.parametrize(
@@ -199,8 +194,7 @@ def test_white_noise_is_level(seed):
 
 
 def test_channels_are_asked_one_by_one(log):
-    rng = default_rng(1)
-    white = rng.standard_normal((len(log.t), 3))
+    white = default_rng(1).standard_normal((len(log.t), 3))
     gyro = np.full_like(white, np.nan)  # not read in every row
     gyro[::2] = sosfilt(butter(2, 0.1, output="sos"), white[::2], axis=0)
     made = replace(log, accelerometer=white, gyro=gyro)
@@ -276,7 +270,7 @@ def test_an_imu_alone_keeps_the_vertical(motion):
     fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1))
     at = np.searchsorted(motion["t"], fused.t - 1e-9)
     error = tilt_error(fused.rotation, motion["rotation"][at])
-    assert np.sqrt(np.mean(error**2)) < 0.02
+    assert rms(error) < 0.02
     assert np.mean(error < 2.5 * np.hypot(fused.std[:, 0], fused.std[:, 1])) > 0.95
     assert abs(Rotation.from_matrix(fused.rotation[0]).as_euler("ZYX")[0]) < 0.1
     assert (fused.std[:, 3:6] > 4.0).all()
@@ -293,6 +287,6 @@ def test_ten_positions_a_second_show_heading_velocity_and_biases(motion):
     ).as_rotvec()
     assert np.abs(off).max() < 0.02
     z = (fused.velocity - motion["velocity"][at]) / fused.std[:, 3:6]
-    assert 0.3 < np.sqrt(np.mean(z**2)) < 2.0
+    assert 0.3 < rms(z) < 2.0
     assert abs(fused.gyro_bias[len(at) // 2] - GYRO_BIAS).max() < 0.002
     assert abs(fused.accelerometer_bias[len(at) // 2] - FORCE_BIAS).max() < 0.03

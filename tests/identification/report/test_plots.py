@@ -102,7 +102,7 @@ def test_pieces_of_several_logs_stand_side_by_side():
     time = page_plots(made_diagnosis(*traces)).data["time"]
     assert [p["log"] for p in time["pieces"]] == ["log 0", "log 1", "log 2"]
     x = times(time["channels"][0], time["pieces"])
-    assert np.all(np.diff(x) > 0)
+    assert (np.diff(x) > 0).all()
     assert x[-1] == pytest.approx(time["end"], abs=1e-3)
     assert len(time["held"]) == 2 * 3
     (plot, *_) = page_plots(made_diagnosis(*traces)).time
@@ -111,8 +111,7 @@ def test_pieces_of_several_logs_stand_side_by_side():
 
 def test_only_the_pages_own_scripts_may_run():
     rude = "</script><script>alert(1)</script>\u2028"
-    made = made_diagnosis(replace(made_trace(), log=rude))
-    page = report_page(made, "command")
+    page = report_page(made_diagnosis(replace(made_trace(), log=rude)), "command")
     scripts = re.findall(r"<script[^>]*>(.*?)</script>", page, re.S)
     assert len(scripts) == 3
     assert json.loads(scripts[0])["time"]["pieces"][0]["log"] == rude
@@ -210,7 +209,7 @@ def test_a_line_of_many_rows_is_drawn_by_its_extremes():
     values = default_rng(1).normal(size=(rows, 2))
     values[777_777, 0], values[rows - 1, 1] = 50.0, -50.0
     shown = log_channels._extremes(values)
-    assert np.all(np.diff(shown) > 0)
+    assert (np.diff(shown) > 0).all()
     assert {0, 777_777, rows - 1} <= set(shown.tolist())
     assert len(shown) < 5 * log_channels._BINS
     few = values[: 2 * log_channels._BINS]

@@ -33,13 +33,11 @@ TRIED = ("rotor_drag", "body_drag", "mass", *(f"effect_{i}" for i in range(14)))
 @pytest.fixture(scope="module")
 def diagnosis():
     """A diagnosis that names rotor drag, of a flight of 20 s."""
-    trace = made_trace(20.0)
-    made = made_diagnosis(trace)
+    made = made_diagnosis(made_trace(20.0))
     (drag,) = made.effects
     unit = "N/(rad/s m/s)"
     std = {"kdx": 3e-6, "kdy": 4e-6}
-    units = dict.fromkeys(DRAG, unit)
-    drag = replace(drag, coefficients=DRAG, std=std, units=units)
+    drag = replace(drag, coefficients=DRAG, std=std, units=dict.fromkeys(DRAG, unit))
     return replace(
         made,
         remainder="random",

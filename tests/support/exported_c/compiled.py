@@ -142,7 +142,7 @@ def differences(c, python):
             difference = abs(np.array(getattr(e, name), dtype=float) - getattr(p, name))
         out[name] = float(np.max(difference / std[k]))
         mine = np.array(getattr(e, f"std_{name}"), dtype=float)
-        out["std"] = max(out.get("std", 0.0), float(np.max(abs(mine / stated[k] - 1.0))))
+        out["std"] = max(out.get("std", 0.0), float(abs(mine / stated[k] - 1.0).max()))
     same = STATUSES[e.status] == p.status and e.restarts == p.restarts
     out["status"] = 0.0 if same else 1.0
     return out
