@@ -12,11 +12,14 @@ from statistics import median
 from .messages import SECOND
 
 _BIN = SECOND // 4  # ns; each bin keeps its message with the least delay
-_KEPT, _NEAR = 120, 4  # bins: a device's, and a simulator's
+_KEPT = 120  # bins: a device's
+_NEAR = 4  # and a simulator's
 _SLOPES = 12  # bins for the rate, 3 s
-_MEAN, _LONG = 20, 40  # bins, 5 s and 10 s, for the mean and the latest rate
+_MEAN = 20  # bins, 5 s, for the mean rate
+_LONG = 40  # 10 s, for the latest rate
 _DEVICE = 0.002  # largest measured difference of a device's rate, with jitter of 5 ms
-_SLOWEST, _FASTEST = 0.01, 100.0
+_SLOWEST = 0.01
+_FASTEST = 100.0
 
 
 class ClockLine:
@@ -39,10 +42,12 @@ class ClockLine:
 
     def add(self, arrival: int, stamp: int) -> None:
         """Take in a message, ns."""
-        silence, self._last = arrival - self._last, max(arrival, self._last)
+        silence = arrival - self._last
+        self._last = max(arrival, self._last)
         if min(silence, self.delay(arrival, stamp)) > self._horizon:
             # the clock stood still, or the link held messages back: then the last one is early
-            self._low, self._base = deque([(arrival, stamp)], maxlen=_KEPT), (arrival, stamp)
+            self._low = deque([(arrival, stamp)], maxlen=_KEPT)
+            self._base = (arrival, stamp)
             return
         low = self._low
         if arrival // _BIN > low[-1][0] // _BIN:
@@ -83,7 +88,8 @@ class ClockLine:
         low = self._low
         if len(low) <= _LONG:
             return None
-        (a0, s0), (a1, s1) = low[-1 - _LONG], low[-1]
+        a0, s0 = low[-1 - _LONG]
+        a1, s1 = low[-1]
         return (s1 - s0) / (a1 - a0)
 
     def _fit(self) -> None:

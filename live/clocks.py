@@ -26,7 +26,8 @@ _SAME = 1.0
 # s: a stamp so far ahead of all others is no faster transport (the horizon bounds the past)
 _AHEAD = 1.0
 # messages in a row, and their s, for a clock's jump; a burst of delayed messages is shorter
-_AGREEING, _LASTING = 20, 0.2
+_AGREEING = 20
+_LASTING = 0.2
 _SILENCE = SECOND // 10  # ns counted of a silence; the slowest ESC sends sooner
 _JITTER = SECOND // 50  # ns, usual spread of a link's delays
 _UNSTAMPED = 1.0  # s of poses without any stamp until the stream's time is ours
@@ -39,7 +40,8 @@ class _Clock:
 
     def __init__(self, shift: int, stamp: int, arrival: int, horizon: int) -> None:
         self.shift = shift  # ns, from stamps to the stream's time
-        self.newest, self.newest_arrival = stamp, arrival
+        self.newest = stamp
+        self.newest_arrival = arrival
         self.line = ClockLine(arrival, stamp, horizon)
         self.odd: list[Measurement] = []  # messages of a possible jump
 
@@ -54,7 +56,8 @@ class Clocks:
     """
 
     def __init__(self, tallies: Tallies, horizon: float, paced: bool = True) -> None:
-        self._tallies, self._paced = tallies, paced
+        self._tallies = tallies
+        self._paced = paced
         self._horizon = round(horizon * SECOND)
         self._clocks: list[_Clock] = []  # the first is the reference
         self._kinds: dict[str, tuple[_Clock, deque[int]]] = {}  # and the last stamps
@@ -96,7 +99,8 @@ class Clocks:
         if sample.stamp in recent:
             self._tallies.counts["doubled"] += 1
             return None
-        reference, stamp = self._clocks[0], sample.stamp
+        reference = self._clocks[0]
+        stamp = sample.stamp
         if not self._goes_on(clock, sample, stamp):
             return None
         self._anew = False
@@ -104,7 +108,8 @@ class Clocks:
         if self._paced:
             clock.line.add(sample.arrival, stamp)
         if stamp >= clock.newest:
-            clock.newest, clock.newest_arrival = stamp, sample.arrival
+            clock.newest = stamp
+            clock.newest_arrival = sample.arrival
             self._awake = 0 if clock is reference else self._awake
         if clock is not reference:
             stamp = reference.line.stamp_of(clock.line.arrival_of(stamp))
@@ -127,7 +132,8 @@ class Clocks:
         reference = self._clocks[0]
         if self._ours:
             return 1e-9 * (arrival + reference.shift)
-        stamp, line = reference.newest, reference.line
+        stamp = reference.newest
+        line = reference.line
         if self._paced:
             stamp += round(self._awake * line.rate)
             if line.known:  # the newest may itself have come late
@@ -147,7 +153,8 @@ class Clocks:
 
     def _goes_on(self, clock: _Clock, sample: Measurement, stamp: int) -> bool:
         """Return whether a stamp is taken; a jump is taken once enough messages agree."""
-        arrival, odd = sample.arrival, clock.odd
+        arrival = sample.arrival
+        odd = clock.odd
         passed = max(arrival - clock.newest_arrival, 0) * max(clock.line.rate, 1.0)
         late = stamp < clock.newest - self._horizon
         ahead = self._paced and stamp - clock.newest > passed + _AHEAD * SECOND
@@ -173,7 +180,8 @@ class Clocks:
         # the stream's time goes on by our time since the last message
         gone = max(round(clock.line.rate * (arrival - clock.newest_arrival)), 1_000_000)
         clock.shift += clock.newest - stamp + (gone if self._paced else 1_000_000)
-        clock.newest, clock.newest_arrival = stamp, arrival
+        clock.newest = stamp
+        clock.newest_arrival = arrival
         clock.line = ClockLine(arrival, stamp, self._horizon)
         odd.clear()
         return True

@@ -64,7 +64,8 @@ class LiveFilter:
     def __init__(
         self, vehicle: Vehicle, tallies: Tallies, settings: LiveSettings | None = None
     ) -> None:
-        self.vehicle, self.settings = vehicle, settings or LiveSettings()
+        self.vehicle = vehicle
+        self.settings = settings or LiveSettings()
         self._tallies = tallies
         self._held: list[Row] = []
         self._timed: TimedFilter | None = None
@@ -124,7 +125,8 @@ class LiveFilter:
             assert row.position is not None
             assert row.quaternion is not None
             timed.reset(row.t, row.position, row.quaternion)
-            self._before, self._settled = row, row.t + _STARTUP
+            self._before = row
+            self._settled = row.t + _STARTUP
             return [self._output(row, timed.estimate)]
         now = timed.time
         if round(row.t, 9) > now:

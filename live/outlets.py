@@ -59,9 +59,12 @@ class Outlet(Generic[Item]):
         failed: Callable[[], object] = lambda: None,
         waiting: int = WAITING,
     ) -> None:
-        self.sink, self.problem = sink, ""
+        self.sink = sink
+        self.problem = ""
         self.patience = 0.0  # s of waiting for room; more than 0 if the source waits too
-        self._tallies, self._failed, self._waiting = tallies, failed, waiting
+        self._tallies = tallies
+        self._failed = failed
+        self._waiting = waiting
         self._held: deque[Item] = deque()
         self._changed = threading.Condition()
         self._over = self._stalls = False

@@ -21,7 +21,8 @@ def as_fields(output: Output) -> dict[str, Any]:
 class Lines(Sink[Output]):
     """Estimates as lines of text in a file."""
 
-    name, lost = "standard output", "not told"
+    name = "standard output"
+    lost = "not told"
 
     def __init__(self, file: TextIO) -> None:
         self._file = file
@@ -37,4 +38,5 @@ class Lines(Sink[Output]):
     def idle(self) -> None:
         """Flush the lines so far."""
         self._file.flush()
-        self.rows, self.held = self.rows + self.held, 0
+        self.rows = self.rows + self.held
+        self.held = 0

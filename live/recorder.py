@@ -61,7 +61,8 @@ class Recorder(Sink[Row]):
         InputError: the name is none of a ``.csv``, or no new file can be written there.
     """
 
-    lost, pause = "not recorded", 0.4  # s without a row until all rows are written
+    lost = "not recorded"
+    pause = 0.4  # s without a row until all rows are written
 
     def __init__(self, path: Path, vehicle: str, tallies: Tallies, horizon: float) -> None:
         if path.suffix.lower() != ".csv":
@@ -74,8 +75,10 @@ class Recorder(Sink[Row]):
         folder = next(folder for folder in path.absolute().parents if folder.exists())
         if not folder.is_dir() or not os.access(folder, os.W_OK):
             raise InputError(f"--record {path}: {folder} is no folder that can be written to")
-        self.path, self.name = path, f"the recording {path}"
-        self._tallies, self._horizon = tallies, horizon
+        self.path = path
+        self.name = f"the recording {path}"
+        self._tallies = tallies
+        self._horizon = horizon
         name = f"vehicle={vehicle}"
         self._last = name if vehicle and VEHICLE.fullmatch(name) else "whole"
         self._held: list[Row] = []  # by time

@@ -31,7 +31,8 @@ class Joiner:
     """
 
     def __init__(self, vehicle: Vehicle, tallies: Tallies) -> None:
-        self._vehicle, self._tallies = vehicle, tallies
+        self._vehicle = vehicle
+        self._tallies = tallies
         self._speeds: list[tuple[float, Array]] = []  # by time
         self._command: Array | None = None
         self._voltage: float | None = None
@@ -105,5 +106,6 @@ class Joiner:
         after = bisect_right(kept, t, key=_time)
         if after in (0, len(kept)):
             return kept[max(after - 1, 0)][1]
-        (t0, a), (t1, b) = kept[after - 1], kept[after]
+        t0, a = kept[after - 1]
+        t1, b = kept[after]
         return np.asarray(a + (b - a) * ((t - t0) / (t1 - t0)))

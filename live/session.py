@@ -48,8 +48,10 @@ class Session:
         telling: Outlet[Output] | None = None,
     ) -> None:
         tallies = source.tallies
-        self.source, self.tallies = source, tallies
-        self.recording, self.telling = recording, telling
+        self.source = source
+        self.tallies = tallies
+        self.recording = recording
+        self.telling = telling
         self.filter = LiveFilter(source.vehicle, tallies, settings)
         self._settings = self.filter.settings
         self.clocks = Clocks(tallies, self._settings.horizon, source.paced)
@@ -147,7 +149,8 @@ class Session:
                     self.take(sample)
                 if self._stop.is_set():
                     break
-            out, spent = time.monotonic_ns(), time.thread_time_ns() - spent
+            out = time.monotonic_ns()
+            spent = time.thread_time_ns() - spent
             for arrival in self._fresh:
                 self.tallies.latency.add(out - arrival)
                 self.tallies.processor.add(spent // len(self._fresh))
@@ -206,7 +209,8 @@ class Session:
         """Return the error for a stream without an estimate."""
         waiting = self.tallies.counts["waiting"]
         came = ", ".join(sorted(self.tallies.rates))
-        bad, problems = self.tallies.counts["malformed"], self.source.problems
+        bad = self.tallies.counts["malformed"]
+        problems = self.source.problems
         if not came:
             problem = "no good message came" if bad else "no message came"
         elif waiting:

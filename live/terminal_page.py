@@ -19,7 +19,8 @@ _HARMLESS = ("late", "doubled")
 def page(session: Session) -> RenderableType:
     """Return the page of a stream; half of the vehicle's weight is a long bar."""
     source = session.source
-    weight, arm = source.vehicle.weight, source.vehicle.arm_l
+    weight = source.vehicle.weight
+    arm = source.vehicle.arm_l
     head = Text(f"{source.name}, {source.vehicle.name}", style="bold")
     output = session.output
     if output is None:
@@ -43,14 +44,18 @@ def page(session: Session) -> RenderableType:
 
 
 def _lines(session: Session) -> list[Text]:
-    output, tallies = session.output, session.tallies
+    output = session.output
+    tallies = session.tallies
     assert output is not None
-    silence, counts, drift = session.silence, tallies.found, session.clocks.drift
+    silence = session.silence
+    counts = tallies.found
+    drift = session.clocks.drift
     watch = session.watch
     silent = silence > SILENT
     status = f"SILENT for {silence:.1f} s" if silent else output.estimate.status
     good = not silent and output.estimate.status == "tracking"
-    nis, rates = output.estimate.nis, sorted(tallies.hertz.items())
+    nis = output.estimate.nis
+    rates = sorted(tallies.hertz.items())
     lines = [
         Text.assemble(
             "status   ",

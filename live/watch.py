@@ -14,7 +14,8 @@ _EVERY = SECOND  # ns between two looks
 _RATE = 0.01  # least difference of a clock from ours for a warning; devices differ by 1e-4
 _LATE = 0.01  # share of poses; a sound link has none
 _POSES = 100  # fewest poses for a share
-_NOISE, _LOOKS = 0.1, 50  # s between two looks at the noise, and looks in the median: 5 s
+_NOISE = 0.1  # s between two looks at the noise
+_LOOKS = 50  # in the median: 5 s
 
 
 class Watch:
@@ -27,7 +28,9 @@ class Watch:
     """
 
     def __init__(self, tallies: Tallies, clocks: Clocks, live: LiveFilter) -> None:
-        self._tallies, self._clocks, self._filter = tallies, clocks, live
+        self._tallies = tallies
+        self._clocks = clocks
+        self._filter = live
         self.poses = self._late = 0
         self._noise: deque[Array] = deque(maxlen=_LOOKS)
         self._due_noise = -np.inf  # s, stream's time
@@ -75,7 +78,8 @@ class Watch:
     @property
     def noise_words(self) -> str:
         """Advice if the poses' noise differs from the declared one; else empty."""
-        scales, tuning = self.noise_scales, self._filter.tuning
+        scales = self.noise_scales
+        tuning = self._filter.tuning
         if scales is None or tuning is None:
             return ""
         return noise_warning(scales, tuning, self._filter.settings.tuning is None)

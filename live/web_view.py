@@ -117,7 +117,9 @@ class WebView:
         Raises:
             TimeoutError: the browser reads nothing.
         """
-        source, last, missed = self._session.source, -math.inf, 0
+        source = self._session.source
+        last = -math.inf
+        missed = 0
         vehicle = source.vehicle
         first: dict[str, Any] = {"vehicle": vehicle.name, "source": source.name}
         first |= {"weight": vehicle.weight, "arm": vehicle.arm_l}
@@ -131,7 +133,8 @@ class WebView:
             else:
                 over = self._over.is_set()
                 points = ",".join(text for t, text in self._points if t > last)
-                last, missed = self._points[-1][0] if self._points else last, 0
+                last = self._points[-1][0] if self._points else last
+                missed = 0
                 ended = (self._session.ended or "the stream ended") if over else ""
                 head = json.dumps({**first, "over": ended})[1:-1]
                 writer.write(f'data: {{{head},{self._state},"points":[{points}]}}\n\n'.encode())
@@ -146,7 +149,8 @@ class WebView:
             values = [one.t, *one.wrench, *one.std]
             point = [float(f"{x:.5g}") if i else round(x, 3) for i, x in enumerate(values)]
             self._points.append((one.t, json.dumps(point)))
-        session, tallies = self._session, self._session.tallies
+        session = self._session
+        tallies = self._session.tallies
         state: dict[str, Any] = {}
         if session.output is not None:
             estimate = session.output.estimate
@@ -169,7 +173,8 @@ def _asked(request: bytes) -> tuple[str, str]:
     """Return the status for a request, and the path to serve; empty: none."""
     first, *lines = request.decode("latin-1").split("\r\n")
     fields = dict(line.lower().split(":", 1) for line in lines if ":" in line)
-    words, host = first.split(" "), fields.get("host", "").strip()
+    words = first.split(" ")
+    host = fields.get("host", "").strip()
     if host.partition(":")[0] not in _HOSTS:
         return "403 Forbidden", ""
     if len(words) != 3 or words[0] != "GET":

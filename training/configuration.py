@@ -34,7 +34,8 @@ def load_config(
     """
     if algorithm not in ALGORITHMS:
         raise unknown_name("algorithm", algorithm, ALGORITHMS)
-    folder, what = Path(__file__).parent / "configs", "a configuration of training"
+    folder = Path(__file__).parent / "configs"
+    what = "a configuration of training"
     config: Config = read_yaml(folder / f"{algorithm}.yaml", what)
     others = {} if task in (None, STANDARD_TASK) else read_yaml(folder / "tasks.yaml", what)
     for key, value in others.get(algorithm, {}).items():

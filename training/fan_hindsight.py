@@ -51,7 +51,9 @@ class FanHindsight:
     A law with sight of the fan flies the first round.
     """
 
-    decisions, period, largest = FanTrackingEnv.decisions(), DECISION_PERIOD, MAX_COMMAND
+    decisions = FanTrackingEnv.decisions()
+    period = DECISION_PERIOD
+    largest = MAX_COMMAND
 
     def __init__(self, limit: float = 2.5, features: Features | None = FEATURES) -> None:
         """Take a limit on what is taught, in largest commands, and a policy's inputs; None: the
@@ -78,7 +80,8 @@ class FanHindsight:
             remember = self._history.push if self._flown else self._history.restart
             remember(self._features.frames(observations))
             seen = self._history.flat()
-        fan, own = infos["fan_y"], infos["y"]
+        fan = infos["fan_y"]
+        own = infos["y"]
         self._set_point = _moved(self._set_point, own, infos["command"][:, 0])
         self._flown.append((self._own(infos), _felt(infos), fan.copy()))
         wanted = infos["fan_velocity"] + _LEAD * (fan - own)
@@ -88,8 +91,10 @@ class FanHindsight:
         """Return the states (n, 7) of the vehicles along y."""
         truth = self._envs.truth()
         assert self._set_point is not None
-        up, y = truth["up"], _ALONG_Y
-        turning, turned = tilting(truth["rate"])[y], tilting(truth["angular_acceleration"])[y]
+        up = truth["up"]
+        y = _ALONG_Y
+        turning = tilting(truth["rate"])[y]
+        turned = tilting(truth["angular_acceleration"])[y]
         middle = up[:, y] / up[:, 2], turning, turned, truth["integral"][:, y]
         return np.column_stack([infos["y"], truth["velocity"][:, y], *middle, self._set_point])
 

@@ -35,9 +35,12 @@ class Flights:
         wander: tuple[float, float],
         seed: int,
     ) -> None:
-        self._envs, self._lesson = envs, lesson
-        self._size, self._time = wander[0] * lesson.largest, wander[1]
-        self._seed, self._rng = seed, np.random.default_rng(seed)
+        self._envs = envs
+        self._lesson = lesson
+        self._size = wander[0] * lesson.largest
+        self._time = wander[1]
+        self._seed = seed
+        self._rng = np.random.default_rng(seed)
         self._flown: list[Sequences] = []
         self.episodes = 0
 
@@ -65,11 +68,15 @@ class Flights:
     def _fly(
         self, env: Any, network: TaughtNetwork | LinearLaw | None, shares: Frames, size: Array
     ) -> Sequences:
-        lesson, n, state = self._lesson, env.num_envs, None
+        lesson = self._lesson
+        n = env.num_envs
+        state = None
         shape = n, env.single_action_space.shape[0]
         keep = np.exp(-lesson.period / self._time)
-        off, flying = size * self._rng.standard_normal(shape), np.ones(n, dtype=np.bool_)
-        seen, kept = [], [flying]
+        off = size * self._rng.standard_normal(shape)
+        flying = np.ones(n, dtype=np.bool_)
+        seen = []
+        kept = [flying]
         seeds = [training_seed(self._seed, 0, self.episodes + i) for i in range(n)]
         observation, infos = env.reset(seed=seeds)
         lesson.begin(env, network is None)

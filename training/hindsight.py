@@ -60,7 +60,8 @@ def lanes_of(
     """Return environments of a task for so many episodes in a scenario, or in ``MIX``;
     ``observation``: one of ``OBSERVATIONS`` in place of the task's own.
     """
-    kind, own = TASKS[task].environment, {LATE: _LATE}
+    kind = TASKS[task].environment
+    own = {LATE: _LATE}
     return [
         TaskLanes(count, task=kind, scenario=own.get(name, name), observation=observation)
         for name, count in mix_of(scenario, episodes).items()
@@ -86,7 +87,9 @@ class WindLesson:
     the first round. An episode of a lesson is the first half of one of the task.
     """
 
-    decisions, period, largest = 250, WIND_PERIOD, MAX_ACCELERATION
+    decisions = 250
+    period = WIND_PERIOD
+    largest = MAX_ACCELERATION
 
     def __init__(self, task: str, limit: float = 1.5) -> None:
         """Take a task.

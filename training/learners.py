@@ -27,7 +27,8 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
         "activation_fn": ACTIVATIONS[config["activation"]],
         "optimizer_kwargs": {"fused": True},
     }
-    start, end = config["learner"]["learning_rate"], config["learning_rate_end"]
+    start = config["learner"]["learning_rate"]
+    end = config["learning_rate_end"]
     learner: Any = None
 
     def rate(_: float) -> float:
@@ -54,7 +55,8 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
 
         from .fast_lstm import FastLstmPolicy
 
-        kind, network = RecurrentPPO, FastLstmPolicy
+        kind = RecurrentPPO
+        network = FastLstmPolicy
         policy["lstm_hidden_size"] = config["lstm"]
     if algorithm in ("ppo", "recurrent-ppo"):
         policy["log_std_init"] = config["log_std_init"]

@@ -45,13 +45,15 @@ class LinearLaw:
 
     def fit(self, flown: Sequences) -> None:
         """Fit the weights to all counting decisions."""
-        kept, all_kept = None, []
+        kept = None
+        all_kept = []
         for frames in flown.seen:
             kept = self._remember(kept, frames)
             all_kept.append(kept)
         some = flown.counts > 0.0
         seen = np.array(all_kept)[some].reshape(int(some.sum()), -1).astype(np.float64)
-        mean, deviation = seen.mean(axis=0), seen.std(axis=0) + 1e-9
+        mean = seen.mean(axis=0)
+        deviation = seen.std(axis=0) + 1e-9
         seen = (seen - mean) / deviation
         wanted = flown.truth[some].astype(np.float64)
         middle = wanted.mean(axis=0)

@@ -162,13 +162,17 @@ class Run:
         observation: str | None = None,
     ) -> None:
         check_training_env(scenario, task)
-        self.config, self.scenario, self.seed, self.folder = config, scenario, seed, folder
+        self.config = config
+        self.scenario = scenario
+        self.seed = seed
+        self.folder = folder
         own = {"reward": reward, "observation": observation}
         self.own = {name: value for name, value in own.items() if value is not None}
         if task != STANDARD_TASK or observation:
             self.own["task"] = task_of(task).name
         self._claim()
-        self.progress, self._report = Progress(), report
+        self.progress = Progress()
+        self._report = report
         self._began = time.perf_counter()
         self.judge = make_training_env(scenario, task, reward, observation)
         self.best = folder / "best.npz"
@@ -217,7 +221,8 @@ class Run:
         """
         episodes = self.config["validation"]["episodes"]
         rmse, lost, by_error = validate(policy, self.judge, episodes)
-        card, now = policy.card, self.progress
+        card = policy.card
+        now = self.progress
         now.by_error = by_error
         now.steps.append(card["steps"])
         now.rmse_m.append(rmse)

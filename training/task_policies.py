@@ -33,7 +33,9 @@ from .taught_network import TaughtNetwork, fit
 
 Array = NDArray[np.float32]
 
-FAN, FAN_PLANE, WIND = "FanTracking", "FanTracking2D", "wind"
+FAN = "FanTracking"
+FAN_PLANE = "FanTracking2D"
+WIND = "wind"
 LINEAR = "linear"
 # of each kind of task: cell, its size, sizes of the layers after it; rounds of DAgger, episodes of
 # each, epochs of its fit (of the last thrice); episodes of a batch, the learning rate; an error
@@ -80,7 +82,8 @@ class FanPlaneLesson:
     """
 
     _kind = TASKS[FAN_PLANE].environment
-    decisions, period = _kind.decisions(), 1.0 / _kind.decision_hz
+    decisions = _kind.decisions()
+    period = 1.0 / _kind.decision_hz
     largest = _kind.largest_action
 
     def begin(self, envs: Any, leads: bool) -> None:
@@ -142,10 +145,12 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
     order = torch.Generator().manual_seed(seed)
     for number in range(given["rounds"]):
         flights.fly(network if number else None, shares)
-        flown, last = flights.sequences(), number == given["rounds"] - 1
+        flown = flights.sequences()
+        last = number == given["rounds"] - 1
         if number == 0 and task != FAN_PLANE:
             network.whiten(flown.seen)
-        epochs, rate = given["epochs"] * (3 if last else 1), given["learning_rate"]
+        epochs = given["epochs"] * (3 if last else 1)
+        rate = given["learning_rate"]
         rates = rate, 0.0 if last else _LEAST_RATE * rate
         fit(network, flown, epochs, given["batch_size"], rates, order, mirrored)
         print(f"{flights.episodes} episodes, {time.process_time():.0f} s", flush=True)
@@ -178,7 +183,8 @@ def linear(
     given = _LINEAR | changed
     lesson: Any = FanHindsight(features=None) if task == FAN else _lesson_of(task)
     envs = lanes_of(task, scenario, given["episodes"], observation)
-    law, flights = LinearLaw(), Flights(envs, lesson, _fit_of(task)["wander"], seed)
+    law = LinearLaw()
+    flights = Flights(envs, lesson, _fit_of(task)["wander"], seed)
     for number in range(given["rounds"]):
         flights.fly(law if number else None, _shares(task))
         law.fit(flights.sequences())
@@ -207,18 +213,21 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, help=f"{said}; default: the task's")
     parser.add_argument("--out", type=Path, help="folder; default: that of the kit's policies")
     given = parser.parse_args()
-    taught, asked = given.kind != LINEAR, vars(given)
+    taught = given.kind != LINEAR
+    asked = vars(given)
     if taught and given.observation:
         parser.error("--observation: expected --kind linear")
     torch.set_num_threads(1)
-    began, task = time.process_time(), given.task
+    began = time.process_time()
+    task = given.task
     changed = {name: asked[name] for name in ("rounds", "episodes", "epochs") if asked[name]}
     usual = MIX if taught and task not in (FAN, FAN_PLANE) else BASE
     scenario = "wide" if taught and task == FAN else given.scenario or usual
     if not taught:
         changed |= {"observation": given.observation}
     policy = (teach if taught else linear)(task, scenario, given.seed, **changed)
-    policies, kind = Path("training/policies"), policy.card["algorithm"]
+    policies = Path("training/policies")
+    kind = policy.card["algorithm"]
     own = isinstance(policy, TrainedPolicy)
     out, start = (policies, "") if own else (policies / "tasks", f"{task}-")
     out = given.out or out

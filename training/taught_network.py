@@ -13,7 +13,8 @@ from .learners import cell_weights, dense_layers, dense_weights
 Array = NDArray[np.float32]
 
 CELLS: dict[str, Any] = {"lstm": torch.nn.LSTM, "gru": torch.nn.GRU}
-_SURE, _UNSURE = -4.0, 1.5  # bounds of what it may say of a logarithmic standard deviation
+_SURE = -4.0  # bounds of what it may say of a logarithmic standard deviation
+_UNSURE = 1.5
 _MIRRORED = 0.5  # share of the episodes
 _SMALLEST = 1.4e-3  # of what is seen, in its scales, that counts
 _STEEPEST = 1.0  # norm to which a gradient is cut
@@ -45,7 +46,8 @@ class TaughtNetwork(torch.nn.Module):
         self, quantities: int, taught: int, cell: str, state: int, net: list[int], activation: str
     ) -> None:
         super().__init__()
-        self.taught, self._name = taught, cell
+        self.taught = taught
+        self._name = cell
         self._white: tuple[torch.Tensor, torch.Tensor] | None = None
         self.cell = CELLS[cell](quantities, state)
         if cell == "lstm":  # it begins by keeping what it has, or it never learns to keep it long
@@ -134,7 +136,8 @@ def fit(
     for _ in range(epochs):
         losses.clear()
         for batch in torch.randperm(count, generator=generator).split(batch_size):  # type: ignore[no-untyped-call]
-            frames, taught = seen[:, batch], truth[:, batch]
+            frames = seen[:, batch]
+            taught = truth[:, batch]
             if flips is not None:
                 some = torch.rand((len(batch), 1), generator=generator) < _MIRRORED
                 frames = torch.where(some, frames * flips, frames)

@@ -60,7 +60,8 @@ def train(
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv
 
-    algorithm, whole = config["algorithm"], config["steps"]
+    algorithm = config["algorithm"]
+    whole = config["steps"]
     features = features_of(config) if standard else None
     envs = make_training_envs(
         scenario, config["environments"], config["estimator"], task, observation
@@ -73,7 +74,8 @@ def train(
     checkpoint = folder / "checkpoint.pt"
     if checkpoint.exists():
         run.resume(progress_from(load_checkpoint(learner, env, checkpoint), checkpoint))
-    every, between = config["validation"]["every"], config["checkpoint"]
+    every = config["validation"]["every"]
+    between = config["checkpoint"]
     follow = _follower(advance)
     while (done := learner.num_timesteps) < whole:
         target = min((done // every + 1) * every, (done // between + 1) * between, whole)

@@ -83,7 +83,9 @@ def tune(
     import optuna
 
     check_request(task, law, scenario, trials, episodes)
-    known, ranges, seeds = task_of(task), RANGES[task][law], validation_seeds(episodes)
+    known = task_of(task)
+    ranges = RANGES[task][law]
+    seeds = validation_seeds(episodes)
     env: Any = (make_training_env if task == STANDARD_TASK else known.environment)(scenario)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
@@ -92,7 +94,9 @@ def tune(
             name: trial.suggest_float(name, low, high, log=True)
             for name, (low, high) in ranges.items()
         }
-        controller, rmse, lost = known.laws[law](**gains), [], 0
+        controller = known.laws[law](**gains)
+        rmse = []
+        lost = 0
         for k, one in enumerate(seeds):
             episode = fly_episode(env, controller, one)
             rmse.append(episode.rmse)

@@ -45,8 +45,10 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         seed_of: Callable[[int, int], int] | None = None,
         reward: Reward | None = None,
     ) -> None:
-        self.envs, self.features = envs, features
-        self._seed_of, self._reward = seed_of or partial(training_seed, 0), reward
+        self.envs = envs
+        self.features = features
+        self._seed_of = seed_of or partial(training_seed, 0)
+        self._reward = reward
         space = envs.single_observation_space
         if features is not None:
             space = gym.spaces.Box(-10.0, 10.0, (features.size,), np.float32)
@@ -95,7 +97,8 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         observations, rewards, lost, over, infos = self.envs.step(self._commands)
         if self._reward is not None:
             rewards = total_of(self._reward, infos)[0]
-        rewards, error = rewards.astype(np.float32), error_of(infos)
+        rewards = rewards.astype(np.float32)
+        error = error_of(infos)
         self._returns += rewards
         self._squares += np.nan if error is None else np.minimum(error, LOST_OFFSET) ** 2
         self._length += 1

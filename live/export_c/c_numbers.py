@@ -17,7 +17,8 @@ _WIDTH = 101  # columns, with a comma
 PRECISIONS = ("single", "double")
 _COMMENT = re.compile(r"(/\*.*?\*/)", re.S)
 _NUMBER = r"(?<![\w.])((?:\d+\.\d*|\d+(?=[eE]))(?:[eE][-+]?\d+)?)"
-_FROM_PYTHON, _ANY = re.compile(_NUMBER + r"F\b"), re.compile(_NUMBER + r"[fF]\b")
+_FROM_PYTHON = re.compile(_NUMBER + r"F\b")
+_ANY = re.compile(_NUMBER + r"[fF]\b")
 # the functions of libm in a source; with f in single
 FUNCTIONS = ("sqrt", "sin", "cos", "fabs", "exp", "log", "pow", "atan2", "tanh")
 _CALL = re.compile(rf"\b({'|'.join(FUNCTIONS)})f\b")

@@ -30,8 +30,10 @@ def couplings(f: Any) -> list[Entry]:
 
 def noises(f: Any) -> list[Entry]:
     """Return the entries, lower half, of the process noise over a time."""
-    body, period = f["body"], float(f["period"])
-    inverse, com = np.array(body["inverse_inertia"]), np.array(body["com"])
+    body = f["body"]
+    period = float(f["period"])
+    inverse = np.array(body["inverse_inertia"])
+    com = np.array(body["com"])
     # angular and linear acceleration by each input, (27)
     by_torque = np.vstack([inverse, np.cross(com, inverse, axis=0)])
     by_thrust = np.vstack([np.zeros((3, 3)), np.eye(3) / float(body["mass"])])

@@ -60,7 +60,9 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
         raise InputError(
             f"--policy {name}: is recurrent; only policies of dense layers can be exported"
         )
-    features, weights, card = policy.features, policy.weights, policy.card
+    features = policy.features
+    weights = policy.weights
+    card = policy.card
     summed = next((quantity for quantity in features.frame if QUANTITIES[quantity].summed), None)
     if summed is not None:
         raise InputError(

@@ -157,7 +157,8 @@ class Function:
         self.used: set[str] = set()  # words of the C
         self.suffix = suffix
         self.returned: Value | None = None
-        self.results, self.out = results_of(self.tree), "float"
+        self.results = results_of(self.tree)
+        self.out = "float"
         self.result = _OF_ANNOTATION.get(getattr(self.tree.returns, "id", ""), "")
 
     def translate(self) -> None:
@@ -181,9 +182,11 @@ class Function:
 
     def code(self) -> str:
         """Return the C function."""
-        parameters, unused = [], []
+        parameters = []
+        unused = []
         for argument, bound in zip(self.arguments, self.bound, strict=True):
-            value, name = self.names[argument.arg], argument.arg
+            value = self.names[argument.arg]
+            name = argument.arg
             if bound is not None and not (isinstance(bound, Array) and bound.root):
                 continue  # a constant
             if isinstance(value, CRecord):
@@ -219,10 +222,12 @@ class Function:
 
     def block(self, body: list[ast.stmt]) -> list[str]:
         """Return the lines of several statements."""
-        outer, self.lines = self.lines, []
+        outer = self.lines
+        self.lines = []
         for statement in body:
             self.statement(statement)
-        lines, self.lines = self.lines, outer
+        lines = self.lines
+        self.lines = outer
         return lines
 
     def indented(self, head: str, body: list[ast.stmt]) -> None:
@@ -409,7 +414,8 @@ class Function:
         condition = self.number(test)
         if condition.known is not None:
             return self.evaluated(body if condition.known else orelse)
-        yes, no = self.number(body), self.number(orelse)
+        yes = self.number(body)
+        no = self.number(orelse)
         kind = yes.kind if yes.kind == no.kind else "float"
         texts = (self.converted(yes, kind), self.converted(no, kind))
         return Number(f"({condition.text} ? {texts[0]} : {texts[1]})", kind)
@@ -518,7 +524,8 @@ class Function:
         """Return a function's result, with its lines put before the current one."""
         self.library.counter += 1
         part = Function(function, self.library, suffix=f"_{self.library.counter}")
-        part.lines, part.locals = self.lines, self.locals
+        part.lines = self.lines
+        part.locals = self.locals
         part.written = self.written
         stored = {
             n.id

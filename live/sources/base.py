@@ -49,7 +49,9 @@ class Source(ABC):
     ) -> None:
         self.name = text  # for people
         self.address = read_address(text, self.kind, self.options)
-        self.vehicle, self.tallies, self.log_map = vehicle, tallies, log_map
+        self.vehicle = vehicle
+        self.tallies = tallies
+        self.log_map = log_map
         self.problems: list[str] = []  # the first malformed messages'
         self._understood = not self.strict
         self._numbers: dict[object, int] = {}  # the newest of each sender's own count

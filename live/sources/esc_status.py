@@ -22,7 +22,9 @@ def add_esc_status(dialect: Any) -> Any:
     class EscStatus(dialect.MAVLink_message):  # type: ignore[misc]
         """ESC status."""
 
-        id, msgname, name = NUMBER, "ESC_STATUS", "ESC_STATUS"
+        id = NUMBER
+        msgname = "ESC_STATUS"
+        name = "ESC_STATUS"
         fieldnames = ("index", "time_usec", "rpm", "voltage", "current")
         ordered_fieldnames = ("time_usec", "rpm", "voltage", "current", "index")
         orders = (4, 0, 1, 2, 3)
@@ -30,7 +32,8 @@ def add_esc_status(dialect: Any) -> Any:
         array_lengths = (0, 4, 4, 4, 0)
         crc_extra = CHECKSUM
         unpacker = struct.Struct(_LAYOUT)
-        instance_field, instance_offset = None, -1
+        instance_field = None
+        instance_offset = -1
 
         def __init__(
             self, index: int, time_usec: int, rpm: Any, voltage: Any, current: Any
@@ -39,8 +42,11 @@ def add_esc_status(dialect: Any) -> Any:
             self._fieldnames = self.fieldnames
             self._instance_field = self.instance_field
             self._instance_offset = self.instance_offset
-            self.index, self.time_usec = index, time_usec
-            self.rpm, self.voltage, self.current = rpm, voltage, current
+            self.index = index
+            self.time_usec = time_usec
+            self.rpm = rpm
+            self.voltage = voltage
+            self.current = current
 
         def pack(self, mav: Any, force_mavlink1: bool = False) -> Any:
             """Return the message's bytes."""

@@ -23,7 +23,8 @@ from .links import Datagrams, sender_name
 from .senders import Senders
 
 _AT_ONCE = 64  # datagrams, and objects of one message, taken before their estimates are out
-_LARGEST, _VALUES = 16_384, 1_024  # bytes and values of a message
+_LARGEST = 16_384  # bytes of a message
+_VALUES = 1_024  # of a message
 _COLUMNS = "t, px, py, pz, qw, qx, qy, qz and omega1 ... omega4"
 _PIECE = 65_536  # bytes read at once
 _PIPE_WAITS = 1.0  # s: the writer of a pipe may fly; a pipe holds more than 1 s at 200 Hz
@@ -89,7 +90,9 @@ class UdpJson(JsonSource):
     (``senders``).
     """
 
-    kind, options, form = "udp-json", ("reply",), "datagram"
+    kind = "udp-json"
+    options = ("reply",)
+    form = "datagram"
 
     def _prepare(self) -> None:
         super()._prepare()
@@ -125,7 +128,8 @@ class UdpJson(JsonSource):
 class JsonLines(JsonSource):
     """Lines of text on standard input, ``-``: the stream ends with the input."""
 
-    kind, form = "-", "line"
+    kind = "-"
+    form = "line"
 
     def _prepare(self) -> None:
         if sys.stdin is None or sys.stdin.closed or sys.stdin.isatty():

@@ -81,8 +81,10 @@ class Datagrams(Link):
 
     def __init__(self, address: Address, largest: int) -> None:
         super().__init__(address.text)
-        self._host, self._port = address.host or "127.0.0.1", address.port
-        self._calls, self._largest = address.scheme == "udpout", largest
+        self._host = address.host or "127.0.0.1"
+        self._port = address.port
+        self._calls = address.scheme == "udpout"
+        self._largest = largest
 
     def open(self) -> str:
         """Listen, or call."""

@@ -53,7 +53,9 @@ _WANTED = (
 class Mavlink(Source):
     """Messages of an autopilot."""
 
-    kind, options, answers = "mavlink", ("baud", "rate", "pose"), True
+    kind = "mavlink"
+    options = ("baud", "rate", "pose")
+    answers = True
 
     def _prepare(self) -> None:
         need("pymavlink", "mavlink")
@@ -93,7 +95,8 @@ class Mavlink(Source):
         kind = message.get_type()
         if kind == "BAD_DATA":
             raise Malformed("bytes that are no message")
-        system, component = message.get_srcSystem(), message.get_srcComponent()
+        system = message.get_srcSystem()
+        component = message.get_srcComponent()
         who = f"system {system} at {sender_name(self.link.sender)}"
         if not self._senders.leaves_out(who):
             self.count_lost((system, component), int(message.get_seq()), 256)

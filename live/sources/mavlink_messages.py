@@ -18,7 +18,8 @@ _ORDER = [motor - 1 for motor in ORDERS["px4-x"]]
 _LARGEST_SHARE = 1.5  # largest command in shares of full; larger ones are pulses
 _RPM = math.pi / 30.0  # rad/s
 _Z_DOWN = (1, 20)  # MAV_FRAME_LOCAL_NED, MAV_FRAME_LOCAL_FRD
-_GYRO, _ACCELEROMETER = 0b111000, 0b111  # bits of HIGHRES_IMU's fields_updated
+_GYRO = 0b111000  # bits of HIGHRES_IMU's fields_updated
+_ACCELEROMETER = 0b111
 _MISSING_CELL = 65_535  # mV
 WRAP = 2**32  # us, of SERVO_OUTPUT_RAW
 POSES = ("ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "ODOMETRY", "LOCAL_POSITION_NED")
@@ -38,7 +39,8 @@ class MessageReader:
     """
 
     def __init__(self, vehicle: Vehicle, forced: str) -> None:
-        self._vehicle, self._forced = vehicle, forced
+        self._vehicle = vehicle
+        self._forced = forced
         self._poses: dict[str, int] = {}  # kinds so far, and their first arrivals, ns
         self._attitude: tuple[int, Array, Array] | None = None  # stamp, quaternion, rates
         self.seen: set[str] = set()  # kinds of messages
@@ -156,7 +158,8 @@ class MessageReader:
         return self._command(sample, (m.servo1_raw, m.servo2_raw, m.servo3_raw, m.servo4_raw))
 
     def _command(self, sample: Measurement, values: Any) -> bool:
-        raw, curve = _motors(values), self._vehicle.motor_curve
+        raw = _motors(values)
+        curve = self._vehicle.motor_curve
         low, high = (0.0, 1.0) if curve is None else curve.command
         if high <= _LARGEST_SHARE < float(np.max(raw)):
             low, high = _PULSES

@@ -27,7 +27,8 @@ class Senders:
     """
 
     def __init__(self, name: str, tallies: Tallies) -> None:
-        self._name, self._tallies = name, tallies
+        self._name = name
+        self._tallies = tallies
         self._last: dict[str, int] = {}  # ns, the senders taken, in order of arrival
         self._single: dict[str, bool] = {}  # the same: only one message so far
         self._sender_of: dict[str, str] = {}  # by quantity
@@ -68,7 +69,8 @@ class Senders:
 
     def changed(self) -> bool:
         """Return whether a sender has replaced a silent one since the last call."""
-        changed, self._changed = self._changed, False
+        changed = self._changed
+        self._changed = False
         return changed
 
     def _is_before(self, sender: str, other: str) -> bool:

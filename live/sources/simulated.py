@@ -26,7 +26,8 @@ _BEHIND = 1.0  # s: after a longer delay the flight goes on from now
 class Simulated(Source):
     """A vehicle flying in this process."""
 
-    kind, options = "sim", ("seed", "speed")
+    kind = "sim"
+    options = ("seed", "speed")
     expected = "a flight of the plant"
 
     def _prepare(self) -> None:
@@ -73,15 +74,18 @@ class Simulated(Source):
 
     def _tick(self) -> tuple[Measurement, int]:
         """Fly one tick; return its pose and rotor speeds, and their arrival, ns."""
-        loop, arrival = self._loop, time.monotonic_ns()
+        loop = self._loop
+        arrival = time.monotonic_ns()
         phase = self._ticks % DECISION_TICKS
         if phase == 0:  # move the fan; the controller answers the wrench felt
             t = TICK * (self._ticks + np.arange(DECISION_TICKS, dtype=np.float64))
-            self._fan_y, x = self._fan_path(t), loop.state
+            self._fan_y = self._fan_path(t)
+            x = loop.state
             observation = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
             self._command = float(self._controller(observation, None)[0])
             loop.setpoint[4] = self._command
-        before, external = loop.unrounded.copy(), loop.external.copy()
+        before = loop.unrounded.copy()
+        external = loop.external.copy()
         loop.run(self._rng.standard_normal((1, NOISE)), self._fan_y[phase : phase + 1])
         if not loop.healthy():
             raise InputError(f"{self.name}: the simulated {self.vehicle.name} crashed")
@@ -89,7 +93,8 @@ class Simulated(Source):
         speeds = 0.25 * before + 0.75 * loop.unrounded
         if self.vehicle.omega_lsb > 0:
             speeds = self.vehicle.omega_lsb * np.round(speeds / self.vehicle.omega_lsb)
-        seen, battery = loop.seen, loop.battery
+        seen = loop.seen
+        battery = loop.battery
         sample = Measurement(
             "row",
             round(self._ticks * TICK * SECOND),

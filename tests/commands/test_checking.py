@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.random_tables import flight, random_table, save
@@ -14,7 +15,7 @@ from windwrench.runtime.errors import InputError
 
 @pytest.fixture(scope="module")
 def written():
-    return random_table(flight("ardrone2", "excite", 1, 12.0), np.random.default_rng(4), 0.0)
+    return random_table(flight("ardrone2", "excite", 1, 12.0), default_rng(4), 0.0)
 
 
 def run(capsys, *arguments):
@@ -23,7 +24,8 @@ def run(capsys, *arguments):
 
 
 def test_check_proposes_a_map_and_writes_the_log_by_it(tmp_path, written, capsys):
-    theirs, map_file = save(written, tmp_path / "theirs.csv"), tmp_path / "map.yaml"
+    theirs = save(written, tmp_path / "theirs.csv")
+    map_file = tmp_path / "map.yaml"
     found = run(
         capsys, "check", theirs, "--vehicle", "ardrone2", "--write-map", map_file, "--out", tmp_path
     )
@@ -33,8 +35,7 @@ def test_check_proposes_a_map_and_writes_the_log_by_it(tmp_path, written, capsys
     assert all(field["why"] for field in found["fields"])
     ours = tmp_path / "ours.csv.gz"
     run(capsys, "check", theirs, "--map", map_file, "--write", ours, "--out", tmp_path / "by_map")
-    log = read_log(ours)
-    assert_allclose(log.position, written.log.position, atol=1e-9)
+    assert_allclose(read_log(ours).position, written.log.position, atol=1e-9)
     again = run(capsys, "check", ours, "--out", tmp_path / "again")
     assert again["read_by"] == "this kit's own format"
     assert again["vehicle"] == "ardrone2"
@@ -64,14 +65,15 @@ def test_positions_without_an_attitude_are_a_channel_and_an_imu_is_checked(tmp_p
     rows = np.column_stack([t, position, sensors, speeds])
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=names, comments="")
     found = run(capsys, "check", tmp_path / "a.csv", "--vehicle", "ardrone2", "--out", tmp_path)
-    channels = found["channels"]
-    assert channels["position"]["rate_hz"] == pytest.approx(5.0)
+    assert found["channels"]["position"]["rate_hz"] == pytest.approx(5.0)
     assert any("ax, ay, az look like g" in text for text in found["doubts"])
 
 
 def test_a_map_with_something_missing_is_written_and_finished_by_hand(tmp_path, capsys):
     """Four columns that do not move: nothing shows that they are rotors, or in which unit."""
-    log, path, map_file = flight("ardrone2", "excite", 1, 12.0), tmp_path / "a.csv", tmp_path / "m"
+    log = flight("ardrone2", "excite", 1, 12.0)
+    path = tmp_path / "a.csv"
+    map_file = tmp_path / "m"
     columns = [log.t, *log.position.T, *log.quaternion.T, *np.full((4, len(log.t)), 380.0)]
     names = "time,x,y,z,qw,qx,qy,qz,aft_1,aft_2,aft_3,aft_4"
     np.savetxt(path, np.column_stack(columns), delimiter=",", header=names, comments="")

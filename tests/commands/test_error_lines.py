@@ -21,7 +21,7 @@ from tests.support.paths import ROOT
 from windwrench.cli import main
 
 GOLDEN = ROOT / "tests" / "golden" / "error_lines.json"
-CASES = json.loads(GOLDEN.read_text(encoding="utf-8"))
+CASES = json.loads(GOLDEN.read_bytes())
 
 
 def refusal(command, folder):

@@ -78,7 +78,7 @@ def test_identify_writes_a_vehicle_that_loads(call, log, tmp_path):
     )
     assert code == 0
     assert load_vehicle(out).mass == MASS
-    data = json.loads((tmp_path / "mine.identify.json").read_text())
+    data = json.loads((tmp_path / "mine.identify.json").read_bytes())
     estimates = {e["name"]: e for e in data["estimates"]}
     low, high = estimates["k"]["interval_95"]
     assert low < estimates["k"]["value"] < high
@@ -98,7 +98,7 @@ def test_the_vehicle_predicts_flights_that_it_was_not_fitted_to(call, log, tmp_p
     assert code == 0
     assert "held out blocks" in text
     assert "if nothing changes" in text
-    data = json.loads((tmp_path / "mine.identify.json").read_text())
+    data = json.loads((tmp_path / "mine.identify.json").read_bytes())
     for errors in (data["held_out_blocks"], data["prediction"]):
         assert errors["starts"] > 20
         for name in ("position", "velocity", "attitude", "body_rate"):

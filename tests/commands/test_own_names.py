@@ -33,7 +33,7 @@ def test_a_task_of_one_s_own_is_trained_with_a_reward_and_its_policy_flies(call,
     code, text, _ = call("train", "sac", *named, *own, *settings, "--json")
     assert code == 0
     policy = json.loads(text)["result"]["policy"]
-    card = json.loads((tmp_path / "run" / "best.json").read_text())
+    card = json.loads((tmp_path / "run" / "best.json").read_bytes())
     assert (card["reward"], card["largest"], len(card["scale"])) == (f"{path}:near", 4.0, 27)
     assert "features" not in card
     code, text, _ = call("fly", *named, "--controller", policy, "--json")

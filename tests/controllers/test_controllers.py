@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
 from windwrench.controllers import CONTROLLERS, AdmittancePID, make_controller
 from windwrench.controllers import wind_observation as seen
 from windwrench.controllers.axis_models import PLACE, axis_models
@@ -23,7 +26,6 @@ from windwrench.controllers.preview import DISTURBANCE_TIME, lasting
 from windwrench.controllers.registry import TASK_LAWS, tuned_gains
 from windwrench.controllers.wind_laws import INDI, PID, L1Adaptive, PIDWithWrench
 from windwrench.controllers.wind_observation import WIND_PERIOD
-from windwrench.dynamics import load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, PlantSettings
 from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
@@ -63,7 +65,7 @@ def test_the_flight_loop_turns_against_a_steady_torque(law):
     """The attitude loop makes k_attitude a / g of an acceleration; tau / J stands against it."""
     law(hovering())
     ahead, *_, action = (law(hovering(TORQUE=[0.01, 0.02, 0.03])) for _ in range(101))
-    inertia = load_vehicle("ardrone2").inertia
+    inertia = VEHICLE.inertia
     cancels = 9.81 / 110.0 * np.array([-0.02 / inertia[1, 1], 0.01 / inertia[0, 0], 0.0])
     assert_allclose(action, cancels, atol=1e-6)
     assert ahead[0] < action[0]  # a torque that grows is met before it is seen in full
@@ -75,15 +77,15 @@ def test_an_axis_moves_as_the_vehicle_in_mujoco_does(axis, pushed):
     """Steps of 0.5 m/s2, 0.2 N, 0.01 Nm and 0.2 m/s, for 0.8 s, without any noise."""
     if (axis, pushed) == (2, "torque"):
         pytest.skip("a torque does not lift")
-    vehicle = load_vehicle("ardrone2")
     quiet = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)
-    loop = ClosedLoop(vehicle, settings=quiet)
-    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]), np.pi)
-    model = axis_models(vehicle)[axis]
+    loop = ClosedLoop(VEHICLE, settings=quiet)
+    loop.reset(default_rng(0), np.array([0.0, 0.0, 1.5]), np.pi)
+    model = axis_models(VEHICLE)[axis]
     if pushed == "set point":
         model = model.with_set_point()
     A, B, D = model.held(TICK)
-    command, push = 0.0, np.zeros(D.shape[1])
+    command = 0.0
+    push = np.zeros(D.shape[1])
     if pushed == "action":
         command = loop.action[axis] = 0.5
     elif pushed == "set point":
@@ -93,7 +95,10 @@ def test_an_axis_moves_as_the_vehicle_in_mujoco_does(axis, pushed):
     else:
         push[1] = 0.01
         loop.applied[3 + (1, 0)[axis]] = (1, -1)[axis] * 0.01
-    x, start, there, expected = np.zeros(len(A)), loop.position[axis], [], []
+    x = np.zeros(len(A))
+    start = loop.position[axis]
+    there = []
+    expected = []
     for _ in range(160):
         loop.run(np.zeros((1, loop.noise_size)))
         x = A @ x + B[:, 0] * command + D @ push
@@ -102,7 +107,7 @@ def test_an_axis_moves_as_the_vehicle_in_mujoco_does(axis, pushed):
     largest = np.abs(expected).max()
     assert largest > 0.005
     # the filter and the ticks between sample and command are not in the model
-    assert np.abs(np.array(there) - expected).max() < 0.12 * largest
+    assert abs(np.array(there) - expected).max() < 0.12 * largest
 
 
 def test_the_torque_is_answered_before_anything_has_moved():
@@ -134,7 +139,7 @@ def test_what_lasts_longer_is_answered_by_more(felt, axes, time, other):
 
     def answer(**times):
         law = LQG(**times)
-        return np.abs([law(hovering(**felt)) for _ in range(10)][-1][axes])
+        return abs([law(hovering(**felt)) for _ in range(10)][-1][axes])
 
     usual = answer()
     assert (answer(**{time: 4.0 * getattr(LQG, time)}) > 1.01 * usual).all()
@@ -159,7 +164,7 @@ class Unturned(LQG):
 def test_a_reference_that_turns_is_followed_closer_where_the_turn_is_known():
     env = WindTrajectoryEnv("calm")
     known, unknown = (fly_episode(env, law, 3).error[75:] for law in (LQG(), Unturned()))
-    assert np.sqrt(np.mean(known**2)) < 0.8 * np.sqrt(np.mean(unknown**2))
+    assert rms(known) < 0.8 * rms(unknown)
 
 
 def test_a_steady_bias_of_the_accelerometer_is_no_wind():
@@ -168,9 +173,6 @@ def test_a_steady_bias_of_the_accelerometer_is_no_wind():
     told, untold = (np.abs([law(biased) for _ in range(101)]) for law in (LQG(), LQG(bias=1e-6)))
     assert_allclose(told[0], untold[0], rtol=0.01)
     assert (told[100] < 0.5 * untold[100]).all()
-
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 def observation(torque=0.0, force=0.5):
@@ -197,7 +199,7 @@ def test_the_flight_loop_s_commands_can_be_flown():
         for index, value in where.items():
             c["setpoint"][index] = value
         fly(c, turning, 0.005)
-        assert np.all(np.isfinite(c["command"]))
+        assert np.isfinite(c["command"]).all()
         assert np.all((c["command"] >= 0) & (c["command"] <= VEHICLE.omega_max))
 
 
@@ -233,7 +235,8 @@ def test_a_vehicle_that_sinks_keeps_three_tenths_of_its_weight_to_steer_with():
 
 
 def test_a_steady_turn_about_the_vertical_costs_a_tilted_vehicle_the_gyroscopic_torque_alone():
-    tilted, turning = flight_record(VEHICLE)[0], flight_record(VEHICLE)[0]
+    tilted = flight_record(VEHICLE)[0]
+    turning = flight_record(VEHICLE)[0]
     q = Rotation.from_euler("zyx", [0.7, 0.1, -0.2])
     rate = q.inv().apply([0.0, 0.0, 1.5])
     tilted["setpoint"][9] = turning["setpoint"][9] = 0.7
@@ -283,7 +286,8 @@ def test_a_vehicle_held_for_long_is_not_thrown_on():
     """Held 1 m low and 1 rad off for a minute: the integrals push by 2 m/s2 and 4 rad/s2. Let go,
     it rises 0.36 m too far.
     """
-    c, x = flight_record(VEHICLE)[0], np.zeros(STATE_SIZE)
+    c = flight_record(VEHICLE)[0]
+    x = np.zeros(STATE_SIZE)
     x[3], c["setpoint"][2], c["setpoint"][9] = 1.0, 1.0, 1.0
 
     def pushed():
@@ -292,9 +296,11 @@ def test_a_vehicle_held_for_long_is_not_thrown_on():
 
     for _ in range(60 * 200):
         fly(c, x, 0.005)
-    x[2], c["setpoint"][9] = 1.0, 0.0
+    x[2] = 1.0
+    c["setpoint"][9] = 0.0
     assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)
-    x[2], highest = 0.0, 0.0
+    x[2] = 0.0
+    highest = 0.0
     for _ in range(10 * 200):
         x[9] += 0.005 * pushed()[0]
         x[2] += 0.005 * x[9]

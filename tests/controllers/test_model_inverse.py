@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.support.vehicles import VEHICLE
 from windwrench.controllers.flight import flight_record
 from windwrench.controllers.model_inverse import HORIZON, foresee, through_the_rotors
-from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.dynamics.effects.call import deliver
 from windwrench.dynamics.model import MODEL_FIELDS, drive, load_model
 from windwrench.dynamics.rotation import quaternion_of_yaw
 from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 
-VEHICLE = load_vehicle("ardrone2")
 _SPEEDS = np.array([380.0, 370.0, 390.0, 375.0])
 _LATE = ("latency", "motor_lag")
 
@@ -63,8 +62,7 @@ def test_commands_deliver_the_wanted_rotor_speeds(name):
 
 
 def test_a_lag_is_led_by_what_remains_after_the_horizon():
-    wanted = _SPEEDS + 10.0
-    command, _, model = commanded(wanted, "motor_lag:tau=0.035")
+    command, _, model = commanded(_SPEEDS + 10.0, "motor_lag:tau=0.035")
     share = 1.0 - math.exp(-HORIZON / 0.035)
     assert_allclose(command, _SPEEDS + 10.0 / share, rtol=1e-9)
     # and looking ahead has not moved the model's own rotors
@@ -99,6 +97,6 @@ def test_a_declared_effect_no_longer_pushes_the_vehicle_off(text):
         env = WindHoverEnv("calm", vehicle=model, truth=VEHICLE, effects=(setting,))
         env.reset(seed=700_000)
         some = [env.step(np.zeros(3))[4]["error"] for _ in range(150)]
-        return math.sqrt(np.mean(np.square(some)))
+        return math.sqrt(np.square(some).mean())
 
     assert error(VEHICLE.with_effects(setting)) < 0.9 * error(VEHICLE)

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import cholesky, lstsq
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.synthetic_wrench import TICKS, observations
@@ -33,7 +35,8 @@ def test_the_map_is_what_the_environment_s_jet_does_to_the_vehicle():
         env.reset(seed=seed)
         for _ in range(12):
             info = env.step(np.zeros(1, dtype=np.float32))[-1]
-            offset, jet = env.loop.position[1] - info["fan_y"], env.loop.jet[[5, 0, 1]]
+            offset = env.loop.position[1] - info["fan_y"]
+            jet = env.loop.jet[[5, 0, 1]]
             shown = [np.interp(offset, offsets, table.mean[a]) for a in range(3)]
             felt.append((np.sign(offset) * jet[0], jet[1], np.sign(offset) * shown[0], shown[1]))
     torque, force, shown_torque, shown_force = np.mean(felt, axis=0)
@@ -60,7 +63,8 @@ class Blind:
 
     def __init__(self, pilot):
         self.pilot = pilot
-        self.brief, self.reset = pilot.brief, pilot.reset
+        self.brief = pilot.brief
+        self.reset = pilot.reset
 
     def __call__(self, observation, info=None):
         return self.pilot(observation)
@@ -124,7 +128,7 @@ def test_a_fan_that_leaves_the_family_is_found_again():
     path = np.concatenate([np.zeros(60), np.cumsum(np.full(30, 0.2 * 0.08))])
     briefing = replace(BRIEFING, motions=Motions(("still",), offset=(0.0, 0.1)))
     fan = np.repeat(np.repeat(path, TICKS)[None], 5, axis=0)
-    shown = observations(fan, briefing, np.random.default_rng(4), turns=False)
+    shown = observations(fan, briefing, default_rng(4), turns=False)
     off = {}
     for leave in (0.0, 0.1):
         tracker = InformedTracker(leave=leave)
@@ -146,13 +150,20 @@ def test_the_command_is_the_first_of_those_that_are_best(law, axis):
     """Least squares over 40 commands at once, with the cost of what is left after them, agree with
     the regulator for any start and any disturbance of 12 decisions.
     """
-    count, horizon, effort, rng = 12, 40, 1e-4, np.random.default_rng(0)
+    count = 12
+    horizon = 40
+    effort = 1e-4
+    rng = default_rng(0)
     A, B, D = law.steps(load_vehicle("ardrone2"))[axis]
     n = len(A)
-    x, d = rng.standard_normal(n), rng.standard_normal((count, D.shape[1]))
+    x = rng.standard_normal(n)
+    d = rng.standard_normal((count, D.shape[1]))
     weights = [np.diag(np.sqrt(np.r_[1.0, np.full(n - 1, 1e-9)]))] * horizon
-    weights[-1] = np.linalg.cholesky(regulator(A, B, effort)[1]).T
-    free, moved, rows, right = x, np.zeros((n, horizon)), [], []
+    weights[-1] = cholesky(regulator(A, B, effort)[1]).T
+    free = x
+    moved = np.zeros((n, horizon))
+    rows = []
+    right = []
     for k, weight in enumerate(weights):
         free = A @ free + (D @ d[k] if k < count else 0.0)
         moved = A @ moved
@@ -161,14 +172,15 @@ def test_the_command_is_the_first_of_those_that_are_best(law, axis):
         right.append(-weight @ free)
     rows.append(np.sqrt(effort) * np.eye(horizon))
     right.append(np.zeros(horizon))
-    best = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0]
+    best = lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0]
     gain, ahead = preview(A, B, D, effort, count)
     assert -(gain @ x + np.sum(ahead * d)) == pytest.approx(best[0], rel=1e-6)
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_who_foresees_nothing_is_told_what_everybody_is(task):
-    plain, knowing = TASKS[task].environment("base"), TASKS[task].environment("base")
+    plain = TASKS[task].environment("base")
+    knowing = TASKS[task].environment("base")
     knowing.foresight = 3
     action = np.full(plain.action_size, 0.2, dtype=np.float32)
     for seen, told in (
@@ -182,9 +194,11 @@ def test_who_foresees_nothing_is_told_what_everybody_is(task):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_what_the_oracle_is_told_is_true(task):
-    env, R = TASKS[task].environment("base"), np.empty((3, 3))
+    env = TASKS[task].environment("base")
+    R = np.empty((3, 3))
     env.foresight = 4
-    infos, jets = [env.reset(seed=900_200)[1]], []
+    infos = [env.reset(seed=900_200)[1]]
+    jets = []
     for k in range(12):
         *_, info = env.step(np.full(env.action_size, 0.3 * (-1) ** (k // 3), dtype=np.float32))
         infos.append(info)
@@ -196,7 +210,7 @@ def test_what_the_oracle_is_told_is_true(task):
         assert_array_equal(info["up"], R[:, 2])
     if task.startswith("Wind"):
         ahead = np.array([info["wrench_ahead"][0, :3] for info in infos[:-1]])
-        assert np.abs(ahead - jets).max() < 0.02 < 0.2 < np.abs(jets).max()  # N
+        assert abs(ahead - jets).max() < 0.02 < 0.2 < np.abs(jets).max()  # N
         return
     assert_array_equal(infos[-1]["place"], env.loop.position)
     assert_array_equal(infos[-1]["setpoint"], env.loop.setpoint[:3])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from windwrench.controllers.features import Features
@@ -66,7 +67,8 @@ def test_a_held_command_changes_every_other_decision():
 
 def recurrent(cell, seen=1, state=4, size=1):
     """Random weights of a cell with a state of some numbers, and a linear layer."""
-    rng, rows = np.random.default_rng(0), state * {"lstm": 4, "gru": 3}[cell]
+    rng = default_rng(0)
+    rows = state * {"lstm": 4, "gru": 3}[cell]
     shapes = {
         f"{cell}_input": (rows, seen),
         f"{cell}_hidden": (rows, state),
@@ -96,7 +98,8 @@ TASK_CARD = {
     ],
 )
 def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(kind, card, weights):
-    policy, observation = kind(card, weights), np.full(27, 0.02)
+    policy = kind(card, weights)
+    observation = np.full(27, 0.02)
     first = [policy(observation)[0] for _ in range(3)]
     assert len(set(first)) == 3  # it remembers
     policy.reset()
@@ -110,8 +113,8 @@ def test_a_policy_of_another_task_is_refused(tmp_path):
 
 
 def test_a_shipped_policy_of_two_axes_flies_better_than_hover():
-    known = TASKS["FanTracking2D"]
-    env, seeds = known.environment("base"), range(910_000, 910_004)
+    env = TASKS["FanTracking2D"].environment("base")
+    seeds = range(910_000, 910_004)
     least, learned = (
         np.mean([fly_episode(env, make_pilot(name, "FanTracking2D"), k).rmse for k in seeds])
         for name in ("hover", "gru-0")

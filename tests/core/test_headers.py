@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.flights import PERIOD, yawing_flight
+from tests.support.vehicles import VEHICLE
 from windwrench import _core
-from windwrench.dynamics import load_vehicle
 from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 from windwrench.estimator.filter_record import FILTER
 from windwrench.estimator.ukf import step
 
-VEHICLE = load_vehicle("ardrone2")
 STEPS = 400
 COMPILER = shutil.which("g++") or shutil.which("clang++")
 PLAIN = ["-std=c++17", "-ffp-contract=off", "-fno-exceptions", "-fno-rtti"]
@@ -29,7 +29,7 @@ def flight_with_faults(seed):
     rotors, position, quaternion = (
         flight[name][1:].copy() for name in ("rotors", "position", "quaternion")
     )
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     count = len(rotors)
     for what, chance in ((rotors, 0.02), (position, 0.05), (quaternion, 0.05)):
         what[rng.random(count) < chance] = np.nan
@@ -56,7 +56,8 @@ def test_the_core_is_the_compiled_python_to_the_bit(gate):
     # through gaps, outliers, restarts and overflows
     kept = FILTER.fields["gated"][1]
     for seed in range(3):
-        core, old = begun(gate), begun(gate)
+        core = begun(gate)
+        old = begun(gate)
         seen = set()
         for sample in zip(*flight_with_faults(seed), strict=True):
             seen.add(core.step(*sample).status)
@@ -77,7 +78,7 @@ def test_single_precision_follows_double():
     apart = []
     for sample in zip(*flight, strict=True):
         double, single = (batch.step(*sample) for batch in batches)
-        apart.append(np.abs(double.force - single.force).max() / double.std_force.min())
+        apart.append(abs(double.force - single.force).max() / double.std_force.min())
     # before the first restart; each of the two then has a way of its own for a moment
     assert max(apart[:110]) < 0.02
     assert np.median(apart) < 0.02
@@ -97,7 +98,7 @@ def flown(tmp_path_factory):
     rotors, position, quaternion = flight_with_faults(8)
     ukf = begun()
     felt = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, VEHICLE.gravity], (len(rotors), 1))
-    felt[:, :6] += 0.01 * np.random.default_rng(8).standard_normal((len(rotors), 6))
+    felt[:, :6] += 0.01 * default_rng(8).standard_normal((len(rotors), 6))
     rows = np.column_stack([rotors, position, quaternion, felt])
     given = ukf.record.tobytes()[: _core.FILTER_SIZE] + rows.tobytes()
     ended = subprocess.run([folder / "flight"], input=given, capture_output=True, check=False)
@@ -122,4 +123,4 @@ def test_lanes_are_the_single_filter_to_the_bit(flown):
 def test_an_imu_in_single_precision_follows_double(flown):
     double, single = flown[0][4:]
     assert np.isfinite(double).all()
-    assert np.abs(double[:100] - single[:100]).max() < 0.02
+    assert abs(double[:100] - single[:100]).max() < 0.02

@@ -5,11 +5,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting, InputError
 from windwrench.dynamics.effects import compile_effects
 from windwrench.dynamics.effects.base import (
     ROTOR_ACCELERATION,
@@ -23,11 +26,11 @@ from windwrench.dynamics.mean_jet import jet_table
 from windwrench.dynamics.motion import body_record, effect_wrench
 from windwrench.envs.fan import Fan, fan_record, jet_wrench
 
-VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005
 # a tilted vehicle that moves, turns and has four different rotors
 R = Rotation.from_euler("zyx", [2.0, 0.2, -0.3]).as_matrix()
-V, OMEGA = np.array([1.5, -0.7, 0.4]), np.array([0.5, -1.0, 2.0])
+V = np.array([1.5, -0.7, 0.4])
+OMEGA = np.array([0.5, -1.0, 2.0])
 W = np.array([380.0, 400.0, 420.0, 410.0])
 
 
@@ -41,10 +44,12 @@ def wrench(
 ):
     """Force (world) and torque (body) of a vehicle's effects in the state above."""
     bundle = compile_effects(vehicle)
-    out, state = np.full(6, np.nan), np.full(STATE_SIZE, np.nan)
+    out = np.full(6, np.nan)
+    state = np.full(STATE_SIZE, np.nan)
     state[ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = acceleration
     effects = bundle.wrench_models, bundle.wrench_coefficients, bundle.constants
-    place, wind = np.asarray(position, float), np.asarray(wind, float)
+    place = np.asarray(position, float)
+    wind = np.asarray(wind, float)
     body = body_record(bundle.vehicle)[0]
     effect_wrench(*effects, body, place, R, V, omega, speeds, wind, 11.0, 0.0, state, out)
     return out[:3], out[3:]
@@ -55,7 +60,8 @@ class Called:
 
     def __init__(self, vehicle, kind):
         bundle = compile_effects(vehicle)
-        models, size = getattr(bundle, f"{kind}_models"), getattr(bundle, f"{kind}_memory")
+        models = getattr(bundle, f"{kind}_models")
+        size = getattr(bundle, f"{kind}_memory")
         memory = np.zeros((len(models), size))
         self.given = models, getattr(bundle, f"{kind}_coefficients"), bundle.constants, memory
 
@@ -144,12 +150,13 @@ def test_an_effect_acts_at_each_rotor(name, size, law, com):
     vehicle = replace(VEHICLE, ceiling_z=0.35)
     got = wrench(vehicle.with_effects(offset(com), EffectSetting(name, size)), wind=WIND)
     assert_wrench(got, *at_rotors(law, com, WIND))
-    assert np.linalg.norm(got[1]) > 0.0
+    assert norm(got[1]) > 0.0
 
 
 BLOWN = np.array([2.0, -1.0, 0.3])  # m/s
 TURN = Rotation.from_rotvec([0.03, -0.05, 0])
-THRUST, ROTOR_TORQUE = np.array([0.0, 0.0, np.sum(VEHICLE.k * W**2)]), VEHICLE.rotor_wrench(W)[1:]
+THRUST = np.array([0.0, 0.0, np.sum(VEHICLE.k * W**2)])
+ROTOR_TORQUE = VEHICLE.rotor_wrench(W)[1:]
 ACCELERATION = np.array([100.0, -50.0, 20.0, 300.0])
 
 
@@ -180,7 +187,7 @@ ACCELERATION = np.array([100.0, -50.0, 20.0, 300.0])
         (  # its change against still air
             {"wind": {"wx": 2.0, "wy": -1.0, "wz": 0.3, "cd": 0.04}},
             {},
-            0.04 * (np.linalg.norm(BLOWN - V) * (BLOWN - V) + np.linalg.norm(V) * V),
+            0.04 * (norm(BLOWN - V) * (BLOWN - V) + norm(V) * V),
             np.zeros(3),
         ),
         ({"wind": {"cd": 0.04}}, {}, np.zeros(3), np.zeros(3)),
@@ -217,14 +224,11 @@ def test_ground_effect_stays_finite_on_the_floor_and_fades_far_from_it():
     thrust = float(np.sum(VEHICLE.k * W**2))
     ceiling = replace(setting("ceiling_effect", rho=3.0), ceiling_z=2.6)
     for touching in (wrench(vehicle, (0, 0, 0.0)), wrench(ceiling, (0, 0, 2.6))):
-        assert 0.0 < np.linalg.norm(touching[0]) <= thrust * (1 + 1e-12)
-    heights = [
-        np.linalg.norm(wrench(vehicle, (0, 0, z))[0]) for z in (0.15, 0.2, 0.3, 0.5, 1.0, 3.0)
-    ]
+        assert 0.0 < norm(touching[0]) <= thrust * (1 + 1e-12)
+    heights = [norm(wrench(vehicle, (0, 0, z))[0]) for z in (0.15, 0.2, 0.3, 0.5, 1.0, 3.0)]
     assert all(low > high for low, high in pairwise(heights))
     assert heights[-1] < 1e-3 * thrust
-    no_ceiling = setting("ceiling_effect", rho=3.0)
-    assert_array_equal(wrench(no_ceiling, (0, 0, 2.4))[0], 0.0)
+    assert_array_equal(wrench(setting("ceiling_effect", rho=3.0), (0, 0, 2.4))[0], 0.0)
 
 
 def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
@@ -235,7 +239,7 @@ def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
         lambda i, u: -W[i] * np.array([k_d, k_d, k_z]) * u + [0, 0, k_h * (u[0] ** 2 + u[1] ** 2)],
         wind=WIND,
     )
-    force = force - R @ (np.linalg.norm(air) * c_D * air)
+    force = force - R @ (norm(air) * c_D * air)
     for r, rate in zip(VEHICLE.positions, W, strict=True):
         torque = torque - k_flap * rate * np.cross(air + np.cross(OMEGA, r), [0, 0, 1])
     effects = {
@@ -249,11 +253,10 @@ def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
 
 
 def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart():
-    kp, kw = 5e-4, 2e-4
+    kp = 5e-4
+    kw = 2e-4
     u = R.T @ (V - WIND)
-    direction = VEHICLE.positions[:, :2] / np.linalg.norm(
-        VEHICLE.positions[:, :2], axis=1, keepdims=True
-    )
+    direction = VEHICLE.positions[:, :2] / norm(VEHICLE.positions[:, :2], axis=1, keepdims=True)
     leads = direction @ u[:2]
     assert leads.min() < 0.0 < leads.max()
     # the induced velocity of momentum theory, and by how far it leans towards the followers
@@ -282,10 +285,8 @@ def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart(
 )
 def test_a_central_model_is_that_of_rotors_drawn_into_the_centre(name, size):
     drawn = replace(VEHICLE, rotor_positions=np.zeros((4, 3)))
-    vehicle = setting(name, **size)
-    expected = wrench(drawn.with_effects(*vehicle.effects))
-    got = wrench(setting(name, **size, central=1.0))
-    assert_wrench(got, *expected)
+    expected = wrench(drawn.with_effects(*setting(name, **size).effects))
+    assert_wrench(wrench(setting(name, **size, central=1.0)), *expected)
 
 
 def test_wind_blows_through_declared_drag_whatever_its_place_in_the_list():
@@ -297,9 +298,12 @@ def test_wind_blows_through_declared_drag_whatever_its_place_in_the_list():
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
 def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
-    fan, com = Fan(turbulence=0.0), np.array([0.01, 0.0, -0.02])
-    position, where = np.array([2.1, 0.3, 1.1]), np.array([0.5, -0.4, 0.0])
-    out, turn = np.zeros(6), Rotation.from_euler("z", heading).as_matrix()
+    fan = Fan(turbulence=0.0)
+    com = np.array([0.01, 0.0, -0.02])
+    position = np.array([2.1, 0.3, 1.1])
+    where = np.array([0.5, -0.4, 0.0])
+    out = np.zeros(6)
+    turn = Rotation.from_euler("z", heading).as_matrix()
     record = fan_record(fan, VEHICLE.positions, PERIOD)
     jet_wrench(
         record[0],
@@ -317,11 +321,12 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
     got = wrench(moved, turn @ position + where)
     assert_allclose(got[0], turn @ out[:3], rtol=1e-10)
     assert_allclose(R @ got[1], turn @ out[3:], rtol=1e-10)
-    assert np.linalg.norm(out[:3]) > 0.1
+    assert norm(out[:3]) > 0.1
 
 
 def test_motor_lag_is_the_exact_exponential_however_a_time_is_cut_up():
-    tau, rng = 0.035, np.random.default_rng(0)
+    tau = 0.035
+    rng = default_rng(0)
     rotors = Rotors(setting("motor_lag", tau=tau))
     assert_array_equal(rotors([400.0] * 4), [400.0] * 4)  # starts at the first rates
     times = rng.uniform(0.001, 0.01, 20)
@@ -364,7 +369,8 @@ def test_latency_is_a_pure_delay_between_samples_too(d, dt, count):
 
 @pytest.mark.parametrize("d", [0.0013, 0.0125, 0.0311])
 def test_latency_takes_nothing_from_what_falls_between_samples(d):
-    rotors, phase = Rotors(setting("latency", d=d)), 2.0 * np.pi * 8.0 * PERIOD * np.arange(80)
+    rotors = Rotors(setting("latency", d=d))
+    phase = 2.0 * np.pi * 8.0 * PERIOD * np.arange(80)
     out = np.array([rotors(400.0 + 10.0 * np.sin(x + np.arange(4.0))) for x in phase])
     wanted = 400.0 + 10.0 * np.sin(phase[:, None] - 2.0 * np.pi * 8.0 * d + np.arange(4.0))
     assert_allclose(
@@ -377,7 +383,8 @@ def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
     out = [rotors([600.0 * (k > 20)] * 4)[0] for k in range(40)]
     assert min(out) == 0.0
     assert max(out) == 600.0
-    rotors, t = Rotors(setting("latency", d=0.0125)), 0.0
+    rotors = Rotors(setting("latency", d=0.0125))
+    t = 0.0
     for k in range(60):
         dt = 0.03 if k % 4 == 0 else PERIOD
         t += dt
@@ -387,8 +394,9 @@ def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
 
 def test_latency_draws_a_line_where_samples_are_six_times_as_far_apart_as_others():
     """A cubic through such four would swing between them."""
-    rotors, times = Rotors(setting("latency", d=0.0125)), np.cumsum([0.03, PERIOD] * 20)
-    speeds = 400.0 + 10.0 * np.random.default_rng(0).standard_normal(len(times))
+    rotors = Rotors(setting("latency", d=0.0125))
+    times = np.cumsum([0.03, PERIOD] * 20)
+    speeds = 400.0 + 10.0 * default_rng(0).standard_normal(len(times))
     steps = np.diff(times, prepend=0.0)
     late = [rotors(w * np.ones(4), dt=dt)[0] for w, dt in zip(speeds, steps, strict=True)]
     assert_allclose(late, np.interp(times - 0.0125, times, speeds), rtol=1e-12)
@@ -418,12 +426,10 @@ def test_an_attitude_gain_scales_the_tilt_and_nothing_else():
     _, position, q = Sensing(setting("attitude_gain", g=g), 1.0)(W, POSE, Q)
     z = rotation_of(q).as_matrix()[:, 2]
     assert np.arccos(z[2]) == pytest.approx((1 + g) * np.arccos(R[2, 2]), rel=1e-12)
-    assert_allclose(z[:2] / np.linalg.norm(z[:2]), R[:2, 2] / np.linalg.norm(R[:2, 2]), rtol=1e-12)
+    assert_allclose(z[:2] / norm(z[:2]), R[:2, 2] / norm(R[:2, 2]), rtol=1e-12)
     # what is left after the tilt is taken off, the turn about the vertical, is the same
     level = [
-        Rotation.from_rotvec(
-            -np.cross([0, 0, 1], up) / np.linalg.norm(up[:2]) * np.arccos(up[2])
-        ).as_matrix()
+        Rotation.from_rotvec(-np.cross([0, 0, 1], up) / norm(up[:2]) * np.arccos(up[2])).as_matrix()
         @ A
         for up, A in ((z, rotation_of(q).as_matrix()), (R[:, 2], R))
     ]
@@ -452,7 +458,7 @@ def test_an_estimator_undoes_a_sensing_effect(effects):
 @pytest.mark.parametrize("dt", [0.02, -0.02, 0.0125, -0.0125])
 def test_a_clock_offset_delays_pose_or_rates_and_an_estimator_the_other(dt):
     clock, undo = (Sensing(setting("clock_offset", dt=dt), way) for way in (1.0, -1.0))
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     for k in range(40):
         t = k * PERIOD
         true = 400.0 + t * np.arange(4.0), np.array([t, -t, 1.0]), Rotation.from_euler("z", 3.0 + t)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.own_effects import HOSE, joined
 from tests.support.parameters import mostly_slow
@@ -80,7 +81,8 @@ def test_an_effect_says_what_it_is(name):
 
 @pytest.mark.parametrize("name", mostly_slow(names(), SHOWN.__contains__))
 def test_the_estimator_explains_an_effect_that_the_plant_flies_once_it_is_declared(name):
-    vehicle, setting = vehicle_for(name), parse_setting(name, VEHICLE)
+    vehicle = vehicle_for(name)
+    setting = parse_setting(name, VEHICLE)
     trajectory = FLIGHTS.get(name, "excite")
     log = FlightLog(**record_flight(vehicle, (setting,), trajectory, 12.0, 1, QUIET))
     explained = remaining(log, vehicle.with_effects(setting))
@@ -89,12 +91,11 @@ def test_the_estimator_explains_an_effect_that_the_plant_flies_once_it_is_declar
 
 def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
     """The load and its thread there share nothing with the effect's equation."""
-    load, rng = (
-        SuspendedLoad(mass=0.03, length=0.3, anchor=(0.0, 0.0, 0.0), drag=0.03),
-        np.random.default_rng(1),
-    )
+    load = SuspendedLoad(mass=0.03, length=0.3, anchor=(0.0, 0.0, 0.0), drag=0.03)
+    rng = default_rng(1)
     t = TICK * np.arange(2401)
-    setpoints, samples = draw_trajectory("excite", rng, t), np.empty((len(t), 11))
+    setpoints = draw_trajectory("excite", rng, t)
+    samples = np.empty((len(t), 11))
     loop = LoadedLoop(VEHICLE, settings=QUIET, load=load)
     loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))
     loop.hang_load()
@@ -152,7 +153,8 @@ def test_a_law_that_does_nothing_one_by_one_must_say_where_to_start(tmp_path):
 
 
 def test_joint_bounds_are_those_of_physics():
-    vehicle, load = load_vehicle("ardrone2"), get("slung_payload")
+    vehicle = load_vehicle("ardrone2")
+    load = get("slung_payload")
     assert load.possible({"m": 0.03, "l": 0.3, "damping": 1.0}, vehicle)
     assert not load.possible({"m": 0.03, "l": 0.3, "damping": 5.0}, vehicle)
 

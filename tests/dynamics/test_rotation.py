@@ -3,6 +3,7 @@
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.linalg import norm
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -12,8 +13,8 @@ numbers = st.floats(-1.0, 1.0, allow_nan=False, width=64)
 quaternions = (
     st.tuples(numbers, numbers, numbers, numbers)
     .map(np.array)
-    .filter(lambda q: np.linalg.norm(q) > 0.05)
-    .map(lambda q: q / np.linalg.norm(q))
+    .filter(lambda q: norm(q) > 0.05)
+    .map(lambda q: q / norm(q))
 )
 
 
@@ -35,7 +36,7 @@ def call(function, *arguments, shape=4):
 def mrp_of(rotation):
     """axis * tan(angle / 4), from the rotation vector."""
     vector = rotation.as_rotvec()
-    angle = np.linalg.norm(vector)
+    angle = norm(vector)
     return np.zeros(3) if angle == 0 else vector / angle * np.tan(angle / 4)
 
 
@@ -49,7 +50,7 @@ def test_the_matrix_takes_body_to_world(q):
 def test_an_mrp_goes_there_and_back_whatever_the_quaternion_s_sign(q):
     for sign in (1.0, -1.0):
         rho = call(r.attitude_error, sign * q, np.array([1.0, 0.0, 0.0, 0.0]), shape=3)
-        assert np.linalg.norm(rho) <= 1 + 1e-12
+        assert norm(rho) <= 1 + 1e-12
         back = call(r.quaternion_from_mrp, rho)
         assert back[0] >= -1e-15
         assert_allclose(scipy_of(back).as_matrix(), scipy_of(q).as_matrix(), atol=1e-13)

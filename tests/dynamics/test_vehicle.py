@@ -5,9 +5,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 import yaml
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.data_paths import data_file
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import (
     EffectSetting,
     InputError,
@@ -27,7 +29,6 @@ GOOD = {
     "k": [8e-6, 8.1e-6, 7.9e-6, 8e-6],
     "p": [2e-7, 2.1e-7, 1.9e-7, 2e-7],
 }
-VEHICLE = load_vehicle("ardrone2")
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -46,8 +47,7 @@ def test_the_measured_flights_vehicle_loads():
     assert vehicle.mass == 0.46
     assert vehicle.mocap.sigma_pos_m == 0.001  # the file says "nominal 0.001"
     assert vehicle.ceiling_z == 2.6
-    default = load_vehicle("ardrone2")
-    assert_array_equal(np.sign(vehicle.mixing), np.sign(default.mixing))
+    assert_array_equal(np.sign(vehicle.mixing), np.sign(VEHICLE.mixing))
 
 
 def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
@@ -97,7 +97,7 @@ def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
 
 def test_a_measured_vehicle_has_the_digits_that_are_known():
     vehicle = replace(
-        load_vehicle("ardrone2"),
+        VEHICLE,
         k=np.full(4, 8.0481234567e-6),
         mocap=Mocap(200.00000000000426, 0.0004993438472289853, 0.005072951427662196),
         effects=(EffectSetting("com_offset", {"cx": 0.0123456789, "cy": -0.000123456}),),
@@ -111,11 +111,14 @@ def test_a_measured_vehicle_has_the_digits_that_are_known():
 
 
 def test_mixing_is_the_paper_s():
-    k, p = np.array([8e-6, 8.2e-6, 7.9e-6, 8.1e-6]), np.array([2e-7, 2.2e-7, 1.9e-7, 2.1e-7])
+    k = np.array([8e-6, 8.2e-6, 7.9e-6, 8.1e-6])
+    p = np.array([2e-7, 2.2e-7, 1.9e-7, 2.1e-7])
     vehicle = parse_vehicle(yaml.safe_dump({**GOOD, "k": k.tolist(), "p": p.tolist()}))
     assert_array_equal(vehicle.inertia, np.diag(GOOD["inertia"]))
     W = np.array([400.0, 410.0, 395.0, 420.0])
-    c, M, arm = k * W**2, p * W**2, GOOD["arm_l"]
+    c = k * W**2
+    M = p * W**2
+    arm = GOOD["arm_l"]
     expected = [
         c.sum(),  # (1)
         arm * (c[0] + c[1] - c[2] - c[3]),  # (8)
@@ -127,7 +130,7 @@ def test_mixing_is_the_paper_s():
 
 
 def test_rotor_speeds_invert_the_rotor_wrench_and_clip_what_no_rotor_can_give():
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     for W in rng.uniform(200, 600, (50, 4)):
         wrench = VEHICLE.rotor_wrench(W)
         assert_allclose(VEHICLE.rotor_speeds(wrench[0], wrench[1:]), W, rtol=1e-10)

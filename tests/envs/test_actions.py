@@ -8,9 +8,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 import windwrench  # noqa: F401  registers the environments
+from tests.support.sizes import rms
 from tests.support.vector_flights import TASKS
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.rotation import quaternion_to_matrix
@@ -59,7 +62,8 @@ def test_an_attitude_is_roll_and_pitch_at_the_present_yaw_yaw_rate_and_thrust():
     assert_allclose(info["command"], [0.2, -0.1, 0.5, 9.81], rtol=1e-6)
     R = turned(env.loop)
     yaw = np.arctan2(R[1, 0], R[0, 0])
-    c, s = np.cos(yaw), np.sin(yaw)
+    c = np.cos(yaw)
+    s = np.sin(yaw)
     R = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ R
     assert np.arctan2(R[2, 1], R[2, 2]) == pytest.approx(0.2, abs=0.03)
     assert np.arcsin(-R[2, 0]) == pytest.approx(-0.1, abs=0.03)
@@ -87,7 +91,8 @@ def test_rotors_are_rotor_speeds_from_none_to_the_largest():
 
 def test_observations_are_of_the_estimate_relative_to_the_reference():
     env, _, seen = flying("attitude", 0.4, [0.4, 0.0, 0.0, 0.0], observation="all", normalize=False)
-    loop, row = env.loop, env.many.episodes.references[0, 80]
+    loop = env.loop
+    row = env.many.episodes.references[0, 80]
     assert_allclose(seen[:3], row[:3] - loop.state[:3], atol=1e-6)
     assert_allclose(seen[3:6], -loop.state[7:10], atol=1e-6)
     assert_allclose(seen[6:9], [0.2, 0.0, 0.0], atol=0.03)
@@ -134,15 +139,16 @@ def test_a_small_and_a_large_vehicle_find_the_task_as_hard_as_the_standard_one(t
     felt = {}
     for vehicle in (load_vehicle("ardrone2"), load_vehicle("crazyflie"), large):
         scale = vehicle.weight * np.array([1.0, vehicle.arm_l])
-        env, rows = gym.make(f"windwrench/{task}-v2", vehicle=vehicle, decision_hz=50), []
+        env = gym.make(f"windwrench/{task}-v2", vehicle=vehicle, decision_hz=50)
+        rows = []
         for seed in range(2):
             env.reset(seed=seed)
             for _ in range(250):
                 *_, lost, _, info = env.step(np.zeros(env.action_space.shape, np.float32))
                 assert not lost
-                size = [np.linalg.norm(info[name]) for name in ("force", "torque")]
+                size = [norm(info[name]) for name in ("force", "torque")]
                 rows.append([*(size / scale), info.get("error", abs(info.get("offset", 0.0)))])
-        felt[vehicle.name] = np.sqrt(np.mean(np.square(rows), axis=0))
+        felt[vehicle.name] = rms(rows, axis=0)
     for name in ("crazyflie", "large"):
         force, torque, error = felt[name] / felt["ardrone2"]
         assert (force, error) == (pytest.approx(1.0, abs=0.25), pytest.approx(1.0, abs=0.35))
@@ -150,7 +156,8 @@ def test_a_small_and_a_large_vehicle_find_the_task_as_hard_as_the_standard_one(t
 
 
 def numbers(envs, decisions, seed=3):
-    rng, rows = np.random.default_rng(1), []
+    rng = default_rng(1)
+    rows = []
     envs.reset(seed=seed)
     shape = 2, *envs.action_space.shape[-1:]
     for _ in range(decisions):

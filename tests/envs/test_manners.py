@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal, assert_equal
 
 from tests.support.vector_flights import fly_alone, make, make_single
@@ -20,7 +21,7 @@ from windwrench.envs.fan_tracking import FRAMES, SCALES
 from windwrench.envs.scenarios import Variation
 from windwrench.evaluation.tasks import TASKS
 
-ACTIONS = np.random.default_rng(1).uniform(-0.6, 0.6, (12, 1)).astype(np.float32)
+ACTIONS = default_rng(1).uniform(-0.6, 0.6, (12, 1)).astype(np.float32)
 
 
 def seen(**kwargs):
@@ -36,9 +37,11 @@ def seen(**kwargs):
 
 def test_views_are_the_frame_over_fixed_scales_a_part_of_it_and_the_last_ones():
     """The history begins full."""
-    frames, history, scaled = seen(), seen(observe="history"), seen(normalize=True)
+    frames = seen()
+    history = seen(observe="history")
+    scaled = seen(normalize=True)
     assert_array_equal(scaled, frames / np.float32(SCALES))
-    assert 0.05 < np.abs(scaled[:, [0, 5, 6, 7]]).mean() < 2.0
+    assert 0.05 < abs(scaled[:, [0, 5, 6, 7]]).mean() < 2.0
     assert_array_equal(seen(observe="wrench-without-fx"), frames[:, 1:])
     padded = np.concatenate([np.repeat(frames[:1], FRAMES - 1, axis=0), frames])
     for k, row in enumerate(history):
@@ -88,7 +91,7 @@ def test_the_stated_distribution_is_the_one_drawn_from():
     env.reset(seed=0)
     assert env.loop.model.body_mass.sum() == pytest.approx(1.3 * env.vehicle.mass)
     assert env.loop.position[0] == pytest.approx(2.5, abs=0.3)  # it drifts while the filter settles
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     drawn = [Variation().draw(rng)["mass"] for _ in range(200)]
     assert 0.93 <= min(drawn) < 0.94
     assert 1.06 < max(drawn) <= 1.07
@@ -110,7 +113,8 @@ def test_gymnasium_s_checker_finds_nothing_and_spaces_are_scaled(task):
 @pytest.mark.parametrize("plant", ["single", "mujoco", "lanes"])
 def test_an_old_id_is_the_new_one_in_si_units_which_info_has(task, plant):
     kind = TASKS[task].environment
-    scales, largest = np.array(kind.scales, dtype=np.float32), np.float32(kind.largest_action)
+    scales = np.array(kind.scales, dtype=np.float32)
+    largest = np.float32(kind.largest_action)
 
     def made(name, **given):
         if plant == "single":
@@ -120,13 +124,15 @@ def test_an_old_id_is_the_new_one_in_si_units_which_info_has(task, plant):
     name = f"windwrench/{task}-v"
     with pytest.warns(DeprecationWarning, match=f"{name}0 is kept until 3.0; take {name}1 with"):
         old = made(f"{name}0")
-    plain, scaled = made(f"{name}1", normalize=False), made(f"{name}1")
+    plain = made(f"{name}1", normalize=False)
+    scaled = made(f"{name}1")
     seed = 4 if plant == "single" else [4, 5]
-    (a, _), (b, told) = plain.reset(seed=seed), scaled.reset(seed=seed)
+    a, _ = plain.reset(seed=seed)
+    b, told = scaled.reset(seed=seed)
     assert_array_equal(old.reset(seed=seed)[0], a)
     assert_array_equal(told["observation"], a)
     assert_array_equal(told["command"], 0.0)
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     for _ in range(6):
         action = rng.uniform(-1.0, 1.0, scaled.action_space.shape).astype(np.float32)
         a, reward, *_ = plain.step(largest * action)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TransformReward
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 import windwrench
@@ -19,7 +20,9 @@ from windwrench.training.training_envs import MixedFanTracking
 class Land(windwrench.envs.Task):
     """From 1.5 m to .3 m within 10 s, softly, in the scenario's winds."""
 
-    decision_hz, action, episode_s = 25, "acceleration", 0.4
+    decision_hz = 25
+    action = "acceleration"
+    episode_s = 0.4
 
     def start(self, rng, n):
         down = np.zeros((n, 4001, 3))
@@ -51,8 +54,9 @@ WAYS = {
 
 def flown(envs, decisions, seed=5):
     """Observations, rewards, ends and an own entry of ``info`` of an environment's decisions."""
-    rows, infos = [], {}
-    rng = np.random.default_rng(0)
+    rows = []
+    infos = {}
+    rng = default_rng(0)
     envs.reset(seed=seed)
     for _ in range(decisions):
         actions = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
@@ -67,7 +71,8 @@ def test_a_task_of_ten_lines_flies_alike_in_each_way_and_is_truncated(way):
     env = gym.make("me/Land-v0")
     frame, _ = env.reset(seed=5)
     assert frame.shape == (6,)
-    rng, alone = np.random.default_rng(0), []
+    rng = default_rng(0)
+    alone = []
     for _ in range(10):
         action = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)[0]
         frame, reward, lost, over, info = env.step(action)
@@ -75,7 +80,7 @@ def test_a_task_of_ten_lines_flies_alike_in_each_way_and_is_truncated(way):
         alone.append([*frame, reward, lost, over, info["reward_soft"]])
     assert (lost, over, info["reward_cost"]) == (False, True, -0.1)
     assert info["height"] == pytest.approx(1.5, abs=0.3)
-    assert np.all(info["std"] > 0.0)
+    assert (info["std"] > 0.0).all()
     rows, infos = flown(gym.make_vec("me/Land-v0", num_envs=3, **WAYS[way]), 10)
     assert_allclose(rows[:, 0], alone, atol=2e-5 if way == "lanes" else 0.0)
     assert not np.array_equal(rows[:, 0], rows[:, 1])
@@ -92,7 +97,8 @@ def test_gymnasium_s_and_sb3_s_checkers_find_nothing_wrong_with_a_task_of_one_s_
 class Mine(WindHoverEnv):
     """One override each."""
 
-    largest_action, decision_hz = 6.0, 50.0
+    largest_action = 6.0
+    decision_hz = 50.0
 
     def start(self, rng, n):
         start = super().start(rng, n)
@@ -110,7 +116,8 @@ class Mine(WindHoverEnv):
 
 @pytest.mark.parametrize("plant", ["mujoco", "lanes"])
 def test_what_a_subclass_overrides_of_the_kit_s_task_holds_in_many_as_in_a_single_one(plant):
-    single, many = Mine(), Mine.vector(2, plant=plant)
+    single = Mine()
+    many = Mine.vector(2, plant=plant)
     frame, _ = single.reset(seed=4)
     frames, infos = many.reset(seed=4)
     assert infos["trajectory"].tolist() == ["higher"] * 2

@@ -6,9 +6,12 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from numpy.linalg import eigvalsh, norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from tests.support.sizes import rms
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.mean_jet import jet_table
 from windwrench.envs.closed_loop import ClosedLoop
@@ -50,7 +53,8 @@ class Bench:
         """Hold rotor speeds (4,) for some ticks; return position, attitude, velocity and body rate
         after each (n, 13).
         """
-        rows, rotors = np.empty((ticks, 13)), np.asarray(command, float)
+        rows = np.empty((ticks, 13))
+        rotors = np.asarray(command, float)
         motion = self.data.qpos, self.data.qvel
         xfrc = self.data.xfrc_applied[self.model.body("vehicle").id]
         for k in range(ticks):
@@ -76,7 +80,8 @@ def test_a_torque_step_turns_it_as_a_rigid_body(axis):
 
 def test_the_motors_follow_their_commands_with_the_stated_lag():
     bench = Bench(settings=replace(QUIET, motor_lag=0.04))
-    command, logged = np.array([500.0, 400.0, 300.0, HOVER]), []
+    command = np.array([500.0, 400.0, 300.0, HOVER])
+    logged = []
     for _ in range(30):
         bench.run(command, 1)
         logged.append(bench.plant["z"][:4].copy())
@@ -108,22 +113,25 @@ def test_a_recorded_rotor_speed_is_rounded_once():
         reported.append(loop.unrounded.copy())
 
     log = record_flight(vehicle, (late,), seconds=3.0, seed=4, push=watch)["rotor_speeds"][1:-1]
-    before, after = np.array(reported)[1:-1], np.array(reported)[2:]
+    before = np.array(reported)[1:-1]
+    after = np.array(reported)[2:]
     # as it is at the pose's instant, between two ticks
-    assert np.max(np.abs(log - (0.25 * before + 0.75 * after))) < 2.0 + 1e-9
-    assert np.max(np.abs(log / 4.0 - np.round(log / 4.0))) < 1e-9
+    assert abs(log - (0.25 * before + 0.75 * after)).max() < 2.0 + 1e-9
+    assert abs(log / 4.0 - np.round(log / 4.0)).max() < 1e-9
 
 
 def test_the_disturbance_has_its_declared_size_and_lasts_as_long_as_it_says():
     """100 s on six axes: 0.03 N and 0.01 Nm, a correlation of 1/e after 0.3 s."""
-    settings, rng = PlantSettings(), np.random.default_rng(0)
-    bench, disturbed = Bench(settings=settings), np.empty((20_000, 6))
+    settings = PlantSettings()
+    rng = default_rng(0)
+    bench = Bench(settings=settings)
+    disturbed = np.empty((20_000, 6))
     for row in disturbed:
         disturb(bench.plant, rng.standard_normal(NOISE))
         row[:] = bench.plant["disturbance"]
     sizes = np.repeat([settings.disturbance_force, settings.disturbance_torque], 3)
     unit = disturbed[1000:] / sizes
-    assert np.sqrt(np.mean(unit**2)) == pytest.approx(1.0, abs=0.06)
+    assert rms(unit) == pytest.approx(1.0, abs=0.06)
     later = round(settings.disturbance_time / TICK)
     assert np.mean(unit[later:] * unit[:-later]) == pytest.approx(np.exp(-1.0), abs=0.08)
 
@@ -138,7 +146,7 @@ def test_a_battery_sags_by_a_twentieth_under_twice_the_hover_s_load():
 
 def sensed(quaternion, count=400):
     bench = Bench(settings=replace(QUIET, sensor_noise=True), quaternion=quaternion)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     rows = np.empty((count, 7))
     for row in rows:
         sense(bench.plant, bench.data.qpos, rng.standard_normal(NOISE))
@@ -147,12 +155,11 @@ def sensed(quaternion, count=400):
 
 
 def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backwards():
-    q = Rotation.from_euler("z", math.pi).as_quat(scalar_first=True)
-    rows = sensed(q)
+    rows = sensed(Rotation.from_euler("z", math.pi).as_quat(scalar_first=True))
     assert rows[:, 3].min() >= 0.0
     flips = np.count_nonzero(np.diff(np.sign(rows[:, 6])))
     assert flips > 50  # of 400 samples; noise alone decides the sign
-    assert_allclose(np.linalg.norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
+    assert_allclose(norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
 
 
 def test_the_pose_has_the_noise_that_the_vehicle_s_motion_capture_states():
@@ -165,13 +172,13 @@ def test_the_pose_has_the_noise_that_the_vehicle_s_motion_capture_states():
 
 def test_the_filter_flies_on_through_dropouts():
     loop = ClosedLoop(VEHICLE, settings=PlantSettings(dropout=0.3))
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     loop.reset(rng, np.array([0.0, 0.0, 1.5]), math.pi)
     loop.run(rng.standard_normal((2000, NOISE)))
     assert loop.healthy()
     assert_allclose(loop.position, [0, 0, 1.5], atol=0.05)
     assert_allclose(loop.state[:3], loop.position, atol=0.01)
-    assert np.linalg.eigvalsh(loop.covariance)[0] > 0
+    assert eigvalsh(loop.covariance)[0] > 0
 
 
 def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
@@ -188,9 +195,9 @@ def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
 def test_every_trajectory_is_flown_without_touching_the_ground(trajectory):
     columns = record_flight(load_vehicle("ardrone2"), (), trajectory, 15.0, 0)
     assert columns["position"][:, 2].min() > 0.05
-    assert np.all(np.isfinite(columns["position"]))
-    assert np.abs(columns["force"]).max() < 0.1  # the background only
-    assert np.all(np.abs(columns["voltage"] / 11.1 - 1.0) < 0.15)
+    assert np.isfinite(columns["position"]).all()
+    assert abs(columns["force"]).max() < 0.1  # the background only
+    assert (abs(columns["voltage"] / 11.1 - 1.0) < 0.15).all()
 
 
 @pytest.mark.parametrize("vehicle", ["ardrone2", "crazyflie", "hummingbird"])

@@ -97,7 +97,7 @@ def drawn(tmp_path_factory):
 
 def changed(a, b):
     """Share of the pixels that differ visibly."""
-    return np.mean(np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 20)
+    return np.mean(abs(a.astype(int) - b.astype(int)).max(axis=2) > 20)
 
 
 def test_a_picture_has_the_size_asked_for_and_shows_the_vehicle_where_it_is_and_the_fan(drawn):
@@ -118,7 +118,7 @@ def test_a_caption_has_a_colour_for_truth_and_estimate_time_and_error(drawn):
     )
     assert true > estimated > 10  # wide and narrow, as the arrows
     for other in ("later", "farther"):
-        assert np.any(first != pictures[other])
+        assert (first != pictures[other]).any()
 
 
 def test_a_machine_that_cannot_draw_is_told_what_to_install(drawn):

@@ -7,13 +7,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import SFC64, random
 from numpy.testing import assert_allclose, assert_array_equal
 
 import windwrench  # noqa: F401  registers the environments
 from tests.support.vector_flights import fly_alone
+from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Admittance
 from windwrench.controllers import wind_observation as seen
-from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics import InputError
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs import FanTrackingEnv
 from windwrench.envs.fan_tracking_2d import FanTracking2DEnv
@@ -27,13 +30,11 @@ from windwrench.evaluation.tasks import TASKS
 @pytest.mark.parametrize("cls", [WindHoverEnv, FanTracking2DEnv])
 def test_the_docstring_s_tables_are_the_spaces(cls):
     env = cls()
-    size = env.observation_space.shape[0]
-    limits = np.zeros(size)
+    limits = np.zeros(env.observation_space.shape[0])
     table = cls.__doc__.partition("## Observation space")[2].partition("##")[0]
     rows = re.findall(r"^\s+\| (\d+)(?:-(\d+))? *\|(.*)\|", table, re.M)
     for row in rows:
-        first, last = int(row[0]), int(row[1] or row[0])
-        limits[first : last + 1] = float(row[2].split("|")[1])
+        limits[int(row[0]) : int(row[1] or row[0]) + 1] = float(row[2].split("|")[1])
     assert rows
     assert_array_equal(env.observation_space.high, limits.astype(np.float32))
 
@@ -53,10 +54,11 @@ def test_the_rewards_are_as_stated(name, weight, width, actions):
     for action in np.array(actions):
         _, reward, _, _, info = env.step(action)
         if name == "FanTracking":
-            action, error = np.float32(np.minimum(action, 1.0)), info["y"] - info["fan_y"]
+            action = np.float32(np.minimum(action, 1.0))
+            error = info["y"] - info["fan_y"]
         else:
             target = info["fan"] if name == "FanTracking2D" else info["reference"]
-            error = np.linalg.norm(info["position"] - target)
+            error = norm(info["position"] - target)
         assert info.get("error", info.get("offset")) == pytest.approx(error)
         assert info["reward_change"] == pytest.approx(-weight * np.sum((action - last) ** 2))
         assert info["reward_tracking"] == pytest.approx(1 / (1 + (error / width) ** 2))
@@ -109,10 +111,10 @@ def test_an_episode_and_numpy_s_global_random_state_leave_each_other_alone():
     env = FanTrackingEnv("varied")
     first = fly_alone(env, 15, 5)
     np.random.seed(123)  # noqa: NPY002
-    expected = np.random.random(3)  # noqa: NPY002
+    expected = random(3)  # noqa: NPY002
     np.random.seed(123)  # noqa: NPY002
     assert_array_equal(fly_alone(env, 15, 5), first)
-    assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
+    assert_array_equal(random(3), expected)  # noqa: NPY002
 
 
 def test_after_a_bad_fan_path_which_is_named_there_is_no_step():
@@ -136,10 +138,11 @@ def test_a_filter_whose_state_is_no_number_starts_over():
 
 
 def test_a_generator_that_is_put_in_is_drawn_from():
-    env, twin = FanTrackingEnv(), FanTrackingEnv()
+    env = FanTrackingEnv()
+    twin = FanTrackingEnv()
     env.reset(seed=1)
     twin.reset(seed=1)
-    env.np_random, other = (np.random.Generator(np.random.SFC64(4)) for _ in range(2))
+    env.np_random, other = (np.random.Generator(SFC64(4)) for _ in range(2))
     env.step(STILL)
     twin.step(STILL)
     assert not np.array_equal(env.loop.state, twin.loop.state)
@@ -147,7 +150,6 @@ def test_a_generator_that_is_put_in_is_drawn_from():
     assert env.np_random.uniform() == other.uniform()
 
 
-VEHICLE = load_vehicle("ardrone2")
 HEAVY = EffectSetting("mass", {"dm": 0.06})
 
 

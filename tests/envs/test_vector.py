@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from numba import njit
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.vector_flights import TASKS, fly, make, make_single
@@ -30,7 +31,8 @@ from windwrench.runtime.vector_lanes import WIDTH
 )
 def test_the_bits_depend_on_neither_number_nor_threads(given, threads):
     given = {"scenario": "varied", "max_episode_steps": 7, **given}
-    many, decisions = 2 * WIDTH + 1 if "plant" in given else 5, 9
+    many = 2 * WIDTH + 1 if "plant" in given else 5
+    decisions = 9
     alone = fly(make(many, **given), decisions)
     for other in (make(2, **given), make(many, threads=threads, **given)):
         count = other.num_envs
@@ -40,7 +42,8 @@ def test_the_bits_depend_on_neither_number_nor_threads(given, threads):
 @pytest.mark.parametrize("plant", ["mujoco", "lanes"])
 def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it runs
-    envs, healthy = make(3, plant, threads=2), make(3, plant)
+    envs = make(3, plant, threads=2)
+    healthy = make(3, plant)
     actions = np.zeros((3, 1), np.float32)
     for one in (envs, healthy):
         one.reset(seed=0)
@@ -90,7 +93,8 @@ def test_bad_actions_are_named_and_nothing_flies(actions):
 
 
 def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():
-    envs, calls = make(1), []
+    envs = make(1)
+    calls = []
 
     def clock():
         calls.append(0)
@@ -112,7 +116,7 @@ def test_side_by_side_is_single_bit_for_bit_and_lanes_to_rounding(task, scenario
     many = fly(make(3, "mujoco", task, scenario=scenario), 6)
     alone = [lambda: make_single(task, scenario=scenario)] * 3
     assert_array_equal(fly(gym.vector.SyncVectorEnv(alone), 6), many)
-    difference = np.abs(fly(make(3, "lanes", task, scenario=scenario), 6) - many)
+    difference = abs(fly(make(3, "lanes", task, scenario=scenario), 6) - many)
     size = alone[0]().observation_space.shape[0]  # of a frame, which is of single precision
     assert difference[..., :size].max() < 2e-5
     assert difference[..., size:].max() < 1e-6
@@ -150,7 +154,7 @@ ENDING = {"scenario": "fast", "max_episode_steps": 7}
 def test_lanes_fly_what_mujoco_does(count, decisions, given, apart):
     """A second of each scenario, all that can be set, and episodes that end and begin."""
     ours, theirs = (fly(make(count, plant, **given), decisions) for plant in ("lanes", "mujoco"))
-    assert np.abs(ours - theirs).max() < apart
+    assert abs(ours - theirs).max() < apart
 
 
 @njit
@@ -168,8 +172,9 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
     inertia = np.array([[2.2, 0.3, -0.2], [0.3, 3.0, 0.1], [-0.2, 0.1, 4.0]]) * 1e-3
     vehicle = replace(load_vehicle("ardrone2"), inertia=inertia, com=np.array([0.02, -0.03, 0.01]))
     blocks = LoopBlocks(1, ClosedLoop(vehicle))
-    rng = np.random.default_rng(0)
-    start, wrench = rng.normal(0, 5, (6, WIDTH)), rng.normal(0, 0.02, (6, WIDTH))
+    rng = default_rng(0)
+    start = rng.normal(0, 5, (6, WIDTH))
+    wrench = rng.normal(0, 0.02, (6, WIDTH))
     blocks.loops["qpos"][0], blocks.loops["qpos"][0, 3] = 0.0, 1.0
     blocks.loops["qvel"][0], blocks.loops["xfrc"][0] = start, wrench
     fly_on(blocks.loops.ctypes.data, round(SUBSTEPS / TICK), TICK / SUBSTEPS)

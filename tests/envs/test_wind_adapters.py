@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -20,10 +21,11 @@ from windwrench.envs.wind import (
     pyflyt_wind_type,
 )
 
-rng = np.random.default_rng(3)
+rng = default_rng(3)
 PLACE, VELOCITY, RATE = rng.normal(size=(3, 2, 3))
 ROTATION = Rotation.random(2, rng)
-ARM, DRAG = 0.1, 0.02
+ARM = 0.1
+DRAG = 0.02
 
 
 class Sheared:
@@ -36,9 +38,9 @@ class Sheared:
 
 def test_pyflyt_and_rotorpy_get_the_same_field():
     wind = Turbulence(0, 1.0, 2.0, (4, 0, 0))
-    points = np.random.default_rng(7).uniform(-1, 1, (5, 3))
+    points = default_rng(7).uniform(-1, 1, (5, 3))
     # as Aviary makes and asks for it
-    field = pyflyt_wind_type(wind)(np_random=np.random.default_rng(0))
+    field = pyflyt_wind_type(wind)(np_random=default_rng(0))
     for one in (field, PyFlytWind(wind)):
         assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
     wind = FanWall(np.full(9, 4.0))
@@ -61,7 +63,7 @@ def test_a_wind_pushes_and_a_shear_turns():
     calm = WindDrag(Turbulence(0, 1e-12, 1.0, (1, 0, 0)), ARM, DRAG)
     force, torque = calm.wrench(0.0, PLACE, ROTATION, VELOCITY, RATE)
     assert_allclose(force, -4 * DRAG * VELOCITY, atol=1e-10)
-    assert np.all(np.sum(torque * RATE, axis=1) < 0.0)  # drag brakes
+    assert (np.sum(torque * RATE, axis=1) < 0.0).all()  # drag brakes
 
 
 def expected(time):
@@ -71,7 +73,8 @@ def expected(time):
 class Leaf:
     """Zeros with JAX's ``at[:].set``."""
 
-    shape, set = (2, 1, 3), staticmethod(np.asarray)
+    shape = (2, 1, 3)
+    set = staticmethod(np.asarray)
     at = property(lambda self: self)
 
     def __getitem__(self, key):
@@ -96,7 +99,8 @@ def test_crazyflow_gets_force_and_torque_of_all_worlds():
 
 
 def test_pybullet_drones_get_force_and_torque(monkeypatch):
-    forces, torques = [], []
+    forces = []
+    torques = []
     bullet = SimpleNamespace(
         WORLD_FRAME=2,
         applyExternalForce=lambda *given: forces.append(np.hstack(given)),
@@ -122,6 +126,7 @@ def test_pybullet_drones_get_force_and_torque(monkeypatch):
     for i, body in enumerate(env.DRONE_IDS):
         assert_allclose(forces[i], [body, -1, *force[i], *PLACE[i], 2, 1])
         assert_allclose(torques[i], [body, -1, *torque[i], 2, 1])
-    env.PYB_STEPS_PER_CTRL, env.CTRL_FREQ = 5, 48
+    env.PYB_STEPS_PER_CTRL = 5
+    env.CTRL_FREQ = 48
     with pytest.raises(InputError, match="expected ctrl_freq equal to pyb_freq, got 48 and 240 Hz"):
         blow_pybullet_drones(env, drag)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -16,6 +17,7 @@ from tests.support.model_flights import (
     drawn,
     simulate_model,
 )
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import Uncertainty
 from windwrench.envs.recording import record_flight
@@ -24,8 +26,6 @@ from windwrench.estimator.consistency import chi2_band, nees, state_error
 from windwrench.estimator.model_uncertainty import factors_alone, factors_of
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log, tune_to_log
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 def share_within(values, band):
@@ -39,7 +39,9 @@ def share_within(values, band):
 )
 def test_a_filter_is_consistent(vehicle, tuning):
     """Truth drawn from the filter's own model, yawed by 120 degrees and turning at 3 rad/s."""
-    runs, steps, estimator = 40, 400, WrenchUKF(vehicle, tuning)
+    runs = 40
+    steps = 400
+    estimator = WrenchUKF(vehicle, tuning)
     found = np.empty((2, runs, steps))
     for r in range(runs):
         speeds = np.full((steps, 4), vehicle.hover_rate)
@@ -71,17 +73,20 @@ def test_nees_of_a_known_error():
 def test_band_holds_the_mean_as_often_as_it_says():
     low, high = chi2_band(6, 100)
     assert (low, high) == pytest.approx((5.341, 6.697), abs=2e-3)
-    means = np.random.default_rng(0).chisquare(6, (4000, 100)).mean(axis=1)
+    means = default_rng(0).chisquare(6, (4000, 100)).mean(axis=1)
     assert np.mean((means > low) & (means < high)) == pytest.approx(0.95, abs=0.015)
 
 
 @pytest.mark.parametrize("source", ["measured", "commanded"])
 def test_intervals_hold_what_they_say(source):
     """95 % of 240 flights of drawn vehicles, three axes each, yawing and with changing thrust."""
-    vehicle, runs, steps = replace(VEHICLE, omega_source=source), 240, 400
-    tuning, error = UKFTuning(), np.empty((3, runs, 6))
+    vehicle = replace(VEHICLE, omega_source=source)
+    runs = 240
+    steps = 400
+    tuning = UKFTuning()
+    error = np.empty((3, runs, 6))
     for r in range(runs):
-        rng = np.random.default_rng(r)
+        rng = default_rng(r)
         true = drawn(vehicle, rng)
         sway = 1.0 + rng.uniform(0.0, 0.3) * np.sin(0.015 * np.arange(steps) + rng.uniform(0, 6))
         speeds = np.tile(true.hover_rate * np.sqrt(sway)[:, None], 4)
@@ -90,11 +95,12 @@ def test_intervals_hold_what_they_say(source):
         error[0, r] = np.concatenate([e.torque - run.torque[-1], e.force - run.force[-1]])
         error[1, r] = np.concatenate([e.std_torque, e.std_force])
         error[2, r] = e.std[12:]
-    inside = np.abs(error[0]) < 1.96 * error[1]
-    torque, force = inside[:, :3].mean(), inside[:, 3:].mean()
+    inside = abs(error[0]) < 1.96 * error[1]
+    torque = inside[:, :3].mean()
+    force = inside[:, 3:].mean()
     assert 0.925 < torque < 0.975  # of 720: 0.016 is the deviation of a share of 0.95, twice
     assert 0.915 < force < 0.98  # the axes of a force share one error of thrust
-    assert np.mean(np.abs(error[0]) < 1.96 * error[2]) < 0.8  # of noise alone
+    assert np.mean(abs(error[0]) < 1.96 * error[2]) < 0.8  # of noise alone
 
 
 @pytest.mark.slow
@@ -103,14 +109,16 @@ def test_intervals_hold_on_flights_of_another_model(name):
     """60 flights of 20 s in MuJoCo in turbulence, estimated as ``windwrench estimate`` does. Hover
     falls short along x and y: turbulence changes within 0.2 s, the walk that is fitted in 1 s.
     """
-    vehicle, inside = load_vehicle(name), {"hover": [], "circle": [], "fast": [], "excite": []}
+    vehicle = load_vehicle(name)
+    inside = {"hover": [], "circle": [], "fast": [], "excite": []}
     for seed, trajectory in enumerate(15 * list(inside)):
-        true = drawn(vehicle, np.random.default_rng((7, seed)))
+        true = drawn(vehicle, default_rng((7, seed)))
         flown = record_flight(true, trajectory=trajectory, seconds=20.0, seed=7000 + seed)
         log = FlightLog(**flown, name="flight", source="flight")
         series = estimate_log(log, vehicle, tuning=tune_to_log(log, vehicle).tuning)
         rows = np.arange(800, len(log.t), 200)
-        off, std = np.abs(series.force - flown["force"])[rows], series.std_force[rows]
+        off = abs(series.force - flown["force"])[rows]
+        std = series.std_force[rows]
         inside[trajectory].append(np.mean(off < 1.96 * std))
     shares = {trajectory: np.mean(of) for trajectory, of in inside.items()}
     flights = np.concatenate(list(inside.values()))
@@ -122,7 +130,8 @@ def test_intervals_hold_on_flights_of_another_model(name):
 @pytest.mark.parametrize("make", [WrenchUKF, ConstantGainFilter])
 def test_the_filter_stays_as_it_is_and_says_in_hover_what_follows_by_hand(make):
     known = VEHICLE.uncertainty
-    exact, stated = make(replace(VEHICLE, uncertainty=Uncertainty())), make(VEHICLE)
+    exact = make(replace(VEHICLE, uncertainty=Uncertainty()))
+    stated = make(VEHICLE)
     for ukf in (exact, stated):
         ukf.reset((0, 0, 1), (1, 0, 0, 0))
     for _ in range(1000):

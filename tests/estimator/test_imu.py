@@ -4,25 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import eigvalsh, inv, solve
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support import flights
 from tests.support.flights import PERIOD, matrix, yawing_flight
 from tests.support.model_flights import simulate_model
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting, InputError
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.error_state import displace
 from windwrench.estimator.imu import expected_imu
 
-VEHICLE = load_vehicle("ardrone2")
-FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])
-GYRO, ACCELEROMETER = 0.005, 0.05
-
-
-@pytest.fixture(scope="module")
-def yawing():
-    return yawing_flight(VEHICLE, 1600, seed=1, sigma_position=0.01, sigma_attitude=0.05)
+FORCE = np.array([0.3, -0.2, -0.1])
+TORQUE = np.array([0.0, 0.0, 0.02])
+GYRO = 0.005
+ACCELEROMETER = 0.05
 
 
 def errors(flight, imu, attitude=True):
@@ -31,24 +31,27 @@ def errors(flight, imu, attitude=True):
     tuning = UKFTuning(position_noise=0.01, attitude_noise=0.05, **noise)
     ukf = WrenchUKF(VEHICLE, tuning, PERIOD)
     flights.begin(ukf, flight)
-    rng, rows = np.random.default_rng(0), []
+    rng = default_rng(0)
+    rows = []
     for k in range(1, len(flight["rotors"])):
         seen = flight["quaternion"][k] if attitude else None
         e = ukf.step(flight["rotors"][k], flight["position"][k], seen)
         if imu:
-            R, gyro = matrix(flight["true_q"][k]), GYRO * rng.standard_normal(3)
+            R = matrix(flight["true_q"][k])
+            gyro = GYRO * rng.standard_normal(3)
             up = R @ [0, 0, VEHICLE.k @ flight["rotors"][k] ** 2]
             felt = R.T @ (up + FORCE) / VEHICLE.mass + ACCELEROMETER * rng.standard_normal(3)
             e = ukf.correct_imu(flight["omega"][k] + gyro, felt)
         rate = e.angular_velocity - flight["omega"][k]
         rows.append([e.force - FORCE, e.torque - TORQUE, rate])
-    return np.sqrt(np.mean(np.square(rows[600:]), axis=(0, 2)))
+    return rms(rows[600:], axis=(0, 2))
 
 
-def test_an_imu_sharpens_every_part_of_the_estimate_and_replaces_an_attitude(yawing):
-    without, with_imu = errors(yawing, False), errors(yawing, True)
-    assert np.all(with_imu < [0.5, 0.2, 0.2] * without)
-    assert np.all(errors(yawing, True, attitude=False) < [0.05, 0.002, 0.01])
+def test_an_imu_sharpens_every_part_of_the_estimate_and_replaces_an_attitude():
+    yawing = yawing_flight(VEHICLE, 1600, seed=1, sigma_position=0.01, sigma_attitude=0.05)
+    without = errors(yawing, False)
+    assert (errors(yawing, True) < [0.5, 0.2, 0.2] * without).all()
+    assert (errors(yawing, True, attitude=False) < [0.05, 0.002, 0.01]).all()
 
 
 def test_a_declared_effect_is_in_what_the_accelerometer_should_read():
@@ -104,14 +107,19 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     tuning = UKFTuning.for_vehicle(vehicle, period)
     f = fly(started(flight, tuning, period, vehicle), flight, 40)
     f.predict(flight.rotor_speeds[40])
-    P, x = f.covariance_with_biases, f.estimate.state
+    P = f.covariance_with_biases
+    x = f.estimate.state
     b = np.concatenate([f.gyro_bias, f.accelerometer_bias])
     z = np.concatenate([flight.gyro[40], flight.accelerometer[40]])
 
     # h and its Jacobian by the error state, from the filter's own model, at the estimate
-    record, point, out = f.record[0], np.zeros(20), np.zeros((2, 6))
-    H, columns = np.zeros((6, 24)), 1e-6 * np.eye(18)
-    rho, q = np.zeros(3), np.zeros(4)
+    record = f.record[0]
+    point = np.zeros(20)
+    out = np.zeros((2, 6))
+    H = np.zeros((6, 24))
+    columns = 1e-6 * np.eye(18)
+    rho = np.zeros(3)
+    q = np.zeros(4)
     for j in range(18):
         for s, sign in enumerate((1.0, -1.0)):
             displace(x, columns[j], sign, rho, q, point)
@@ -120,12 +128,15 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     H[:, 18:] = np.eye(6)
     expected_imu(record, x, out[0])
     # the noise of a step: torque n_m and thrust n_c in body axes, through centre of mass and mass
-    R, com = record["centre_rotation"].copy(), vehicle.com
-    GQ, DQ = np.zeros((24, 6)), np.zeros((6, 6))
+    R = record["centre_rotation"].copy()
+    com = vehicle.com
+    GQ = np.zeros((24, 6))
+    DQ = np.zeros((6, 6))
     for n in range(3):
-        alpha = np.linalg.inv(vehicle.inertia)[:, n] * tuning.motor_torque_noise
+        alpha = inv(vehicle.inertia)[:, n] * tuning.motor_torque_noise
         centre = np.cross(com, alpha)
-        GQ[3:6, n], DQ[3:6, n] = period * alpha, centre
+        GQ[3:6, n] = period * alpha
+        DQ[3:6, n] = centre
         GQ[9:12, n], GQ[6:9, n] = period * R @ centre, period**2 / 2 * R @ centre
         push = np.eye(3)[n] * tuning.thrust_noise / vehicle.mass
         GQ[9:12, 3 + n], GQ[6:9, 3 + n] = period * R @ push, period**2 / 2 * R @ push
@@ -134,22 +145,23 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     cross = P @ H.T + GQ @ DQ.T
     S = H @ P @ H.T + H @ GQ @ DQ.T + (H @ GQ @ DQ.T).T + DQ @ DQ.T + np.diag(noise)
     innovation = z - out[0] - b
-    expected = cross @ np.linalg.solve(S, innovation)
+    expected = cross @ solve(S, innovation)
 
     after = f.correct_imu(flight.gyro[40], flight.accelerometer[40])
     deviation = np.sqrt(np.diagonal(P))
     step = -error_of(f, x, b[:3], b[3:])
-    assert np.max(np.abs(step - expected) / deviation) < 2e-3
+    assert np.max(abs(step - expected) / deviation) < 2e-3
     assert np.max(np.abs(expected) / deviation) > 0.1
-    left = P - cross @ np.linalg.solve(S, cross.T)
+    left = P - cross @ solve(S, cross.T)
     scale = np.sqrt(np.outer(np.diagonal(left), np.diagonal(left)))
-    assert np.max(np.abs(f.covariance_with_biases - left) / scale) < 5e-3
-    assert after.nis == pytest.approx(innovation @ np.linalg.solve(S, innovation), rel=2e-3)
+    assert np.max(abs(f.covariance_with_biases - left) / scale) < 5e-3
+    assert after.nis == pytest.approx(innovation @ solve(S, innovation), rel=2e-3)
 
 
 def test_pose_and_imu_of_one_moment_may_come_in_either_order():
     flight = drawn(80)
-    one, other = fly(started(flight), flight, 80), fly(started(flight), flight, 80, first="pose")
+    one = fly(started(flight), flight, 80)
+    other = fly(started(flight), flight, 80, first="pose")
     apart = started(flight)
     for k in range(80):
         apart.predict(flight.rotor_speeds[k])
@@ -170,7 +182,8 @@ def consistency(vehicle, rate, pose_hz, fine, runs, seconds):
     dt = 1.0 / rate
     tuning = UKFTuning.for_vehicle(vehicle, dt * fine)
     drawn_with = UKFTuning.for_vehicle(vehicle, dt)
-    steps, every = round(seconds * rate), rate // pose_hz
+    steps = round(seconds * rate)
+    every = rate // pose_hz
     found = np.empty((4, runs, steps))
     for r in range(runs):
         flight = drawn(steps, dt, r, drawn_with, vehicle, angular_velocity=(0.0, 0.0, 1.0))
@@ -184,7 +197,7 @@ def consistency(vehicle, rate, pose_hz, fine, runs, seconds):
             error = error_of(f, flight.state[k], flight.gyro_bias[k], flight.accelerometer_bias[k])
             found[0, r, k] = nis
             for i, rows in ((1, slice(15, 18)), (2, slice(0, 18)), (3, slice(0, 24))):
-                found[i, r, k] = error[rows] @ np.linalg.solve(P[rows, rows], error[rows])
+                found[i, r, k] = error[rows] @ solve(P[rows, rows], error[rows])
     return found.mean(axis=(1, 2)), [chi2_band(dof, runs) for dof in (6, 3, 18, 24)]
 
 
@@ -220,10 +233,10 @@ def test_biases_are_found_and_cost_nothing():
     turn = np.array([0.0, 0.02, 0.0])
     biased = replace(flight, gyro=flight.gyro + turn, accelerometer=flight.accelerometer - 0.1)
     f, g = (fly(started(each, tuning), each, 1200) for each in (biased, flight))
-    assert np.all(np.abs(f.gyro_bias - turn) < 4 * f.gyro_bias_std)
-    assert np.all(np.abs(f.accelerometer_bias + 0.1) < 4 * f.accelerometer_bias_std)
-    assert np.all(f.gyro_bias_std < 0.002)
-    assert np.all(f.accelerometer_bias_std < 0.02)
+    assert (abs(f.gyro_bias - turn) < 4 * f.gyro_bias_std).all()
+    assert (abs(f.accelerometer_bias + 0.1) < 4 * f.accelerometer_bias_std).all()
+    assert (f.gyro_bias_std < 0.002).all()
+    assert (f.accelerometer_bias_std < 0.02).all()
     assert_allclose(f.estimate.force, g.estimate.force, atol=0.003)
 
 
@@ -235,7 +248,7 @@ def test_the_first_gyro_sample_has_a_bias_whenever_it_comes(posed):
     f.reset(*pose)
     f.step(np.full(4, VEHICLE.hover_rate), *(pose if posed else (None, None)))
     e = f.correct_imu(np.zeros(3), None)
-    assert np.all(np.sqrt(np.diag(e.covariance)[3:6]) > 0.09)
+    assert (np.sqrt(np.diag(e.covariance)[3:6]) > 0.09).all()
 
 
 def test_an_accelerometer_says_nothing_while_the_rotors_are_unknown():
@@ -263,15 +276,15 @@ def test_an_accelerometer_says_nothing_while_the_rotors_are_unknown():
 
 def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
     flight = drawn(50)
-    f, g = started(flight), fly(started(flight), flight, 5)
+    f = started(flight)
+    g = fly(started(flight), flight, 5)
     flight.begin(g)
     for k in range(50):
-        speeds, x, q = (
-            flight.rotor_speeds[k],
-            flight.measured_position[k],
-            flight.measured_quaternion[k],
-        )
-        one, other = f.step(speeds, x, q), g.step(speeds, x, q)
+        speeds = flight.rotor_speeds[k]
+        x = flight.measured_position[k]
+        q = flight.measured_quaternion[k]
+        one = f.step(speeds, x, q)
+        other = g.step(speeds, x, q)
         # nor do biases that nothing measures change the pose's part
         assert_array_equal(one.state, other.state)
         assert_array_equal(one.covariance, other.covariance)
@@ -287,7 +300,7 @@ def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
 def test_a_flight_that_begins_anew_has_the_prior_of_the_biases(begun):
     flight = drawn(100)
     f = fly(started(flight), flight, 100)
-    assert np.all(f.gyro_bias_std < 0.1)
+    assert (f.gyro_bias_std < 0.1).all()
     if begun == "by a reset":
         f.reset([0, 0, 1], [1, 0, 0, 0])
         assert f.imu_refused == 0
@@ -307,24 +320,26 @@ def test_the_gate_keeps_faults_of_an_imu_out(shaking, constant):
     flight = drawn(500)
     bad = flight.accelerometer.copy()
     count = slice(200, 300)  # 0.5 s
-    bad[count] += shaking * np.random.default_rng(1).standard_normal((100, 3))
+    bad[count] += shaking * default_rng(1).standard_normal((100, 3))
     bad[count, 0] += constant
     spoiled = replace(flight, accelerometer=bad)
-    gated, open_, clean = started(flight, gate=0.999), started(flight), started(flight)
+    gated = started(flight, gate=0.999)
+    open_ = started(flight)
+    clean = started(flight)
     errors = []
     for f, seen in ((gated, spoiled), (open_, spoiled), (clean, flight)):
         worst = 0.0
         for k in range(500):
             fly(f, seen, 1, after=k)
             if k >= 200:
-                worst = max(worst, np.max(np.abs(f.estimate.force - flight.force[k])))
+                worst = max(worst, abs(f.estimate.force - flight.force[k]).max())
         errors.append(worst)
     assert gated.imu_refused > 90
     assert open_.imu_refused == 0
     assert errors[0] < 2.0 * errors[2]
     assert errors[1] > 5.0 * errors[2]
     deviation = np.sqrt(np.diagonal(gated.covariance)[15:18])
-    assert np.all(np.abs(gated.estimate.force - flight.force[-1]) < 5 * deviation)
+    assert (abs(gated.estimate.force - flight.force[-1]) < 5 * deviation).all()
 
 
 def test_a_gate_leaves_the_gyro_in_where_the_accelerometer_saturates():
@@ -350,19 +365,20 @@ def hovering(gate=None):
 @pytest.mark.parametrize("likelier", [0, 1])
 def test_of_two_sensors_that_are_unlikely_together_alone_the_likelier_counts(likelier):
     """Gates of 0.999: 16.3 for one sensor, 22.5 for both."""
-    expected, off = np.array([[0.0] * 3, [0.0, 0.0, 9.81]]), np.eye(3)[0]
-    wanted, read = [15.0, 15.0], expected.copy()
+    expected = np.array([[0.0] * 3, [0.0, 0.0, 9.81]])
+    off = np.eye(3)[0]
+    wanted = [15.0, 15.0]
+    read = expected.copy()
     wanted[likelier] = 9.0
     for sensor in (0, 1):
         alone = [None, None]
         alone[sensor] = expected[sensor] + off
         size = np.sqrt(wanted[sensor] / hovering().correct_imu(*alone).nis)
         read[sensor] = expected[sensor] + size * off
-    f, g = hovering(0.999), hovering()
-    both, one = (
-        f.correct_imu(*read),
-        g.correct_imu(*(read[0], None) if likelier == 0 else (None, read[1])),
-    )
+    f = hovering(0.999)
+    g = hovering()
+    both = f.correct_imu(*read)
+    one = g.correct_imu(*(read[0], None) if likelier == 0 else (None, read[1]))
     assert (f.imu_refused, both.nis > 22.5) == (1, True)
     assert_allclose(both.state[:19], one.state[:19], atol=1e-12)
 
@@ -391,7 +407,7 @@ def test_a_bias_that_jumps_is_found_again_through_the_gate():
 
 
 def test_whatever_an_imu_says_numbers_stay_finite():
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     for gate in (None, 0.999):
         f = WrenchUKF(VEHICLE, gate=gate)
         f.reset([0, 0, 1], [1, 0, 0, 0])
@@ -404,6 +420,6 @@ def test_whatever_an_imu_says_numbers_stay_finite():
             J = f.covariance_with_biases
             assert np.isfinite(J).all()
             scale = 1.0 / np.sqrt(np.diagonal(J))
-            assert np.linalg.eigvalsh(J * np.outer(scale, scale))[0] > 0
+            assert eigvalsh(J * np.outer(scale, scale))[0] > 0
             assert np.isfinite(f.estimate.state[:19]).all()
             assert np.isfinite(f.accelerometer_bias).all()

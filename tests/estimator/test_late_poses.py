@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.flights import PERIOD, yawing_flight
@@ -52,7 +53,8 @@ def batch(ukf, flight, measurements):
     predictions end at each stamp and at each set of rotor speeds.
     """
     ukf.reset(flight["position"][0], flight["quaternion"][0])
-    now, waiting = 0.0, sorted(measurements, key=lambda m: m[0])
+    now = 0.0
+    waiting = sorted(measurements, key=lambda m: m[0])
     for k in range(1, len(flight["rotors"])):
         reached = [m for m in waiting if m[0] <= time(k)]
         waiting = waiting[len(reached) :]
@@ -101,13 +103,15 @@ def measured(flight, stamps, parts):
     """What is measured of a flight at ``stamps``: 1 position, 2 attitude, 3 both, 4 both and off, 5
     an IMU's.
     """
-    out, rng = [], np.random.default_rng(2)
+    out = []
+    rng = default_rng(2)
     for t, part in zip(stamps, parts, strict=True):
         if part == 5:
             out.append((t, "correct_imu", (0.1 * rng.standard_normal(3), [0.0, 0.0, 9.81])))
             continue
         k = round(t / PERIOD)
-        x, q = flight["position"][k], flight["quaternion"][k]
+        x = flight["position"][k]
+        q = flight["quaternion"][k]
         x = x + 0.05 if part == 4 else x
         out.append((t, "correct", (x if part != 2 else None, q if part != 1 else None)))
     return out
@@ -129,7 +133,8 @@ STAMPS = st.lists(
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(drawn=STAMPS, kind=st.sampled_from(FILTERS), gate=st.sampled_from((None, 0.999)))
 def test_whatever_is_late_comes_out_as_if_it_had_not_been(name, drawn, kind, gate):
-    vehicle, flight = VEHICLES[name], FLIGHTS[name]
+    vehicle = VEHICLES[name]
+    flight = FLIGHTS[name]
     if kind is ConstantGainFilter:
         drawn = [one for one in drawn if one[1] != 5]
     measurements = measured(flight, [t for t, _, _ in drawn], [part for _, part, _ in drawn])
@@ -165,7 +170,8 @@ def test_what_is_wrong_is_named_and_changes_nothing():
     for k in range(1, 41):
         timed.predict(time(k), flight["rotors"][k])
         timed.correct(time(k) - 0.001, *pose)
-    before, events = timed.estimate.state.copy(), len(timed._events)
+    before = timed.estimate.state.copy()
+    events = len(timed._events)
     for words, call in (
         (r"0\.250000 s.*future.*0\.200000 s", lambda: timed.correct(0.25, *pose)),
         (r"0\.150000 s.*0\.200000 s", lambda: timed.predict(0.15, flight["rotors"][1])),

@@ -4,16 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm, slogdet
+from numpy.random import default_rng
 
 from tests.support.model_flights import WITH_EFFECTS, simulate_model
-from windwrench.dynamics import InputError, load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import InputError
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band
 from windwrench.estimator.innovations import innovations, pieces_of
 from windwrench.estimator.noise_fit import NoiseFitSettings, consistency_of, fit_noise
 from windwrench.estimator.rise_time import rise_times
 
-VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005
 # white noise as large as the default, walks faster, and no two axes and sensors in proportion
 TRUE = UKFTuning(
@@ -34,8 +37,7 @@ def flight(tuning=TRUE, seconds=20.0, seed=0, vehicle=VEHICLE, whole=False):
     Its rotor speeds hold over a step where the fit takes the mean of two rows; with a rate loop of
     5 / s the difference is about 1 % of one step's motor torque noise.
     """
-    steps = round(seconds / PERIOD)
-    speeds = np.full((steps, 4), vehicle.hover_rate)
+    speeds = np.full((round(seconds / PERIOD), 4), vehicle.hover_rate)
     run = simulate_model(vehicle, tuning, speeds, PERIOD, seed, rate_gain=5.0)
     return (run.log(), run) if whole else run.log()
 
@@ -55,12 +57,12 @@ def fits():
 def test_known_noise_is_found_back_within_its_uncertainty(fits):
     """Over three flights the eight errors in their own deviations are like 24 normal numbers."""
     errors = np.array([(logarithms(fit.tuning) - logarithms(TRUE)) / fit.deviation for fit in fits])
-    assert np.all(np.abs(errors) < 3.5)
-    assert 0.5 < np.sqrt(np.mean(errors**2)) < 1.5
+    assert (np.abs(errors) < 3.5).all()
+    assert 0.5 < rms(errors) < 1.5
     # and that is not little said: pose noise is known to 2 %, walks to 40 %
     for fit in fits:
-        assert np.all(fit.deviation[6:] < 0.02)
-        assert np.all(fit.deviation[:4] < 0.4)
+        assert (fit.deviation[6:] < 0.02).all()
+        assert (fit.deviation[:4] < 0.4).all()
 
 
 def test_nis_is_in_its_band_after_the_fit_and_not_before(fits):
@@ -98,7 +100,7 @@ def test_the_likelihood_is_that_of_the_filters_own_steps():
         before = ukf.predict(0.5 * (speeds[k - 1] + speeds[k])).covariance
         nis = ukf.correct(position[k], quaternion[k]).nis
         S = before[np.ix_(seen, seen)] + noise
-        expected.append(-0.5 * (nis + np.linalg.slogdet(2.0 * np.pi * S)[1]))
+        expected.append(-0.5 * (nis + slogdet(2.0 * np.pi * S)[1]))
     late = t[1:] > t[0] + 0.2
     assert np.allclose(found.log_likelihood, np.array(expected)[late], rtol=0, atol=1e-6)
 
@@ -108,27 +110,31 @@ def test_bounds_hold_where_there_is_no_noise_to_find():
     use = NoiseFitSettings()
     log, truth = flight(quiet, seconds=4.0, whole=True)
     fit = fit_noise(VEHICLE, *log)
-    assert np.all(np.asarray(fit.tuning.position_noise) >= use.position[0] * (1 - 1e-9))
-    assert np.all(np.asarray(fit.tuning.attitude_noise) >= use.attitude[0] * (1 - 1e-9))
-    assert np.all(np.asarray(fit.tuning.thrust_noise) >= use.white[0] * VEHICLE.weight * (1 - 1e-9))
+    assert (np.asarray(fit.tuning.position_noise) >= use.position[0] * (1 - 1e-9)).all()
+    assert (np.asarray(fit.tuning.attitude_noise) >= use.attitude[0] * (1 - 1e-9)).all()
+    assert (np.asarray(fit.tuning.thrust_noise) >= use.white[0] * VEHICLE.weight * (1 - 1e-9)).all()
     assert np.isnan(fit.deviation[6:]).all()
     estimate = truth.fly(WrenchUKF(VEHICLE, fit.tuning, PERIOD))[-1]
     assert np.isfinite(estimate.covariance).all()
-    assert np.linalg.norm(estimate.force - truth.force[-1]) < 0.05
+    assert norm(estimate.force - truth.force[-1]) < 0.05
 
 
 def test_lost_held_and_wild_poses_change_little(fits):
-    clean, (t, speeds, position, quaternion) = fits[0], flight(seed=0)
-    rng = np.random.default_rng(1)
+    clean = fits[0]
+    t, speeds, position, quaternion = flight(seed=0)
+    rng = default_rng(1)
     wild = rng.choice(len(t), len(t) // 100, replace=False)
     position[wild] += rng.uniform(-0.3, 0.3, (len(wild), 3))
-    position[700:760], quaternion[700:760] = np.nan, np.nan  # lost for 0.3 s
-    position[1500:1700], quaternion[1500:1700] = np.nan, np.nan  # for 1 s: the filter starts anew
-    position[2500:2560], quaternion[2500:2560] = position[2499], quaternion[2499]  # held
+    position[700:760] = np.nan  # lost for 0.3 s
+    quaternion[700:760] = np.nan
+    position[1500:1700] = np.nan  # for 1 s: the filter starts anew
+    quaternion[1500:1700] = np.nan
+    position[2500:2560] = position[2499]  # held
+    quaternion[2500:2560] = quaternion[2499]
     spoiled = fit_noise(VEHICLE, t, speeds, position, quaternion)
     assert 25 <= spoiled.outliers <= 60
     apart = (logarithms(spoiled.tuning) - logarithms(clean.tuning)) / clean.deviation
-    assert np.all(np.abs(apart) < 2.0)
+    assert (np.abs(apart) < 2.0).all()
     low, high = chi2_band(6, spoiled.after.poses)
     assert low <= spoiled.after.nis <= high
 
@@ -154,7 +160,7 @@ def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
     log = flight(seconds=30.0)
     fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=2000))
     assert fit.after.poses == len(log[0]) - 200  # figures are those of the whole log
-    assert np.all(np.abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation)
+    assert (abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation).all()
 
 
 def test_declared_effects_are_part_of_the_model():
@@ -171,14 +177,15 @@ def test_rise_times_are_those_of_the_filter():
     assert force[0] > 2.0 * (2.2 * PERIOD * 0.003 / 0.02)  # the pose's noise is what slows it down
     ukf = WrenchUKF(VEHICLE, quick, PERIOD)
     ukf.reset((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
-    speeds, push, position, velocity = np.full(4, VEHICLE.hover_rate), 0.2, 1.0, 0.0
+    speeds = np.full(4, VEHICLE.hover_rate)
+    push = 0.2
+    position = 1.0
+    velocity = 0.0
     seen = []
     for k in range(800):
         a = push / VEHICLE.mass if k >= 400 else 0.0
-        position, velocity = (
-            position + PERIOD * (velocity + 0.5 * PERIOD * a),
-            velocity + PERIOD * a,
-        )
+        position = position + PERIOD * (velocity + 0.5 * PERIOD * a)
+        velocity = velocity + PERIOD * a
         seen.append(ukf.step(speeds, (0.0, 0.0, position), (1.0, 0.0, 0.0, 0.0)).force[2])
     seen = np.array(seen[400:])
     measured = PERIOD * (np.argmax(seen > 0.9 * push) - np.argmax(seen > 0.1 * push))

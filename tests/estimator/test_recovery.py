@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.linalg import cholesky, norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c.hostile import KINDS, befall
 from tests.support.parameters import mostly_slow
+from tests.support.sizes import rms
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.rotation import quaternion_multiply
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
@@ -48,8 +51,12 @@ class Flight:
         """``turn`` (rad) is by how much the filter's start is off; ``noise``, in declared
         deviations, that of poses.
         """
-        self.noise, self.rng = noise, np.random.default_rng(0)
-        self.vehicle, self.dt, self.gate, self.imu = VEHICLES[vehicle], dt, gate, imu
+        self.noise = noise
+        self.rng = default_rng(0)
+        self.vehicle = VEHICLES[vehicle]
+        self.dt = dt
+        self.gate = gate
+        self.imu = imu
         self.estimator = FILTERS[kind](self.vehicle, period=dt, gate=gate)
         self.speeds = hover(self.vehicle)
         self.position = np.array([0.0, 0.0, HEIGHT])
@@ -69,10 +76,12 @@ class Flight:
 
     def noisy(self, position, quaternion):
         """Return a pose with noise."""
-        mocap, (moved, turned) = self.vehicle.mocap, self.noise * self.rng.standard_normal((2, 3))
-        turn, seen = np.array([1.0, *(0.5 * mocap.sigma_att_rad * turned)]), np.empty(4)
+        mocap = self.vehicle.mocap
+        moved, turned = self.noise * self.rng.standard_normal((2, 3))
+        turn = np.array([1.0, *(0.5 * mocap.sigma_att_rad * turned)])
+        seen = np.empty(4)
         quaternion_multiply(turn, np.array(quaternion), seen)
-        return position + mocap.sigma_pos_m * moved, seen / np.linalg.norm(seen)
+        return position + mocap.sigma_pos_m * moved, seen / norm(seen)
 
     def check(self, estimate):
         """Numbers are finite and the covariance is one."""
@@ -81,17 +90,17 @@ class Flight:
         assert np.isfinite(P).all()
         # of the correlations: variances of 1e-9 and 1e4 stand side by side
         scale = 1.0 / np.sqrt(np.diag(P))
-        np.linalg.cholesky(P * scale[:, None] * scale)
+        cholesky(P * scale[:, None] * scale)
 
     def suffer(self, kind, samples, size, seed):
         """Feed one fault."""
-        rng = np.random.default_rng(seed)
+        rng = default_rng(seed)
         step = float(rng.choice([self.dt, 1e-3, 0.01, 0.1]))
         if kind == "long gap":
             self.check([self.estimator.step(self.speeds) for _ in range(6000)][-1])
         rows = [np.tile(x, (samples, 1)) for x in (self.position, STILL, self.speeds)]
         away = befall(kind, slice(0, samples), *rows, rng, size)
-        rows[1] /= np.linalg.norm(rows[1], axis=1, keepdims=True)
+        rows[1] /= norm(rows[1], axis=1, keepdims=True)
         if kind == "jump for good":
             self.position = self.position + away
         for position, quaternion, speeds in zip(*rows, strict=True):
@@ -109,7 +118,7 @@ class Flight:
         assert estimate.status == "tracking"
         wrench = np.concatenate([estimate.torque, estimate.force])
         wrench[5] -= FORCE * self.vehicle.weight
-        assert np.all(np.abs(wrench) < 3.0 * np.sqrt(np.diag(estimate.covariance)[12:18]))
+        assert (np.abs(wrench) < 3.0 * np.sqrt(np.diag(estimate.covariance)[12:18])).all()
 
 
 # what happens, for how many samples, how large (1 mm to 1 km), and a seed
@@ -211,7 +220,8 @@ def test_the_wrench_is_right_again_after_two_rise_times(life, noise):
 
 def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
     """Poses that jump by 10 m each are not believed before ``give_up``, 1.5 s."""
-    flight, rng = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True), np.random.default_rng(0)
+    flight = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True)
+    rng = default_rng(0)
     flight.recover(RISE)
     said = []
     for _ in range(400):
@@ -221,18 +231,19 @@ def test_poses_that_never_agree_restart_the_filter_as_uncertain_as_they_are():
             break
     assert 295 <= len(said) <= 305
     assert set(said[:-1]) == {"rejected"}
-    assert np.all(e.std[6:9] > 0.1)
+    assert (e.std[6:9] > 0.1).all()
 
 
 def test_what_is_claimed_widens_while_poses_are_refused():
     flight = Flight("ukf", "ardrone2", 0.005, 0.9999, imu=True)
     calm = flight.recover(RISE)
-    away, said = np.array([3.0, 0.0, HEIGHT]), []
+    away = np.array([3.0, 0.0, HEIGHT])
+    said = []
     for _ in range(100):
         said.append(flight.feed(flight.speeds, away, STILL, 0.005))
     forces = np.array([e.std_force[0] for e in said])
     assert {e.status for e in said} == {"rejected"}
-    assert np.all(np.diff(forces) > 0.0)
+    assert (np.diff(forces) > 0.0).all()
     assert forces[-1] == pytest.approx(0.5 * flight.vehicle.weight, rel=0.1)
     assert said[-1].std[6] == pytest.approx(3.0, rel=0.1)
     assert flight.estimator.dead_reckoning == pytest.approx(0.5)
@@ -243,7 +254,8 @@ def test_what_is_claimed_widens_while_poses_are_refused():
 
 def test_a_bias_stays_within_its_bound():
     """An accelerometer that shows 7.6 m/s2 too much is no sensor with a bias."""
-    vehicle, tuning = VEHICLES["ardrone2"], UKFTuning()
+    vehicle = VEHICLES["ardrone2"]
+    tuning = UKFTuning()
     ukf = WrenchUKF(vehicle, tuning)
     ukf.reset([0.0, 0.0, 1.0], STILL)
     for _ in range(1000):
@@ -261,18 +273,21 @@ def test_a_burst_of_bad_poses_costs_what_a_gap_costs(burst):
     none is believed, and those that are back are, at once, though they are far from what is
     expected.
     """
-    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(3)
-    begin, end = 400, 500
+    vehicle = VEHICLES["ardrone2"]
+    rng = default_rng(3)
+    begin = 400
+    end = 500
     poses = pushed(vehicle, 0.4, 700, 350)
     poses += 0.001 * rng.standard_normal(poses.shape)
     drawn = rng.standard_normal((end - begin, 3))
     away = {"one offset": drawn[:1], "each its own": drawn, "upside down": np.zeros((1, 3))}.get(
         burst, drawn[[0] * 40 + [1] * 60]
     )
-    away = 0.1 * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    away = 0.1 * away / np.maximum(norm(away, axis=1, keepdims=True), 1e-9)
     turned = [0.0, 1.0, 0.0, 0.0] if burst == "upside down" else STILL
     seen = [(pose, STILL) for pose in poses]
-    gone, bad = seen.copy(), seen.copy()
+    gone = seen.copy()
+    bad = seen.copy()
     gone[begin:end] = [(None, None)] * (end - begin)
     bad[begin:end] = [(pose, turned) for pose in poses[begin:end] + away]
     unseen, hit = (along(WrenchUKF(vehicle, gate=0.9999), vehicle, each) for each in (gone, bad))
@@ -289,10 +304,15 @@ def test_poses_of_a_blurred_clock_are_not_held_out(late, seed):
     """At 1.5 m/s one pose in fifty is measured some milliseconds before its time stamp: it is off
     by just more than a vehicle can move. Those after it are good, and believed soon.
     """
-    vehicle, rng, dt, speed = VEHICLES["crazyflie"], np.random.default_rng(seed), 0.004, 1.5
+    vehicle = VEHICLES["crazyflie"]
+    rng = default_rng(seed)
+    dt = 0.004
+    speed = 1.5
     ukf = WrenchUKF(vehicle, UKFTuning.for_vehicle(vehicle, dt), period=dt, gate=0.9999)
     ukf.reset([0, 0, 1], STILL, velocity=[speed, 0, 0])
-    speeds, said, hit = np.full(4, vehicle.hover_rate), [], 0
+    speeds = np.full(4, vehicle.hover_rate)
+    said = []
+    hit = 0
     for k in range(1, 1500):
         lag = late * rng.exponential() if rng.random() < 0.02 else 0.0
         hit += lag > 0.0
@@ -306,8 +326,8 @@ def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
     """The first pose after half a second is off and likely, so it is believed; those that follow
     have jumped then, until they have lasted. Attitudes without a position come between them.
     """
-    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(0)
-    position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((700, 3))
+    vehicle = VEHICLES["ardrone2"]
+    position = [0.0, 0.0, HEIGHT] + 0.001 * default_rng(0).standard_normal((700, 3))
     position[400] += [0.29, -0.29, 0.29]
     poses = [(None if k > 400 and k % 25 == 0 else x, STILL) for k, x in enumerate(position)]
     poses[300:400] = [(None, None)] * 100
@@ -318,12 +338,14 @@ def test_an_attitude_alone_does_not_end_the_doubt_of_a_position():
     assert status[425] == "tracking"
     assert status[426] == "rejected"
     assert said[-1].restarts == 1
-    assert np.all(np.abs([e.force for e in said[601:]]) < 0.03 * vehicle.weight)
+    assert (np.abs([e.force for e in said[601:]]) < 0.03 * vehicle.weight).all()
 
 
 def test_a_doubted_wrench_may_be_none_at_all():
     vehicle = VEHICLES["ardrone2"]
-    ukf, speeds, q = WrenchUKF(vehicle), hover(vehicle), STILL
+    ukf = WrenchUKF(vehicle)
+    speeds = hover(vehicle)
+    q = STILL
     ukf.reset([0, 0, 1], q)
     for _ in range(2000):
         ukf.step(0.0 * speeds, [0, 0, 1], q)  # a force of a weight, which never acted
@@ -338,10 +360,10 @@ def test_rates_do_not_run_away_where_positions_alone_are_measured():
     """
     vehicle = VEHICLES["crazyflie"]
     for seed in range(5):
-        rng = np.random.default_rng(seed)
+        rng = default_rng(seed)
         position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((177, 3))
         turns = np.column_stack([np.ones(177), 0.0025 * rng.standard_normal((177, 3))])
-        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        turns /= norm(turns, axis=1, keepdims=True)
         poses = [
             (x, q if k < 127 else None)
             for k, (x, q) in enumerate(zip(position, turns, strict=True))
@@ -349,12 +371,14 @@ def test_rates_do_not_run_away_where_positions_alone_are_measured():
         poses[50:125] = [(None, None)] * 75
         said = along(WrenchUKF(vehicle, period=0.02, gate=0.9999), vehicle, poses)
         assert said[-1].restarts == 1
-        assert max(np.linalg.norm(e.angular_velocity) for e in said[127:]) < 20.0
+        assert max(norm(e.angular_velocity) for e in said[127:]) < 20.0
 
 
 def test_what_happened_is_said():
     vehicle = VEHICLES["ardrone2"]
-    ukf, speeds, q = WrenchUKF(vehicle, gate=0.999), hover(vehicle), STILL
+    ukf = WrenchUKF(vehicle, gate=0.999)
+    speeds = hover(vehicle)
+    q = STILL
     ukf.reset([0, 0, 1], q)
     assert [ukf.step(speeds, [0, 0, 1], q).status for _ in range(400)][-1] == "tracking"
     assert ukf.step(speeds).status == "coasting"
@@ -385,8 +409,10 @@ def noisy_hover(kind, vehicle, dt, gate, noise, seconds, lost=(0.0, 0.0), seed=0
     """Yield the estimates of a hover whose poses have ``noise`` (2,) times the declared deviations
     of attitude and position, and are missing between two times.
     """
-    vehicle, rng = VEHICLES[vehicle], np.random.default_rng(seed)
-    mocap, estimator = vehicle.mocap, FILTERS[kind](vehicle, period=dt, gate=gate)
+    vehicle = VEHICLES[vehicle]
+    rng = default_rng(seed)
+    mocap = vehicle.mocap
+    estimator = FILTERS[kind](vehicle, period=dt, gate=gate)
     estimator.reset([0.0, 0.0, HEIGHT], STILL)
     for k in range(round(seconds / dt)):
         position = [0.0, 0.0, HEIGHT] + noise[1] * mocap.sigma_pos_m * rng.standard_normal(3)
@@ -402,10 +428,9 @@ def test_noise_of_poses_is_learned_of_attitude_and_position_apart(kind, noise):
     said = list(noisy_hover(kind, "ardrone2", 0.005, None, noise, 4.0))
     scales = np.median([e.noise_scales for e in said[400:]], axis=0)
     assert_allclose(scales, noise, rtol=0.08)
-    assert said[-1].noise_scale == pytest.approx(np.sqrt(np.mean(np.square(noise))), rel=0.15)
+    assert said[-1].noise_scale == pytest.approx(rms(noise), rel=0.15)
     assert said[-1].restarts == 0
-    force = np.array([e.force / e.std_force for e in said[400:]])
-    assert np.sqrt(np.mean(np.square(force))) < 1.0
+    assert rms(np.array([e.force / e.std_force for e in said[400:]])) < 1.0
 
 
 def test_the_declared_noise_holds_until_poses_refute_it():
@@ -429,14 +454,15 @@ def test_a_restart_does_not_bring_the_next(kind, gate):
     said = list(noisy_hover(kind, "crazyflie", 0.005, gate, (2.0, 2.0), 7.0, lost=(2.0, 3.0)))
     assert said[-1].restarts <= 2
     force = np.array([e.force for e in said[1000:]])
-    assert np.sqrt(np.mean(np.sum(np.square(force), axis=1))) < 0.05 * VEHICLES["crazyflie"].weight
+    assert np.sqrt(np.mean(np.square(force).sum(axis=1))) < 0.05 * VEHICLES["crazyflie"].weight
 
 
 def test_a_gust_is_no_noise():
     """Half a weight that sets in at once moves the innovations for a second, and hardly what poses
     add to each other.
     """
-    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(1)
+    vehicle = VEHICLES["ardrone2"]
+    rng = default_rng(1)
     position = pushed(vehicle, 0.5, 1000, 400)
     position += vehicle.mocap.sigma_pos_m * rng.standard_normal((1000, 3))
     said = along(WrenchUKF(vehicle), vehicle, position)
@@ -448,7 +474,9 @@ def test_what_an_unlikely_pose_leaves_is_forgotten_in_the_patience():
     """A tilt of 2 degrees goes on from the pose before: the variances widen by its NIS, and 1/e of
     that is left after 0.6 s.
     """
-    vehicle, half, place = VEHICLES["ardrone2"], np.radians(1.0), [0.0, 0.0, HEIGHT]
+    vehicle = VEHICLES["ardrone2"]
+    half = np.radians(1.0)
+    place = [0.0, 0.0, HEIGHT]
     poses = [(place, STILL)] * 721
     poses[600] = place, [np.cos(half), np.sin(half), 0.0, 0.0]
     said = along(WrenchUKF(vehicle, gate=0.99), vehicle, poses)

@@ -5,17 +5,18 @@
 
 import numpy as np
 import pytest
+from numpy.linalg import eigvalsh, inv, solve
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
-from windwrench.dynamics import load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
 from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning, rauch_tung_striebel, smoother
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.row_steps import steps_between
 from windwrench.estimator.smoother import RecordingUKF
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 def model_log(steps, seed=1):
@@ -61,9 +62,10 @@ def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
         found = ukf.smooth(covariance=True)
         for k in range(steps):
             e = found.at(1 + k)
-            error, P = state_error(e, run.state[k]), e.covariance
+            error = state_error(e, run.state[k])
+            P = e.covariance
             for n, part in enumerate(parts.values()):
-                nees[n, r, k] = error[part] @ np.linalg.solve(P[part, part], error[part])
+                nees[n, r, k] = error[part] @ solve(P[part, part], error[part])
     for dof, values in zip(parts, nees, strict=True):
         low, high = chi2_band(abs(dof), runs, 0.999)
         assert low <= values.mean() <= high
@@ -83,7 +85,7 @@ def test_nothing_is_smoothed_across_a_restart():
     moved[250:] += [100.0, 0, 0]
     jump = smooth(t, speeds, moved, q, restarted=[250])
     assert np.array_equal(jump.state[:250], whole.state[:250], equal_nan=True)
-    assert np.sqrt(np.mean(np.square(jump.force - whole.force))) < 1e-9
+    assert rms(jump.force - whole.force) < 1e-9
     # of itself, without a gate, the filter restarts at a pose that jumps
     alone = smooth(t, speeds, moved, q)
     assert np.array_equal(np.flatnonzero(np.diff(alone.restarts)), [249])
@@ -93,14 +95,17 @@ def test_nothing_is_smoothed_across_a_restart():
 
 def test_a_link_is_cut_where_there_is_no_joint_distribution():
     """As between a covariance and one that was held at a bound."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     A = rng.standard_normal((18, 18))
-    P, F = A @ A.T + np.eye(18), np.eye(18) + 0.1 * rng.standard_normal((18, 18))
-    G, K = np.empty((18, 18)), np.empty((18, 18))
-    C, after = P @ F.T, F @ P @ F.T + np.eye(18)
+    P = A @ A.T + np.eye(18)
+    F = np.eye(18) + 0.1 * rng.standard_normal((18, 18))
+    G = np.empty((18, 18))
+    K = np.empty((18, 18))
+    C = P @ F.T
+    after = F @ P @ F.T + np.eye(18)
     link_back = rauch_tung_striebel.link_back.py_func  # nobody calls it compiled by itself
     link_back(P, C, after, G, K)
-    gain = C @ np.linalg.inv(after)
+    gain = C @ inv(after)
     assert np.allclose(G.T, gain)
     assert np.allclose(K, P - gain @ C.T, atol=1e-9)
     link_back(P, C, 0.5 * after, G, K)
@@ -124,14 +129,16 @@ def test_blocks_change_nothing(block, monkeypatch):
 def test_unlikely_poses_widen_what_is_smoothed_before_and_after():
     """A pose that stands still for 0.4 s at 1.5 m/s: without the widening z is 37."""
     flown = record_flight(VEHICLE, (), "circle", 6.0)
-    x, q = flown["position"], flown["quaternion"]
-    x[800:880], q[800:880] = x[800], q[800]
+    x = flown["position"]
+    q = flown["quaternion"]
+    x[800:880] = x[800]
+    q[800:880] = q[800]
     ukf = RecordingUKF(VEHICLE, gate=0.9999)
     ukf.reset(x[0], q[0])
     for k in range(1, len(x)):
         ukf.step(flown["rotor_speeds"][k], x[k], q[k])
     found = ukf.smooth(covariance=True)
-    z = np.abs(found.force - flown["force"]) / found.std_force
+    z = abs(found.force - flown["force"]) / found.std_force
     assert z[800:].max() < 6.0
     assert z[700:800].max() < 6.0
     diagonal = np.diagonal(found.covariance, axis1=1, axis2=2)
@@ -140,14 +147,14 @@ def test_unlikely_poses_widen_what_is_smoothed_before_and_after():
 
 @pytest.mark.parametrize("seed", [0, 2, 5])
 def test_covariances_stay_positive_definite_whatever_was_flown(seed):
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     _, speeds, x, q = model_log(400, seed)
     x += np.cumsum(rng.choice([0.0, 1.0], (400, 1), p=[0.98, 0.02]) * rng.normal(0, 2, (400, 3)), 0)
     lost = slice(150, 150 + 40 * (seed + 1))
-    x[lost], q[lost] = np.nan, np.nan
+    x[lost] = np.nan
+    q[lost] = np.nan
     t = np.cumsum(rng.choice([0.001, 0.005, 0.02], 400))
     found = smooth(t, speeds, x, q, covariance=True)
     assert np.isfinite(found.state[:, :19]).all()
     scale = 1.0 / found.std
-    eigenvalues = np.linalg.eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :])
-    assert eigenvalues.min() > 0
+    assert eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :]).min() > 0

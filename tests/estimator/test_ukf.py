@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -19,7 +20,8 @@ from tests.support.reference_filters import (
     initial_covariance,
     rotor_effects,
 )
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.filter_record import drive, propagate
@@ -28,7 +30,6 @@ from windwrench.estimator.reference import difference, displaced
 from windwrench.estimator.smoother import RecordingUKF
 from windwrench.runtime.compiled import compiled
 
-VEHICLE = load_vehicle("ardrone2")
 OFFSET = EffectSetting("com_offset", {"cx": 0.01, "cy": -0.006, "cz": 0.02})
 DRAG = EffectSetting("rotor_drag", {"kdx": 1.5e-4, "kdy": 1.5e-4})
 GROUND = EffectSetting("ground_effect", {"rho": 3.0})
@@ -58,13 +59,14 @@ def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_
         if k not in missing:
             slow.correct(flight["position"][k], flight["quaternion"][k])
             assert abs(e.nis - slow.nis) < 1e-9 * (1 + slow.nis)
-        assert np.abs(as_reference(e, slow.state) - slow.state).max() < 1e-9
-        assert np.abs(e.covariance - slow.covariance).max() < 1e-9
+        assert abs(as_reference(e, slow.state) - slow.state).max() < 1e-9
+        assert abs(e.covariance - slow.covariance).max() < 1e-9
     found = fast.smooth(covariance=True)
     for k, (state, P) in enumerate(slow.smoothed()):
-        e, size = found.at(k), np.sqrt(np.diag(P))
+        e = found.at(k)
+        size = np.sqrt(np.diag(P))
         assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
-        assert np.abs((e.covariance - P) / np.outer(size, size)).max() < 1e-7
+        assert abs((e.covariance - P) / np.outer(size, size)).max() < 1e-7
 
 
 def test_asynchronous_measurements_agree_with_regular_ones():
@@ -108,14 +110,16 @@ def one_step(record, speeds, dt, A):
 )
 @pytest.mark.parametrize("rate", [0.0, 4.0])
 def test_jacobian_equals_finite_differences(vehicle, rate):
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     record = WrenchUKF(vehicle).record
     x = np.zeros(20)
     x[0:3] = [0.1, -0.2, 0.5]
     x[3:7] = Rotation.random(rng=rng).as_quat(scalar_first=True)
     x[7:10], x[10:13] = rng.standard_normal(3), rate * rng.standard_normal(3)
     x[13:16], x[16:19] = 0.05 * rng.standard_normal(3), rng.standard_normal(3)
-    speeds, numeric, size = np.array([350.0, 380.0, 360.0, 400.0]), np.empty((18, 18)), 1e-5
+    speeds = np.array([350.0, 380.0, 360.0, 400.0])
+    numeric = np.empty((18, 18))
+    size = 1e-5
     start = x[KIT_ORDER]
 
     def stepped(error):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.alike import assert_alike, strict_json
 from tests.support.parameters import mostly_slow
@@ -18,8 +19,9 @@ from windwrench.evaluation.submission import results_hash, write_submission
 from windwrench.evaluation.tables import markdown, rows_of, summary, write_leaderboard
 from windwrench.evaluation.tasks import TASKS, short_names
 
-GOLDEN = json.loads((ROOT / "tests" / "golden" / "leaderboards.json").read_text(encoding="utf-8"))
-EPISODES, SEED = 2, 3
+GOLDEN = json.loads((ROOT / "tests" / "golden" / "leaderboards.json").read_bytes())
+EPISODES = 2
+SEED = 3
 # of every row of ``leaderboard.json``, in this order
 KEYS = [
     "controller",
@@ -42,7 +44,8 @@ def flown():
 
     def fly(task):
         if task not in kept:
-            names, scenarios = GOLDEN[task]["controllers"], GOLDEN[task]["scenarios"]
+            names = GOLDEN[task]["controllers"]
+            scenarios = GOLDEN[task]["scenarios"]
             request = Request(tuple(names), tuple(scenarios), EPISODES, SEED, task)
             results = fly_all(request, jobs=1)
             kept[task] = names, results, leaderboard(results, names, SEED, task)
@@ -92,10 +95,10 @@ class Still:
 def test_the_number_of_processes_changes_nothing(flown, tmp_path):
     """Nor whether a law is the kit's or in a file of a user's own."""
     names, results, _ = flown("FanTracking2D")
-    own, advanced = f"{tmp_path / 'laws.py'}:Still", []
+    own = f"{tmp_path / 'laws.py'}:Still"
+    advanced = []
     (tmp_path / "laws.py").write_text(OWN)
-    laws = ["ratio", own]
-    request = Request(tuple(laws), ("base",), EPISODES, SEED, "FanTracking2D")
+    request = Request(("ratio", own), ("base",), EPISODES, SEED, "FanTracking2D")
     split = fly_all(request, 2, advanced.append)
     assert sum(advanced) == request.flights() == 10
     assert set(split) == {*results, (own, "base")}
@@ -116,7 +119,8 @@ def test_the_file_has_the_documented_keys_and_pages_have_losses(task, tmp_path, 
     draw_leaderboard(rows, results, tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 10_000
     table = markdown(rows).splitlines()
-    figures, compared = table[: len(table) // 2], table[len(table) // 2 + 1 :]
+    figures = table[: len(table) // 2]
+    compared = table[len(table) // 2 + 1 :]
     assert "| terminated |" in figures[0]
     assert ("to the limit" in compared[0]) == (task == "FanTracking")
     for part in (figures, compared):
@@ -133,7 +137,8 @@ def test_where_hover_and_oracle_are_alike_there_is_no_score(flown):
 def episode(seed, level, lost, flown=500):
     """An episode of a constant error but for the first 3 s, where the error is 1 m."""
     n = flown
-    blank, time = np.zeros((n, 3)), 0.04 * np.arange(1, n + 1)
+    blank = np.zeros((n, 3))
+    time = 0.04 * np.arange(1, n + 1)
     return Episode(
         seed, "", lost, False, 0.0, 500, time, np.where(time <= 3.0, 1.0, level), blank,
         np.zeros((n, 4)), np.zeros((n, 6)), blank, blank, np.full(n, np.nan), blank, blank,
@@ -141,7 +146,8 @@ def episode(seed, level, lost, flown=500):
 
 
 def test_the_first_seconds_do_not_rank_and_the_rest_of_a_lost_episode_counts():
-    whole, lost = episode(0, 0.1, False), episode(0, 0.1, True, flown=250)
+    whole = episode(0, 0.1, False)
+    lost = episode(0, 0.1, True, flown=250)
     assert whole.rmse_settled == pytest.approx(0.1)
     assert (whole.rmse_transient, lost.rmse_transient) == (1.0, 1.0)
     assert whole.rmse == pytest.approx(np.sqrt(0.15 * 1.0 + 0.85 * 0.01))
@@ -149,8 +155,9 @@ def test_the_first_seconds_do_not_rank_and_the_rest_of_a_lost_episode_counts():
 
 
 def test_the_activity_is_that_of_the_reward_and_the_bound_is_seen():
-    known = TASKS["WindHover"]
-    env, rng, terms = known.make("base"), np.random.default_rng(1), []
+    env = TASKS["WindHover"].make("base")
+    rng = default_rng(1)
+    terms = []
 
     def shaken(observation, info):
         return rng.choice([-9.0, 0.0, 4.0], 3, p=[0.1, 0.8, 0.1]) * (rng.random() < 0.5)
@@ -158,7 +165,7 @@ def test_the_activity_is_that_of_the_reward_and_the_bound_is_seen():
     flown = fly_episode(env, shaken, 5, lambda info: terms.append(info["reward_change"]), 60)
     cost = 0.002 * env.largest_action**2  # CHANGE_COST in m/s2
     assert -np.mean(terms) / cost == pytest.approx(flown.command_activity, rel=1e-6)
-    assert flown.saturated_fraction == pytest.approx(np.mean(np.abs(flown.action).max(1) == 1.0))
+    assert flown.saturated_fraction == pytest.approx(np.mean(abs(flown.action).max(1) == 1.0))
     assert 0.1 < flown.saturated_fraction < 0.5
 
 
@@ -213,7 +220,8 @@ def test_a_submission_says_what_flew_and_its_hash_is_of_the_results(tmp_path, fl
 
 
 def test_policies_of_a_kind_stand_together_and_their_losses_show(tmp_path):
-    rng, policies = np.random.default_rng(0), [f"gru-{k}" for k in range(3)]
+    rng = default_rng(0)
+    policies = [f"gru-{k}" for k in range(3)]
     levels = {"hover": 0.2, "pid": 0.1, "pid-force": 0.08, "oracle": 0.07}
     levels |= dict(zip(policies, (0.05, 0.06, 0.07), strict=True))
     results = {

@@ -119,7 +119,8 @@ def test_a_class_of_a_file_is_a_task_and_has_the_laws_of_the_kit_s_task(tmp_path
 
 def test_a_reward_of_one_s_own_holds_alone_and_its_terms_stand_in_info(tmp_path):
     path = written(tmp_path, "own_reward.py", LANDING)
-    env, seen = TASKS["WindHover"].make("base", f"{path}:near"), []
+    env = TASKS["WindHover"].make("base", f"{path}:near")
+    seen = []
     flown = fly_episode(env, make_pilot("pid", "WindHover"), 3, seen.append, 20)
     assert flown.total_reward == pytest.approx(
         sum(info["reward_near"] + info["reward_change"] for info in seen)
@@ -144,7 +145,8 @@ def test_the_kit_s_own_file_of_scenarios_is_a_user_s(tmp_path):
         "fan: {still: {motions: [still]}}\nwind:\n  gale: &a {mean: [4.0, 5.0], turbulence: dryden}"
         "\n  foggy: {<<: *a, sigma_position: 0.02}\n",
     )
-    wind, fan = TASKS["WindHover"], TASKS["FanTracking"]
+    wind = TASKS["WindHover"]
+    fan = TASKS["FanTracking"]
     assert scenario_names([given, "base"], wind) == [f"{given}:gale", f"{given}:foggy", "base"]
     assert wind.scenario(f"{given}:foggy").sigma_position == 0.02
     assert fan.scenario(given).motions == ("still",)  # the only one of its kind
@@ -167,8 +169,8 @@ def test_registered_laws_and_scenarios_and_a_law_with_gains(tmp_path, monkeypatc
     monkeypatch.setitem(WIND_SCENARIOS, "me/calm", WIND_SCENARIOS["calm"])
     Request(("me/gentle",), ("me/calm",), 1, 0, "WindHover").check()
     stiff = written(tmp_path, "stiff.yaml", "law: pid\ngains: {kp: 12.5}\n")
-    law, tuned = make_pilot(stiff, "WindHover"), make_pilot("pid", "WindHover")
-    assert (law.kp, law.ki) == (12.5, tuned.ki)
+    law = make_pilot(stiff, "WindHover")
+    assert (law.kp, law.ki) == (12.5, make_pilot("pid", "WindHover").ki)
     wrong = {"law: pid\ngains: {kq: 1}\n": "unknown gain 'kq'", "law: pod\n": "unknown law 'pod'"}
     for text, words in wrong.items():
         with pytest.raises(InputError, match=rf"wrong\.yaml.*{words}"):

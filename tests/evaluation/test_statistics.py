@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import scipy.stats
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from windwrench.evaluation.statistics import (
@@ -21,8 +22,9 @@ from windwrench.evaluation.statistics import (
     sign_probability,
 )
 
-RNG = np.random.default_rng(5)
-X, Y = RNG.normal(1.0, 0.3, (5, 12)), RNG.normal(0.8, 0.3, (4, 12))
+RNG = default_rng(5)
+X = RNG.normal(1.0, 0.3, (5, 12))
+Y = RNG.normal(0.8, 0.3, (4, 12))
 
 
 def covered(intervals):
@@ -31,7 +33,8 @@ def covered(intervals):
 
 
 def test_probability_of_improvement_counts_all_pairs_of_runs_task_by_task():
-    a, b = X.round(1), Y.round(1)  # with ties
+    a = X.round(1)
+    b = Y.round(1)  # with ties
     pairs = [
         (a[i, k] > b[j, k]) + 0.5 * (a[i, k] == b[j, k])
         for i, j, k in itertools.product(range(5), range(4), range(12))
@@ -73,7 +76,7 @@ def test_strata_are_drawn_among_themselves():
 
 
 def test_the_bootstrap_covers_the_truth_as_often_as_it_says():
-    samples = [np.random.default_rng(k).normal(2.0, 1.0, 40) for k in range(120)]
+    samples = [default_rng(k).normal(2.0, 1.0, 40) for k in range(120)]
     assert 0.87 <= covered(episode_bootstrap(mean, s, resamples=300) for s in samples) <= 0.99
     assert episode_bootstrap(mean, [[3.0]]) == (3.0, 3.0)
 
@@ -94,7 +97,8 @@ def test_hierarchical_draws_have_the_variance_of_crossed_policies_and_episodes(p
 
 def test_the_hierarchical_interval_covers_other_policies_and_other_episodes():
     def interval(k):
-        rng, sizes = np.random.default_rng(k), {(8, 1): 0.3, (1, 40): 1.0, (8, 40): 0.5}
+        rng = default_rng(k)
+        sizes = {(8, 1): 0.3, (1, 40): 1.0, (8, 40): 0.5}
         scores = 2.0 + sum(rng.normal(0.0, sigma, shape) for shape, sigma in sizes.items())
         return hierarchical_bootstrap(mean, scores, resamples=400, seed=k)
 
@@ -117,7 +121,7 @@ def test_holm_on_an_example_done_by_hand():
 
 
 def test_the_sign_s_probability_is_that_of_a_normal_draw():
-    draws = np.random.default_rng(2).normal(1.0, 0.5, 200_000)
+    draws = default_rng(2).normal(1.0, 0.5, 200_000)
     assert sign_probability(draws) == pytest.approx(2 * scipy.stats.norm.sf(2.0), rel=0.1)
     assert sign_probability(-draws) == pytest.approx(sign_probability(draws))
     assert sign_probability(np.full(99, 1.0)) == pytest.approx(0.02)

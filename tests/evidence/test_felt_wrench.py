@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from windwrench.envs import OBSERVATIONS
@@ -13,7 +14,7 @@ from windwrench.evidence.felt_wrench import LAW, change, rows, trained
 
 
 def test_a_change_is_paired_over_the_episodes():
-    hard = 10.0 ** np.random.default_rng(0).uniform(-1.0, 1.0, (1, 40))
+    hard = 10.0 ** default_rng(0).uniform(-1.0, 1.0, (1, 40))
     found = change(1.1 * hard, hard)
     assert_allclose([found["change"], *found["ci95"]], 0.1)
     assert np.ptp(change(1.1 * hard[:, ::-1], hard)["ci95"]) > 0.2
@@ -35,7 +36,8 @@ def test_a_row_compares_each_observation_with_the_one_that_has_more():
 @pytest.mark.parametrize("observation", OBSERVATIONS)
 def test_a_law_answers_a_change_of_the_wrench_only_where_it_sees_the_wrench(observation):
     policy = trained(LAW, "FanTracking", "base", observation, 0, 8)
-    env, commands = task_of("FanTracking").make("base", observation=observation), set()
+    env = task_of("FanTracking").make("base", observation=observation)
+    commands = set()
     env.reset(seed=0)
     for felt in (0.0, 0.1):
         env.many.state.estimate.force[:] += felt

@@ -4,6 +4,7 @@ has, are diagnosed in ``tests/identification/test_measured_excerpts.py``.
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from scipy.spatial.transform import Rotation
 
 from tests.support.data_paths import crazyswarm2_file, data_file
@@ -47,8 +48,8 @@ def test_slung_payload(number):
     if number == "202":
         assert load.indistinguishable_from == ()
         sideways = swing(log, diagnosis)
-        assert np.all(np.array(sideways["law_std"]) / sideways["tracked_std"] > 0.4)
-        assert np.all(np.array(sideways["law_std"]) / sideways["tracked_std"] < 2.5)
+        assert (np.array(sideways["law_std"]) / sideways["tracked_std"] > 0.4).all()
+        assert (np.array(sideways["law_std"]) / sideways["tracked_std"] < 2.5).all()
 
 
 @pytest.mark.measured
@@ -62,7 +63,7 @@ def test_only_the_time_in_the_air_counts():
 
 def made_starts(count):
     """Random states, and rotors that swing about hover; what follows is not known yet."""
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     states = np.zeros((count, 13))
     states[:, 6] = 1.0
     speeds = np.full((count, STEPS + 1, 4), np.sqrt(MASS * GRAVITY / (4.0 * BEGIN.thrust)))
@@ -77,7 +78,7 @@ def made_starts(count):
 
 
 def test_known_coefficients_come_back():
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     factors = rng.uniform(0.85, 1.15, len(FITTED))
     true = BEGIN._replace(
         **{n: f * getattr(BEGIN, n) for n, f in zip(FITTED, factors, strict=True)}

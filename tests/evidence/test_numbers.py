@@ -53,7 +53,8 @@ def test_an_exception_that_is_not_needed_goes():
 
 
 def test_a_figure_without_a_source_and_a_wrong_one_are_seen():
-    page, said = QUOTES[0].page, QUOTES[0].says
+    page = QUOTES[0].page
+    said = QUOTES[0].says
     text = (ROOT / page).read_text(encoding="utf-8") + "\nIt is 17 % better.\n"
     found = quoting.unknown_numbers(page, QUOTES, NOT_RESULTS[page], text)
     assert len(found) == 1
@@ -91,7 +92,8 @@ def test_the_rule_of_a_sure_name_is_that_of_the_code():
     """A report shows a probability times that of nothing unknown: 0.95 x 0.75 at the least."""
     text = (rendering.DOCS / "diagnosis.md").read_text(encoding="utf-8")
     rule = " ".join(text.split()).replace(" %", "%")
-    least, most = DIAGNOSIS.least_sure_probability, DIAGNOSIS.most_unknown
+    least = DIAGNOSIS.least_sure_probability
+    most = DIAGNOSIS.most_unknown
     assert f"its probability is {least:.0%} or more if nothing" in rule
     assert f"they show {least * (1.0 - most):.0%} or more" in rule
     assert f"has a probability of {most:.0%} at most" in rule

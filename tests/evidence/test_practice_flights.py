@@ -5,10 +5,13 @@ import json
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.paths import ROOT
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import check_setting, get, names
 from windwrench.evidence.trials.outsiders import HELD_BACK, OUTSIDERS
 from windwrench.evidence.trials.practice_flights import SIZES, draw_effect, fly_practice
@@ -16,10 +19,11 @@ from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
 
-VEHICLE = load_vehicle("ardrone2")
-WEIGHT, ARM = VEHICLE.weight, VEHICLE.arm_l
+WEIGHT = VEHICLE.weight
+ARM = VEHICLE.arm_l
 LARGEST = 0.3  # parts of weight (times the arm, for torque) that a disturbance reaches in flight
-CUTOFF, EDGE = 4.0, 200  # Hz, samples
+CUTOFF = 4.0  # Hz
+EDGE = 200  # samples
 DISTURBANCES = sorted({**OUTSIDERS, **HELD_BACK})
 # sizes of each; ``python -m tests.evidence.test_practice_flights`` writes them anew
 GOLDEN = ROOT / "tests" / "golden" / "disturbances.json"
@@ -50,17 +54,17 @@ def disturbed(name):
 
 def spread(truth):
     """Root mean square of each component of a wrench."""
-    return np.sqrt(np.mean(truth**2, axis=0))
+    return rms(truth, axis=0)
 
 
 @pytest.mark.parametrize("name", DISTURBANCES)
 def test_a_disturbance_acts_in_flight_and_is_what_the_residual_shows(name):
     assert {**OUTSIDERS, **HELD_BACK}[name].__doc__
     r, truth = disturbed(name)
-    kept = json.loads(GOLDEN.read_text(encoding="utf-8"))[name]
+    kept = json.loads(GOLDEN.read_bytes())[name]
     assert_allclose(spread(truth), kept, rtol=1e-3, atol=1e-6)
     scale = np.repeat([WEIGHT, WEIGHT * ARM], 3)
-    assert np.abs(truth / scale).max() < LARGEST
+    assert abs(truth / scale).max() < LARGEST
     axis = int(np.argmax(truth.std(axis=0) / scale))
     assert truth[:, axis].std() > 0.003 * scale[axis]
     assert np.corrcoef(r[:, axis], truth[:, axis])[0, 1] > 0.95
@@ -79,7 +83,7 @@ def test_the_same_seed_gives_the_same_log_and_another_one_another():
 @pytest.mark.parametrize("size", SIZES)
 def test_drawn_effects_are_in_range_and_grow_with_the_size(size):
     for name in names():
-        setting = check_setting(draw_effect(name, VEHICLE, size, np.random.default_rng(1)))
+        setting = check_setting(draw_effect(name, VEHICLE, size, default_rng(1)))
         assert set(setting.coefficients) == {c.name for c in get(name).coefficients}
         typical = max(abs(c.typical[0]) for c in get(name).coefficients)
         if name not in ("fan_jet", "slung_payload", "wind", "clock_offset", "latency"):

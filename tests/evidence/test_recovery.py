@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from scipy.spatial.transform import Rotation
 
+from tests.support.sizes import rms
 from windwrench.evidence.recovery import (
     EVENTS,
     FILTERS,
@@ -41,7 +44,7 @@ def test_rotors_fly_the_path_under_the_wrench(flown):
     settled = slice(flight.row(6.0), None)
     assert error[settled].max() < 0.01
     assert z[settled].max() < 1.0
-    torque = np.abs(said.torque - flight.wrench[:3])[settled]
+    torque = abs(said.torque - flight.wrench[:3])[settled]
     assert torque.max() < 0.01 * flight.vehicle.weight * flight.vehicle.arm_l
     assert np.ptp(flight.position, axis=0).max() > 0.3
 
@@ -49,24 +52,25 @@ def test_rotors_fly_the_path_under_the_wrench(flown):
 @pytest.mark.parametrize("noise", SIZES)
 def test_poses_are_as_noisy_as_said(noise):
     flight = exact_flight("ardrone2@200", 20.0)
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     position, attitude = measured(flight, (NOISES | TAILS)[noise], rng)
     turns = (attitude * flight.attitude.inv()).as_rotvec() / flight.vehicle.mocap.sigma_att_rad
     off = (position - flight.position) / flight.vehicle.mocap.sigma_pos_m
     for values in (turns, off):
-        assert np.sqrt(np.mean(values**2)) == pytest.approx(SIZES[noise], rel=0.1)
+        assert rms(values) == pytest.approx(SIZES[noise], rel=0.1)
 
 
 def test_what_happens_to_poses_happens_to_them_alone():
-    flight, rng = exact_flight("crazyflie@100", 3.0), np.random.default_rng(0)
+    flight = exact_flight("crazyflie@100", 3.0)
+    rng = default_rng(0)
     during = slice(100, 200)
     for event in EVENTS:
         position, quaternion = befall(event, 100, 200, flight.position, flight.attitude, rng)
-        away = np.linalg.norm(position - flight.position, axis=1)
+        away = norm(position - flight.position, axis=1)
         turns = Rotation.from_quat(np.nan_to_num(quaternion, nan=1.0), scalar_first=True)
         tilt = (turns * flight.attitude.inv()).magnitude()
         others = np.r_[0:100, 200:300]
-        assert np.all(np.isnan(away[during]) == (event == "gap"))
+        assert (np.isnan(away[during]) == (event == "gap")).all()
         assert np.nanmax(away[during], initial=0.0) == pytest.approx(0.5 * (event == "jump"))
         assert away[others].max() == pytest.approx(0.5 * (event == "jump"))
         assert tilt[others].max() < 1e-6
@@ -135,14 +139,16 @@ def test_wrong_attitudes_are_got_over_without_a_gate():
 
 def test_a_filter_that_knows_the_noise_is_told_it():
     words = ("ukf", "crazyflie@100", "x3", "nothing", "no-gate")
-    told, learned = fly_combination(words, told=True).error, fly_combination(words).error
+    told = fly_combination(words, told=True).error
+    learned = fly_combination(words).error
     assert 0.8 * learned < told < learned  # what is learned of the noise is nearly as good
 
 
 def test_wrong_attitudes_are_as_wrong_as_said():
-    attitude, seen = exact_flight("crazyflie@100", 1.0).attitude, set()
+    attitude = exact_flight("crazyflie@100", 1.0).attitude
+    seen = set()
     for seed in range(30):
-        words, wrong = turned(np.random.default_rng(seed), attitude)
+        words, wrong = turned(default_rng(seed), attitude)
         off = np.degrees((wrong * attitude.inv()).magnitude())
         kind, *angle = words.split()[:2]
         sizes = {0.0, 180.0} if kind == "flicker" else {float(*angle or [180.0])}

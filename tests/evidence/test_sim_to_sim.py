@@ -5,6 +5,7 @@ simulator that is installed obeys its published vehicle.
 import mujoco
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.rotation import matrix_of
@@ -27,7 +28,8 @@ class Ours:
         self.data.qpos[:], self.speeds = pose, self.vehicle.hover_rate
 
     def step(self, command, wrench):
-        data, self.speeds = self.data, command + np.exp(-TICK / OURS) * (self.speeds - command)
+        data = self.data
+        self.speeds = command + np.exp(-TICK / OURS) * (self.speeds - command)
         thrust, *torque = self.vehicle.rotor_wrench(self.speeds)
         turn = matrix_of(data.qpos[3:])
         data.xfrc_applied[-1] = wrench + np.hstack([turn[:, 2] * thrust, turn @ torque])
@@ -56,8 +58,10 @@ def test_a_simulator_obeys_its_published_vehicle(name):
         peer = PEERS[name]()
     except InputError as error:
         pytest.skip(str(error))
-    vehicle, facing_back = peer.vehicle, np.array([2.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0])
-    hover, push = np.full(4, vehicle.hover_rate), 0.1 * vehicle.weight * np.arange(1.0, 4.0)
+    vehicle = peer.vehicle
+    facing_back = np.array([2.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0])
+    hover = np.full(4, vehicle.hover_rate)
+    push = 0.1 * vehicle.weight * np.arange(1.0, 4.0)
     peer.start(facing_back)
     _, velocity, speeds = peer.step(hover, np.hstack([push, 0.01 * push]))
     turned = 0.01 * push * [-1.0, -1.0, 1.0] / np.diag(vehicle.inertia)
@@ -69,10 +73,10 @@ def test_a_simulator_obeys_its_published_vehicle(name):
         for _ in range(4):
             velocity, speeds = peer.step(command, np.zeros(6))[1:]
         assert speeds.argmax() == command.argmax()
-        assert np.all(np.sign(velocity[3:]) == np.sign(vehicle.rotor_wrench(command)[1:]))
+        assert (np.sign(velocity[3:]) == np.sign(vehicle.rotor_wrench(command)[1:])).all()
 
 
 def test_clear_pairs_that_turn_round_are_counted():
-    noise = 0.01 * np.random.default_rng(0).standard_normal((3, 40))
+    noise = 0.01 * default_rng(0).standard_normal((3, 40))
     found = ranking(np.array([[1], [2], [2]]) + noise, np.array([[2], [1], [3]]) + noise)
     assert (found["pairs"], found["clear_pairs"], found["clear_pairs_reversed"]) == (3, 2, 1)

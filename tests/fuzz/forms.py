@@ -153,8 +153,7 @@ def _log(path, reader=None, vehicle="ardrone2"):
     """Read a log, and estimate the wrench on it where it is short."""
     log = read_log(path, reader, _vehicle(vehicle))
     if len(log.t) <= _LONGEST and log.has_pose and log.has_rotor_speeds:
-        series = estimate_log(log, _vehicle(vehicle))
-        assert np.isfinite(series.force).all()
+        assert np.isfinite(estimate_log(log, _vehicle(vehicle)).force).all()
 
 
 _MAP = (
@@ -173,8 +172,7 @@ def _use_map(path):
 
 
 def _foreign_table():
-    text = _own_log("log.csv").decode()
-    head, _, rest = text.partition("\n")
+    head, _, rest = _own_log("log.csv").decode().partition("\n")
     head = head.replace("omega", "rpm").replace("px", "x").replace("py", "y").replace("pz", "z")
     return f"{head}\n{rest}".encode()
 
@@ -194,8 +192,7 @@ def _folder_bag(path):
 def _use_vehicle(path):
     """Load a vehicle, write it and read it back, and let a filter know it."""
     vehicle = load_vehicle(path)
-    again = parse_vehicle(dump_vehicle(vehicle))
-    assert dump_vehicle(again) == dump_vehicle(vehicle)
+    assert dump_vehicle(parse_vehicle(dump_vehicle(vehicle))) == dump_vehicle(vehicle)
     ukf = WrenchUKF(vehicle, UKFTuning.for_vehicle(vehicle))
     ukf.reset([0, 0, 1], [1, 0, 0, 0])
     ukf.step(np.full(4, min(vehicle.hover_rate, vehicle.omega_max)), [0, 0, 1], [1, 0, 0, 0])
@@ -229,11 +226,10 @@ def _use_policy(path):
     attacker's would.
     """
     if path.suffix == ".npz":
-        card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        card = json.loads(path.with_suffix(".json").read_bytes())
         card["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
         path.with_suffix(".json").write_text(json.dumps(card), encoding="utf-8")
-    command = load_policy(path)(np.zeros(8), {})
-    assert command.shape == (1,)
+    assert load_policy(path)(np.zeros(8), {}).shape == (1,)
 
 
 def _vehicle_with_effects():
@@ -292,7 +288,8 @@ def _spoiled_parquet(draw, data):
     """Take a column of a Parquet file away, give it twice, cut it or change its type."""
     table = parquet.read_table(io.BytesIO(data))
     i = draw(places(table.column_names))
-    name, count = table.column_names[i], table.num_rows
+    name = table.column_names[i]
+    count = table.num_rows
     how = draw(st.sampled_from(("away", "twice", "cut", "type")))
     if how == "away":
         table = table.remove_column(i)
@@ -309,7 +306,8 @@ def _spoiled_parquet(draw, data):
 
 
 _BYTES = (spoiled_bytes,)
-_CELLS, _WORDS = (spoiled_table, spoiled_bytes), (spoiled_text, spoiled_bytes)
+_CELLS = (spoiled_table, spoiled_bytes)
+_WORDS = (spoiled_text, spoiled_bytes)
 _PARQUET = (_spoiled_parquet, spoiled_bytes)
 _BAGS = {"rosbag 1": "bag", "rosbag 2, SQLite": "db3", "rosbag 2, MCAP": "mcap"}
 
@@ -325,9 +323,11 @@ def _form_of_log(name, file, good, ways, reader=None, vehicle="ardrone2", beside
 
 def forms():
     """Return every form of input by its name."""
-    log, flown = _form_of_log, ("record", "--seconds", "1", "--out", "out", "--vehicle")
+    log = _form_of_log
+    flown = ("record", "--seconds", "1", "--out", "out", "--vehicle")
     sd = "crazyflie_sd", "crazyflie"
-    own, packed = partial(_own_log, "log.csv"), (_zipped(spoiled_table), spoiled_bytes)
+    own = partial(_own_log, "log.csv")
+    packed = (_zipped(spoiled_table), spoiled_bytes)
     scored = ("benchmark", "--episodes", "1", "--out", "out", "--controllers")
     found = [
         log("CSV", "log.csv", own, _CELLS),

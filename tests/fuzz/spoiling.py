@@ -35,7 +35,8 @@ def spoiled_bytes(draw, data):
     """Put other bytes in a stretch's place or before it, or lose all that follows."""
     start = draw(places(data))
     stop = min(start + draw(st.sampled_from((0, 1, 4, 16, 256, 4096))), len(data))
-    stretch, other = data[start:stop], draw(places(data))
+    stretch = data[start:stop]
+    other = draw(places(data))
     filled = st.sampled_from((b"\x00", b"\xff", b"\x7f")).map(lambda byte: byte * len(stretch))
     count = st.sampled_from(ABSURD_COUNTS).map(lambda number: number.to_bytes(8, "little"))
     copied = st.sampled_from((b"", 2 * stretch, 50 * stretch, data[other : other + len(stretch)]))
@@ -47,8 +48,10 @@ def spoiled_bytes(draw, data):
 def spoiled_table(draw, data):
     """Spoil cells, a row, a column or the line ends of CSV text."""
     rows = [line.split(",") for line in data.decode("utf-8", "surrogateescape").split("\n")]
-    row, other = draw(places(rows)), draw(places(rows))
-    column, end = draw(places(rows[row])), "\n"
+    row = draw(places(rows))
+    other = draw(places(rows))
+    column = draw(places(rows[row]))
+    end = "\n"
     how = draw(st.sampled_from(("cells", "row", "exchange", "column", "scale", "cut", "ends")))
     if how == "cells":
         for at in draw(st.lists(places(rows[row]), min_size=1, max_size=4)):
@@ -77,7 +80,8 @@ def spoiled_table(draw, data):
 def spoiled_text(draw, data):
     """Spoil words, a line or an indent of text: YAML, JSON, a setting of an effect, a name."""
     text = data.decode("utf-8", "surrogateescape")
-    lines, how = text.split("\n"), draw(st.sampled_from(("words", "insert", "line", "cut")))
+    lines = text.split("\n")
+    how = draw(st.sampled_from(("words", "insert", "line", "cut")))
     row = draw(places(lines))
     if how == "words":
         words = list(re.finditer(r"[^\s,:\[\]{}]+", text))

@@ -8,8 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.flown import VEHICLE, recorded
+from tests.support.sizes import rms
 from windwrench.dynamics import InputError
 from windwrench.dynamics.effects import parse_setting
 from windwrench.identification.logs.flight_log import with_rows
@@ -45,19 +47,21 @@ def put(field, rows, columns, value):
 
 
 def scattered(positions):
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     hit = rng.random((len(positions), 1)) < 0.01
     return positions + hit * rng.standard_normal(positions.shape)
 
 
 def rows_lost(log, counted):
     """The log without a fifth of its rows; ``counted``: its times go on as if none were lost."""
-    kept = with_rows(log, np.random.default_rng(0).random(len(log.t)) > 0.2)
+    kept = with_rows(log, default_rng(0).random(len(log.t)) > 0.2)
     return replace(kept, t=log.t[: len(kept.t)]) if counted else kept
 
 
-ALL, LATER = slice(None), slice(1200, None)
-SPEEDS, PLACE = "rotor_speeds", "position"
+ALL = slice(None)
+LATER = slice(1200, None)
+SPEEDS = "rotor_speeds"
+PLACE = "position"
 FAULTS = {
     "rotors swapped": (put(SPEEDS, ALL, [0, 2], lambda x: x[:, [2, 0]]), ROTORS),
     "a rotor's column twice": (put(SPEEDS, ALL, 1, lambda x: x[:, 3]), ROTORS),
@@ -68,7 +72,7 @@ FAULTS = {
         ("the attitude stands still",),
     ),
     "a second of rows is lost": (
-        lambda log: with_rows(log, np.abs(log.t - 5.5) > 0.5),
+        lambda log: with_rows(log, abs(log.t - 5.5) > 0.5),
         ("gap", *POSE),
     ),
     "every other row is lost": (lambda log: with_rows(log, np.arange(len(log.t)) % 2 == 0), ()),
@@ -93,7 +97,7 @@ def is_same(series, unspoiled):
     ):
         there = [np.interp(t[compared], unspoiled.t, column) for column in expected.T]
         error = found[compared] - np.column_stack(there)
-        if np.sqrt(np.mean(error**2)) > SAME * scale:
+        if rms(error) > SAME * scale:
             return False
     return True
 

@@ -49,7 +49,8 @@ def bounded(longest):
         raise TooLong(f"more than {longest:g} s")
 
     held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
-    before, limits = signal.signal(signal.SIGVTALRM, stop), resource.getrlimit(resource.RLIMIT_DATA)
+    before = signal.signal(signal.SIGVTALRM, stop)
+    limits = resource.getrlimit(resource.RLIMIT_DATA)
     resource.setrlimit(resource.RLIMIT_DATA, (held + MOST_MEMORY, limits[1]))
     signal.setitimer(signal.ITIMER_VIRTUAL, longest)
     try:
@@ -98,7 +99,8 @@ def compiled():
 
 @pytest.mark.parametrize("name", FORMS)
 def test_spoiled_inputs_are_read_or_refused(name, tmp_path, monkeypatch, capsys):
-    form, refused = FORMS[name], []
+    form = FORMS[name]
+    refused = []
     assert not is_refused(form, lay_out(form, form.good(), tmp_path / "input"), longest=900.0)
 
     @MANY

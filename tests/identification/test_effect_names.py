@@ -10,14 +10,12 @@ import pytest
 from tests.support.alike import assert_alike
 from tests.support.imu_flights import imu_flight, pose_removed
 from tests.support.own_effects import renamed
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import names
 from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.report.files import report_data
-
-VEHICLE = load_vehicle("ardrone2")
-
 
 FLIGHTS = {
     "late": ("excite", {"latency": {"d": 0.03}}),

@@ -39,11 +39,12 @@ def test_a_nanobench_flight_lacks_the_lift_of_a_full_battery(name, logs):
     assert any("voltage" in note for note in log.notes)
     assert screen_log(log, VEHICLE)[1] == ()
     series = estimate_log(log, VEHICLE)
-    settled, weight = series.t > 2.0, VEHICLE.weight
+    settled = series.t > 2.0
+    weight = VEHICLE.weight
     assert np.isfinite(series.nis[1:]).all()
     assert -0.85 * weight < series.force[settled, 2].mean() < -0.65 * weight
-    assert np.abs(series.force[settled, :2]).max() < 0.25 * weight
-    assert np.abs(series.torque[settled]).max() < 0.2 * weight * VEHICLE.arm_l
+    assert abs(series.force[settled, :2]).max() < 0.25 * weight
+    assert abs(series.torque[settled]).max() < 0.2 * weight * VEHICLE.arm_l
     # what a diagnosis of the whole flights finds, declared: next to nothing is left
     known = VEHICLE.with_effects(
         EffectSetting("battery_sag", {"n": 1.5}), EffectSetting("thrust_scale", {"s": -0.28})
@@ -64,8 +65,8 @@ def test_a_crazyswarm2_flight_carries_what_hangs_from_it(number, load):
     # by the mass that those who flew it state, and with the load that they weighed
     expected = -((0.0369 if load else 0.032) + load - VEHICLE.mass) * 9.81
     assert series.force[settled, 2].mean() == pytest.approx(expected, rel=0.4)
-    assert np.abs(series.force[settled, :2]).max() < 0.04
-    assert np.abs(series.torque[settled]).max() < 1e-3
+    assert abs(series.force[settled, :2]).max() < 0.04
+    assert abs(series.torque[settled]).max() < 1e-3
 
 
 def test_a_diagnosis_of_one_flight_explains_another(logs):
@@ -77,13 +78,12 @@ def test_a_diagnosis_of_one_flight_explains_another(logs):
     row = compare(test, found)
     assert row["before_rms"][2] > 10 * row["after_rms"][2]
     assert row["norm_before"] > 10 * row["norm_after"]
-    assert np.all(np.array(row["before_std"]) > 3.5 * np.array(row["after_std"]))
-    assert np.all(np.abs(np.array(linear_drag(found)) - 0.0100) < 0.0025)  # N per m/s
+    assert (np.array(row["before_std"]) > 3.5 * np.array(row["after_std"])).all()
+    assert (abs(np.array(linear_drag(found)) - 0.0100) < 0.0025).all()  # N per m/s
     named = {e.name: e for e in found.effects}
     assert 0.8 < named["battery_sag"].coefficients["n"] < 2.5
     delay = named["latency"]
     assert delay.indistinguishable_from == ("motor_lag", "clock_offset")
     assert 0.030 < delay.coefficients["d"] < 0.055
-    path = excerpt(f"nanobench/{NANOBENCH[1]}.csv.gz")
-    imu = imu_check(path, test, found)
+    imu = imu_check(excerpt(f"nanobench/{NANOBENCH[1]}.csv.gz"), test, found)
     assert imu["model_std"] < 0.8 * imu["constant_std"]

@@ -5,11 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded, resting, settings, without_pose
 from tests.support.imu_flights import imu_flight
+from tests.support.sizes import rms
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.plant import PlantSettings
 from windwrench.identification import predict
@@ -44,7 +47,7 @@ def residual_rms(log):
     for signals in log_signals(log):
         edge = round(0.6 / signals.period)
         pieces.append(low_pass(residual_wrench(signals, VEHICLE), 4.0, signals.period)[edge:-edge])
-    return np.sqrt(np.mean(np.concatenate(pieces) ** 2, axis=0))
+    return rms(np.concatenate(pieces), axis=0)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +63,8 @@ def residual_rms(log):
     ],
 )
 def test_a_log_without_its_sensing_effects_leaves_the_residual_of_a_clean_flight(clean, effects):
-    floor, log = residual_rms(clean), fly(**effects)
+    floor = residual_rms(clean)
+    log = fly(**effects)
     before = residual_rms(log) / floor
     after = residual_rms(undo_log_sensing(log, VEHICLE.with_effects(*settings(effects)))) / floor
     assert np.max(before) > 2.0
@@ -105,7 +109,8 @@ def test_the_missing_effect_brings_prediction_back_to_the_flight(name, trajector
 def test_predictions_start_where_a_whole_horizon_follows(clean):
     log = without_pose(clean, slice(2000, 2100))
     made = predict(log, VEHICLE, horizon_s=0.25, every=7)
-    n, steps = len(made.start), 50
+    n = len(made.start)
+    steps = 50
     assert made.period == pytest.approx(0.005)
     assert (
         made.position.shape == made.velocity.shape == made.angular_velocity.shape == (n, steps, 3)
@@ -120,7 +125,7 @@ def test_predictions_start_where_a_whole_horizon_follows(clean):
     inside = (made.start > 200) & (ends < 1900)
     off = made.position[inside, -1] - log.position[ends[inside]]
     assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 0.02  # the pose's noise is 0.005 m an axis
-    turned = np.abs(np.sum(made.quaternion[inside, -1] * log.quaternion[ends[inside]], axis=1))
+    turned = abs(np.sum(made.quaternion[inside, -1] * log.quaternion[ends[inside]], axis=1))
     assert 2 * np.degrees(np.arccos(np.minimum(turned, 1.0))).mean() < 2.0
     ahead = made.position[:, 1:] - made.position[:, :-1]
     assert_allclose(ahead, 0.005 * made.velocity[:, 1:], atol=2e-3)
@@ -136,13 +141,14 @@ def test_nothing_after_a_start_changes_its_prediction(kind):
     if kind == "gap":
         log = without_pose(log, slice(700, 760))
     elif kind == "jitter":
-        log = replace(log, t=log.t + np.random.default_rng(0).uniform(-1e-3, 1e-3, len(log.t)))
+        log = replace(log, t=log.t + default_rng(0).uniform(-1e-3, 1e-3, len(log.t)))
     elif kind == "late":
         vehicle = VEHICLE.with_effects(*settings(LATE))
     elif kind == "wrong inertia":
         vehicle = replace(VEHICLE, inertia=2.0 * VEHICLE.inertia)
     for k in (20, 300, 900):
-        later, rng = np.arange(len(log.t)) > k, np.random.default_rng(k)
+        later = np.arange(len(log.t)) > k
+        rng = default_rng(k)
         moved = {"position": log.position + rng.normal(0.0, 5.0, 3)}
         moved["quaternion"] = np.roll(log.quaternion, 1, axis=1)
         for sensor in ("gyro", "accelerometer"):
@@ -154,9 +160,10 @@ def test_nothing_after_a_start_changes_its_prediction(kind):
         known = before.start <= k
         assert known.any()
         for name in ("position", "velocity", "quaternion", "angular_velocity"):
-            x, y = getattr(before, name), getattr(after, name)
+            x = getattr(before, name)
+            y = getattr(after, name)
             assert_allclose(x[known], y[known], rtol=0.0, atol=1e-9)
-            assert np.abs(x[~known] - y[~known]).max() > 0.1
+            assert abs(x[~known] - y[~known]).max() > 0.1
 
 
 def test_a_log_that_ends_after_a_horizon_has_the_same_predictions():
@@ -169,12 +176,12 @@ def test_a_log_that_ends_after_a_horizon_has_the_same_predictions():
 
 def test_a_state_is_taken_as_it_is():
     """Without thrust, and about a principal axis, what follows is known exactly."""
-    rng = np.random.default_rng(0)
-    n, period = 400, 0.01
-    t = period * np.arange(n) + rng.uniform(-1e-4, 1e-4, n)
+    rng = default_rng(0)
+    n = 400
+    t = 0.01 * np.arange(n) + rng.uniform(-1e-4, 1e-4, n)
     log = resting(t, rotor_speeds=np.zeros((n, 4)), name="falling")
     state = rng.normal(size=(n, 13))
-    state[:, 3:7] /= np.linalg.norm(state[:, 3:7], axis=1)[:, None]
+    state[:, 3:7] /= norm(state[:, 3:7], axis=1)[:, None]
     state[:, 10:12] = 0.0
     state[30:40, 8] = np.nan
     made = predict(log, VEHICLE, 0.2, 5, state)
@@ -209,7 +216,8 @@ def test_a_state_of_another_form_is_refused(clean):
 @pytest.mark.parametrize(("inertia", "most"), [(1.0, 0.045), (1.6, 0.2)])
 def test_a_start_knows_the_flight_whatever_the_model(inertia, most):
     """The angular velocity of a differentiated pose has 1.4 rad/s of noise."""
-    log, vehicle = imu_flight(VEHICLE), replace(VEHICLE, inertia=inertia * VEHICLE.inertia)
+    log = imu_flight(VEHICLE)
+    vehicle = replace(VEHICLE, inertia=inertia * VEHICLE.inertia)
     (signals,) = log_signals(log)
     velocity = low_pass(signals.velocity, 4.0, signals.period)
     for known in (log, replace(log, gyro=None, accelerometer=None)):
@@ -253,8 +261,8 @@ def test_a_turn_at_one_rate_is_no_change():
     turned = np.column_stack([np.cos(half), 0.0 * t, 0.0 * t, np.sin(half)])
     log = resting(t, position=np.outer(t, [1.0, -0.5, 0.2]), quaternion=turned)
     found = prediction_errors([log], VEHICLE)
-    assert np.all(found.still < 2e-3)
-    assert np.all(found.model < 2e-3)
+    assert (found.still < 2e-3).all()
+    assert (found.model < 2e-3).all()
     with pytest.raises(InputError, match=r"flight: expected a pose, unbroken for 4 s"):
         prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [[(0.0, 2.0)]])
 
@@ -266,4 +274,4 @@ def test_models_are_compared_from_the_same_starts(clean):
     kept = prediction_errors([clean], heavy, start_by=VEHICLE)
     assert_array_equal(kept.still, own.still)
     assert kept.model[3] == pytest.approx(own.still[3], rel=1e-3)
-    assert np.all(own.model[:, -1] < kept.model[:, -1])
+    assert (own.model[:, -1] < kept.model[:, -1]).all()

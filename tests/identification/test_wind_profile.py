@@ -4,11 +4,12 @@ flies as the task does, and no law where there is no jet.
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
+from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Admittance
 from windwrench.controllers.briefing import FilterNoise
-from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.envs.fan import Fan
 from windwrench.evidence.profiled_fans import follows, make_env, recorded, true_profile
 from windwrench.identification.jet_design import (
@@ -23,9 +24,9 @@ from windwrench.identification.jet_design import (
 from windwrench.identification.profile_law import profile_log
 from windwrench.identification.wind_profile import _curve
 
-VEHICLE = load_vehicle("ardrone2")
 # neither strength nor radius nor distance of the kit's own fan
-FAN, DISTANCE = Fan(speed=4.6, radius=0.37), 2.05
+FAN = Fan(speed=4.6, radius=0.37)
+DISTANCE = 2.05
 PLACE = np.arange(-1.5, 1.5, 0.02)
 JET = 0.03 * PLACE / 0.46 * np.exp(0.5 - 0.5 * (PLACE / 0.46) ** 2)
 
@@ -42,7 +43,7 @@ def test_the_intervals_of_a_sweep_hold_the_jet(swept):
     assert inside[0] > 0.7
     assert inside[5] > 0.8
     # and they are narrow: a third of the largest torque at most, in the jet
-    jet = np.abs(p.place) < 0.8
+    jet = abs(p.place) < 0.8
     assert np.max((p.high - p.low)[5, jet]) < true[5].max() / 1.5
     assert p.direction == pytest.approx(np.pi / 2, abs=0.03)
     assert p.beside == pytest.approx(DISTANCE, abs=0.05)
@@ -57,9 +58,11 @@ def test_the_jet_of_a_sweep_has_its_shape(swept):
 
 
 def test_the_law_follows_slower_fans_and_loses_faster_ones(swept):
-    law, fastest = Admittance(swept.law["gain"]), swept.law["fastest_fan_m_s"]
+    law = Admittance(swept.law["gain"])
+    fastest = swept.law["fastest_fan_m_s"]
     assert fastest < swept.law["bound_m_s"]
-    env, reach = make_env(FAN, DISTANCE), np.array(swept.shape.edges) - swept.shape.axis
+    env = make_env(FAN, DISTANCE)
+    reach = np.array(swept.shape.edges) - swept.shape.axis
     slower, faster = (
         sum(follows(env, law, share * fastest, seed, reach) for seed in range(1_068_000, 1_068_008))
         for share in (0.75, 1.6)
@@ -77,9 +80,10 @@ def test_a_flight_in_still_air_has_no_law():
 def test_intervals_of_correlated_errors_hold_95_percent_of_the_places():
     inside = []
     for seed in range(40):
-        rng = np.random.default_rng(seed)
+        rng = default_rng(seed)
         t = np.arange(200 * 20) / 20.0
-        place, second = 1.5 * np.sin(0.05 * t), t.astype(int)
+        place = 1.5 * np.sin(0.05 * t)
+        second = t.astype(int)
         noise = np.zeros(len(t))
         for k in range(1, len(t)):  # 0.5 s
             noise[k] = 0.905 * noise[k - 1] + 0.425 * rng.standard_normal()
@@ -87,7 +91,7 @@ def test_intervals_of_correlated_errors_hold_95_percent_of_the_places():
         means = y.reshape(200, 20).mean(axis=1)
         at = PLACE[(place.min() < PLACE) & (place.max() > PLACE)]
         mean, std, draws, samples = _curve(place, second, means, at)
-        inside.append(np.mean(np.abs(mean - np.interp(at, PLACE, JET)) < 1.96 * std))
+        inside.append(np.mean(abs(mean - np.interp(at, PLACE, JET)) < 1.96 * std))
         assert samples < 200
         assert_allclose(draws.std(axis=0).mean(), std.mean(), rtol=0.25)
     assert 0.9 < np.mean(inside) < 0.99
@@ -116,8 +120,7 @@ def test_a_jet_has_its_places():
     assert shape.axis == pytest.approx(0.0, abs=1e-6)
     assert_allclose(shape.peaks, (-0.46, 0.46), atol=0.011)
     assert shape.weaker == pytest.approx(0.03, rel=1e-3)
-    fifth = np.interp(np.abs(shape.edges), PLACE, JET) / 0.03
-    assert_allclose(fifth, 0.2, atol=0.02)
+    assert_allclose(np.interp(abs(shape.edges), PLACE, JET) / 0.03, 0.2, atol=0.02)
     assert shape.slope == pytest.approx(0.1, rel=0.1)
 
 
@@ -135,7 +138,8 @@ def test_in_calm_air_the_bound_is_the_fastest_fan():
 
 def test_margins_tell_where_the_loop_begins_to_swing():
     loop = following_loop(VEHICLE.inertia[2, 2], FilterNoise())
-    line, shape = 0.1 * PLACE, shape_of(PLACE, JET)
+    line = 0.1 * PLACE
+    shape = shape_of(PLACE, JET)
     crossings = np.linspace(1.0, 6.0, 101)
     critical = crossings[np.argmax([loop.margins(c)[0] < 0.0 for c in crossings])]
     gains = np.array([0.8, 1.2]) * critical / 0.1
@@ -144,6 +148,6 @@ def test_margins_tell_where_the_loop_begins_to_swing():
     assert offsets[1] > 0.3
     # a delay as long as the margin leaves none
     margin, delay = loop.margins(1.5)
-    crossed = _OMEGA[np.flatnonzero(np.abs(1.5 * loop.response) >= 1.0)[-1]]
+    crossed = _OMEGA[np.flatnonzero(abs(1.5 * loop.response) >= 1.0)[-1]]
     assert margin == pytest.approx(delay * crossed)
-    assert np.all(np.diff(RISE_TIMES) > 0.0)
+    assert (np.diff(RISE_TIMES) > 0.0).all()

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.linalg import inv, norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from tests.support.flown import without_pose
 from tests.support.imu_flights import imu_flight, pose_removed
-from windwrench.dynamics import InputError, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import InputError
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.estimator import WrenchUKF
 from windwrench.estimator.row_steps import steps_between
@@ -36,14 +39,13 @@ from windwrench.identification.wrench_series import (
 )
 from windwrench.identification.wrench_track import write_mcap
 
-VEHICLE = load_vehicle("ardrone2")
 WRENCH = [f"{kind}{axis}" for kind in "ft" for axis in "xyz"]
 HEADER = ["t", *WRENCH, *(f"std_{name}" for name in WRENCH), "nis", "status"]
 
 
 def held_flight(t, lift=0.3, lost=None):
     """A vehicle at rest in the air while something carries ``lift`` N of its weight."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     count = len(t)
     speed = VEHICLE.hover_rate * np.sqrt(1 - lift / VEHICLE.weight)
     position = np.array([0.5, -0.5, 1.0]) + VEHICLE.mocap.sigma_pos_m * rng.normal(size=(count, 3))
@@ -85,7 +87,7 @@ def test_a_constant_force_is_found():
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), jitter=st.floats(0.0, 0.9), share=st.floats(0.0, 0.9))
 def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     t = np.cumsum(0.01 * (1 + jitter * rng.uniform(-1, 1, 300)))
     lost = rng.random(300) < share
     lost[rng.integers(300)] = False
@@ -97,13 +99,14 @@ def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):
 @pytest.mark.parametrize("with_imu", [False, True])
 def test_a_log_is_the_calls_of_a_filter(with_imu):
     """To the last bit: with late rows, lost and wild poses, and sensors read in some rows."""
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     t = np.cumsum(rng.choice([0.005, 0.012], 400))
     log = held_flight(t, lost=slice(150, 220))
     log.position[300:320] += 0.2
     if with_imu:
         gyro, force = 0.02 * rng.standard_normal((2, 400, 3)) + np.array([[0.0], [9.81]])[:, None]
-        gyro[::3], force[::2] = np.nan, np.nan
+        gyro[::3] = np.nan
+        force[::2] = np.nan
         log = replace(log, gyro=gyro, accelerometer=force * [0.0, 0.0, 1.0])
     found = estimate_log(log, VEHICLE)
     ukf = WrenchUKF(VEHICLE, None, log.period, GATE)
@@ -129,7 +132,7 @@ def test_a_gap_widens_the_band_and_is_bridged():
     t = 0.005 * np.arange(2000)
     t[1000:] += 1.0
     series = estimate_log(held_flight(t), VEHICLE)
-    assert np.all(series.std[1000, 15:] > 1.05 * series.std[999, 15:])
+    assert (series.std[1000, 15:] > 1.05 * series.std[999, 15:]).all()
     # at its default noise the filter has lost the attitude in a second
     assert (series.restarts[-1], series.status[1000]) == (1, "restarted")
     assert "the filter restarted at t = 6 s: after a gap" in series.notes[0]
@@ -148,16 +151,16 @@ def test_wild_poses_are_refused_and_said(smooth):
     assert "6 of 1200 poses jump from those before and were refused" in series.notes[-1]
     assert counts(series)["rejected"] == 6
     clean = estimate_log(log, VEHICLE, smooth=smooth)
-    assert np.max(np.abs(series.force - clean.force)) < 0.03
+    assert abs(series.force - clean.force).max() < 0.03
     # no gate: each of them, and each way back, is a jump for good
-    trusting = estimate_log(spoiled, VEHICLE, gate=None)
-    assert trusting.restarts[-1] >= 6
+    assert estimate_log(spoiled, VEHICLE, gate=None).restarts[-1] >= 6
 
 
 def test_smoothing_is_the_filters_nis_with_a_narrower_band():
     lost = slice(400, 440)
     log = held_flight(0.005 * np.arange(1200), lost=lost)
-    filtered, smoothed = estimate_log(log, VEHICLE), estimate_log(log, VEHICLE, smooth=True)
+    filtered = estimate_log(log, VEHICLE)
+    smoothed = estimate_log(log, VEHICLE, smooth=True)
     assert np.allclose(filtered.nis, smoothed.nis, equal_nan=True)
     assert np.allclose(filtered.force[-1], smoothed.force[-1])
     inner = slice(100, -100)
@@ -276,7 +279,7 @@ def test_an_imu_alone_shows_a_vertical_force(flown):
     series = estimate_log(pose_removed(flown), VEHICLE)
     inner = slice(400, -400)
     assert abs(float(series.force[inner, 2].mean()) + 0.4) < 0.1
-    z = np.abs(series.force - flown.force)[inner] / series.std[inner, 15:]
+    z = abs(series.force - flown.force)[inner] / series.std[inner, 15:]
     assert (z.mean(axis=0) < 2.0).all()
     assert np.isnan(series.nis).all()
     assert any("no pose" in note for note in series.notes)
@@ -300,8 +303,7 @@ def test_gyro_and_accelerometer_of_a_log_sharpen_its_estimate(flown):
         series = estimate_log(replace(log, **less), VEHICLE)
         assert_array_equal(np.isfinite(series.nis[1:]), log.valid[1:])
         return [
-            np.linalg.norm((x - y)[400:])
-            for x, y in ((series.force, log.force), (series.torque, log.torque))
+            norm((x - y)[400:]) for x, y in ((series.force, log.force), (series.torque, log.torque))
         ]
 
     force, torque = errors(accelerometer=None, gyro=None)
@@ -316,13 +318,14 @@ def test_a_tuning_needs_poses(flown):
 
 def test_the_force_is_the_posterior_of_a_walk():
     """Far from the ends, where the start is forgotten, a dense solution says the same."""
-    rng = np.random.default_rng(0)
-    n, walk, variance = 400, 0.01, 1.0
+    rng = default_rng(0)
+    n = 400
+    walk = 0.01
+    variance = 1.0
     y = np.cumsum(np.sqrt(walk) * rng.standard_normal(n)) + rng.standard_normal(n)
     found, std = _two_sided(y[:, None], np.zeros((n, 1, 1)), np.eye(1), np.diag([walk]), variance)
     between = np.diff(np.eye(n), axis=0)
-    precision = np.eye(n) / variance + between.T @ between / walk
-    covariance = np.linalg.inv(precision)
+    covariance = inv(np.eye(n) / variance + between.T @ between / walk)
     inner = slice(150, 250)
     assert_allclose(found[inner, 0, 0], (covariance @ y / variance)[inner], atol=1e-5)
     assert std[0] == pytest.approx(np.sqrt(covariance[200, 200]), rel=1e-4)

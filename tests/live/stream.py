@@ -12,6 +12,7 @@ from unittest import mock
 import numpy as np
 
 from tests.support.programs import until
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
@@ -22,7 +23,6 @@ from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 from windwrench.runtime.errors import InputError
 
-VEHICLE = load_vehicle("ardrone2")
 NED = np.array([1.0, -1.0, -1.0])
 HALF = np.array([1.0, 1.0, -1.0, -1.0])
 MOTORS = [3, 1, 0, 2]  # the kit's rotors that are PX4's motors 1 to 4
@@ -96,10 +96,14 @@ def wrench_of(outputs):
 class Kept:
     """A sink that keeps what comes, with ``does`` before each item."""
 
-    name, lost, pause, held = "what is kept", "not told", 0.0, 0
+    name = "what is kept"
+    lost = "not told"
+    pause = 0.0
+    held = 0
 
     def __init__(self, does=lambda: None):
-        self.items, self.does = [], does
+        self.items = []
+        self.does = does
 
     @property
     def rows(self):
@@ -119,7 +123,8 @@ class Pipeline:
     """Samples in, estimates out, by a session without a source and without time passing."""
 
     def __init__(self, **settings):
-        self.tallies, self.outputs = Tallies(), []
+        self.tallies = Tallies()
+        self.outputs = []
         source = SimpleNamespace(
             name="here", vehicle=VEHICLE, tallies=self.tallies, paced=True, send=lambda output: None
         )
@@ -145,7 +150,9 @@ class Running:
     """A session of a source, in a thread of its own."""
 
     def __init__(self, text, vehicle=VEHICLE, log_map=None, kept=None, record=None, **settings):
-        self.tallies, self.kept, self.failed = Tallies(), kept or Kept(), []
+        self.tallies = Tallies()
+        self.kept = kept or Kept()
+        self.failed = []
         self.outputs = self.kept.items
         self.source = make_source(text, vehicle, log_map, self.tallies)
         self.session = Session(

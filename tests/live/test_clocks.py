@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.live import stream
 from tests.live.stream import (
@@ -17,6 +18,7 @@ from tests.live.stream import (
     send_odometry,
     send_rotors,
 )
+from tests.support.sizes import rms
 from windwrench.live.clock_line import ClockLine
 from windwrench.live.messages import SECOND
 from windwrench.live.sources.open import make_source
@@ -24,7 +26,8 @@ from windwrench.live.tallies import Tallies
 
 RATES = (0.5, 0.7, 0.9, 1.0, 1.1, 1.5)
 START = 100.0  # s, on our clock
-LATENCY, JITTER = 0.005, 0.015  # s: delays of 5 to 20 ms
+LATENCY = 0.005  # s: delays of 5 to 20 ms
+JITTER = 0.015
 
 
 def flight():
@@ -36,7 +39,8 @@ def times_of(flown, ours, jitter=JITTER, bursts=(), in_order=False):
     """When messages come, s on our clock, with their kinds and rows: rotor speeds of each row, a
     pose of every second. ``ours`` makes our time of the sender's.
     """
-    rng, found = np.random.default_rng(1), []
+    rng = default_rng(1)
+    found = []
     for k, t in enumerate(flown["t"]):
         for kind in ("motors", "pose")[: 2 - k % 2]:
             at = ours(t) + LATENCY + rng.uniform(0.0, jitter)
@@ -58,7 +62,9 @@ class Json:
     """Objects of JSON, of one sender until ``moves``, s, and then of another."""
 
     def __init__(self, flown, moves=np.inf):
-        self.flown, self.objects, self.moves = flown, as_objects(flown), moves
+        self.flown = flown
+        self.objects = as_objects(flown)
+        self.moves = moves
         self.source = make_source("udp-json://:9", VEHICLE, None, Tallies())
 
     def message(self, kind, k, stamp):
@@ -74,7 +80,8 @@ class Mavlink:
         common = pytest.importorskip("pymavlink.dialects.v20.ardupilotmega")
         from windwrench.live.sources.esc_status import add_esc_status
 
-        self.flown, self.esc_status = flown, add_esc_status(common)
+        self.flown = flown
+        self.esc_status = add_esc_status(common)
         self.source = make_source("mavlink:udp://:9?pose=ODOMETRY", VEHICLE, None, Tallies())
         self.source.link.sender = "here"
         self.bytes = []
@@ -82,7 +89,8 @@ class Mavlink:
         self.parser = common.MAVLink(None)
 
     def message(self, kind, k, stamp):
-        flown, us = self.flown, round(1e6 * (stamp or 0.0))
+        flown = self.flown
+        us = round(1e6 * (stamp or 0.0))
         if kind == "pose":
             send_odometry(self.sender, us, flown, k)
         elif stamp is None:
@@ -94,7 +102,8 @@ class Mavlink:
 
 def played(sender, times, stamped, stamp_of=lambda kind, t: t):
     """The stream of a sender's messages; ``stamped`` are the kinds that have a stamp."""
-    live, flown = Pipeline(), sender.flown
+    live = Pipeline()
+    flown = sender.flown
     for at, kind, k in times:
         stamp = stamp_of(kind, float(flown["t"][k])) if kind in stamped else None
         message = sender.message(kind, k, stamp)
@@ -104,10 +113,11 @@ def played(sender, times, stamped, stamp_of=lambda kind, t: t):
 
 def error_of(live, after=4.0):
     """Root mean square of the force's error, N."""
-    t, force = live.wrench()[:, 0], live.wrench()[:, 1:4]
+    t = live.wrench()[:, 0]
+    force = live.wrench()[:, 1:4]
     truth = [np.interp(t - t[0], flight()["t"], part) for part in flight()["force"].T]
     wrong = force - np.transpose(truth)
-    return float(np.sqrt(np.mean(np.square(wrong[t - t[0] > after]))))
+    return float(rms(wrong[t - t[0] > after]))
 
 
 SENDERS = [
@@ -252,7 +262,8 @@ def test_poses_that_are_too_late_are_told_with_their_share():
         for at, kind, k in times_of(flown, lambda t: t)
     ]
     live = played(Json(flown), sorted(times), ("motors", "pose"))
-    late, poses = live.session.watch.too_late, live.session.watch.poses
+    late = live.session.watch.too_late
+    poses = live.session.watch.poses
     assert (late, poses) == (77, 801)  # but for the last
     (said,) = live.tallies.news()
     assert "poses came more than 0.3 s late and were left out; --horizon takes later" in said
@@ -261,15 +272,15 @@ def test_poses_that_are_too_late_are_told_with_their_share():
 
 @pytest.mark.parametrize("rate", [0.3, 0.9, 1.0, 1.5])
 def test_the_line_of_a_clock_is_below_its_messages(rate):
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     line = ClockLine(round(0.01 * SECOND), 7 * SECOND, SECOND)
     for t in np.arange(0.0, 20.0, 0.01):
         delay = 0.005 + rng.exponential(0.01)
-        arrival, stamp = round((t + delay) * SECOND), round((7.0 + rate * t) * SECOND)
+        arrival = round((t + delay) * SECOND)
+        stamp = round((7.0 + rate * t) * SECOND)
         line.add(arrival, stamp)
         assert line.delay(arrival, stamp) >= 0.0
     assert line.rate == pytest.approx(rate, rel=5e-3)
     assert line.mean_rate == pytest.approx(rate, rel=1e-3)
-    least = 1e-9 * line.arrival_of(stamp) - t
-    assert least == pytest.approx(0.005, abs=0.003)
+    assert 1e-9 * line.arrival_of(stamp) - t == pytest.approx(0.005, abs=0.003)
     assert line.stamp_of(line.arrival_of(stamp)) == pytest.approx(stamp, abs=10)

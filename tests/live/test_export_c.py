@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c import firmware
@@ -27,6 +29,7 @@ from tests.support.exported_c.flights import FLIGHTS, flight, vehicle_of
 from tests.support.exported_c.hostile import PERIOD, hostile
 from tests.support.paths import ROOT
 from tests.support.synthetic_wrench import TICKS, observations
+from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Tracker
 from windwrench.controllers.observation import FORCE_X, TORQUE_Z, VELOCITY_Y
 from windwrench.controllers.trained_policy import load_policy
@@ -76,15 +79,16 @@ FLOWN = [
 )
 def test_c_and_python_agree_along_a_flight_with_faults(estimator, name, gate, imu, tmp_path):
     exported = export_c(vehicle_of(name), estimator, gate=gate)
-    c, python = CompiledFilter(exported, tmp_path), exported.filter
+    c = CompiledFilter(exported, tmp_path)
+    python = exported.filter
     worst = compare(c, python, flight(name, QUICK, imu=imu), 4)
     assert worst["restarts"] > (0 if gate else 2) or "brisk" not in name
     assert_same(worst)
     if imu:
         e = c.estimate
         for name in ("gyro_bias", "accelerometer_bias"):
-            difference = np.abs(np.array(getattr(e, name)) - getattr(python, name))
-            assert np.all(difference < LARGEST * getattr(python, f"{name}_std"))
+            difference = abs(np.array(getattr(e, name)) - getattr(python, name))
+            assert (difference < LARGEST * getattr(python, f"{name}_std")).all()
         assert e.imu_refused == python.imu_refused > 0
 
 
@@ -101,7 +105,8 @@ SUFFERED = ("world_tilt:ax=0.03,ay=-0.05", "marker_offset:mx=0.03,mz=0.05", "att
 )
 def test_c_undoes_what_is_declared_of_pose_and_battery(estimator, effects, part, size, tmp_path):
     """A filter without the effect reads another position (m) or force (N) from the same flight."""
-    model, flown = vehicle_of(TURNING), flight(TURNING, QUICK)
+    model = vehicle_of(TURNING)
+    flown = flight(TURNING, QUICK)
     if part == "force":  # of a battery that runs down
         volts = 12.4 - 0.003 * np.arange(QUICK)
         volts[:100], volts[150:200] = 11.1, np.nan
@@ -111,7 +116,7 @@ def test_c_undoes_what_is_declared_of_pose_and_battery(estimator, effects, part,
     assert_same(compare(c, exported.filter, flown, 10))
     compare(c, plain.filter, flown, 1000)
     apart = getattr(plain.filter.estimate, part) - getattr(exported.filter.estimate, part)
-    assert np.linalg.norm(apart) > size
+    assert norm(apart) > size
 
 
 HOSTILE = [
@@ -137,14 +142,14 @@ def test_c_and_python_agree_along_hostile_sequences(
     estimator, gate, imu, precision, seeds, tmp_path
 ):
     """Statuses and counts of restarts at every step, estimates and deviations within rounding."""
-    vehicle = load_vehicle("ardrone2")
-    exported = export_c(vehicle, estimator, rate=1.0 / PERIOD, gate=gate, precision=precision)
+    exported = export_c(VEHICLE, estimator, rate=1.0 / PERIOD, gate=gate, precision=precision)
     if precision == "double":
         code = re.sub(r"/\*.*?\*/", "", exported.files["windwrench_filter.c"], flags=re.S)
         assert not re.search(r"\bfloat\b|[0-9.][fF]\b|sqrtf", code)
-    c, restarts = CompiledFilter(exported, tmp_path), 0.0
+    c = CompiledFilter(exported, tmp_path)
+    restarts = 0.0
     for seed in seeds:
-        flown = hostile(vehicle, seed)
+        flown = hostile(VEHICLE, seed)
         if not imu:
             del flown["gyro"], flown["accelerometer"]
         worst = compare(c, exported.filter, flown)
@@ -162,7 +167,7 @@ def test_good_poses_restart_c_as_rarely_as_python(estimator, gate, tmp_path):
     exported = export_c(good.vehicle, estimator, good.rate, gate=gate)
     c = CompiledFilter(exported, tmp_path)
     for noise, errors in QUIET_NOISES.items():
-        position, attitude = measured(good, errors, np.random.default_rng(0))
+        position, attitude = measured(good, errors, default_rng(0))
         flown = {
             "dt": np.full(len(position), 1.0 / good.rate),
             "rotor_speeds": good.rotor_speeds,
@@ -180,9 +185,8 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
     optimises is an error wherever ``CompiledFilter`` compiles.
     """
     compiler = "gcc" if missing("clang") else "clang"
-    model = load_vehicle("ardrone2")
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
-    model = declaring(model, *effects)
+    model = declaring(VEHICLE, *effects)
     few = model.with_effects(model.effects[0])
     names = {"ukf": ("tracker", "sac-0"), "constant-gain": ("lead",)}
     for name in names[estimator]:
@@ -197,7 +201,7 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
 
 def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     needs("nm")
-    model = declaring(load_vehicle("ardrone2"), *exportable_effects())
+    model = declaring(VEHICLE, *exportable_effects())
     allowed = {*(f"{name}f" for name in FUNCTIONS), "memcpy", "memset"}
     folder = write(export_c(model, policy=exportable_policy("sac-0")), tmp_path)
     # a compiler that optimises may make one call of two (sincosf), or none
@@ -215,8 +219,7 @@ def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     ],
 )
 def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, steps, tmp_path):
-    model = declaring(load_vehicle("ardrone2"), "rotor_drag", "motor_lag")
-    exported = export_c(model, estimator)
+    exported = export_c(declaring(VEHICLE, "rotor_drag", "motor_lag"), estimator)
     write(exported, tmp_path)
     shutil.copy(ROOT / "tests/support/exported_c/faults.c", tmp_path)
     speed = float(exported.filter.record[0]["last_speeds"][0])
@@ -234,7 +237,7 @@ def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, steps, 
 
 
 def test_effects_in_c_are_those_in_python(tmp_path):
-    model = replace(load_vehicle("ardrone2"), ceiling_z=3.0)
+    model = replace(VEHICLE, ceiling_z=3.0)
     names = [n for n in exportable_effects() if get(n).kind != "body"]
     assert {"rotor_drag", "body_drag", "inflow_thrust", "motor_lag", "ground_effect"} <= set(names)
     model = declaring(model, *names)
@@ -245,7 +248,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
     run("gcc", "-std=c99", "-O1", "-shared", "-fPIC", "effects.c", "-o", "e.so", "-lm", cwd=folder)
     library = ctypes.CDLL(str(folder / "e.so"))
     vehicle = compile_effects(model).constants
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     for name in names:
         effect = get(name)
         for _ in range(5):
@@ -253,10 +256,12 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             c[: len(effect.coefficients)] = effect.vector(parse_setting(name, model).coefficients)
             state = rng.uniform(0.2, 2.0, STATE_SIZE)
             state[18:22] = rng.uniform(300.0, 500.0, 4)
-            rotors, memory = rng.uniform(300.0, 500.0, ROTORS_SIZE), np.zeros(112)
-            rotors[4:], memory[:5] = (0.005, 10.0, 2.0), (1.0, 410.0, 420.0, 430.0, 440.0)
+            rotors = rng.uniform(300.0, 500.0, ROTORS_SIZE)
+            memory = np.zeros(112)
+            rotors[4:] = (0.005, 10.0, 2.0)
+            memory[:5] = (1.0, 410.0, 420.0, 430.0, 440.0)
             sample = rng.uniform(0.2, 2.0, SAMPLE_SIZE)
-            sample[7:11] /= np.linalg.norm(sample[7:11])
+            sample[7:11] /= norm(sample[7:11])
             sample[12:16] = 1.0, 1.0, 1.0, rng.choice([-1.0, 1.0])
             third, fourth = {
                 "wrench": (state, np.zeros(6)),
@@ -269,15 +274,16 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             effect.model.ctypes(*pointers)
             getattr(library, f"effect_{name}")(*(ctypes.c_void_p(x.ctypes.data) for x in given))
             which = 3 if effect.kind == "wrench" else 2
-            assert np.any(double[which] != 0.0), name
-            scale = np.abs(double[which]).max()
+            assert (double[which] != 0.0).any(), name
+            scale = abs(double[which]).max()
             assert_allclose(given[which], double[which], rtol=0, atol=1e-5 * scale)
 
 
 def commands(c, seen):
     """The commands (n,) of the C along observations (n, 8)."""
     c.c.ww_policy_init(c._policy)
-    e, out = c.estimate, []
+    e = c.estimate
+    out = []
     for row in seen:
         e.force[:], e.torque[:], e.velocity[1] = row[:3], row[3:6], row[VELOCITY_Y]
         out.append(c.policy(e))
@@ -285,10 +291,11 @@ def commands(c, seen):
 
 
 def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
-    policy = exportable_policy("sac-0")
-    c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
-    python, rng = load_policy(POLICY), np.random.default_rng(0)
-    force, torque = rng.normal(0.3, 0.3, (50, 3)), rng.normal(0.0, 0.03, (50, 3))
+    c = CompiledFilter(export_c(VEHICLE, policy=exportable_policy("sac-0")), tmp_path)
+    python = load_policy(POLICY)
+    rng = default_rng(0)
+    force = rng.normal(0.3, 0.3, (50, 3))
+    torque = rng.normal(0.0, 0.03, (50, 3))
     seen = np.column_stack([force, torque, np.full(50, 0.2), np.zeros(50)])
     wanted = np.zeros(51)
     for k in range(50):
@@ -297,8 +304,7 @@ def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
 
 
 def test_the_law_with_lead(tmp_path):
-    policy = exportable_policy("lead")
-    c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
+    c = CompiledFilter(export_c(VEHICLE, policy=exportable_policy("lead")), tmp_path)
     seen = np.zeros((5, 8))
     seen[:, TORQUE_Z] = torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
     seen[:, FORCE_X] = force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
@@ -335,7 +341,8 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
         assert board.ram <= ram
         assert board.ram + board.stack <= 16_384
         assert np.median(board.predict + board.correct) <= instructions
-        c, python = CompiledFilter(exported, tmp_path / f"{estimator}-here"), exported.filter
+        c = CompiledFilter(exported, tmp_path / f"{estimator}-here")
+        python = exported.filter
         begin(python, flown)
         for k in range(begin(c, flown) + 1, len(flown["dt"])):
             take(c, flown, k)
@@ -346,18 +353,17 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
             parts = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
             mine = np.concatenate([getattr(e, name) for name in parts])
             assert board.status[k - 1] == e.status
-            assert np.all(np.abs(board.estimates[k - 1] - mine) < LARGEST * std)
+            assert (abs(board.estimates[k - 1] - mine) < LARGEST * std).all()
 
 
 def test_names_cannot_end_the_comment_that_holds_them(tmp_path):
-    model = replace(load_vehicle("ardrone2"), name="a*/ #error \n\\ b")
+    model = replace(VEHICLE, name="a*/ #error \n\\ b")
     exported, again = (export_c(model, command="windwrench */\n#error") for _ in range(2))
     assert exported.files == again.files  # the same bytes
     folder = write(exported, tmp_path)
     run("gcc", *STRICT, "-fsyntax-only", "windwrench_filter.c", cwd=folder)
 
 
-VEHICLE = load_vehicle("ardrone2")
 BRIEFING = briefing_of(VEHICLE, UKFTuning.for_vehicle(VEHICLE, 0.005, 0.45), 0.005)
 SEEDS = (2463534242, 1013904223, 362436069, 521288629, 88675123)
 
@@ -370,7 +376,8 @@ class Streams:
         self.asked = 0  # uniform numbers since normal ones
 
     def _uniform(self, stream, count):
-        out, x = np.empty(count), self.state[stream]
+        out = np.empty(count)
+        x = self.state[stream]
         for i in range(count):
             x ^= (x << 13) & 0xFFFFFFFF
             x ^= x >> 17
@@ -417,12 +424,12 @@ def c(tmp_path_factory):
 
 def fans(count, decisions, rng):
     t = 0.005 * np.arange(decisions * TICKS)
-    start, speed = rng.uniform(-0.3, 0.3, (count, 1)), rng.uniform(0.05, 0.35, (count, 1))
-    return start + 0.8 * np.sin(speed / 0.8 * t)
+    start = rng.uniform(-0.3, 0.3, (count, 1))
+    return start + 0.8 * np.sin(rng.uniform(0.05, 0.35, (count, 1)) / 0.8 * t)
 
 
 def test_given_the_same_random_numbers_it_commands_the_same(c):
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     seen = observations(fans(6, 60, rng), BRIEFING, rng)
     apart = []
     for one in seen.astype(np.float32):
@@ -431,7 +438,7 @@ def test_given_the_same_random_numbers_it_commands_the_same(c):
         law.reset()
         python = np.array([float(law(row)[0]) for row in one])
         assert np.ptp(python) > 0.2
-        apart.append(np.abs(commands(c, one) - python))
+        apart.append(abs(commands(c, one) - python))
     apart = np.array(apart)
     assert np.max(apart[:, :6]) < 1e-4
     # where rounding once draws another particle than Python does, commands go on a little apart

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.live.stream import VEHICLE, as_objects, flight, send_odometry, send_rotors
 from windwrench.live.filtering import LiveSettings
@@ -35,7 +36,7 @@ class Attacked:
     def __init__(self, text):
         self.source = make_source(text, VEHICLE, None, Tallies())
         self.session = Session(self.source, LiveSettings(wait=0.0, rate_hz=200.0))
-        self.rng = np.random.default_rng(5)
+        self.rng = default_rng(5)
 
     def any(self, values=NUMBERS):
         return values[self.rng.integers(len(values))]
@@ -52,7 +53,8 @@ class Attacked:
             if k % 9 == 0:
                 good(rows // 2 + k // 9 % (rows // 2))
                 self.session._once()
-        counts, output = self.source.tallies.counts, self.session.output
+        counts = self.source.tallies.counts
+        output = self.session.output
         assert not {name: counts[name] for name in FAILURES if counts[name]}, self.said()
         assert self.session.estimates > 100
         assert np.isfinite([*output.wrench, *output.std]).all()
@@ -114,10 +116,8 @@ def test_json(count):
 )
 def test_a_datagram_that_costs_much_is_malformed(data):
     stream = Attacked("udp-json://:9")
-    stream.source.link, stream.source._understood = (
-        SimpleNamespace(read=lambda _: data, sender=""),
-        True,
-    )
+    stream.source.link = SimpleNamespace(read=lambda _: data, sender="")
+    stream.source._understood = True
     stream.session._once()
     assert stream.source.tallies.counts == {"malformed": 64}
     (said,) = stream.said()
@@ -138,7 +138,9 @@ def test_mavlink(count, only):
     stream = Attacked("mavlink:udp://:9?pose=ODOMETRY&rate=50")
     stream.source.link = link = Link()
     stream.source.open()
-    rng, flown, esc_status = stream.rng, flight(), add_esc_status(common)
+    rng = stream.rng
+    flown = flight()
+    esc_status = add_esc_status(common)
     sender = common.MAVLink(SimpleNamespace(write=link.pieces.append), srcSystem=7)
     names = [only] if only else [*MessageReader(VEHICLE, "")._readers, "HEARTBEAT"]
     kinds = [one for one in common.mavlink_map.values() if one.msgname in names]

@@ -73,13 +73,14 @@ def test_a_full_disk_ends_the_recording_and_not_the_estimates(tmp_path, size, ou
     assert f"the recording {path}: File too large; {rows} rows" in line
     assert path.exists() == bool(rows)
     if rows:
-        log = read_log(path)
-        assert_allclose(log.t, 0.005 * np.arange(rows))
+        assert_allclose(read_log(path).t, 0.005 * np.arange(rows))
 
 
 def test_a_disk_that_stalls_costs_rows_and_no_estimate(tmp_path, monkeypatch, outputs):
     """What came after the queue was full is missing; what comes once it goes on is there."""
-    path, goes_on, write = tmp_path / "flight.csv", threading.Event(), os.write
+    path = tmp_path / "flight.csv"
+    goes_on = threading.Event()
+    write = os.write
 
     def stalling(descriptor, data):
         goes_on.wait()
@@ -125,7 +126,8 @@ def test_a_reader_who_reads_nothing_stalls_nobody(outputs):
 
 def test_a_terminal_that_stalls_costs_no_estimate(tmp_path):
     """Nobody reads on after the first page, as after Ctrl-S: the flight goes on to its end."""
-    path, (terminal, end) = tmp_path / "flight.csv", pty.openpty()
+    path = tmp_path / "flight.csv"
+    terminal, end = pty.openpty()
     words = ("live", "sim:static", "--seconds", "5", "--record", path)
     child = started(*words, stdout=end, stderr=subprocess.PIPE)
     os.close(end)
@@ -180,7 +182,8 @@ def test_what_takes_the_estimates_may_raise_or_never_return():
     ("part", "count"), [("decode", "not decoded"), ("read", "not read"), ("send", "not sent")]
 )
 def test_an_exception_of_a_source_costs_a_message(monkeypatch, part, count):
-    works, calls = getattr(Simulated, part), []
+    works = getattr(Simulated, part)
+    calls = []
 
     def sometimes(source, *arguments):
         calls.append(0)
@@ -224,7 +227,8 @@ GET = b"GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n"
 @pytest.mark.parametrize("request_", [b"", b"GET / HT", GET])
 def test_connections_are_few_and_last_for_a_time(view, watched, request_):
     """Half open, or never read: 16 of 40 are held, none for ever, all by one thread."""
-    counts, threads = watched.tallies.counts, threading.active_count()
+    counts = watched.tallies.counts
+    threads = threading.active_count()
     turned = counts["turned away"]
     with ExitStack() as stack:
         some = [connected(view, stack, request_) for _ in range(40)]
@@ -251,7 +255,8 @@ def test_a_page_that_fails_is_told_and_the_stream_goes_on(monkeypatch, watched):
 
 def test_it_listens_to_this_machine_alone_unless_told_and_says_so():
     for kind, host in (("mavlink:udp", ""), ("mavlink:udpin", "0.0.0.0"), ("udp-json", "")):
-        port, at = free_port(), host or "127.0.0.1"
+        port = free_port()
+        at = host or "127.0.0.1"
         running = Running(f"{kind}://{host}:{port}")
         running.until(lambda one=running: one.source.link.opened)
         assert running.source.link.opened.getsockname() == (at, port)

@@ -106,7 +106,9 @@ def test_each_pose_in_the_kits_frames(pose):
     pilot = Autopilot(options=f"?pose={pose}").play(range(100, 200), pose=pose).end()
     assert not pilot.failed
     assert len(pilot.outputs) == 100
-    row, flown, k = pilot.outputs[50].row, flight(), 150
+    row = pilot.outputs[50].row
+    flown = flight()
+    k = 150
     assert_allclose(row.position, flown["position"][k], atol=1e-6)
     assert abs(row.quaternion @ flown["quaternion"][k]) == pytest.approx(1.0, abs=1e-6)
     assert_allclose(row.rotor_speeds, flown["rotor_speeds"][k], atol=0.06)
@@ -133,12 +135,13 @@ def test_a_flight_with_faults():
     assert counts == {"lost": 20, "doubled": 1}
     assert not pilot.failed
     found = np.mean([o.estimate.force for o in pilot.outputs if o.t > 6.0], axis=0)
-    assert np.abs(found - flight()["force"][1200:1400].mean(axis=0)).max() < 0.1
+    assert abs(found - flight()["force"][1200:1400].mean(axis=0)).max() < 0.1
 
 
 def test_of_two_vehicles_at_one_address_one_is_listened_to():
     """The second has another number and comes from elsewhere; a ground station disturbs nobody."""
-    pilot, away = Autopilot(), flight() | {"position": flight()["position"] + [9.0, 0.0, 0.0]}
+    pilot = Autopilot()
+    away = flight() | {"position": flight()["position"] + [9.0, 0.0, 0.0]}
     other, station = (
         mavutil.mavlink_connection(
             f"udpout:127.0.0.1:{pilot.port}",
@@ -177,7 +180,8 @@ def test_the_wrench_comes_back_in_the_vehicles_own_frame():
         got.setdefault(message.get_type(), []).append(message)
         if len(got.get("DEBUG_FLOAT_ARRAY", [])) == 100:
             break
-    last, output = got["DEBUG_FLOAT_ARRAY"][-1], pilot.end().outputs[-1]
+    last = got["DEBUG_FLOAT_ARRAY"][-1]
+    output = pilot.end().outputs[-1]
     assert last.name == "wrench"
     wanted = [*output.estimate.force * NED, *output.estimate.torque * NED, *output.std]
     assert_allclose(last.data[:12], wanted, rtol=1e-5, atol=1e-8)
@@ -205,10 +209,12 @@ def test_commands_by_the_motor_curve_and_none_without():
 
 
 def test_gyro_accelerometer_and_battery():
-    flown, pilot = flight(4.0, "gentle", imu=True), Autopilot()
+    flown = flight(4.0, "gentle", imu=True)
+    pilot = Autopilot()
 
     def beside(k):
-        a, g = flown["accelerometer"][k] * NED, flown["gyro"][k] * NED
+        a = flown["accelerometer"][k] * NED
+        g = flown["gyro"][k] * NED
         pilot.mav.highres_imu_send(pilot.us(k), *a, *g, 0, 0, 0, 0, 0, 0, 0, 0x3F)
         if k == 10:
             pilot.mav.battery_status_send(0, 0, 0, 0, [3700] * 3 + [65535] * 7, -1, -1, -1, 90)

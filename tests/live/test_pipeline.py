@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.live.stream import VEHICLE, Pipeline, flight, log_of
@@ -95,7 +96,7 @@ def test_late_doubled_and_reordered_messages_end_as_if_in_order(seed):
     """Rotor speeds come in order, poses within the horizon: the filter ends where all in order
     leads to. It begins with the pose that comes first; what was measured before that is too late.
     """
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     flown = flight()
     samples = split(flown)[:600]
     poses = [s for s in samples if s.kind == "pose"]
@@ -123,14 +124,15 @@ def test_a_second_clock_is_brought_to_the_first():
     other = Pipeline(rate_hz=100.0).take(split(flown, sensor_clock=86_400.0))
     assert [one.session.clocks.count for one in (same, other)] == [1, 2]
     # brought over by the least delays, which differ by what the poses' is longer: 6 ms
-    a, b = same.outputs[-1].estimate, other.outputs[-1].estimate
-    assert np.abs(a.force - b.force).max() < 0.05
+    a = same.outputs[-1].estimate
+    assert abs(a.force - other.outputs[-1].estimate.force).max() < 0.05
 
 
 def test_a_vehicle_that_boots_again_goes_on_with_the_stream():
     """Its clock begins at 0 again; the stream's time goes on, and the filter restarts."""
     flown = flight()
-    before, after = whole(flown)[:600], whole(flown, start=104.0)[700:]
+    before = whole(flown)[:600]
+    after = whole(flown, start=104.0)[700:]
     for sample in after:
         sample.stamp -= round(3.4 * SECOND)
     live = Pipeline().take([*before, *after])
@@ -164,7 +166,7 @@ def test_a_fault_of_the_stream_is_counted_and_the_force_is_right_after_it(fault,
     assert live.outputs[-1].t == pytest.approx(8.0, abs=0.03)
     assert {o.estimate.status for o in live.outputs if o.t > 5.5} == {"tracking"}
     found = np.mean([o.estimate.force for o in live.outputs if o.t > 7.0], axis=0)
-    assert np.abs(found - flown["force"][1400:].mean(axis=0)).max() < 0.1
+    assert abs(found - flown["force"][1400:].mean(axis=0)).max() < 0.1
 
 
 def test_measured_rotor_speeds_are_waited_for():
@@ -241,12 +243,12 @@ def test_inertial_rows_between_poses(tmp_path):
     flown = flight(4.0, "gentle", imu=True)
     samples = whole(flown)
     for k, sample in enumerate(samples):
-        sample.gyro, sample.accelerometer = flown["gyro"][k], flown["accelerometer"][k]
+        sample.gyro = flown["gyro"][k]
+        sample.accelerometer = flown["accelerometer"][k]
         if k % 2:
             sample.position = sample.quaternion = None
     live = Pipeline().take(samples)
-    recorder = record(tmp_path / "flight.csv", live.rows)
-    log = read_log(recorder.path)
+    log = read_log(record(tmp_path / "flight.csv", live.rows).path)
     assert log.valid.sum() == (len(log.t) + 1) // 2
     assert_allclose(log.gyro, flown["gyro"])
     found = estimate_log(log, VEHICLE)

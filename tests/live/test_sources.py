@@ -92,8 +92,7 @@ def test_bad_lines_are_counted_wherever_they_stand(bad):
         lines[k] = lines[k][:20]
     stream = run_text("\n\n".join(lines))  # empty lines are none
     assert not stream.failed
-    found = stream.tallies.counts
-    assert found["malformed"] == len(bad)
+    assert stream.tallies.counts["malformed"] == len(bad)
     assert len(stream.outputs) == len(flight()["t"]) - len(bad)
     said = stream.tallies.news()
     assert len(said) == len(bad)
@@ -110,7 +109,8 @@ class Sender(Running):
     """Sends datagrams to a session that listens, and reads its answers."""
 
     def __init__(self, **options):
-        self.port, self.answers = free_port(), []
+        self.port = free_port()
+        self.answers = []
         super().__init__(f"udp-json://127.0.0.1:{self.port}?reply=1", **options)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
@@ -188,8 +188,7 @@ def test_senders_of_different_quantities_join():
 
 def test_of_two_vehicles_whose_messages_alternate_one_is_taken_whole():
     """The second's rotor speeds come before the first's: they are not joined with its poses."""
-    tallies = Tallies()
-    senders = Senders("port", tallies)
+    senders = Senders("port", Tallies())
     order = [("a", "position"), ("b", "rotor_speeds"), ("b", "position"), ("a", "rotor_speeds")]
     found = [(who, taken(senders, who, 0.01 * k, what)) for k in range(50) for who, what in order]
     assert len({who for who, is_taken in found[8:] if is_taken}) == 1
@@ -205,7 +204,8 @@ def test_a_socket_for_each_message_is_one_sender():
 
 
 def test_two_senders_on_one_port_are_told_by_their_addresses():
-    sender, flown = Sender(), as_objects(flight())
+    sender = Sender()
+    flown = as_objects(flight())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         for k, one in enumerate(flown[:100]):

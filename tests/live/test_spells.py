@@ -7,6 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 
 from tests.support.exported_c.compiled import begin, take
 from tests.support.exported_c.flights import FLIGHTS, flight, vehicle_of
@@ -18,7 +20,9 @@ SPELLS = (
     *("random attitudes", "random poses"),
 )
 GATE = 0.9999
-LONGEST, SOON, BEGUN = 3.0, 2.0, 4.0  # s: of a spell, until all is right, until the first one
+LONGEST = 3.0  # s, of a spell
+SOON = 2.0  # s, until all is right
+BEGUN = 4.0  # s, until the first one
 KEPT = 50  # rows from one copy of a filter to the next
 SEED = 1
 
@@ -39,7 +43,8 @@ def calm(name, imu, kind, noise):
     rate = 200 // FLIGHTS[name][4]
     flown = flight(name, 15 * rate, SEED, faults=False, imu=imu, noise=noise)
     begin(estimator, flown)
-    said, copies = [None], {}
+    said = [None]
+    copies = {}
     for k in range(1, len(flown["dt"])):
         take(estimator, flown, k)
         said.append(seen(estimator))
@@ -59,7 +64,7 @@ def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count, noise):
     flights = flights if count > 10 else flights[2:4]
     wrong = []
     for i in range(count):
-        rng = np.random.default_rng((SEED, i))
+        rng = default_rng((SEED, i))
         name, imu = flights[int(rng.integers(len(flights)))]
         sound, rate, said, copies = calm(name, imu, kind, noise)
         rows = len(said) - (LONGEST + SOON) * rate
@@ -69,14 +74,15 @@ def test_all_is_right_again_after_any_spell_of_bad_poses(kind, count, noise):
         spell = str(rng.choice(SPELLS))
         parts = (flown[name] for name in ("position", "quaternion", "rotor_speeds"))
         away = befall(spell, when, *parts, rng)
-        flown["quaternion"] /= np.linalg.norm(flown["quaternion"], axis=1, keepdims=True)
-        estimator, end = copy.copy(copies[k]), when.stop + round(SOON * rate)
+        flown["quaternion"] /= norm(flown["quaternion"], axis=1, keepdims=True)
+        estimator = copy.copy(copies[k])
+        end = when.stop + round(SOON * rate)
         for row in range(k + 1, end):
             take(estimator, flown, row)
         status, position, wrench, std = seen(estimator)
         _, right, usual, _ = said[end - 1]
-        misses = np.abs(wrench - usual) / std
-        off = float(np.linalg.norm(position - right - (spell == "jump for good") * away))
+        misses = abs(wrench - usual) / std
+        off = float(norm(position - right - (spell == "jump for good") * away))
         if status != "tracking" or off > 0.1 or misses.max() > 4.0:
             wrong.append((i, name, imu, spell, when, status, off, misses.round(1)))
     assert not wrong

@@ -8,11 +8,12 @@ from functools import partial
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c.compiled import CompiledFilter, begin, needs, take
 from tests.support.model_flights import drawn
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics.vehicle import Uncertainty
 from windwrench.envs.recording import record_flight
 from windwrench.estimator import WrenchUKF, WrenchUKFBatch
@@ -23,18 +24,19 @@ from windwrench.live.filtering import LiveFilter
 from windwrench.live.messages import Row
 from windwrench.live.tallies import Tallies
 
-VEHICLE = load_vehicle("ardrone2")
-COUNT, STEPS = 20, 1000
+COUNT = 20
+STEPS = 1000
 LOOKED_AT = slice(499, STEPS, 100)  # 2.5 to 5 s
 SAMPLE = "rotor_speeds", "position", "quaternion"
-WRENCH, STATED = ("torque", "force"), ("std_torque", "std_force")
+WRENCH = ("torque", "force")
+STATED = ("std_torque", "std_force")
 
 
 @pytest.fixture(scope="module")
 def flights():
     """Circles of drawn vehicles, measured with the declared noise."""
     return [
-        record_flight(drawn(VEHICLE, np.random.default_rng(seed)), (), "circle", 5.0, seed)
+        record_flight(drawn(VEHICLE, default_rng(seed)), (), "circle", 5.0, seed)
         | {"dt": np.full(STEPS + 1, 0.005)}
         for seed in range(COUNT)
     ]
@@ -107,7 +109,8 @@ def test_errors_of_drawn_vehicles_are_as_large_as_it_says(way, flights, tmp_path
     found = np.array(WAYS[way](tmp_path)(flights))[:, LOOKED_AT]
     true = np.array([np.hstack([flown[name] for name in WRENCH])[LOOKED_AT] for flown in flights])
     z = (found[..., :6] - true) / found[..., 6:]
-    torque, force = np.mean(z[..., :3] ** 2), np.mean(z[..., 3:] ** 2)
+    torque = np.mean(z[..., :3] ** 2)
+    force = np.mean(z[..., 3:] ** 2)
     print(f"{way}: mean square of z: torque {torque:.2f}, force {force:.2f}; {abs(z).max():.1f}")
     assert 0.4 < torque < 1.2
     assert 0.4 < force < 1.2
@@ -118,7 +121,7 @@ def test_noise_alone_would_not_do(flights):
     exact = WrenchUKF(replace(VEHICLE, uncertainty=Uncertainty()), gate=0.9999)
     found = np.array([by_filter(exact, flown)[-1] for flown in flights])
     true = np.array([np.hstack([flown[name][STEPS - 1] for name in WRENCH]) for flown in flights])
-    assert np.mean(np.square((found[:, 3:6] - true[:, 3:]) / found[:, 9:])) > 3.0
+    assert np.square((found[:, 3:6] - true[:, 3:]) / found[:, 9:]).mean() > 3.0
 
 
 @pytest.mark.parametrize("commanded", [False, True])

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.commands.conftest import call, recorded
@@ -59,7 +60,8 @@ def test_a_stream_warns_once_of_its_noise(monkeypatch, scales, warned):
 
 def test_a_burst_of_noise_is_no_word(monkeypatch):
     """It is the median of 5 s; 2 s are less than half of them."""
-    live, now = Pipeline(), [0.0]
+    live = Pipeline()
+    now = [0.0]
     scales = property(lambda e: np.array([1.0, 3.0 if 3.0 < now[0] < 5.0 else 1.0]))
     monkeypatch.setattr(WrenchEstimate, "noise_scales", scales, raising=False)
     for sample in whole(flight()):
@@ -79,7 +81,8 @@ def test_a_log_with_another_noise_is_told(tmp_path, call, monkeypatch):
 
 @pytest.mark.parametrize("times", [1.0, 3.0])
 def test_noise_that_is_three_times_the_declared_is_found(times):
-    flown, rng = dict(flight(20.0, "gentle")), np.random.default_rng(4)
+    flown = dict(flight(20.0, "gentle"))
+    rng = default_rng(4)
     more = np.sqrt(times**2 - 1.0) * NOISE
     flown["position"] = flown["position"] + rng.normal(0.0, more, flown["position"].shape)
     live = Pipeline().take(whole(flown))

@@ -29,8 +29,7 @@ def before(folder):
 
 def imported(checkout, what):
     """Start a program that prints a value of a checkout's core."""
-    code = f"from windwrench import _core; print(_core.{what})"
-    words = [sys.executable, "-c", code]
+    words = [sys.executable, "-c", f"from windwrench import _core; print(_core.{what})"]
     return subprocess.run(words, env=before(checkout.parent), capture_output=True, text=True)
 
 

@@ -56,7 +56,7 @@ def test_stable_baselines3_trains_on_the_plain_environment(example):
 def test_fans_on_paths_of_ones_own_are_followed_and_drawn(example, tmp_path):
     script = example("fan_path")
     t = np.linspace(0.0, 20.0, 4001)
-    assert np.abs(np.gradient(script.chirp(t), t)).max() < 0.4  # m/s, what the law can follow
+    assert abs(np.gradient(script.chirp(t), t)).max() < 0.4  # m/s, what the law can follow
     assert set(np.unique(script.steps(t))) == {0.0, 0.35}
     followed = script.main(tmp_path / "followed")
     left_alone = script.main(tmp_path / "hover", controller="hover")
@@ -122,8 +122,7 @@ def test_topics_of_ros_2_are_estimated(example, monkeypatch, capsys):
     assert found["messages"] == {"motors": 1601, "pose": 1601}
     assert found["counts"].keys() <= {"waiting"}
     assert found["estimates"] >= 1599
-    difference = found["force_mean_N"] - flight()["force"].mean(axis=0)
-    assert np.abs(difference).max() < 0.1
+    assert np.abs(found["force_mean_N"] - flight()["force"].mean(axis=0)).max() < 0.1
 
 
 NOTEBOOKS = FOLDER / "notebooks"
@@ -182,8 +181,7 @@ def test_the_papers_law_stays_in_the_jet_and_hovering_does_not(run):
 
 @pytest.mark.slow  # a diagnosis names a drag in tests/identification, the other notebooks run here
 def test_the_diagnosis_of_a_log_names_what_was_added(run):
-    names = run("your_log")
-    found = names["found"]
+    found = run("your_log")["found"]
     assert [effect.name for effect in found.effects] == ["rotor_drag"]
     assert found.effects[0].coefficients["kdx"] == pytest.approx(1.2e-4, rel=0.1)
     assert found.after.force_rms < 0.5 * found.before.force_rms

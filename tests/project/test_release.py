@@ -16,7 +16,8 @@ import windwrench
 from tests.support.diagnoses import made_diagnosis, made_trace
 from tests.support.paths import ROOT
 from tests.support.programs import said
-from windwrench.dynamics import EffectSetting, Mocap, Vehicle, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting, Mocap, Vehicle
 from windwrench.dynamics.effects.base import Coefficient, Effect
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.estimator import (
@@ -132,7 +133,6 @@ DOCUMENTED = (
     *(NoiseFit, NoiseFitSettings, ObserverTuning, Recovery),
     *(UKFTuning, FlightLog),
 )
-VEHICLE = load_vehicle("ardrone2")
 POSE = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
 SPEEDS = np.full(4, VEHICLE.hover_rate)
 

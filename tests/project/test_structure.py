@@ -174,7 +174,9 @@ def test_identification_is_built_from_logs_upwards(modules):
 
 def reached(modules, first):
     """All modules that some import, with those themselves, however many imports lie between."""
-    found, todo, known = set(), list(first), edges(modules)
+    found = set()
+    todo = list(first)
+    known = edges(modules)
     while todo:
         module = todo.pop()
         if module not in found:

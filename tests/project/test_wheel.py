@@ -127,7 +127,7 @@ def test_every_command_starts_where_there_is_no_checkout(empty, tmp_path):
 def test_tasks_fly_where_there_is_no_checkout(empty, tmp_path):
     few = ("--episodes", "1", "--scenarios", "static", "--jobs", "1", "--out", "demo")
     call(empty, tmp_path, "benchmark", *few)
-    assert len(json.loads((tmp_path / "demo" / "leaderboard.json").read_text())) == 4
+    assert len(json.loads((tmp_path / "demo" / "leaderboard.json").read_bytes())) == 4
     said = call(empty, tmp_path, "fly", "--scenario", "static", "--out", "demo", "--json")
     assert json.loads(said)["result"]["lost"] is False
     call(empty, tmp_path, "record", "--seconds", "1", "--out", "flight.csv")

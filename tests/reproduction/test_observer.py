@@ -2,15 +2,19 @@
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal, assert_array_less
 from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, fly, yawing_flight
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.sizes import rms
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.reproduction import NonlinearObserver
 
-VEHICLE = load_vehicle("ardrone2")
-FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])  # of yawing_flight
+FORCE = np.array([0.3, -0.2, -0.1])  # of yawing_flight
+TORQUE = np.array([0.0, 0.0, 0.02])
 
 
 def loaded_hover(observer, steps, force, torque):
@@ -19,9 +23,9 @@ def loaded_hover(observer, steps, force, torque):
     """
     lift = np.array([0.0, 0.0, VEHICLE.weight]) - force
     axis = np.cross([0.0, 0.0, 1.0], lift)
-    sine = np.linalg.norm(axis) / np.linalg.norm(lift)
-    attitude = Rotation.from_rotvec(axis / max(np.linalg.norm(axis), 1e-12) * np.arcsin(sine))
-    rotors = VEHICLE.rotor_speeds(np.linalg.norm(lift), -attitude.inv().apply(torque))
+    sine = norm(axis) / norm(lift)
+    attitude = Rotation.from_rotvec(axis / max(norm(axis), 1e-12) * np.arcsin(sine))
+    rotors = VEHICLE.rotor_speeds(norm(lift), -attitude.inv().apply(torque))
     pose = [0, 0, 1], attitude.as_quat(scalar_first=True)
     observer.reset(*pose)
     estimates = [observer.step(rotors, *pose) for _ in range(steps)]
@@ -41,7 +45,8 @@ def errors_along(flight, missing=()):
 
 
 def test_steady_state_is_exact_after_a_rise_of_a_second():
-    force, torque = np.array([0.4, -0.3, 0.5]), np.array([0.02, -0.01, 0.015])
+    force = np.array([0.4, -0.3, 0.5])
+    torque = np.array([0.02, -0.01, 0.015])
     forces, torques, e = loaded_hover(NonlinearObserver(VEHICLE), 3000, force, torque)
     assert_allclose(forces[-1], force, atol=1e-9)
     assert_allclose(torques[-1], torque, atol=1e-9)
@@ -60,29 +65,29 @@ def test_a_yawing_flight_is_no_wrench():
     flight = yawing_flight(VEHICLE, 2501, sigma_position=0.0, sigma_attitude=0.0, substeps=6)
     clean = errors_along(flight)[1200:]
     bounds = np.repeat([2e-3, 5e-5, 1e-3, 1e-3], 3)
-    assert_array_less(np.abs(clean[:, :12]).max(axis=0), bounds)
+    assert_array_less(abs(clean[:, :12]).max(axis=0), bounds)
     flight = yawing_flight(VEHICLE, 2501, seed=2, substeps=3)
     errors = errors_along(flight)
-    noisy = np.sqrt(np.mean(errors[1200:] ** 2, axis=0))
+    noisy = rms(errors[1200:], axis=0)
     assert_array_less(noisy[:12], np.repeat([6e-3, 0.6e-3, 1e-3, 0.01], 3))
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], 2501)
+    signs = default_rng(0).choice([-1.0, 1.0], 2501)
     flipped = flight | {"quaternion": signs[:, None] * flight["quaternion"]}
     assert_array_equal(errors_along(flipped), errors)
 
 
 def test_missing_measurements_leave_the_wrench_where_it_was():
     flight = yawing_flight(VEHICLE, 2501, seed=1, substeps=3)
-    random = set(np.random.default_rng(3).choice(2501, 1250, replace=False))
+    random = set(default_rng(3).choice(2501, 1250, replace=False))
     errors = errors_along(flight, random)[1200:]
-    assert np.sqrt(np.mean(errors[:, :3] ** 2)) < 8e-3
-    assert np.sqrt(np.mean(errors[:, 3:6] ** 2)) < 1e-3
+    assert rms(errors[:, :3]) < 8e-3
+    assert rms(errors[:, 3:6]) < 1e-3
     # half a second blind, then the pose again
     errors = errors_along(flight, range(1500, 1600))
-    assert np.abs(errors[1499:1598, :3] - errors[1498, :3]).max() < 1e-12
-    assert np.abs(errors[1499:1598, 6:9]).max() < 0.05
-    assert np.abs(errors[1599:, :3]).max() < 0.15
-    assert np.abs(errors[1599:, 3:6]).max() < 5e-3
-    assert np.abs(errors[-100:, :3]).max() < 0.03
+    assert abs(errors[1499:1598, :3] - errors[1498, :3]).max() < 1e-12
+    assert abs(errors[1499:1598, 6:9]).max() < 0.05
+    assert abs(errors[1599:, :3]).max() < 0.15
+    assert abs(errors[1599:, 3:6]).max() < 5e-3
+    assert abs(errors[-100:, :3]).max() < 0.03
 
 
 def test_declared_effects_are_not_a_wrench():
@@ -101,4 +106,4 @@ def test_declared_effects_are_not_a_wrench():
     assert_allclose(force[True], 0.0, atol=1e-6)
     # the wrench that cancels drag and the offset thrust in a steady translation
     assert_allclose(force[False][0], pull, rtol=1e-6)
-    assert_allclose(np.abs(force[False][3:5]), np.abs(torque), rtol=1e-6)
+    assert_allclose(abs(force[False][3:5]), np.abs(torque), rtol=1e-6)

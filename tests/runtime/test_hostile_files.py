@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.fuzz.spoiling import LAUGHS
@@ -35,7 +36,8 @@ from windwrench.runtime.regular_files import read_json
 from windwrench.runtime.yaml_file import parse_yaml
 
 HEADER = (",".join(REQUIRED) + "\n").encode()
-MEMORY, SECONDS = 1.1e9, 10.0
+MEMORY = 1.1e9
+SECONDS = 10.0
 PARQUET = find_spec("pyarrow") is not None
 ULOG = find_spec("pyulog") is not None
 
@@ -89,7 +91,8 @@ def matlab(count, size, kind=6, stored=9, item=8):
     """
     body = struct.pack("<IIII", 6, 8, kind, 0) + struct.pack("<IIii", 5, 8, size // item, 1)
     body += struct.pack("<II8s", 1, 1, b"t") + struct.pack("<II", stored, size)
-    packing, piece = zlib.compressobj(1), 2**26
+    packing = zlib.compressobj(1)
+    piece = 2**26
     packed = packing.compress(struct.pack("<II", 14, len(body) + size) + body)
     if size < LIMITS.arrays:
         packed += b"".join(packing.compress(bytes(piece)) for _ in range(size // piece))
@@ -131,7 +134,8 @@ def parquet_bombs(folder):
     import pyarrow
     from pyarrow import parquet
 
-    rows, zeros = 10_000, pyarrow.chunked_array([np.zeros(2_500_000)] * 10)
+    rows = 10_000
+    zeros = pyarrow.chunked_array([np.zeros(2_500_000)] * 10)
     parquet.write_table(pyarrow.table({"t": zeros}), folder / "claim.parquet")
     text = pyarrow.DictionaryArray.from_arrays(
         pyarrow.array(np.zeros(rows, np.int32)), pyarrow.array(["1" * 1_000_000])
@@ -297,7 +301,7 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
 
 
 def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     rows = 1000
     table = rng.standard_normal((rows, len(REQUIRED)))
     table[:, 0], table[:, 4:8], table[:, 8:] = 0.01 * np.arange(rows), (1, 0, 0, 0), 300.0

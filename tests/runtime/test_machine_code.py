@@ -60,7 +60,8 @@ def run(package, program=None, **options):
 
 def edit(path, old, new):
     """Change a file and leave its size and its time as they were."""
-    found, text = path.stat(), path.read_text()
+    found = path.stat()
+    text = path.read_text()
     assert old in text
     assert len(old) == len(new)
     path.write_text(text.replace(old, new))
@@ -108,8 +109,7 @@ def test_an_edit_beside_a_users_own_file_counts(package, tmp_path):
 
 
 def test_a_function_of_a_prompt_is_compiled_and_not_kept(package):
-    program = f"exec({CALLEE!r}); print(scaled(4))"
-    assert run(package, program) == "8\n"
+    assert run(package, f"exec({CALLEE!r}); print(scaled(4))") == "8\n"
 
 
 def test_code_not_used_for_longest_is_removed(package):
@@ -174,7 +174,8 @@ def test_without_any_place_it_is_compiled_at_each_start(package):
 
 def as_anyone():
     """Have root write no more than permissions say, in this process."""
-    drop, may_write_all = 24, 1
+    drop = 24
+    may_write_all = 1
     assert ctypes.CDLL(None).prctl(drop, may_write_all, 0, 0, 0) == 0
 
 

@@ -30,13 +30,6 @@ EFFECT = HOSE.replace("# more", "starting_points=lambda flights: [{'a': 0.2, 'w'
 
 
 @pytest.fixture
-def laws(tmp_path):
-    path = tmp_path / "laws.py"
-    path.write_text(LAWS)
-    return path
-
-
-@pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A folder for effects that has left the library again once the test is over."""
     monkeypatch.setenv("WINDWRENCH_EFFECTS", "")
@@ -45,7 +38,9 @@ def folder(tmp_path, monkeypatch):
     forget()
 
 
-def test_a_class_of_a_file_is_a_controller(laws):
+def test_a_class_of_a_file_is_a_controller(tmp_path):
+    laws = tmp_path / "laws.py"
+    laws.write_text(LAWS)
     for name in (f"{laws}:Left", str(laws)):
         assert is_file_name(name)
         assert make_pilot(name)(np.zeros(8)) == pytest.approx([0.25])

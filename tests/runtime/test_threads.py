@@ -50,7 +50,8 @@ def test_one_thread_inside_and_those_of_before_afterwards():
 
 def test_one_that_leaves_before_another_leaves_it_alone():
     """As calls of two threads of a program do."""
-    first, second = one_thread(), one_thread()
+    first = one_thread()
+    second = one_thread()
     first.__enter__()
     second.__enter__()
     first.__exit__(None, None, None)
@@ -76,7 +77,8 @@ def counts(seen):
 
 
 def test_an_estimate_a_diagnosis_and_a_vehicle_from_logs():
-    log, seen = imu_flight(VEHICLE, seconds=12.0, trajectory="hover"), []
+    log = imu_flight(VEHICLE, seconds=12.0, trajectory="hover")
+    seen = []
     geometry = parse_geometry(str(VEHICLE.arm_l))
     for work in (
         lambda: estimate_log(log, VEHICLE, report=counts(seen)),

@@ -80,12 +80,15 @@ numbers = st.one_of(st.floats(-10, 10), st.sampled_from([0.0, -0.0, math.nan, ma
     b=st.lists(numbers, min_size=WIDTH, max_size=WIDTH),
 )
 def test_each_lane_is_a_single_number(a, b):
-    lanes, singles = RECORD.zeros(1), np.zeros(WIDTH, SINGLE)
+    lanes = RECORD.zeros(1)
+    singles = np.zeros(WIDTH, SINGLE)
     for records in (lanes, singles):
         records["gain"], records["count"] = 0.7, 2
         records["inner"]["shift"] = 0.25
-    lanes["a"], singles["a"] = a, a
-    lanes["b"][0, 0], singles["b"][:, 0] = b, b
+    lanes["a"] = a
+    singles["a"] = a
+    lanes["b"][0, 0] = b
+    singles["b"][:, 0] = b
     work_at(lanes.ctypes.data)
     work_singly(singles)
     assert_array_equal(lanes["b"][0].T, singles["b"])

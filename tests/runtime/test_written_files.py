@@ -23,7 +23,8 @@ from windwrench.runtime.whole_files import replaced
 def events(monkeypatch):
     """What was kept and put in place, in order."""
     found = []
-    fsync, replace = os.fsync, os.replace
+    fsync = os.fsync
+    replace = os.replace
 
     def kept(descriptor):
         folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
@@ -43,7 +44,8 @@ def test_a_file_is_kept_before_and_its_folder_after_it_takes_its_place(tmp_path,
     path = tmp_path / "new" / "deep" / "file.txt"
     with replaced(path) as partial:
         partial.write_text("whole")
-    file, folder = path.stat().st_ino, path.parent.stat().st_ino
+    file = path.stat().st_ino
+    folder = path.parent.stat().st_ino
     assert events[-3:] == [("keep file", file), ("place", file), ("keep folder", folder)]
     above = {path.parents[1].stat().st_ino, tmp_path.stat().st_ino}
     assert above <= {number for what, number in events[:-3] if what == "keep folder"}
@@ -130,6 +132,6 @@ def test_json_is_compact_finite_and_whole_or_not_there(tmp_path):
         write_json({"x": float("nan")}, path)
     assert path.read_text() == '{"x":1}\n'
     write_json({"x": float("inf")}, path, allow_nan=True)
-    assert json.loads(path.read_text()) == {"x": float("inf")}
+    assert json.loads(path.read_bytes()) == {"x": float("inf")}
     with pytest.raises(InputError, match="cannot be written"):
         write_json({}, path / "below")

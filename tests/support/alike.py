@@ -13,7 +13,7 @@ def strict_json(path):
     def refuse(word):
         raise AssertionError(f"{word} is no JSON")
 
-    return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+    return json.loads(path.read_bytes(), parse_constant=refuse)
 
 
 def assert_alike(now, kept, where="", rel=1e-4, least=1e-9):

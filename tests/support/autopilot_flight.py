@@ -19,7 +19,8 @@ def motion(t):
 
 def inertial(t):
     """Angular velocity (rad/s) and specific force (m/s2), body axes forward, left, up."""
-    turn, after = motion(t)[1], motion(t + 1e-5)[1]
+    turn = motion(t)[1]
+    after = motion(t + 1e-5)[1]
     acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
     return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
 

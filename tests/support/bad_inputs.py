@@ -10,7 +10,7 @@ import json
 
 from tests.support.paths import ROOT
 
-KEPT = json.loads((ROOT / "tests" / "data" / "bad_inputs.json").read_text(encoding="utf-8"))
+KEPT = json.loads((ROOT / "tests" / "data" / "bad_inputs.json").read_bytes())
 COLUMNS = ("t", "px", "py", "pz", "qw", "qx", "qy", "qz", "omega1", "omega2", "omega3", "omega4")
 
 
@@ -41,7 +41,8 @@ def forms(kind, letter):
 
 def logs():
     """Return tables, each with one mistake, and logs that end too early."""
-    good, packed = table(), io.BytesIO()
+    good = table()
+    packed = io.BytesIO()
     with gzip.GzipFile(fileobj=packed, mode="wb", mtime=0) as file:
         file.write(good.encode())
     in_ms = {(i, "t"): f"{10 * i}" for i in range(60)}
@@ -78,7 +79,7 @@ def policies():
     """Return policies whose weights or cards do not fit."""
     folder = ROOT / "training" / "policies"
     weights = (folder / "sac-0.npz").read_bytes()
-    card = json.loads((folder / "sac-0.json").read_text(encoding="utf-8"))
+    card = json.loads((folder / "sac-0.json").read_bytes())
     bare = {k: v for k, v in card.items() if k != "features"}
     cards = {
         "other": card,

@@ -2,7 +2,7 @@
 has, after the format's description in Betaflight's documentation.
 """
 
-import numpy as np
+from numpy.random import default_rng
 
 # field: predictor and encoding in I frames, predictor and encoding in P frames
 FIELDS = {
@@ -21,7 +21,9 @@ FIELDS = {
     **{f"motor[{i}]": (5, 0, 3, 0) for i in range(1, 4)},
     **{f"eRPM[{i}]": (0, 1, 1, 0) for i in range(4)},
 }
-VBATREF, MINTHROTTLE, LEAST_MOTOR = 2520, 1070, 158
+VBATREF = 2520
+MINTHROTTLE = 1070
+LEAST_MOTOR = 158
 HEADERS = {
     "Data version": "2",
     "Firmware revision": "Betaflight 4.4.2",
@@ -39,7 +41,7 @@ def flight(count=400, seed=0):
     """Rows of a flight at 1 kHz: half a second on the ground, then all fields wander, now and then
     by a leap.
     """
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     values = dict.fromkeys(FIELDS, 0) | {
         "accSmooth[2]": 2048,
         "rcCommand[3]": 1200,
@@ -106,7 +108,9 @@ def blackbox(rows, headers=None, variable=True):
 
 
 def _frame(fields, row, before, older, which):
-    out, names, i = b"", list(fields), 0
+    out = b""
+    names = list(fields)
+    i = 0
     while i < len(names):
         encoding = fields[names[i]][which + 1]
         group = [names[i]]
@@ -189,7 +193,8 @@ def _three(values, layouts):
             for value, width, place in zip(values, widths, places, strict=True):
                 bits |= (value & ((1 << width) - 1)) << place
             return bits.to_bytes(kind + 1, "big")
-    selector, out = 0xC0, b""
+    selector = 0xC0
+    out = b""
     for i, value in enumerate(values):
         width = next(w for w in (1, 2, 3, 4) if _fits([value], [8 * w]))
         selector |= (width - 1) << (2 * i)
@@ -198,7 +203,8 @@ def _three(values, layouts):
 
 
 def _four(values):
-    selector, halves = 0, []
+    selector = 0
+    halves = []
     for i, value in enumerate(values):
         kind = (
             0

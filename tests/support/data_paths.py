@@ -22,7 +22,8 @@ SOURCES = yaml.safe_load((EXCERPTS / "sources.yaml").read_text(encoding="utf-8")
 
 def data_file(relative):
     """Return the path of a whole original; skip the test where it is not there."""
-    path, name = DATA / relative, Path(relative).parts[0]
+    path = DATA / relative
+    name = Path(relative).parts[0]
     if not path.exists():
         pytest.skip(
             f"measured data {relative} is not in {DATA}: put there, in a folder {name}, "

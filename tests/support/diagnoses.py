@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.random import default_rng
 
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.findings import (
@@ -17,7 +18,7 @@ from windwrench.identification.findings import (
 
 def made_trace(seconds=60.0, effects=("rotor_drag",), rate=25.0, seed=0, log="flight"):
     """A residual that each of some effects has a share of, and noise."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     t = 1.5 + np.arange(round(seconds * rate)) / rate
     after = 0.02 * rng.standard_normal((len(t), 6)) * [1, 1, 1, 0.1, 0.1, 0.1]
     parts = {

@@ -28,7 +28,8 @@ def install_cflib(monkeypatch, flown):
 
     class LogConfig:
         def __init__(self, name, period_in_ms):
-            self.names, self.period = [], period_in_ms
+            self.names = []
+            self.period = period_in_ms
 
         def add_variable(self, name, fetched):
             self.names.append(name)

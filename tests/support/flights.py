@@ -1,13 +1,16 @@
 """Flights for the tests, drawn from equations of motion that share no code with the package."""
 
 import numpy as np
+from numpy.linalg import inv, norm
+from numpy.random import default_rng
 
 PERIOD = 0.005
 
 
 def cross(a, b):
     """As ``numpy.cross``, bit for bit, without what that takes to accept any shape."""
-    (ax, ay, az), (bx, by, bz) = a, b
+    ax, ay, az = a
+    bx, by, bz = b
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
@@ -50,13 +53,17 @@ def yawing_flight(
     A feedback on the true state gives the rotor speeds; truth is integrated in fine substeps.
     Returns a dict of arrays.
     """
-    rng = np.random.default_rng(seed)
-    force, torque = np.asarray(force, float), np.asarray(torque, float)
-    x, v = np.array([0.0, 0.0, 1.5]), np.zeros(3)
-    q, w = np.array([np.cos(np.pi / 3), 0, 0, np.sin(np.pi / 3)]), np.array([0.0, 0.0, yaw_rate])
+    rng = default_rng(seed)
+    force = np.asarray(force, float)
+    torque = np.asarray(torque, float)
+    x = np.array([0.0, 0.0, 1.5])
+    v = np.zeros(3)
+    q = np.array([np.cos(np.pi / 3), 0, 0, np.sin(np.pi / 3)])
+    w = np.array([0.0, 0.0, yaw_rate])
     turns = vehicle.arm_l * vehicle.k * [[1, 1, -1, -1], [-1, 1, 1, -1]]
     mixing = np.array([vehicle.k, *turns, vehicle.p * [1, -1, 1, -1]])
-    unmixing, inverse = np.linalg.inv(mixing), np.linalg.inv(vehicle.inertia)
+    unmixing = inv(mixing)
+    inverse = inv(vehicle.inertia)
     names = ("rotors", "position", "quaternion", "velocity", "omega", "true_q", "true_x")
     out = {name: [] for name in names}
     for k in range(steps):
@@ -65,7 +72,7 @@ def yawing_flight(
         speed = [1.3 * np.cos(1.3 * t), 0.72 * np.cos(0.9 * t + 1), 0.14 * np.cos(0.7 * t)]
         a = 4 * (target - x) + 3.5 * (speed - v) + [0, 0, vehicle.gravity] - force / vehicle.mass
         R = matrix(q)
-        up = a / np.linalg.norm(a)
+        up = a / norm(a)
         tilt = R.T @ cross(R[:, 2], up)
         rate = np.array([0, 0, yaw_rate * (1 + 0.5 * np.sin(1.1 * t))])
         alpha = 110 * tilt * [1, 1, 0] - 18 * (w - rate) * [1, 1, 0.4]
@@ -76,8 +83,10 @@ def yawing_flight(
             R = matrix(q)
             acc = (R @ [0, 0, thrust] + force) / vehicle.mass - [0, 0, vehicle.gravity]
             alpha = inverse @ (moment + R.T @ torque - cross(w, vehicle.inertia @ w))
-            x, v = x + h * v + h * h / 2 * acc, v + h * acc
-            q, w = multiply(q, turn_by(h * (w + h / 2 * alpha))), w + h * alpha
+            x = x + h * v + h * h / 2 * acc
+            v = v + h * acc
+            q = multiply(q, turn_by(h * (w + h / 2 * alpha)))
+            w = w + h * alpha
             q = q / np.sqrt(q @ q)
         error = turn_by(sigma_attitude * rng.standard_normal(3))
         out["rotors"].append(np.sqrt(squares))

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 
-VEHICLE = load_vehicle("ardrone2")
 DRAG = {"kdx": 1.2e-4, "kdy": 1.2e-4}
 
 
@@ -38,6 +38,8 @@ def resting(t, **columns):
 
 def without_pose(log, rows):
     """Return a log whose poses are lost in some rows: a slice, or a mask (N,)."""
-    pose, valid = np.column_stack([log.position, log.quaternion]), log.valid.copy()
-    pose[rows], valid[rows] = np.nan, False
+    pose = np.column_stack([log.position, log.quaternion])
+    valid = log.valid.copy()
+    pose[rows] = np.nan
+    valid[rows] = False
     return replace(log, position=pose[:, :3], quaternion=pose[:, 3:], valid=valid)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from numpy.random import default_rng
 
 from tests.identification.comparison.test_change import drawn
 from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
@@ -32,7 +33,8 @@ def failing_flight():
     """An IMU flight whose rotor 3 loses 40 % of its thrust at 9 s, without the loop's answer."""
     log, speeds = inertial_flights([3])[0]
     lost = np.where(log.t > 9.0, 0.4, 0.0) * 6.0e-6 * speeds[:, 2] ** 2
-    force, rate = log.accelerometer.copy(), log.gyro.copy()
+    force = log.accelerometer.copy()
+    rate = log.gyro.copy()
     force[:, 2] -= lost / MASS
     turn = np.column_stack([ARM * lost / 3.0e-3, -ARM * lost / 3.6e-3, -0.02 * lost / 6.0e-3])
     rate += np.cumsum(turn * (log.t < 9.4)[:, None], axis=0) * log.period
@@ -70,7 +72,7 @@ def said(found):
 def made():
     """Return all that is kept, as plain data."""
     one = inertial_flights([0])[0][0]
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     changes = {
         str(moved): compare(drawn(rng, 2, moved), drawn(rng, 3))
         for moved in ((0.0, 0.0, 0.0, 0.0), (0.08, -0.08, 0.08, 0.08), (0.1, 0.0, 0.0, 0.1))

@@ -133,7 +133,7 @@ def _summary(values):
 
 def load_golden():
     """Return what was recorded, by the cases' names."""
-    kept = json.loads(GOLDEN.read_text(encoding="utf-8"))
+    kept = json.loads(GOLDEN.read_bytes())
     return {case: kept[found] if isinstance(found, str) else found for case, found in kept.items()}
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-import numpy as np
+from numpy.random import default_rng
 
 from tests.support import golden_logs
 from tests.support.data_paths import DATA, EXCERPTS
@@ -112,7 +112,8 @@ def _fields(guess):
 
 
 def _table(name):
-    path, said = path_of(name), {}
+    path = path_of(name)
+    said = {}
     for way, model in (("alone", None), ("vehicle", vehicle_of(path))):
         try:
             guess = guess_map(open_table(path), model)
@@ -131,7 +132,7 @@ def _table(name):
 def random_case(number):
     """Return a flight's table in a random convention, and the vehicle by which it is guessed."""
     log = flown(number % len(FLIGHTS))
-    written = random_table(log, np.random.default_rng(7000 + number))
+    written = random_table(log, default_rng(7000 + number))
     return written, load_vehicle(log.vehicle) if number // len(FLIGHTS) % 2 else None
 
 
@@ -181,7 +182,7 @@ def _screened(log, vehicle, least, words):
 
 def load_golden():
     """Return what was recorded, by the cases' names."""
-    return json.loads(GOLDEN.read_text(encoding="utf-8"))
+    return json.loads(GOLDEN.read_bytes())
 
 
 if __name__ == "__main__":

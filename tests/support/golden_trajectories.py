@@ -10,6 +10,7 @@ import json
 
 import gymnasium
 import numpy as np
+from numpy.random import default_rng
 
 import windwrench  # noqa: F401 - registers the environments
 from tests.support.paths import ROOT
@@ -18,7 +19,8 @@ from windwrench.evaluation.tasks import TASKS
 
 GOLDEN = ROOT / "tests" / "golden" / "trajectories.json"
 GOLDEN_TASKS = ROOT / "tests" / "golden" / "tasks.json"
-SEED, SEED_OF_TASKS = 20161009, 20261124
+SEED = 20161009
+SEED_OF_TASKS = 20261124
 DECISIONS = 40
 EVERY = 8  # decisions between two samples
 
@@ -27,9 +29,10 @@ def trajectory(task, scenario):
     """Return observations, true wrench (5, 6), reward (5,), and ``y`` (FanTracking) or ``error``
     (5,) in m, of an episode's first decisions.
     """
-    env, is_fan = TASKS[task].environment(scenario), task == "FanTracking"
+    env = TASKS[task].environment(scenario)
+    is_fan = task == "FanTracking"
     seed, place = (SEED, "y") if is_fan else (SEED_OF_TASKS, "error")
-    drawn = np.random.default_rng(seed).uniform(-0.5, 0.5, (DECISIONS, *env.action_space.shape))
+    drawn = default_rng(seed).uniform(-0.5, 0.5, (DECISIONS, *env.action_space.shape))
     pilot = make_controller("admittance")
     pilot.reset()
     observation, info = env.reset(seed=seed)

@@ -59,7 +59,9 @@ def of_log(change, *arguments, then=None):
     return lambda log: (then or (lambda same: same))(change(log, *arguments))
 
 
-NED, Y_UP_WORLD, Y_UP_BODY = (DOWN, DOWN, DOWN), (Y_UP, Y_UP, ONE), (Y_UP, Y_UP, Y_UP.T)
+NED = (DOWN, DOWN, DOWN)
+Y_UP_WORLD = (Y_UP, Y_UP, ONE)
+Y_UP_BODY = (Y_UP, Y_UP, Y_UP.T)
 AS_LAST = "scalar first under the headers of scalar last.*"
 as_last = partial(of_log, then=scalar_first_as_last)
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-import numpy as np
+from numpy.random import default_rng
 
 from windwrench.envs.recording import background, record_flight
 from windwrench.evidence.trials.logged_poses import pose_removed
@@ -18,7 +18,7 @@ def imu_flight(vehicle, effects=(), seconds=20.0, trajectory="excite"):
         **record_flight(vehicle, effects, trajectory, seconds, 1, settings, imu=True),
         name="imu_flight",
     )
-    noise = np.random.default_rng(1).standard_normal((2, len(log.t), 3))
+    noise = default_rng(1).standard_normal((2, len(log.t), 3))
     return replace(
         log,
         accelerometer=log.accelerometer + 0.1 * noise[0] + [0.05, -0.1, 0.08],

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.linalg import inv
+from numpy.random import default_rng
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply
@@ -33,7 +35,8 @@ WITH_EFFECTS = load_vehicle("ardrone2").with_effects(
 
 def drawn(vehicle, rng):
     """Return a vehicle as it may be where ``vehicle`` is declared."""
-    known, normal = vehicle.uncertainty, rng.standard_normal
+    known = vehicle.uncertainty
+    normal = rng.standard_normal
     command = 1.0 + known.command * normal() if vehicle.omega_source == "commanded" else 1.0
     return replace(
         vehicle,
@@ -106,7 +109,7 @@ def simulate_model(
     start = np.zeros(20)
     start[POSITION], start[QUATERNION] = (0.0, 0.0, 1.0), quaternion
     start[VELOCITY], start[RATE] = velocity, angular_velocity
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     steps = len(speeds)
     # of a step: rotor torque and force, the walks of torque and force, attitude (16) and position
     noise = np.hstack([rng.standard_normal((steps, 12)), rng.standard_normal((steps, 6))])
@@ -120,7 +123,7 @@ def simulate_model(
     out[:, 27:], biases = _inertial_noise(tuning, steps, seed)
     record = filter_record(vehicle, tuning, period)
     drawn = rng.multivariate_normal(np.zeros(N), P, method="cholesky")
-    unmix = np.ascontiguousarray(np.linalg.inv(vehicle.mixing)[:, 1:]) @ vehicle.inertia * rate_gain
+    unmix = np.ascontiguousarray(inv(vehicle.mixing)[:, 1:]) @ vehicle.inertia * rate_gain
     _simulate(
         *(record, start, drawn, speeds, unmix, vehicle.omega_max, noise, period),
         *(vehicle.voltage_ref, out),
@@ -148,7 +151,7 @@ def _deviations(*each):
 
 def _inertial_noise(tuning, steps, seed):
     """Return what gyro and accelerometer (K, 6) measure beside the truth, and the biases in it."""
-    rng = np.random.default_rng([seed, 1])
+    rng = default_rng([seed, 1])
     walk = rng.standard_normal((steps, BIASES))
     walk *= _deviations(tuning.gyro_bias_walk, tuning.accelerometer_bias_walk)
     walk[0] += rng.standard_normal(BIASES) * _deviations(

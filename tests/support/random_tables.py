@@ -6,6 +6,7 @@ The writing shares no code with the reading: what it writes comes from the map's
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import default_rng
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import load_vehicle
@@ -55,7 +56,7 @@ def flight(vehicle, trajectory, seed, seconds=20.0):
     fastest).
     """
     c = record_flight(load_vehicle(vehicle), (), trajectory, seconds, seed, imu=True)
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     c["accelerometer"] += 0.1 * rng.standard_normal(c["accelerometer"].shape)
     c["gyro"] += 0.01 * rng.standard_normal(c["gyro"].shape)
     return FlightLog(
@@ -85,8 +86,7 @@ def random_table(log, rng, imu_only=0.15):
 
     unit = pick(tuple(_TIME))
     begin = pick((0.0, 12.5, 1.7e9 if unit == "s" else 50.0))
-    template = pick(_TIMES)
-    name = template.format(u=unit)
+    name = pick(_TIMES).format(u=unit)
     columns[name] = (log.t + begin) / _TIME[unit]
     parts = {"time": TimeColumn(name, unit), "world": world, "body": body}
 
@@ -156,7 +156,8 @@ def _pose(log, columns, world, body, pick):
         template = pick(_QUATERNIONS if pick((True, True, False)) else _NUMBERED)
         out["attitude"] = Attitude(_add(columns, template, q, order), order=order, sense=sense)
         return out
-    euler, unit = pick(("zyx", "zyx", "xyz")), pick(("deg", "rad"))
+    euler = pick(("zyx", "zyx", "xyz"))
+    unit = pick(("deg", "rad"))
     angles = rotation.as_euler(euler.upper())[:, [euler.index(axis) for axis in "xyz"]]
     angles *= 1.0 if unit == "rad" else 180.0 / np.pi
     names = _add(columns, pick(_ANGLES), angles, ("roll", "pitch", "yaw"), unit)

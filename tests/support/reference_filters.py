@@ -3,6 +3,8 @@ inverses: slow, and the judges of the fast ones. They share no code with them.
 """
 
 import numpy as np
+from numpy.linalg import inv
+from numpy.random import default_rng
 
 from tests.support.flights import matrix
 from windwrench.dynamics.effects import compile_effects
@@ -23,7 +25,7 @@ def as_reference(estimate, near):
 
 def initial_covariance(seed=1):
     """Return a start (18, 18) in which everything is correlated with everything."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     A = np.eye(18) + 0.15 * rng.standard_normal((18, 18))
     scale = np.repeat([0.003, 0.3, 0.003, 0.1, 0.02, 0.3], 3)
     return (A @ A.T) * np.outer(scale, scale)
@@ -40,13 +42,16 @@ def rotor_effects(vehicle, drag=0.0, ground=0.0):
     com = compile_effects(vehicle).vehicle.com
 
     def wrench(x, q, v, w, W):
-        C, force, torque = matrix(q), np.zeros(3), np.zeros(3)
+        C = matrix(q)
+        force = np.zeros(3)
+        torque = np.zeros(3)
         for corner, rate, k in zip(CORNERS, W, vehicle.k, strict=True):
             r = vehicle.arm_l * corner
             ratio = ground * (vehicle.rotor_radius / (4 * (x + C @ r)[2])) ** 2
             lift = k * rate**2 * (1 / (1 - ratio) - 1)
             f = [0, 0, lift] - rate * drag * (C.T @ v + np.cross(w, r)) * [1, 1, 0]
-            force, torque = force + C @ f, torque + np.cross(r - com, f)
+            force = force + C @ f
+            torque = torque + np.cross(r - com, f)
         return force, torque
 
     return wrench
@@ -67,7 +72,7 @@ class ReferenceSmoother(ReferenceUKF):
         found = [(self.state, self.covariance)]
         for x, P, C, predicted, P_after in reversed(self.links):
             later, P_later = found[-1]
-            G = C @ np.linalg.inv(P_after)
+            G = C @ inv(P_after)
             state = displaced(x, G @ difference(later, predicted))
             found.append((state, P + G @ (P_later - P_after) @ G.T))
         return found[::-1]

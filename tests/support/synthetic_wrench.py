@@ -24,7 +24,8 @@ def kalman_gain(inertia, white, walk, measured, period):
 def estimated(wrench, inertia, noise, measured, period, rng):
     """Run that filter on the motion that a true wrench (n, ticks) makes; return its wrench."""
     A, K = kalman_gain(inertia, *noise, measured, period)
-    x, guess = np.zeros((len(wrench), 3)), np.zeros((len(wrench), 3))
+    x = np.zeros((len(wrench), 3))
+    guess = np.zeros((len(wrench), 3))
     guess[:, 2] = wrench[:, 0]
     out = np.empty_like(wrench)
     for k in range(wrench.shape[1]):
@@ -39,7 +40,8 @@ def estimated(wrench, inertia, noise, measured, period, rng):
 
 def lasting(rng, shape, time, period):
     """Noise of unit variance (n, ticks) that lasts over ``time`` s."""
-    keep, drawn = np.exp(-period / time), rng.standard_normal(shape)
+    keep = np.exp(-period / time)
+    drawn = rng.standard_normal(shape)
     drawn[:, 1:] *= np.sqrt(1 - keep**2)
     return scipy.signal.lfilter([1.0], [1.0, -keep], drawn)
 
@@ -48,7 +50,9 @@ def observations(fan, briefing, rng, settle=300, turns=True):
     """Observations (n, decisions, 8) of a vehicle that hovers at 0 while the fan is at ``fan`` (n,
     ticks) m; before them the filter settles. Unless it ``turns``, it holds its yaw whatever comes.
     """
-    air, noise, vehicle = briefing.air, briefing.noise, briefing.vehicle
+    air = briefing.air
+    noise = briefing.noise
+    vehicle = briefing.vehicle
     fan = np.concatenate([np.repeat(fan[:, :1], settle, axis=1), fan], axis=1)
     tables = jet_map(vehicle, briefing.jet, air)
     offsets = FIRST + STEP * np.arange(COUNT)
@@ -62,7 +66,8 @@ def observations(fan, briefing, rng, settle=300, turns=True):
             + gust * lasting(rng, fan.shape, air.gust_time, noise.period)
         )
     # the vehicle yaws under the torque, and its stations move against the jet
-    gains, inertia = FlightGains(), vehicle.inertia[2, 2]
+    gains = FlightGains()
+    inertia = vehicle.inertia[2, 2]
     A = np.zeros((4, 4))
     A[0, 1] = A[1, 2] = 1.0
     A[2] = -gains.yaw_integral, -gains.yaw, -gains.yaw_rate, 1.0 / inertia

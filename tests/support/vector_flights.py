@@ -2,6 +2,7 @@
 
 import gymnasium as gym
 import numpy as np
+from numpy.random import default_rng
 
 import windwrench  # noqa: F401  registers the environment
 
@@ -29,7 +30,8 @@ def fly(envs, decisions, seed=3):
     """Everything that the first decisions return, as one array (decisions, n, .), frames first. The
     random actions of one environment do not depend on how many there are.
     """
-    rng, rows = np.random.default_rng(seed), []
+    rng = default_rng(seed)
+    rows = []
     envs.reset(seed=seed)
     for _ in range(decisions):
         drawn = rng.uniform(-1, 1, (100, *envs.action_space.shape[1:])).astype(np.float32)
@@ -44,7 +46,8 @@ def fly_alone(env, decisions=4, seed=None):
     """Frame, reward, true position, force and torque (decisions, .) of random commands, after a
     reset where there is a seed.
     """
-    rng, rows = np.random.default_rng(1), []
+    rng = default_rng(1)
+    rows = []
     if seed is not None:
         env.reset(seed=seed)
     for _ in range(decisions):

@@ -33,7 +33,8 @@ def cluster():
 def test_a_run_on_a_cluster_is_the_local_one_though_its_worker_is_killed(cluster, tmp_path):
     pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
     config = load_config("sac", TINY)
-    process, killed = tmp_path / "process", []
+    process = tmp_path / "process"
+    killed = []
 
     def run_noted(folder):
         process.write_text(str(os.getpid()))
@@ -83,7 +84,8 @@ def test_a_task_that_fails_is_named(cluster):
 @pytest.mark.slow
 def test_flights_on_a_cluster_are_the_local_ones(cluster):
     request = Request(("admittance",), ("base",), 4, 0)
-    there, here = fly_all(request, cluster=cluster), fly_all(request, jobs=1)
+    there = fly_all(request, cluster=cluster)
+    here = fly_all(request, jobs=1)
     assert list(there) == list(here)
     for key, flown in here.items():
         for a, b in zip(flown, there[key], strict=True):
@@ -103,8 +105,7 @@ def test_rllib_knows_the_environment_by_its_name(cluster):
         .training(train_batch_size_per_learner=50, minibatch_size=25, num_epochs=1)
     )
     algorithm = config.build_algo()
-    result = algorithm.train()
-    assert result["env_runners"]["num_env_steps_sampled"] == 50
+    assert algorithm.train()["env_runners"]["num_env_steps_sampled"] == 50
     algorithm.stop()
 
 

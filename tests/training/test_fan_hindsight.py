@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.support.sizes import rms
 from windwrench.controllers.preview import Oracle
 from windwrench.controllers.trained_policy import TrainedPolicy
 from windwrench.envs.fan_tracking import FanTrackingEnv
@@ -35,11 +37,13 @@ def test_what_is_taught_is_the_oracle_s_command():
     """Of the first episode once more, one environment by itself, at the commands that were seen."""
     flights = flown(FanHindsight(), "base", 0.1)
     assert flights.seen.shape == (250, 8, FEATURES.size)
-    env, oracle = FanTrackingEnv("base"), Oracle(foresight=24)
+    env = FanTrackingEnv("base")
+    oracle = Oracle(foresight=24)
     oracle.largest = 2.5
     env.foresight = oracle.foresight
     observation, info = env.reset(seed=training_seed(3, 0, 0))
-    wanted, offsets = [], []
+    wanted = []
+    offsets = []
     for k in range(100):
         seen = FEATURES.frames(observation[None])[0]
         assert_allclose(flights.seen[k, 0, -6:-1], seen[:5], atol=1e-3)
@@ -49,16 +53,15 @@ def test_what_is_taught_is_the_oracle_s_command():
     truth = flights.truth[:100, 0]
     assert_allclose(truth[:, 1], offsets, atol=1e-4)
     # the set point is held to begin where the vehicle is: it has moved while the filter settled
-    assert np.sqrt(np.mean((truth[:, 0] - wanted) ** 2)) < 0.1 * np.std(wanted)
+    assert rms(truth[:, 0] - wanted) < 0.1 * np.std(wanted)
     assert flights.counts.sum(axis=0).tolist() == [241.0] * 8
 
 
 def test_nothing_is_taught_where_the_vehicle_is_lost():
     flights = flown(FanHindsight(), "base", 20.0, 30.0, 0, 16)
-    ended = np.flatnonzero(flights.counts[:200].min(axis=0) == 0.0)
-    assert len(ended) > 0
-    assert np.all(np.diff(flights.counts, axis=0) <= 0.0)  # and never again
-    assert np.abs(flights.truth[..., 1][flights.counts > 0]).max() <= 2.6
+    assert len(np.flatnonzero(flights.counts[:200].min(axis=0) == 0.0)) > 0
+    assert (np.diff(flights.counts, axis=0) <= 0.0).all()  # and never again
+    assert abs(flights.truth[..., 1][flights.counts > 0]).max() <= 2.6
 
 
 def test_a_round_has_all_scenarios_of_the_mix():
@@ -72,7 +75,7 @@ def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
     network = TaughtNetwork(FEATURES.size, 3, cell, 5, [7], "tanh")
     shares = np.array([[0.4, 1.0, 0.3]], dtype=np.float32)
     policy = TrainedPolicy(_card(FAN, cell, "wide", 0, 0), network.policy_weights(shares))
-    frames = np.random.default_rng(0).normal(size=(9, FEATURES.size)).astype(np.float32)
+    frames = default_rng(0).normal(size=(9, FEATURES.size)).astype(np.float32)
     with torch.no_grad():
         means, _, _ = network(torch.from_numpy(frames)[:, None])
     expected = np.clip(means[:, 0].numpy() @ shares[0], -1.0, 1.0)
@@ -81,7 +84,7 @@ def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
 
 def test_the_mean_of_what_is_hidden_is_learned():
     """A random walk seen through noise: the network must come to the error of the Kalman filter."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     walk = np.cumsum(0.3 * rng.normal(size=(60, 256, 1)), axis=0).astype(np.float32)
     seen = walk + rng.normal(size=walk.shape).astype(np.float32)
     torch.manual_seed(0)
@@ -90,16 +93,15 @@ def test_the_mean_of_what_is_hidden_is_learned():
     fit(network, episodes, 25, 32, (0.01, 0.0), torch.Generator().manual_seed(0))
     with torch.no_grad():
         mean, deviation, _ = network(torch.from_numpy(seen))
-    error = np.sqrt(np.mean((mean.numpy() - walk)[20:] ** 2))
+    error = rms((mean.numpy() - walk)[20:])
     # the Riccati equation of the walk: p = (p + q) / (p + q + 1), q = 0.09
-    best = np.sqrt((-0.09 + np.sqrt(0.09**2 + 4 * 0.09)) / 2)
-    assert error < 1.25 * best
+    assert error < 1.25 * np.sqrt((-0.09 + np.sqrt(0.09**2 + 4 * 0.09)) / 2)
     assert np.exp(deviation[20:].numpy()).mean() == pytest.approx(error, rel=0.2)
 
 
 def test_the_left_is_learned_from_the_right():
     """Episodes in which what is hidden is positive alone teach what it is where it is negative."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     hidden = np.repeat(rng.uniform(0.5, 1.5, (1, 128, 1)), 20, axis=0).astype(np.float32)
     seen = np.concatenate([hidden, np.ones_like(hidden)], axis=2)
     torch.manual_seed(0)
@@ -109,7 +111,7 @@ def test_the_left_is_learned_from_the_right():
     fit(network, episodes, 40, 16, (0.02, 0.0), torch.Generator().manual_seed(0), mirrored)
     with torch.no_grad():
         mean, _, _ = network(torch.from_numpy(seen * mirrored))
-    assert np.abs(mean.numpy() + hidden)[5:].mean() < 0.05
+    assert abs(mean.numpy() + hidden)[5:].mean() < 0.05
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
@@ -25,7 +26,8 @@ MEMORIES = {"memory": list(MEMORY)}
 
 
 def test_lanes_tell_the_truth_of_the_single_environment():
-    lanes, single = TaskLanes(3, task=HOVER), HOVER()
+    lanes = TaskLanes(3, task=HOVER)
+    single = HOVER()
     single.foresight = 1
     lanes.reset(seed=[4, 5, 6])
     single.reset(seed=5)
@@ -49,20 +51,25 @@ def test_lanes_tell_how_late_their_answers_are():
 @pytest.mark.parametrize("late", [0.0, 0.02])
 def test_hindsight_knows_what_came_beside_the_model(late):
     """Of a flight of the linear model itself with any commands and disturbances."""
-    oracle, rng, count = WindOracle(), np.random.default_rng(0), 30
+    oracle = WindOracle()
+    rng = default_rng(0)
+    count = 30
     lesson = WindLesson("WindHover", limit=np.inf)
     lesson._late = np.full(2, late)
     commands = rng.standard_normal((count + 1, 2, 3))
-    states, wanted = [], []
+    states = []
+    wanted = []
     for i, axis in enumerate(axis_models(oracle.vehicle, lag=0.04 + late)):
         A, B, _ = axis.held(WIND_PERIOD)
         gain, ahead = preview(A, B, np.eye(len(A)), oracle.effort, AHEAD)
-        x, came = [rng.standard_normal((2, len(A)))], rng.standard_normal((count, 2, len(A)))
+        x = [rng.standard_normal((2, len(A)))]
+        came = rng.standard_normal((count, 2, len(A)))
         for k in range(count):
             x.append(x[k] @ A.T + commands[k + 1, :, i : i + 1] * B[:, 0] + came[k])
         states.append(x)
         wanted.append(-(x[3] @ gain + np.einsum("kni,ki->n", came[3 : 3 + AHEAD], ahead)))
-    lesson._states, lesson._commands = list(zip(*states, strict=True)), list(commands)
+    lesson._states = list(zip(*states, strict=True))
+    lesson._commands = list(commands)
     best, counts = lesson.taught(np.ones((count + 1, 2), dtype=np.bool_))
     assert_allclose(best[3], np.transpose(wanted))
     assert counts.sum(axis=0).tolist() == [count - AHEAD + 1] * 2
@@ -70,7 +77,8 @@ def test_hindsight_knows_what_came_beside_the_model(late):
 
 def test_a_policy_sees_what_its_network_saw_whitened():
     torch.manual_seed(0)
-    network, rng = TaughtNetwork(27, 3, "gru", 8, [5], "tanh"), np.random.default_rng(0)
+    network = TaughtNetwork(27, 3, "gru", 8, [5], "tanh")
+    rng = default_rng(0)
     mixed = np.diag(np.full(27, 0.01)) + 0.1 * rng.standard_normal((1, 27))
     seen = (rng.standard_normal((40, 6, 27)) @ mixed + 1.0).astype(np.float32)
     network.whiten(seen)
@@ -88,21 +96,21 @@ def test_a_policy_sees_what_its_network_saw_whitened():
 
 def test_a_linear_policy_learns_a_lagging_answer_and_flies_as_it_was_fitted():
     """The answer is a low-pass of the position error, of four decisions."""
-    rng, law = np.random.default_rng(0), LinearLaw()
+    rng = default_rng(0)
+    law = LinearLaw()
     seen = rng.standard_normal((120, 8, 27)).astype(np.float32)
-    kept, truth = seen[0], []
+    kept = seen[0]
+    truth = []
     for frames in seen:
         kept = kept + 0.25 * (frames - kept)
         truth.append(kept[:, :3])
     ones = np.ones(seen.shape[:2], dtype=np.float32)
     law.fit(Sequences(seen, np.array(truth), ones))
-    policy, state = (
-        TaskPolicy(
-            _card("WindHover", "linear", MIX, 0, 0) | MEMORIES,
-            law.weights(np.eye(3, dtype=np.float32)),
-        ),
-        None,
+    policy = TaskPolicy(
+        _card("WindHover", "linear", MIX, 0, 0) | MEMORIES,
+        law.weights(np.eye(3, dtype=np.float32)),
     )
+    state = None
     for k, frames in enumerate(seen):
         said, _, state = law(torch.from_numpy(frames[None]), state)
         flown = policy(frames[2] * np.float32(HOVER.scales))

@@ -11,6 +11,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.training.tiny import TINY
@@ -67,19 +68,20 @@ def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
     train(config, "base", 3, tmp_path / "parts")
     for name in ("best.npz", "last.npz", "best.json", "last.json"):
         assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
-    a, b = read_progress(tmp_path / "whole"), read_progress(tmp_path / "parts")
+    a = read_progress(tmp_path / "whole")
+    b = read_progress(tmp_path / "parts")
     assert (a.steps, a.rmse_m) == (b.steps, b.rmse_m) == ([120, 240], b.rmse_m)
 
 
 @pytest.mark.parametrize("algorithm", LEARNERS)
 def test_the_shipped_policy_does_what_the_learner_would(algorithm):
     config = tiny(algorithm)
-    env = make_env(config)
-    learner = make_learner(config, env, 0)
+    learner = make_learner(config, make_env(config), 0)
     learner.learn(120)
     policy = TrainedPolicy(card_of(config, "base", 0, 120), weights_of(learner, algorithm))
     policy.reset()
-    rng, state = np.random.default_rng(0), None
+    rng = default_rng(0)
+    state = None
     for _ in range(5):
         x = rng.normal(size=features_of(config).size).astype(np.float32)
         expected, state = learner.predict(
@@ -102,7 +104,7 @@ def test_a_run_says_beside_the_policy_what_it_was_and_another_is_refused(tmp_pat
     assert card["config"]["learner"]["gamma"] == 0.9
     assert card["versions"]["stable-baselines3"] == sb3.__version__
     assert card["seeds"]["training"][1] < card["seeds"]["validation"][0]
-    kept = json.loads((tmp_path / "training.json").read_text())
+    kept = json.loads((tmp_path / "training.json").read_bytes())
     assert kept["config"] == card["config"]
     assert any((tmp_path / "tensorboard").iterdir()) or (tmp_path / "progress.csv").exists()
 
@@ -136,7 +138,8 @@ def test_sequences_in_one_call_are_those_of_sb3_contrib(starts):
     from windwrench.training.fast_lstm import FastLstmPolicy
 
     torch.manual_seed(0)
-    lstm, count = torch.nn.LSTM(3, 5), len(starts) // 4
+    lstm = torch.nn.LSTM(3, 5)
+    count = len(starts) // 4
     states = torch.randn(1, count, 5), torch.randn(1, count, 5)
     given = torch.randn(len(starts), 3), states, torch.tensor(starts, dtype=torch.float32), lstm
     ours, then = FastLstmPolicy._process_sequence(*given)
@@ -261,10 +264,12 @@ def away(seed):
 
 def lone_flight(seed, commands):
     """Features, rewards and losses of a single environment, computed by itself."""
-    env, history = FanTrackingEnv("static"), History(FEATURES, 1)
+    env = FanTrackingEnv("static")
+    history = History(FEATURES, 1)
     observation, info = env.reset(seed=seed)
     history.restart(FEATURES.frames(observation[None]))
-    seen, rewards = [history.flat()[0]], []
+    seen = [history.flat()[0]]
+    rewards = []
     for command in commands:
         observation, reward, lost, _, info = env.step(np.array([command], dtype=np.float32))
         history.push(FEATURES.frames(observation[None]))
@@ -277,7 +282,8 @@ def lone_flight(seed, commands):
 
 def test_each_environment_ends_by_itself_with_its_own_last_observation():
     limit = 30
-    env, direction = make(3, limit), away(seed_of(1, 0))
+    env = make(3, limit)
+    direction = away(seed_of(1, 0))
     first, _, lost = lone_flight(seed_of(1, 0), [direction] * limit)
     assert lost
     gone = len(first) - 1
@@ -330,7 +336,9 @@ def test_rewards_are_weighted_terms():
 
 
 class Rates(WindHoverEnv):
-    vehicle, action, observation = "crazyflie", "rates", "pose"
+    vehicle = "crazyflie"
+    action = "rates"
+    observation = "pose"
 
 
 def test_vehicle_action_and_observation_of_a_class_hold_and_sb3_trains_on_its_lanes():

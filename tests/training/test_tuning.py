@@ -43,8 +43,7 @@ def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp
     kept = yaml.safe_load((tmp_path / "tuned.yaml").read_text(encoding="utf-8"))
     assert kept["FanTracking2D"]["admittance"]["gains"].keys() == {"gain", "gain_z"}
     found = tune("admittance", "static", trials=3, episodes=3, seed=1)
-    again = tune("admittance", "static", trials=3, episodes=3, seed=1)
-    assert found == again
+    assert found == tune("admittance", "static", trials=3, episodes=3, seed=1)
     assert found["rmse_m"] <= found["default_rmse_m"]
     path = tmp_path / "tuned.yaml"
     path.write_text("ratio: {base: {gains: {gain: 5.0}}}\n", encoding="utf-8")

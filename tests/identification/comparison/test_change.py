@@ -5,10 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import solve
+from numpy.random import default_rng
 from typer.testing import CliRunner
 
 from tests.support.data_paths import excerpt
 from tests.support.flown import VEHICLE, recorded
+from tests.support.sizes import rms
 from windwrench.cli import app
 from windwrench.identification.comparison.change import NOWHERE, SOMETHING_ELSE, compare
 from windwrench.identification.comparison.sessions import FLIGHT_STD, SESSION_STD, difference
@@ -35,14 +38,14 @@ def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), sessions=1):
         middle += np.array(SESSION_STD) * rng.standard_normal(4)
         for i in range(count):
             numbers = middle + np.array(FLIGHT_STD) * rng.standard_normal(4)
-            thrust = np.linalg.solve(MIX, np.append(numbers[:3], 1.0)) * np.exp(numbers[3])
+            thrust = solve(MIX, np.append(numbers[:3], 1.0)) * np.exp(numbers[3])
             out.append(Trim(f"{session}, {i}", thrust, 20.0))
     return out
 
 
 def test_flights_without_a_change_are_never_given_a_sure_one():
     """Of 60 pairs of sets at most one, and most are said to be unchanged."""
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     found = [compare(drawn(rng, 1), drawn(rng, 2)) for _ in range(60)]
     assert sum(c.sure and c.place != NOWHERE for c in found) <= 1
     assert sum(c.place == NOWHERE for c in found) > 55
@@ -50,7 +53,7 @@ def test_flights_without_a_change_are_never_given_a_sure_one():
 
 
 def test_more_sessions_make_an_answer_surer_and_more_flights_of_one_do_not():
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     moved = (0.06, -0.06, -0.06, 0.06)  # rotor 2 is asked for more
     chances = {(count, sessions): [] for count, sessions in ((1, 1), (6, 1), (1, 6))}
     for _ in range(40):
@@ -65,19 +68,19 @@ def test_more_sessions_make_an_answer_surer_and_more_flights_of_one_do_not():
 
 def test_a_session_ends_where_the_battery_was_changed():
     """Flights with two batteries know their vehicle better than as many with one."""
-    after, *flights = drawn(np.random.default_rng(5), 5)
+    after, *flights = drawn(default_rng(5), 5)
 
     def std(volts):
         known = [replace(x, voltage=v) for x, v in zip(flights, volts, strict=True)]
         found = difference([after], known)
         return np.sqrt(np.exp(found.log) @ found.variance)
 
-    assert np.all(std([12.4, 12.0, 12.4, 12.0]) < 0.95 * std([12.4, 12.2, 12.0, 11.8]))
+    assert (std([12.4, 12.0, 12.4, 12.0]) < 0.95 * std([12.4, 12.2, 12.0, 11.8])).all()
 
 
 def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
     """Of 60 pairs each: the spread of the difference is what its deviation says."""
-    rng = np.random.default_rng(8)
+    rng = default_rng(8)
     for day in ("mon", "tue"):
         scores = []
         for _ in range(60):
@@ -89,8 +92,8 @@ def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
             share = np.exp(found.log)
             size = np.sqrt(share @ found.variance)
             scores.append(share @ found.mean / size)
-            assert np.all(size < 2.5 * np.array(FLIGHT_STD)) == (day == "mon")
-        assert 0.8 < np.sqrt(np.mean(np.square(scores))) < 1.2
+            assert (size < 2.5 * np.array(FLIGHT_STD)).all() == (day == "mon")
+        assert 0.8 < rms(scores) < 1.2
 
 
 @pytest.mark.parametrize(
@@ -103,7 +106,7 @@ def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
     ],
 )
 def test_what_is_no_rotors_change_is_told_from_one(place, moved):
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     found = [compare(drawn(rng, 3, moved), drawn(rng, 3)) for _ in range(15)]
     assert np.mean([c.place == place for c in found]) > 0.9
     assert ("otherwise than" in change_headline(found[0])) == (place == SOMETHING_ELSE)
@@ -111,9 +114,10 @@ def test_what_is_no_rotors_change_is_told_from_one(place, moved):
 
 @pytest.mark.parametrize("rotor", range(4))
 def test_a_weak_rotor_and_a_weight_are_named_at_their_place(rotor):
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     left, front = MIX[:2, rotor]
-    weak, weight = 0.08 * MIX[:, rotor], 0.1 * np.array([left, front, 0, 1])
+    weak = 0.08 * MIX[:, rotor]
+    weight = 0.1 * np.array([left, front, 0, 1])
     places = [compare(drawn(rng, 3, x), drawn(rng, 3)) for x in [weak] * 8 + [weight] * 8]
     assert np.mean([c.place == ROTORS[rotor] for c in places]) > 0.8
     assert not any(c.sure and c.place != ROTORS[rotor] for c in places)
@@ -133,7 +137,7 @@ def test_simulated_changes_are_named_without_a_true_model(effects, place, tmp_pa
     change = compare(after, before)
     assert change.place == place
     data, picture = write_change(change, tmp_path)
-    said = json.loads(data.read_text(encoding="utf-8"))
+    said = json.loads(data.read_bytes())
     assert said["headline"] == change_headline(change)
     assert place in said["headline"]
     assert picture.stat().st_size > 5000
@@ -141,8 +145,9 @@ def test_simulated_changes_are_named_without_a_true_model(effects, place, tmp_pa
 
 
 def test_another_battery_voltage_makes_the_total_less_certain():
-    rng = np.random.default_rng(7)
-    after, before = drawn(rng, 3, (0.0, 0.0, 0.0, 0.13)), drawn(rng, 3)
+    rng = default_rng(7)
+    after = drawn(rng, 3, (0.0, 0.0, 0.0, 0.13))
+    before = drawn(rng, 3)
     assert compare(after, before).places["all rotors"] > 0.8
     low = [replace(trim, voltage=10.5) for trim in after]
     high = [replace(trim, voltage=12.0) for trim in before]
@@ -160,7 +165,7 @@ def test_a_measured_weight_is_named_from_the_requests_alone(tmp_path):
         options = ["--reader", "crazypad", "--out", str(tmp_path)]
         result = CliRunner().invoke(app, ["compare", *options, *map(str, words)])
         assert result.exit_code == 0, result.output
-        change = json.loads((tmp_path / "change.json").read_text(encoding="utf-8"))
+        change = json.loads((tmp_path / "change.json").read_bytes())
         return change, "".join(result.output.splitlines())
 
     found, _ = compared(weight, "--against", *normal)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from typer.testing import CliRunner
 
 from tests.support.data_paths import data_file
@@ -17,8 +18,9 @@ from windwrench.identification.logs.streams import Stream
 
 
 def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
-    rng = np.random.default_rng(0)
-    t, u = np.arange(0.0, seconds, 1.0 / rate), np.arange(0.0, seconds, 1.0 / command_rate)
+    rng = default_rng(0)
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    u = np.arange(0.0, seconds, 1.0 / command_rate)
     streams = {
         "gyro": 0.01 * rng.standard_normal((len(t), 3)),
         "accelerometer": np.tile([0.0, 0.0, 9.81], (len(t), 1)),
@@ -75,7 +77,7 @@ def test_a_px4_log_names_the_motor_and_the_time(name, commanded, tmp_path):
         app, ["diagnose", str(log), "--rotor-faults", "--out", str(tmp_path)]
     )
     assert result.exit_code == 0, result.output
-    (found,) = json.loads((tmp_path / "rotor_faults.json").read_text(encoding="utf-8"))
+    (found,) = json.loads((tmp_path / "rotor_faults.json").read_bytes())
     assert found["found"] == "rotor 4"
     assert found["motor"] == "PX4 motor 1"
     assert found["sure"]

@@ -10,9 +10,11 @@ from operator import attrgetter
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.data_paths import data_file
 from tests.support.flown import settings, without_pose
+from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
 from windwrench.evidence.trials.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
@@ -21,8 +23,6 @@ from windwrench.identification.diagnosis.settings import DiagnosisSettings
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.sensor_noise import sensor_noise, with_noise
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 @cache
@@ -296,7 +296,7 @@ def test_no_flight_keeps_step_with_what_is_held_out():
     """
     number = np.arange(400)
     held = number % 4 == held_out(number)
-    assert np.all(held.reshape(-1, 4).sum(axis=1) == 1)
+    assert (held.reshape(-1, 4).sum(axis=1) == 1).all()
     for period in range(2, 14):
         share = np.bincount(number % period, held) / np.bincount(number % period)
         assert np.all((share > 0.05) & (share < 0.5)), period
@@ -321,7 +321,8 @@ def test_the_error_is_that_of_test_logs_where_they_are_given():
 
 
 def test_sensor_noise_is_read_off_the_log():
-    log, rng = fly(), np.random.default_rng(0)
+    log = fly()
+    rng = default_rng(0)
     noise = sensor_noise(log, VEHICLE)
     assert noise.position == pytest.approx(0.001, rel=0.05)
     assert noise.attitude == pytest.approx(0.005, rel=0.05)
@@ -339,7 +340,7 @@ def test_sensor_noise_is_read_off_the_log():
 @pytest.mark.slow
 def test_flights_of_another_simulator(name):
     folder = data_file("flights")
-    label = json.loads((folder / "labels.json").read_text())[f"{name}.csv.gz"]
+    label = json.loads((folder / "labels.json").read_bytes())[f"{name}.csv.gz"]
     vehicle = load_vehicle(folder / "vehicle.yaml")
     found = diagnose([read_log(folder / f"{name}.csv.gz", None, vehicle)], vehicle)
     truth = {e["name"]: e for e in label["effects"] if e["name"] != "OUT_OF_LIBRARY"}

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.vehicles import VEHICLE
+from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import Need, needing
 from windwrench.evidence.trials.logged_poses import FILTERS
 from windwrench.evidence.trials.practice_flights import fly_practice, practise
@@ -18,8 +19,6 @@ from windwrench.identification.diagnosis.residuals import transient_disturbances
 from windwrench.identification.report.headline import headline
 from windwrench.identification.report.words import remainder_sentence
 
-VEHICLE = load_vehicle("ardrone2")
-
 
 def fly(name, trajectory="excite", seconds=20.0, seed=1, **coefficients):
     return fly_practice(VEHICLE, (EffectSetting(name, coefficients),), trajectory, seconds, seed)
@@ -29,8 +28,7 @@ def fly(name, trajectory="excite", seconds=20.0, seed=1, **coefficients):
     ("name", "value"), [("thrust_scale", {"s": -0.08}), ("mass", {"dm": 0.05})]
 )
 def test_a_factor_on_thrust_from_commands_alone_is_never_sure(name, value):
-    log = replace(fly(name, **value), commanded=True)
-    found = diagnose([log], VEHICLE)
+    found = diagnose([replace(fly(name, **value), commanded=True)], VEHICLE)
     factors = [e for e in found.effects if e.name in ("thrust_scale", "mass")]
     assert factors
     for effect in factors:
@@ -54,8 +52,7 @@ def test_a_factor_on_thrust_from_commands_alone_is_never_sure(name, value):
     ],
 )
 def test_names_behind_a_filter_are_the_same_but_tentative(name, filtered, coefficients):
-    log = FILTERS[filtered](fly(name, **coefficients), VEHICLE)
-    found = diagnose([log], VEHICLE)
+    found = diagnose([FILTERS[filtered](fly(name, **coefficients), VEHICLE)], VEHICLE)
     assert found.floor_is_bound
     assert name in {e.name for e in found.effects}
     assert all(e.tentative for e in found.effects)
@@ -88,7 +85,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "random", ())
     (down,) = (push for push in found.pushes if push.channel == "Fz")
-    near = np.abs(flown.log.t - down.t) < 0.3
+    near = abs(flown.log.t - down.t) < 0.3
     truth = flown.log.force[:, 2]
     assert truth[near].min() == pytest.approx(truth.min(), rel=0.1)
     assert down.peak == pytest.approx(truth.min(), rel=0.3)

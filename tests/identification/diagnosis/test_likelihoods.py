@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm, slogdet, solve
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
@@ -34,7 +36,8 @@ def by_numbers(normal, right, low, high):
     def density(z):
         return math.exp(right * z - 0.5 * normal * z * z - 0.5 * z * z)
 
-    low, high = max(low, -12.0), min(high, 12.0)
+    low = max(low, -12.0)
+    high = min(high, 12.0)
     share = quad(lambda z: math.exp(-0.5 * z * z), low, high)[0]
     return math.log(quad(density, low, high)[0] / share)
 
@@ -52,8 +55,9 @@ def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
 
 
 def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
-    rng = np.random.default_rng(2)
-    x, noise = rng.standard_normal((40, 100, 3)), rng.standard_normal((40, 100))
+    rng = default_rng(2)
+    x = rng.standard_normal((40, 100, 3))
+    noise = rng.standard_normal((40, 100))
     alike = np.repeat(rng.standard_normal((40, 5)), 20, axis=1)  # one error for 20 samples
     slow = np.repeat(rng.standard_normal((40, 5, 3)), 20, axis=1)
 
@@ -66,17 +70,19 @@ def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
 
 
 def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
-    rng = np.random.default_rng(4)
-    x, y = rng.standard_normal((200, 4)), rng.standard_normal(200)
+    rng = default_rng(4)
+    x = rng.standard_normal((200, 4))
+    y = rng.standard_normal(200)
     y += 0.4 * x[:, 3]
-    normal, right = x.T @ x, x.T @ y
+    normal = x.T @ x
+    right = x.T @ y
 
     def evidence(columns, size):
         at = np.array(columns)
         own = np.array([1.0, 1.0, size])[: len(at)]
         inner = normal[np.ix_(at, at)] * own[:, None] * own + np.eye(len(at))
         b = right[at] * own
-        return 0.5 * b @ np.linalg.solve(inner, b) - 0.5 * np.linalg.slogdet(inner)[1]
+        return 0.5 * b @ solve(inner, b) - 0.5 * slogdet(inner)[1]
 
     sizes = (0.1, 1.0)
     products = np.block([[normal, right[:, None]], [right, 0.0]])
@@ -95,9 +101,11 @@ VEHICLE = replace(load_vehicle("ardrone2"), effects=(LAW,))
 
 def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1):
     """A flight in which thrust and attitude are what the forces ask for; rotors by commands."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)
-    rate, size, phase = (0.9, 1.4, 0.5), (1.2, 0.7, 0.4), (0.0, 0.6, 1.1)
+    rate = (0.9, 1.4, 0.5)
+    size = (1.2, 0.7, 0.4)
+    phase = (0.0, 0.6, 1.1)
     angle = [np.outer(t, [w, 1.7 * w]) + p for w, p in zip(rate, phase, strict=True)]
     place = [s * np.sin(a) @ [1.0, 0.5] for s, a in zip(size, angle, strict=True)]
     place = np.column_stack(place) + np.array([0.0, 0.0, 2.0])
@@ -105,12 +113,12 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     gust = 3e-4 * VEHICLE.weight * np.cumsum(rng.standard_normal(place.shape), axis=0)
     gust -= np.linspace(0.0, 1.0, len(t))[:, None] * gust[-1]
     past = np.array(wind) - speed
-    air = np.linalg.norm(past, axis=1)[:, None] * DRAG * past
+    air = norm(past, axis=1)[:, None] * DRAG * past
     need = VEHICLE.mass * np.gradient(speed, t, axis=0) + [0.0, 0.0, VEHICLE.weight] - air - gust
-    thrust = np.linalg.norm(need, axis=1)
+    thrust = norm(need, axis=1)
     z = need / thrust[:, None]
     y = np.cross(z, [1.0, 0.0, 0.0])
-    y /= np.linalg.norm(y, axis=1)[:, None]
+    y /= norm(y, axis=1)[:, None]
     rotation = np.stack([np.cross(y, z), y, z], axis=2)
     turned = Rotation.from_rotvec(pose_noise * rng.standard_normal(place.shape))
     q = (Rotation.from_matrix(rotation) * turned).as_quat(scalar_first=True)
@@ -130,12 +138,8 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     return replace(log, accelerometer=noisy, gyro=np.zeros_like(felt))
 
 
-@pytest.fixture(scope="module")
-def windy():
-    return diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
-
-
-def test_a_wind_is_named_and_no_tilt(windy):
+def test_a_wind_is_named_and_no_tilt():
+    windy = diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
     found = {e.name: e for e in windy.effects}
     assert "wind" in found
     assert "world_tilt" not in found
@@ -159,7 +163,8 @@ def test_in_still_air_nothing_is_sure():
 @pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 2, 3), marks=pytest.mark.slow)])
 def test_a_drag_that_nobody_declared_is_sure(seeds):
     """On five of six flights; on one the gust looks like a part that swings."""
-    bare, sure = replace(VEHICLE, effects=()), 0
+    bare = replace(VEHICLE, effects=())
+    sure = 0
     for seed in seeds:
         found = diagnose([flown(seed=seed)], bare)
         drags = [e for e in found.effects if e.name in ("body_drag", "rotor_drag")]
@@ -182,12 +187,11 @@ def test_the_accelerometer_is_read_beside_the_pose():
     # its bias is in its channels, and only there; the gust is in both
     off = (left[:, 3:] - left[:, :3]).mean(axis=0)
     assert_allclose(off, [0.15, -0.1, 0.2], atol=0.01)
-    both = np.corrcoef(left[:, 0], left[:, 3])[0, 1]
-    assert both > 0.85
+    assert np.corrcoef(left[:, 0], left[:, 3])[0, 1] > 0.85
 
 
 def test_the_noise_of_an_autoregression_is_found():
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     lag = np.array([[0.7, 0.2], [0.0, 0.4]])
     root = np.array([[1.0, 0.0], [0.8, 0.5]])
     x = np.zeros((20000, 2))
@@ -195,12 +199,10 @@ def test_the_noise_of_an_autoregression_is_found():
         x[k] = lag @ x[k - 1] + root @ rng.standard_normal(2)
     begins = np.arange(len(x)) == 0
     begins[5000] = True
-    fit = np.arange(len(x)) % 400 < 300
-    found = fitted_noise(x, begins, fit, np.zeros(2))
+    found = fitted_noise(x, begins, np.arange(len(x)) % 400 < 300, np.zeros(2))
     assert_allclose(found.lags[0], lag, atol=0.06)
     assert_allclose(found.covariance, root @ root.T, atol=0.06)
-    white = found.white(x)[found.known]
-    assert_allclose(np.cov(white.T), np.eye(2), atol=0.15)
+    assert_allclose(np.cov(found.white(x)[found.known].T), np.eye(2), atol=0.15)
     assert not found.known[:3].any()
     assert not found.known[5000:5003].any()
 
@@ -212,13 +214,13 @@ def test_noise_without_memory_only_scales():
 
 
 def test_a_column_of_factors_is_their_product_a_part_at_a_time():
-    rng = np.random.default_rng(3)
-    z, turned, part = rng.normal(size=50), rng.normal(size=(50, 3)), rng.normal(size=(50, 4))
-    force, torque, share = (
-        Product(1.7, z, turned, slice(3)),
-        Product(0.3, z, None, slice(4, 5)),
-        Product(1.0, z, part),
-    )
+    rng = default_rng(3)
+    z = rng.normal(size=50)
+    turned = rng.normal(size=(50, 3))
+    part = rng.normal(size=(50, 4))
+    force = Product(1.7, z, turned, slice(3))
+    torque = Product(0.3, z, None, slice(4, 5))
+    share = Product(1.0, z, part)
     dense = np.zeros((2, 50, 6))
     dense[0, :, :3], dense[1, :, 4] = 1.7 * z[:, None] * turned, 0.3 * z
     for rows in (slice(None), slice(7, 31)):

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import inv, solve
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
@@ -23,7 +25,8 @@ from windwrench.identification.diagnosis.steady_filter import (
     steady_filter,
 )
 
-PERIOD, GRAVITY = 0.01, 9.81
+PERIOD = 0.01
+GRAVITY = 9.81
 TRUE = PoseNoise(
     np.repeat([2e-4, 1e-3], 3),
     np.repeat([0.4, 3.0], 3),
@@ -47,12 +50,13 @@ def moved(state, push):
 @pytest.fixture(scope="module")
 def search():
     """Return a search on 30 s of a pose that moves by what TRUE says."""
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     n = 3000
     jumps = np.zeros((n, 6, 1))
     jumps[:, 2, 0] = 0.3 * rng.standard_normal(n)
     spread = TRUE.disturbance * np.sqrt(-np.expm1(-2.0 * PERIOD / TRUE.time))
-    state, pose = np.zeros((6, 3)), np.empty((n, 6))
+    state = np.zeros((6, 3))
+    pose = np.empty((n, 6))
     for k in range(n):
         state[:, 2] += GAIN * jumps[k, :, 0]
         pose[k] = state[:, 0] + TRUE.pose * rng.standard_normal(6)
@@ -61,11 +65,14 @@ def search():
 
     pull = np.zeros((n, 3, 2))
     pull[:, 1, 0], pull[:, 0, 1] = PULLS[1], PULLS[0]
-    still, none = (np.tile([1.0, 0.0], (n, 1)), np.zeros((n, 3))), np.empty((n, 6, 0))
+    still = (np.tile([1.0, 0.0], (n, 1)), np.zeros((n, 3)))
+    none = np.empty((n, 6, 0))
 
     def see(steady, gains, slopes):
         own = (OWN @ gains)[:, 0]
-        x, innovations, disturbance = np.zeros((6, 3)), np.empty((n, 6)), np.empty((n, 6))
+        x = np.zeros((6, 3))
+        innovations = np.empty((n, 6))
+        disturbance = np.empty((n, 6))
         for k in range(n):
             x[:, 2] += own * jumps[k, :, 0]
             e = innovations[k] = pose[k] - x[:, 0]
@@ -102,9 +109,12 @@ def search():
 def test_the_gains_are_those_of_the_riccati_equation():
     found = steady_filter(TRUE, PERIOD, GRAVITY)
     for pair, pull in zip(PAIRS, GRAVITY * PULL, strict=True):
-        F, Q, H = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((2, 6))
+        F = np.zeros((6, 6))
+        Q = np.zeros((6, 6))
+        H = np.zeros((2, 6))
         for i, axis in enumerate(pair):
-            at, push = slice(3 * i, 3 * i + 3), np.append(STEP, 0.0)
+            at = slice(3 * i, 3 * i + 3)
+            push = np.append(STEP, 0.0)
             F[at, at] = [[1.0, PERIOD, STEP[0]], [0.0, 1.0, PERIOD], [0.0, 0.0, found.keep[axis]]]
             Q[at, at] = TRUE.white[axis] ** 2 * np.outer(push, push)
             Q[at, at][2, 2] = TRUE.disturbance[axis] ** 2 * (1.0 - found.keep[axis] ** 2)
@@ -113,7 +123,7 @@ def test_the_gains_are_those_of_the_riccati_equation():
         R = np.diag(TRUE.pose[pair] ** 2)
         P = solve_discrete_are(F.T, H.T, Q, R)
         S = H @ P @ H.T + R
-        K = P @ H.T @ np.linalg.inv(S)
+        K = P @ H.T @ inv(S)
         assert_allclose(found.covariance[np.ix_(pair, pair)], S, rtol=1e-6, atol=1e-15)
         for i, axis in enumerate(pair):
             own = np.column_stack([K[3 * i : 3 * i + 3, i], K[3 * i : 3 * i + 3, 1 - i]])
@@ -164,7 +174,7 @@ def test_gyroscopic_torques_grow_with_the_rate():
     rate = np.array([0.3, -0.7, 1.9])
     found = gyration(replace(VEHICLE, inertia=J), rate[None])[0]
     for i, step in enumerate(1e-4 * np.eye(3)):
-        there, here = (np.linalg.solve(J, np.cross(w, J @ w)) for w in (rate + step, rate - step))
+        there, here = (solve(J, np.cross(w, J @ w)) for w in (rate + step, rate - step))
         assert_allclose(found[:, i], (here - there) / 2e-4, atol=1e-9)
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -17,7 +18,8 @@ from windwrench.identification.diagnosis.row_nuisances import THRUST_STD, row_nu
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
 
-SECONDS, PERIOD = 20.0, 0.01
+SECONDS = 20.0
+PERIOD = 0.01
 # N of thrust is what a command is taken for
 STATED = replace(VEHICLE, motor_curve=MotorCurve(thrust=(0.0, 0.5, 1.0)))
 
@@ -38,9 +40,11 @@ def hover(load, seed):
     """Return a hover in gusts of a vehicle that carries a load: its loop answers them by thrust and
     by tilt, of which the motion capture sees 0.3 degrees too much or too little.
     """
-    rng = np.random.default_rng(seed)
-    push, seen = gusts(rng, np.array([0.04, 0.04, 0.06]), 0.5), gusts(rng, np.full(2, 0.006), 0.1)
-    position, answer = np.zeros_like(push), np.zeros_like(push)
+    rng = default_rng(seed)
+    push = gusts(rng, np.array([0.04, 0.04, 0.06]), 0.5)
+    seen = gusts(rng, np.full(2, 0.006), 0.1)
+    position = np.zeros_like(push)
+    answer = np.zeros_like(push)
     position[0, 2] = 1.0
     velocity = np.zeros(3)
     for k in range(1, len(push)):
@@ -67,7 +71,7 @@ def test_thrust_at_a_command_is_a_nuisance_by_its_differences_between_flights():
     logs = [hover(0.0, seed) for seed in range(2)]
     one, two = (row_nuisances(Rows(RegressedFlights(x, STATED), {})) for x in (logs[:1], logs))
     assert not one["thrust 0"].any()
-    assert np.abs(two["thrust 0"]).max() > 0.4 * THRUST_STD * STATED.gravity
+    assert abs(two["thrust 0"]).max() > 0.4 * THRUST_STD * STATED.gravity
     assert_allclose(two["thrust 0"], -two["thrust 1"], atol=1e-12)
 
 
@@ -79,7 +83,8 @@ def test_a_hover_shows_a_load_by_the_mean_thrust_alone():
     by_name = {e.name: e for e in found.effects}
     assert "constant_force" not in by_name
     thrust = by_name["thrust_scale"]
-    scale, std = thrust.coefficients["s"], thrust.std["s"]
+    scale = thrust.coefficients["s"]
+    std = thrust.std["s"]
     assert abs(scale - (1.0 / 1.3 - 1.0)) < 1.96 * std
     # a command makes another thrust in each flight
     assert std > 0.9 * THRUST_STD * (1.0 + scale)

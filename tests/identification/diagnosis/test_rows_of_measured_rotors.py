@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import lstsq
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.flown import VEHICLE, resting
@@ -53,7 +55,8 @@ def test_a_simulator_may_have_no_noise(trajectory, missing):
 @pytest.mark.parametrize("turns", [0.0, 1e-9])
 def test_a_still_flight_without_noise_is_diagnosed(turns):
     """Columns that do not vary carry nothing; what is known to the last digit is no more."""
-    rng, count = np.random.default_rng(0), 3001
+    rng = default_rng(0)
+    count = 3001
     place = [0.0, 0.0, 1.0] + 1e-9 * rng.standard_normal((count, 3))
     attitude = [1.0, 0.0, 0.0, 0.0] + turns * rng.standard_normal((count, 4))
     log = resting(0.005 * np.arange(count), position=place, quaternion=attitude)
@@ -73,8 +76,9 @@ def test_rows_hold_forces_and_torques(offset):
     """An effect leaves the residual by as much as its columns say, torques among them."""
     rows = Rows(offset, {})
     assert rows.channels == 6
-    without, found = rows.residual({}), rows.residual({"com_offset": dict(OFFSET.coefficients)})
-    assert np.mean(np.square(found[:, 4])) < 0.2 * np.mean(np.square(without[:, 4]))
+    without = rows.residual({})
+    found = rows.residual({"com_offset": dict(OFFSET.coefficients)})
+    assert np.square(found[:, 4]).mean() < 0.2 * np.square(without[:, 4]).mean()
     column = rows.columns({}, [("com_offset", "cx")])["com_offset", "cx"]
     assert_allclose(without - found, 0.01 * column, atol=0.03 * abs(without).max())
 
@@ -105,7 +109,8 @@ def test_a_bias_hides_steady_forces_along_the_body():
     found = rank_by_rows(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {})
     assert found.ranking.sets[0].effects == ()
     biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
-    shown, known = found.posterior.shown(), found.posterior.shown(biases)
+    shown = found.posterior.shown()
+    known = found.posterior.shown(biases)
     assert all(x > 13.0 for x in shown.values())
     assert {e for e, x in shown.items() if x < 250.0 <= known[e]} == {
         "thrust_scale",
@@ -139,7 +144,7 @@ def test_a_disturbance_that_thrust_answers_by_its_change_counts_as_one(weak):
     columns = answered(rows, followers(rows), disturbance)
     X = np.stack([x[rows.fit, 2] for x in columns.values()], axis=1)
     y = disturbance[rows.fit, 2]
-    left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    left = y - X @ lstsq(X, y, rcond=None)[0]
     assert left.std() < 0.1 * y.std()
 
 

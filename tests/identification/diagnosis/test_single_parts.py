@@ -101,8 +101,7 @@ def test_only_the_time_in_the_air_counts():
     # taking off and landing last beyond
     assert found.t[0] == pytest.approx(4.0 + TAKE_OFF, abs=0.5)
     assert found.t[-1] == pytest.approx(15.0 - TAKE_OFF, abs=0.5)
-    whole = in_flight_by_thrust(log, VEHICLE)
-    assert len(whole.t) == len(log.t)
+    assert len(in_flight_by_thrust(log, VEHICLE).t) == len(log.t)
 
 
 def flown_signals(vehicle, **effects):
@@ -139,7 +138,8 @@ def test_moments_of_another_flight_show_no_delay():
     assert turning_delay([], model) is None
 
 
-TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down
+TAU = 0.03  # s: 22 ms up, 38 ms down
+APART = 0.008
 
 
 def unevenly_lagging(commanded):

@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.outcomes import refused
@@ -88,7 +89,8 @@ def test_a_spoiled_matlab_file_is_refused_or_read(tmp_path, seed):
     from scipy.io import savemat
 
     savemat(tmp_path / "whole.mat", {"t": T, "log": {"p": PLACE, "about": ["x", "yy"]}})
-    good, rng = (tmp_path / "whole.mat").read_bytes(), np.random.default_rng(seed)
+    good = (tmp_path / "whole.mat").read_bytes()
+    rng = default_rng(seed)
     data = np.frombuffer(good, np.uint8).copy()
     data[rng.integers(0, 700, 3)] = rng.integers(0, 256, 3)
     (tmp_path / "a.mat").write_bytes(data[: rng.integers(1, 2 * len(data))].tobytes())

@@ -57,8 +57,7 @@ def test_a_clock_of_32_bits_goes_on_after_its_rollover():
 
 def boots():
     """A DataFlash log of two boots, of 4 and 8 s; the commands of the second are higher."""
-    first, second = T[:200] + 1.0, T[:400] + 0.5
-    t = np.concatenate([first, second])
+    t = np.concatenate([T[:200] + 1.0, T[:400] + 0.5])
     name, letters, columns = rcou(t)
     high = np.arange(600) >= 200
     columns = {

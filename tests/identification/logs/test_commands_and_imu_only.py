@@ -41,7 +41,8 @@ def inertial_log(**fields):
 
 def test_a_motor_curve_turns_commands_into_rotor_speeds(tmp_path):
     """At 3.8 V of 4 V and an exponent of 2, thrust is 0.9025 of the curve's."""
-    path, vehicle = tmp_path / "imu.csv", curved()
+    path = tmp_path / "imu.csv"
+    vehicle = curved()
     write_log(inertial_log(), path)
     assert not read_log(path).has_rotor_speeds
     log = read_log(path, vehicle=vehicle)
@@ -66,7 +67,8 @@ def test_the_scale_of_commands_counts_the_dips_between_high_thrusts():
     """Thrust that swings from 0.2 to 1.8 of the weight has the weight as its mean; without its dips
     the mean is above it, and the scale would be too small.
     """
-    vehicle, t = load_vehicle("ardrone2"), 0.01 * np.arange(2000)
+    vehicle = load_vehicle("ardrone2")
+    t = 0.01 * np.arange(2000)
     weights = 1.0 + 0.8 * np.sin(2.0 * np.pi * t)
     weights[t < 2.0] = 0.05  # on the ground, rotors idling
     command = np.tile(np.sqrt(weights / 4.0 * vehicle.weight / 3.0)[:, None], (1, 4))

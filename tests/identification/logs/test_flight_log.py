@@ -32,7 +32,8 @@ def read(tmp_path):
 def assert_same(one, other):
     columns = ("t", "position", "rotor_speeds", "voltage", "force", "torque", "valid")
     for name in (*columns, "accelerometer", "gyro", "command"):
-        a, b = getattr(one, name), getattr(other, name)
+        a = getattr(one, name)
+        b = getattr(other, name)
         assert (a is None) == (b is None)
         if a is not None:
             assert_array_equal(a, b)
@@ -144,7 +145,8 @@ def flight_logs(draw):
         np.column_stack([draw(arrays(float, (count, 3), elements=st.floats(-9, 9))), quaternions]),
         np.nan,
     )
-    optional, commanded = draw(st.booleans()), draw(st.booleans())
+    optional = draw(st.booleans())
+    commanded = draw(st.booleans())
     inertial = np.where(
         draw(arrays(bool, (count, 2, 1))),
         draw(arrays(float, (count, 2, 3), elements=finite)),

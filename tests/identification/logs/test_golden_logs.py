@@ -26,7 +26,8 @@ def test_a_file_gives_the_flight_log_that_was_recorded(case):
     room, _, rest = case.rpartition(" ")[0].partition("/")
     if room == "shared" and not (DATA / rest).exists():
         pytest.skip(f"the measured file {rest} is not in {DATA} (WINDWRENCH_DATA names another)")
-    found, expected = recorded(case), GOLDEN[case]
+    found = recorded(case)
+    expected = GOLDEN[case]
     assert found.get("error") == expected.get("error")
     if "error" in expected:
         return

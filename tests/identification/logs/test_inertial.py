@@ -6,23 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from tests.support.hostile_conventions import scaled
 from tests.support.outcomes import noted
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.inertial import check_inertial
 from windwrench.identification.logs.reading import read_log
 
-VEHICLE = load_vehicle("ardrone2")
 FRD = np.array([1.0, -1.0, -1.0])
 
 
 def flight(seconds=6.0, rate=200.0, moving=1.0, noise=0.003, bias=0.1, seed=0):
     """A log with a biased, noisy IMU in every row."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)
     position, angles = _path(t, moving)
     turn = Rotation.from_euler("ZYX", angles)
@@ -120,7 +120,8 @@ def test_gravity_left_out_and_a_gyro_that_stands_still_are_told():
 
 def test_leaps_and_gaps_of_the_pose_are_no_sensors_fault():
     log = flight()
-    position, quaternion = log.position.copy(), log.quaternion.copy()
+    position = log.position.copy()
+    quaternion = log.quaternion.copy()
     position[400:] += 5.0
     quaternion[700] = [0.0, 1.0, 0.0, 0.0]
     position[900:1000] = quaternion[900:1000] = np.nan
@@ -131,12 +132,12 @@ def test_leaps_and_gaps_of_the_pose_are_no_sensors_fault():
 def test_a_sensor_faster_than_the_pose_has_rows_of_its_own(tmp_path):
     log = flight(rate=1000.0)
     every = np.arange(len(log.t)) % 10 == 0
-    position, quaternion = log.position.copy(), log.quaternion.copy()
+    position = log.position.copy()
+    quaternion = log.quaternion.copy()
     position[~every] = quaternion[~every] = np.nan
     log = replace(log, position=position, quaternion=quaternion, valid=every)
     write_log(log, tmp_path / "flight.csv")
     read = read_log(tmp_path / "flight.csv", vehicle=VEHICLE)
     assert read.notes == ()  # no pose was lost between two poses
     assert_array_equal(read.gyro, log.gyro)
-    thinned = with_rows(read, every)
-    assert_array_equal(thinned.accelerometer, log.accelerometer[every])
+    assert_array_equal(with_rows(read, every).accelerometer, log.accelerometer[every])

@@ -8,13 +8,12 @@ from numpy.testing import assert_allclose
 
 from tests.support.imu_flights import imu_flight, pose_removed
 from tests.support.outcomes import refused
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.identification.logs.flight_log import with_rows, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.motion.inertial_signals import pose_rate, reads_imu
 
-VEHICLE = load_vehicle("ardrone2")
 SIDE = np.eye(3)[[2, 1, 0]]  # a board that is mounted on its side
 BETAFLIGHT = np.eye(4)[[3, 2, 0, 1]]  # that order of rotors, by the torques against the gyro
 

@@ -7,6 +7,7 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.outcomes import noted, refused
@@ -54,7 +55,7 @@ def assert_same(found, true):
 )
 def test_any_convention_and_its_map_give_the_same_flight(tmp_path, flown, seed):
     """Separators, decimal commas, units, frames, quaternion and Euler orders, rotor orders."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     first = int(rng.integers(0, len(flown.t) - 60))
     rows = np.zeros(len(flown.t), bool)
     rows[first : first + 50] = True
@@ -93,8 +94,7 @@ def table(path, columns, count=40):
 def test_a_map_file_is_taken_by_read_log(tmp_path):
     """Betaflight's motor 1 is the rear right one, the kit's rotor 3."""
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD))
-    path = table(tmp_path / "a.csv", {"m1": 3000.0})
-    log = read_log(path, map=tmp_path / "map.yaml")
+    log = read_log(table(tmp_path / "a.csv", {"m1": 3000.0}), map=tmp_path / "map.yaml")
     assert_allclose(log.rotor_speeds[0] * 30 / np.pi, [3600, 3600, 3000, 3600])
 
 
@@ -163,8 +163,7 @@ def test_channels_in_rows_of_their_own_meet_at_the_poses_times(tmp_path, own, st
 
 def test_rows_of_one_time_are_one_row(tmp_path):
     t = [f"{0.01 * (k // 2):.2f}" for k in range(80)]
-    path = table(tmp_path / "a.csv", {"t": t, **apart(1)}, 80)
-    found = mapped(path)
+    found = mapped(table(tmp_path / "a.csv", {"t": t, **apart(1)}, 80))
     assert len(found.t) == 40
     assert found.valid.all()
     assert noted(found, "joined")

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.outcomes import refused
@@ -29,13 +30,12 @@ def flown():
 
 
 def guessed(path, name=""):
-    table = open_table(path)
-    return guess_map(table, load_vehicle(name) if name else None)
+    return guess_map(open_table(path), load_vehicle(name) if name else None)
 
 
 def test_the_map_that_is_written_is_the_map_that_was_guessed(tmp_path, flown):
     for seed in range(4):
-        written = random_table(flown, np.random.default_rng(seed))
+        written = random_table(flown, default_rng(seed))
         found = guessed(save(written, tmp_path / "table.csv"))
         text = map_yaml(found)
         again = parse_map(yaml.safe_load(text), "map")
@@ -76,7 +76,8 @@ def table_of(columns, path):
     return path
 
 
-_QUATERNION, _SENSORS = "qw qx qy qz", "vx vy vz ax ay az gx gy gz"
+_QUATERNION = "qw qx qy qz"
+_SENSORS = "vx vy vz ax ay az gx gy gz"
 NAMES = f"t x y z {_QUATERNION} {_SENSORS} "  # and four motors behind
 _PX4 = "/fmu/out/vehicle_odometry"
 _VICON = "/vicon/drone/transform"
@@ -110,7 +111,8 @@ _VICON = "/vicon/drone/transform"
 )
 def test_parts_are_found_by_what_their_numbers_obey(tmp_path, flown, names):
     columns = columns_of(flown, names, is_ned=True)
-    listed, found = list(columns), guessed(table_of(columns, tmp_path / "a.csv"), "ardrone2")
+    listed = list(columns)
+    found = guessed(table_of(columns, tmp_path / "a.csv"), "ardrone2")
     log_map = found.log_map
     assert not found.missing
     assert (log_map.world, log_map.body) == ("ned", "frd")
@@ -205,13 +207,13 @@ def test_motion_capture_with_y_up(tmp_path, flown):
     assert (found.log_map.world, found.log_map.body) == ("y_up", "y_up")
     log = map_table(open_table(path), found.log_map)
     assert_allclose(log.position, flown.position, atol=1e-9)
-    alike = np.abs(np.sum(log.quaternion * flown.quaternion, axis=1))
+    alike = abs(np.sum(log.quaternion * flown.quaternion, axis=1))
     assert_allclose(alike, 1.0, atol=1e-9)
 
 
 def test_more_than_four_rotors_that_move_are_refused(tmp_path, flown):
     columns = columns_of(flown, NAMES + "w1 w2 w3 w4")
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     good = guessed(table_of(columns, tmp_path / "quad.csv")).log_map
     columns |= {"w5": columns["w1"] + rng.standard_normal(len(flown.t)), "w6": columns["w2"]}
     path = table_of(columns, tmp_path / "hexa.csv")

@@ -21,11 +21,10 @@ from tests.support.dataflash_writer import (
     xkq,
 )
 from tests.support.outcomes import noted, refused
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.identification.logs.readers.ardupilot_bin import read_dataflash
 from windwrench.identification.logs.reading import read_log
 
-VEHICLE = load_vehicle("ardrone2")
 T = 5.0 + 0.02 * np.arange(300)
 SLOW = T[::5]
 FAST = 5.0 + 0.0025 * np.arange(2400)
@@ -82,7 +81,8 @@ def test_a_log_as_text(read, tmp_path):
     messages = parm(), *POSE, imu(T), current, (name, letters, sent)
     path = tmp_path / "2014-01-01.log"
     path.write_text(dataflash_text(messages) + "\r\nIMU, 11")  # and the last line is cut
-    log, binary = read_log(path), read(*messages[:-1], rcou(T))
+    log = read_log(path)
+    binary = read(*messages[:-1], rcou(T))
     assert "reader ardupilot_bin" in log.source
     assert_allclose(log.command, binary.command, atol=1e-9)
     assert_allclose(log.position, binary.position, atol=1e-6)
@@ -134,7 +134,8 @@ def test_without_a_position_the_imu_is_read(read):
 
 def test_places_on_the_globe_become_metres(read):
     position, _ = ned(T)
-    lat, lng = 52.0, 10.0
+    lat = 52.0
+    lng = 10.0
     place = {
         "TimeUS": micro(T),
         "Lat": lat + np.degrees(position[:, 0] / 6_378_137.0),

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
 from numpy.testing import assert_allclose
 from scipy.signal import butter, filtfilt
 
@@ -88,7 +89,8 @@ def test_a_log_before_2021(write):
 
 
 def test_set_points_become_rotor_speeds(write):
-    path, vehicle = write(IMU), load_vehicle("crazyflie")
+    path = write(IMU)
+    vehicle = load_vehicle("crazyflie")
     log = read_log(path)  # the log names its vehicle
     assert log.vehicle == "crazyflie"
     counts = OURS * vehicle.voltage_ref / 4.2
@@ -163,7 +165,7 @@ def test_real_logs_turn_as_their_motors_say(number, axes):
     assert not log.has_pose
     assert 980.0 < 1.0 / log.period < 1030.0
     assert not noted(log, "damaged")
-    still = np.linalg.norm(log.accelerometer[log.command.max(axis=1) == 0.0], axis=1)
+    still = norm(log.accelerometer[log.command.max(axis=1) == 0.0], axis=1)
     assert_allclose(np.median(still), 9.81, atol=0.3)
     b, a = butter(2, 8.0 / 500.0)
     turn = np.gradient(filtfilt(b, a, np.nan_to_num(log.gyro), axis=0), log.t, axis=0)
@@ -172,5 +174,6 @@ def test_real_logs_turn_as_their_motors_say(number, axes):
     torque = command @ np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1]]).T
     for axis in axes:
         delay = 40 if axis < 2 else 0
-        a, b = turn[flying][delay:, axis], torque[flying][: flying.sum() - delay, axis]
+        a = turn[flying][delay:, axis]
+        b = torque[flying][: flying.sum() - delay, axis]
         assert np.corrcoef(a, b)[0, 1] > 0.85

@@ -24,10 +24,8 @@ from tests.support.ulog_writer import (
     stamps,
     ulog_bytes,
 )
-from windwrench.dynamics import load_vehicle
+from tests.support.vehicles import VEHICLE
 from windwrench.identification.logs.reading import read_log
-
-VEHICLE = load_vehicle("ardrone2")
 
 pytest.importorskip("pyulog", reason="pip install 'windwrench[logs]'")
 
@@ -186,7 +184,8 @@ def test_without_a_pose_the_inertial_sensors_are_read(read, topic):
 
 @pytest.mark.parametrize("pose", [mocap, onboard])
 def test_a_slow_pose_stands_in_rows_of_the_inertial_sensors(read, pose):
-    slow, times = 0.1 * np.arange(40), np.arange(-0.2, 4.2, 0.004)
+    slow = 0.1 * np.arange(40)
+    times = np.arange(-0.2, 4.2, 0.004)
     sensors = {"sensor_combined": sensor_combined(times), "esc_status": esc(times)}
     log = read(pose(slow) | sensors)
     assert log.valid.sum() == len(slow)
@@ -226,8 +225,7 @@ def test_bad_pulse_limits_are_named(read):
     topics = MOCAP | {"actuator_outputs": fields}
     with refused("expected MIN below MAX"):
         read(topics, {"PWM_MAIN_MIN2": 2100})
-    log = read(topics, {"THR_MDL_FAC": np.nan})
-    assert noted(log, "f = 0;", "1000 to 2000 us")
+    assert noted(read(topics, {"THR_MDL_FAC": np.nan}), "f = 0;", "1000 to 2000 us")
 
 
 LONG = odometry(T) | {"float q": 2 * odometry(T)["float q"]}

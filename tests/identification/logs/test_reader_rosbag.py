@@ -22,8 +22,8 @@ from tests.support.autopilot_flight import (
     ned,
 )
 from tests.support.outcomes import noted, refused
+from tests.support.vehicles import VEHICLE
 from windwrench.cli import app
-from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.readers import rosbag
 from windwrench.identification.logs.reading import read_log
 from windwrench.runtime.file_limits import LIMITS
@@ -36,7 +36,6 @@ from rosbags.rosbag1 import reader
 from tests.support.bag_writer import START, stamp, write_bag
 from windwrench.identification.logs.readers.ros_topics import definitions
 
-VEHICLE = load_vehicle("ardrone2")
 T = 0.01 * np.arange(50)
 WIDE = np.arange(-0.05, 0.6, 0.004)
 KINDS = ("bag", "db3", "mcap")
@@ -438,8 +437,7 @@ def test_the_folder_one_stands_in_is_a_bag(kind, has_metadata, write, monkeypatc
     (path / "inner").mkdir()
     for folder, given in ((path, "."), (path / "inner", "..")):
         monkeypatch.chdir(folder)
-        log = read_log(given, None, VEHICLE)
-        assert_array_equal(log.position, whole.position)
+        assert_array_equal(read_log(given, None, VEHICLE).position, whole.position)
 
 
 def broken_database(folder):

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -22,9 +23,10 @@ def taken(reading, what, columns):
 @pytest.mark.parametrize("first", range(0, len(POSES), 10))
 def test_the_advice_of_a_sentence_makes_the_pose_that_the_reading_means(first):
     """90 ways to write a pose, each undone by its own advice."""
-    rng = np.random.default_rng(first)
+    rng = default_rng(first)
     for reading in POSES[first : first + 10]:
-        position, quaternion = rng.standard_normal(3), rng.standard_normal(4)
+        position = rng.standard_normal(3)
+        quaternion = rng.standard_normal(4)
         columns = dict(zip(("px", "py", "pz"), position, strict=True))
         assert_allclose(taken(reading, "position", columns), reading.frames.position @ position)
         columns = dict(zip(("qw", "qx", "qy", "qz"), quaternion, strict=True))

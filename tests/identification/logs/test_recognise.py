@@ -35,8 +35,7 @@ BEGINNINGS = {
 @pytest.mark.parametrize("name", ["a", "a.csv", "a.BIN", "a.bag"])
 def test_the_first_bytes_decide_whatever_the_name(tmp_path, begins, name):
     (tmp_path / name).write_bytes(begins + bytes(20))
-    found = reader_by_content(tmp_path / name)
-    assert found.name == BEGINNINGS[begins]
+    assert reader_by_content(tmp_path / name).name == BEGINNINGS[begins]
     with pytest.raises(InputError):  # that reader's own words
         read_log(tmp_path / name)
 
@@ -73,7 +72,8 @@ def test_a_table_whose_guess_leaves_no_doubt_is_read_at_once(tmp_path):
     path = DATA / "flights" / "labelled_01.csv.gz"
     if not path.exists():
         pytest.skip(f"{path} is not here")
-    log, vehicle = read_log(path), load_vehicle(DATA / "flights" / "vehicle.yaml")
+    log = read_log(path)
+    vehicle = load_vehicle(DATA / "flights" / "vehicle.yaml")
     down = [1.0, -1.0, -1.0]
     columns = {
         "time_ms": 1e3 * log.t,

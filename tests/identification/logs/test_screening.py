@@ -9,6 +9,8 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -17,6 +19,7 @@ from tests.support.flown import VEHICLE, recorded, without_pose
 from tests.support.hostile_conventions import permuted
 from tests.support.outcomes import refused
 from tests.support.parameters import mostly_slow
+from tests.support.sizes import rms
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.evidence.trials.practice_flights import practise
@@ -98,7 +101,7 @@ def test_an_undeclared_effect_is_no_wrong_convention(effect):
 
 def test_a_quiet_hover_decides_nothing():
     """Without excitation no order of rotors explains more than another."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     t = np.arange(0.0, 15.0, 0.005)
     attitude = Rotation.from_rotvec(0.005 * rng.standard_normal((len(t), 3))).as_quat(
         scalar_first=True
@@ -126,13 +129,13 @@ def test_short_measured_flights_pass_where_short_is_enough(number):
 
 def jumped_clock(log):
     k = len(log.t) // 2
-    speed = np.linalg.norm(np.gradient(log.position, log.t, axis=0), axis=1)
+    speed = norm(np.gradient(log.position, log.t, axis=0), axis=1)
     k += int(np.argmax(np.convolve(speed[k:], np.ones(21) / 21, "same")[200:-200])) + 200
     return replace(log, t=log.t + np.where(np.arange(len(log.t)) >= k, 5.0, 0.0))
 
 
 def uneven_clock(log):
-    step = np.random.default_rng(0).choice([0.0005, 0.005, 0.02], len(log.t), p=[0.4, 0.4, 0.2])
+    step = default_rng(0).choice([0.0005, 0.005, 0.02], len(log.t), p=[0.4, 0.4, 0.2])
     return replace(log, t=np.cumsum(step))
 
 
@@ -207,7 +210,8 @@ PARTS = ("clock jump", "rows cut out")
 @pytest.mark.parametrize("kind", TORN)
 def test_a_torn_log_is_refused_and_an_estimate_needs_less(kind):
     make, expected = TORN[kind]
-    log, said = make(flight()), f"flight.csv: .*{expected}"
+    log = make(flight())
+    said = f"flight.csv: .*{expected}"
     with refused(said):
         screen_log(log, VEHICLE)
     if kind in (*ENOUGH, *PARTS):
@@ -221,11 +225,11 @@ def test_a_torn_log_is_refused_and_an_estimate_needs_less(kind):
 
 def test_a_gap_that_leaves_enough_is_a_note():
     log = flight(seconds=20.0)
-    _, (note,) = screen_log(without_pose(log, np.abs(log.t - 10.0) < 2.0), VEHICLE)
+    _, (note,) = screen_log(without_pose(log, abs(log.t - 10.0) < 2.0), VEHICLE)
     assert note.startswith("the pose is lost in 1 run(s)")
     assert "16 of 20 s of flight" in note
     # a gap in which the vehicle flew on is no jump of the clock
-    screen_log(with_rows(log, np.abs(log.t - 10.0) > 0.5), VEHICLE)
+    screen_log(with_rows(log, abs(log.t - 10.0) > 0.5), VEHICLE)
 
 
 def test_two_seconds_and_a_hover_are_enough_for_an_estimate():
@@ -238,8 +242,10 @@ def test_a_frozen_pose_counts_as_none():
     log = flight()
     frozen = (log.t >= 5.0) & (log.t <= 6.0)
     first = int(np.argmax(frozen))
-    position, quaternion = log.position.copy(), log.quaternion.copy()
-    position[frozen], quaternion[frozen] = position[first], quaternion[first]
+    position = log.position.copy()
+    quaternion = log.quaternion.copy()
+    position[frozen] = position[first]
+    quaternion[frozen] = quaternion[first]
     log = replace(log, position=position, quaternion=quaternion)
     checked, notes = screen_log(log, VEHICLE, None)
     assert any("pose is frozen for 0.995 s from t = 5.005 s (1 such" in note for note in notes)
@@ -251,7 +257,8 @@ def test_a_frozen_pose_counts_as_none():
 
 def test_rotors_that_stop_or_race_are_named():
     log = flight()
-    stopped, racing = log.rotor_speeds.copy(), log.rotor_speeds.copy()
+    stopped = log.rotor_speeds.copy()
+    racing = log.rotor_speeds.copy()
     stopped[(log.t > 7.0) & (log.t < 8.0), 2] = 0.0
     racing[[700, 1500], 1] = 4e4
     for speeds, words in (
@@ -329,7 +336,7 @@ def test_a_clean_flight_and_a_rotor_at_its_limit_are_not_noted():
 def test_commands_that_run_seconds_late_are_named_by_the_thrust_alone():
     """No torque is known of a collective command; the force along the thrust axis is enough."""
     log = flight("gentle", seconds=25.0)
-    collective = np.sqrt(np.mean(np.square(log.rotor_speeds), axis=1))
+    collective = rms(log.rotor_speeds, axis=1)
     on_time = replace(log, rotor_speeds=np.tile(collective[:, None], 4), commanded=True)
     screen_log(on_time, VEHICLE)
     late = np.interp(log.t - 2.25, log.t, collective)

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from tests.support.flown import VEHICLE, recorded
 from tests.support.outcomes import refused
+from tests.support.sizes import rms
 from windwrench.identification import diagnose, read_log
 from windwrench.identification.logs.flight_log import write_log
 from windwrench.identification.logs.screening import screen_log
@@ -18,7 +20,7 @@ PERIOD = 0.005  # s
 
 def walk(rate, seconds=20.0, seed=0):
     """Times and values (n, 4) of a random walk that was sampled at a rate."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)
     return t, 400.0 + np.cumsum(rng.normal(size=(len(t), 4)), axis=0)
 
@@ -46,7 +48,7 @@ def test_a_channel_that_is_held_or_drawn_in_lines_keeps_its_own_rate(rate):
 @pytest.mark.parametrize("step", [1e-6, 0.3, 3.0])
 def test_a_rounded_channel_is_as_fast_as_its_rows(step):
     t = np.arange(0.0, 20.0, PERIOD)
-    noise = np.random.default_rng(1).normal(size=(len(t), 4))
+    noise = default_rng(1).normal(size=(len(t), 4))
     slow = 400.0 + 10.0 * np.sin(np.pi * t[:, None] + np.arange(4))
     for values in (slow, slow + noise, np.full((len(t), 4), 400.0)):
         assert source_rate(t, step * np.round(values / step)) == pytest.approx(1.0 / PERIOD)
@@ -55,16 +57,10 @@ def test_a_rounded_channel_is_as_fast_as_its_rows(step):
 def test_what_lies_between_samples_is_bounded_by_their_neighbours():
     times, values = walk(200.0, seconds=100.0)
     lines = in_lines(times, values, 4.0)
-    left = np.sqrt(np.mean(np.square(values - lines), axis=0))
+    left = rms(values - lines, axis=0)
     bound = between_samples(times, lines, 4.0)
-    assert np.all(left < bound)
-    assert np.all(bound < 3.0 * left)
-
-
-@pytest.fixture(scope="module")
-def flown():
-    """A simulated flight of 14 s at 200 Hz."""
-    return recorded(seconds=14.0, seed=3)
+    assert (left < bound).all()
+    assert (bound < 3.0 * left).all()
 
 
 def with_rotors_at(rate, log):
@@ -73,16 +69,17 @@ def with_rotors_at(rate, log):
 
 
 @pytest.mark.parametrize(("rate", "force"), [(4.0, True), (30.0, False)])
-def test_slow_rotors_tell_no_torque_and_no_effect(rate, force, flown, tmp_path):
+def test_slow_rotors_tell_no_torque_and_no_effect(rate, force, tmp_path):
     path = tmp_path / "slow.csv"
-    write_log(with_rotors_at(rate, flown), path)
+    write_log(with_rotors_at(rate, recorded(seconds=14.0, seed=3)), path)
     log = read_log(path)
     said = rf"rotor speeds come {rate:g} times a second; expected at least 45"
     with refused(said):
         screen_log(log, VEHICLE)
     with refused(said):
         diagnose([log], VEHICLE)
-    series, told = estimate_log(log, VEHICLE), estimate_log(replace(log, rates={}), VEHICLE)
+    series = estimate_log(log, VEHICLE)
+    told = estimate_log(replace(log, rates={}), VEHICLE)
     assert np.isnan(series.torque).all()
     assert np.isnan(series.std_torque).all()
     assert np.array_equal(series.force, told.force)

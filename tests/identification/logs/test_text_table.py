@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.programs import said
@@ -76,7 +77,9 @@ def test_latin_letters_of_an_old_encoding_are_read(opened):
 
 
 def test_three_hours_at_200_hz_are_within_the_limits():
-    rows, columns, characters = 3 * 3600 * 200, 20, 7.5e8
+    rows = 3 * 3600 * 200
+    columns = 20
+    characters = 7.5e8
     assert rows < LIMITS.table_rows
     assert rows * columns < LIMITS.table_numbers
     assert characters < LIMITS.table_text
@@ -100,7 +103,7 @@ def test_the_memory_of_a_check_is_in_proportion_to_the_numbers_that_are_read(tmp
     header = [*REQUIRED, "vbat", "fx", "fy", "fz", "tx", "ty", "tz"]
     taken = {}
     for rows in (1_000, 150_000):
-        columns = np.random.default_rng(0).normal(0.0, 0.001, (rows, len(header)))
+        columns = default_rng(0).normal(0.0, 0.001, (rows, len(header)))
         columns[:, 0] = 0.005 * np.arange(rows)
         columns[:, 4:8] = 1.0, 0.0, 0.0, 0.0
         columns[:, 8:12] += 300.0

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.dataflash_writer import dataflash, imu, parm
@@ -111,8 +112,7 @@ def test_a_battery_that_is_not_connected_has_no_voltage(px4):
 def test_a_file_that_ends_within_a_message_says_so(px4):
     path = px4(PULSES[:, :4], MAV_TYPE=2)
     assert not noted(read_log(path), "was cut")
-    data = path.read_bytes()
-    path.write_bytes(data[:-3])
+    path.write_bytes(path.read_bytes()[:-3])
     assert noted(read_log(path), "was cut")
 
 
@@ -223,9 +223,10 @@ def test_a_log_of_motor_requests_alone_serves_to_compare(tmp_path):
 def test_whether_anything_flew():
     """By the motors and what was measured, whatever the vehicle."""
     t = 0.01 * np.arange(2000)
-    hover, still = np.full((2000, 4), 390.0), np.zeros((2000, 3))
+    hover = np.full((2000, 4), 390.0)
+    still = np.zeros((2000, 3))
     turned = np.tile([1.0, 0.0, 0.0, 0.0], (2000, 1))
-    noise = np.random.default_rng(0).standard_normal((2000, 3))
+    noise = default_rng(0).standard_normal((2000, 3))
     moving = 0.3 * np.sin(np.outer(t, [0.5, 0.7, 0.9]))
     way = still + np.outer(t, [0.3, 0.0, 0.0])
 

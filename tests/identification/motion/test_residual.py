@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import butter, sosfilt, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded, resting
+from tests.support.sizes import rms
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle, preset_names
 from windwrench.dynamics.effects import compile_effects
 from windwrench.evidence.trials.logged_poses import FILTERS
@@ -36,16 +39,13 @@ AMENDED = VEHICLE.with_effects(
 )
 
 
-@pytest.fixture(scope="module")
-def flown():
-    (signals,) = log_signals(fly_practice(VEHICLE, seconds=6.0, seed=1))
-    return signals
-
-
-def test_the_residual_is_newton_and_euler(flown):
+def test_the_residual_is_newton_and_euler():
+    (flown,) = log_signals(fly_practice(VEHICLE, seconds=6.0, seed=1))
     body = compile_effects(AMENDED).vehicle
     rotors = body.rotor_wrench(flown.rotor_speeds)
-    R, omega, alpha = flown.rotation, flown.angular_velocity, flown.angular_acceleration
+    R = flown.rotation
+    omega = flown.angular_velocity
+    alpha = flown.angular_acceleration
     centre = np.cross(alpha, body.com) + np.cross(omega, np.cross(omega, body.com))
     acceleration = (
         flown.acceleration
@@ -62,14 +62,14 @@ def test_the_residual_is_newton_and_euler(flown):
 
 @pytest.mark.parametrize("shape", [(10, 1), (500,), (500, 2), (500, 3, 3)])
 def test_the_low_pass_is_that_of_scipy_to_the_last_digit(shape):
-    x = np.cumsum(np.random.default_rng(0).standard_normal(shape), axis=0)
+    x = np.cumsum(default_rng(0).standard_normal(shape), axis=0)
     for cutoff in (1.0, 5.0, 40.0):
         there = sosfiltfilt(butter(2, cutoff / 100.0, output="sos"), x, axis=0)
         assert_array_equal(low_pass(x, cutoff, 0.005), there)
 
 
 def test_the_size_of_white_noise_is_read_behind_a_high_pass_and_through_outliers():
-    noise = 0.02 * np.random.default_rng(0).standard_normal((20_000, 1))
+    noise = 0.02 * default_rng(0).standard_normal((20_000, 1))
     assert robust_std(noise) == pytest.approx(0.02, rel=0.02)
     assert robust_std(high_pass(noise, 0.25)) == pytest.approx(0.02, rel=0.03)
     noise[::50] += 1.0
@@ -79,7 +79,9 @@ def test_the_size_of_white_noise_is_read_behind_a_high_pass_and_through_outliers
 @pytest.mark.parametrize("lag", [0.004, 0.03, 0.2])
 def test_a_first_order_lag_has_made_63_per_cent_of_a_step_after_its_time(lag):
     """At rest before the step, and each sample held over the period that ends there."""
-    period, rest, step = 0.005, np.array([300.0, -1.0]), np.array([100.0, 2.0])
+    period = 0.005
+    rest = np.array([300.0, -1.0])
+    step = np.array([100.0, 2.0])
     x = rest + np.outer(np.arange(200) >= 20, step)
     since = np.maximum(period * (np.arange(200) - 19), 0.0)
     made = rest + np.outer(1.0 - np.exp(-since / lag), step)
@@ -116,8 +118,7 @@ def test_a_declared_clock_offset_delays_the_voltage_and_takes_the_first_poses_af
     late = VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": -0.02}))
     undone = undo_log_sensing(log, late)
     assert_allclose(undone.voltage[4:], log.voltage[:-4], rtol=1e-9)
-    unseen = np.flatnonzero(~undone.valid)
-    assert_array_equal(unseen, [*range(4), *range(1000, 1104)])
+    assert_array_equal(np.flatnonzero(~undone.valid), [*range(4), *range(1000, 1104)])
 
 
 @pytest.mark.parametrize(
@@ -127,8 +128,9 @@ def test_noise_that_a_filter_hid_is_what_the_vehicle_states_of_its_motion_captur
     own, hidden, added
 ):
     """In units of the vehicle's."""
-    log, stated = still_log(200.0), VEHICLE.mocap.sigma_pos_m
-    noise = np.random.default_rng(1).standard_normal(log.position.shape)
+    log = still_log(200.0)
+    stated = VEHICLE.mocap.sigma_pos_m
+    noise = default_rng(1).standard_normal(log.position.shape)
     log = replace(log, position=own * stated * noise)
     (noisier,) = noisy_logs([log], VEHICLE, hidden)
     assert (noisier.position - log.position).std() == pytest.approx(added * stated, rel=0.05)
@@ -137,7 +139,8 @@ def test_noise_that_a_filter_hid_is_what_the_vehicle_states_of_its_motion_captur
 def test_an_imu_at_1_khz_tells_as_much_as_one_of_half_its_noise_at_250_hz():
     found = []
     for rate, size in ((1000.0, 2.0), (250.0, 1.0)):
-        rng, log = np.random.default_rng(0), still_log(rate, 8.0)
+        rng = default_rng(0)
+        log = still_log(rate, 8.0)
         position = np.full_like(log.position, np.nan)
         tenth = slice(None, None, round(rate / 10.0))
         position[tenth] = 0.002 * rng.standard_normal(position[tenth].shape)
@@ -176,7 +179,7 @@ def test_what_was_filtered_is_recognised_and_what_was_not_is_not(log, name):
 
 @pytest.mark.parametrize("seed", range(10))
 def test_white_noise_is_level(seed):
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     n = 2000
     spin = 0.005 * rng.standard_normal((n, 3))
     quaternion = np.column_stack([np.sqrt(1.0 - np.sum(spin**2, axis=1)), spin])
@@ -191,8 +194,7 @@ def test_white_noise_is_level(seed):
 
 
 def test_channels_are_asked_one_by_one(log):
-    rng = np.random.default_rng(1)
-    white = rng.standard_normal((len(log.t), 3))
+    white = default_rng(1).standard_normal((len(log.t), 3))
     gyro = np.full_like(white, np.nan)  # not read in every row
     gyro[::2] = sosfilt(butter(2, 0.1, output="sos"), white[::2], axis=0)
     made = replace(log, accelerometer=white, gyro=gyro)
@@ -218,8 +220,10 @@ def test_a_rotor_s_own_lag_is_no_filter(vehicle, trajectory):
     assert note.startswith("the rotor speeds were filtered before the log was written")
 
 
-PERIOD, GRAVITY = 0.005, 9.81
-GYRO_BIAS, FORCE_BIAS = np.array([0.01, -0.02, 0.015]), np.array([0.05, -0.1, 0.08])
+PERIOD = 0.005
+GRAVITY = 9.81
+GYRO_BIAS = np.array([0.01, -0.02, 0.015])
+FORCE_BIAS = np.array([0.05, -0.1, 0.08])
 
 
 @pytest.fixture(scope="module")
@@ -234,16 +238,16 @@ def motion():
     acceleration = -position * wave**2
     felt = acceleration + np.array([0.0, 0.0, GRAVITY])
     up = felt.copy()
-    up /= np.linalg.norm(up, axis=1)[:, None]
+    up /= norm(up, axis=1)[:, None]
     heading = 2.0 + 0.5 * np.sin(0.3 * t)
     forward = np.column_stack([np.cos(heading), np.sin(heading), np.zeros_like(t)])
     left = np.cross(up, forward)
-    left /= np.linalg.norm(left, axis=1)[:, None]
+    left /= norm(left, axis=1)[:, None]
     rotation = np.stack([np.cross(left, up), left, up], axis=2)
     turned = Rotation.from_matrix(rotation)
     rate = (turned[:-1].inv() * turned[1:]).as_rotvec() / PERIOD
     rate = np.vstack([rate[:1], 0.5 * (rate[1:] + rate[:-1]), rate[-1:]])
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     force = turned.inv().apply(felt)
     return {
         "t": t,
@@ -258,7 +262,7 @@ def motion():
 
 def tilt_error(rotation, truth):
     """Angle (rad) between the verticals of two attitudes, in body axes."""
-    return np.linalg.norm(rotation[:, 2] - truth[:, 2], axis=1)
+    return norm(rotation[:, 2] - truth[:, 2], axis=1)
 
 
 def test_an_imu_alone_keeps_the_vertical(motion):
@@ -266,7 +270,7 @@ def test_an_imu_alone_keeps_the_vertical(motion):
     fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1))
     at = np.searchsorted(motion["t"], fused.t - 1e-9)
     error = tilt_error(fused.rotation, motion["rotation"][at])
-    assert np.sqrt(np.mean(error**2)) < 0.02
+    assert rms(error) < 0.02
     assert np.mean(error < 2.5 * np.hypot(fused.std[:, 0], fused.std[:, 1])) > 0.95
     assert abs(Rotation.from_matrix(fused.rotation[0]).as_euler("ZYX")[0]) < 0.1
     assert (fused.std[:, 3:6] > 4.0).all()
@@ -283,6 +287,6 @@ def test_ten_positions_a_second_show_heading_velocity_and_biases(motion):
     ).as_rotvec()
     assert np.abs(off).max() < 0.02
     z = (fused.velocity - motion["velocity"][at]) / fused.std[:, 3:6]
-    assert 0.3 < np.sqrt(np.mean(z**2)) < 2.0
-    assert np.abs(fused.gyro_bias[len(at) // 2] - GYRO_BIAS).max() < 0.002
-    assert np.abs(fused.accelerometer_bias[len(at) // 2] - FORCE_BIAS).max() < 0.03
+    assert 0.3 < rms(z) < 2.0
+    assert abs(fused.gyro_bias[len(at) // 2] - GYRO_BIAS).max() < 0.002
+    assert abs(fused.accelerometer_bias[len(at) // 2] - FORCE_BIAS).max() < 0.03

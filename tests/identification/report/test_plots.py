@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.browser import look, needs_browser
@@ -53,13 +54,13 @@ def test_a_flight_of_a_minute_is_carried_whole():
     assert time["effects"] == ["rotor_drag", "wind"]
     for i, channel in enumerate(time["channels"]):
         factor = FACTORS[channel["unit"]]
-        assert np.abs(times(channel, time["pieces"]) - trace.t).max() < 1e-4
+        assert abs(times(channel, time["pieces"]) - trace.t).max() < 1e-4
         series = [channel["before"], channel["after"], *channel["parts"]]
         truth = [trace.before, trace.after, *(trace.parts[name] for name in time["effects"])]
         for packed, x in zip(series, truth, strict=True):
             x = factor * x[:, i]
             assert (packed is None) == (not x.any())
-            assert packed is None or np.abs(unpacked(packed) - x).max() <= 1e-4 * np.abs(x).max()
+            assert packed is None or abs(unpacked(packed) - x).max() <= 1e-4 * np.abs(x).max()
 
 
 SPIKES = (("before", 12_345, 0, 7.0), ("before", 100_001, 4, -8.0), ("after", 170_000, 2, 9.0))
@@ -73,7 +74,7 @@ def test_a_spike_of_any_channel_stays():
     for side, _, i, size in SPIKES:
         channel = plots[i].packed
         drawn = FACTORS[channel["unit"]] * size
-        assert np.abs(unpacked(channel[side]) - drawn).min() <= 1e-4 * abs(drawn)
+        assert abs(unpacked(channel[side]) - drawn).min() <= 1e-4 * abs(drawn)
     kept = telling_samples(trace, 0, 150)
     assert 12_345 in kept
     assert (kept[0], kept[-1]) == (0, len(trace.t) - 1)
@@ -101,7 +102,7 @@ def test_pieces_of_several_logs_stand_side_by_side():
     time = page_plots(made_diagnosis(*traces)).data["time"]
     assert [p["log"] for p in time["pieces"]] == ["log 0", "log 1", "log 2"]
     x = times(time["channels"][0], time["pieces"])
-    assert np.all(np.diff(x) > 0)
+    assert (np.diff(x) > 0).all()
     assert x[-1] == pytest.approx(time["end"], abs=1e-3)
     assert len(time["held"]) == 2 * 3
     (plot, *_) = page_plots(made_diagnosis(*traces)).time
@@ -110,8 +111,7 @@ def test_pieces_of_several_logs_stand_side_by_side():
 
 def test_only_the_pages_own_scripts_may_run():
     rude = "</script><script>alert(1)</script>\u2028"
-    made = made_diagnosis(replace(made_trace(), log=rude))
-    page = report_page(made, "command")
+    page = report_page(made_diagnosis(replace(made_trace(), log=rude)), "command")
     scripts = re.findall(r"<script[^>]*>(.*?)</script>", page, re.S)
     assert len(scripts) == 3
     assert json.loads(scripts[0])["time"]["pieces"][0]["log"] == rude
@@ -169,7 +169,7 @@ def test_keys_zoom_and_switches_in_a_browser(tmp_path, width, dark):
     # one cursor: a key on one plot, the values of all six at the same time
     seconds = {re.search(r"t = ([\d.]+) s", text)[1] for text in done["linked"]}
     assert len(seconds) == 1
-    i = int(np.argmin(np.abs(trace.t - float(seconds.pop()))))
+    i = int(np.argmin(abs(trace.t - float(seconds.pop()))))
     for k, text in enumerate(done["linked"]):
         told = re.findall(r"(?:before|after) (−?[\d.]+)", text)
         values = [float(value.replace("−", "-")) for value in told]
@@ -206,10 +206,10 @@ def test_cursors_over_a_long_flight_say_one_time(tmp_path):
 
 def test_a_line_of_many_rows_is_drawn_by_its_extremes():
     rows = 1_000_003
-    values = np.random.default_rng(1).normal(size=(rows, 2))
+    values = default_rng(1).normal(size=(rows, 2))
     values[777_777, 0], values[rows - 1, 1] = 50.0, -50.0
     shown = log_channels._extremes(values)
-    assert np.all(np.diff(shown) > 0)
+    assert (np.diff(shown) > 0).all()
     assert {0, 777_777, rows - 1} <= set(shown.tolist())
     assert len(shown) < 5 * log_channels._BINS
     few = values[: 2 * log_channels._BINS]

@@ -33,12 +33,11 @@ TRIED = ("rotor_drag", "body_drag", "mass", *(f"effect_{i}" for i in range(14)))
 @pytest.fixture(scope="module")
 def diagnosis():
     """A diagnosis that names rotor drag, of a flight of 20 s."""
-    trace = made_trace(20.0)
-    made = made_diagnosis(trace)
+    made = made_diagnosis(made_trace(20.0))
     (drag,) = made.effects
     unit = "N/(rad/s m/s)"
-    std, units = {"kdx": 3e-6, "kdy": 4e-6}, dict.fromkeys(DRAG, unit)
-    drag = replace(drag, coefficients=DRAG, std=std, units=units)
+    std = {"kdx": 3e-6, "kdy": 4e-6}
+    drag = replace(drag, coefficients=DRAG, std=std, units=dict.fromkeys(DRAG, unit))
     return replace(
         made,
         remainder="random",
@@ -80,7 +79,8 @@ def hard(diagnosis):
             "com_offset", {"cx": 0.00612}, {"cx": 0.0002}, {"cx": "m"}, False, (), {"share": 0.2}
         ),
     ]
-    trace, signature = diagnosis.traces[0], diagnosis.signatures[0]
+    trace = diagnosis.traces[0]
+    signature = diagnosis.signatures[0]
     return replace(
         diagnosis,
         verdict="partly explained",
@@ -176,7 +176,7 @@ def test_a_coefficient_is_as_precise_as_it_is_known(value, std, text):
 
 
 def test_the_sentences_are_those_kept():
-    assert said() == json.loads(GOLDEN.read_text(encoding="utf-8"))
+    assert said() == json.loads(GOLDEN.read_bytes())
 
 
 class Page(HTMLParser):
@@ -184,7 +184,8 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.tags, self.words = [], []
+        self.tags = []
+        self.words = []
         self.feed(text)
         self.text = " ".join(" ".join(self.words).split())
 

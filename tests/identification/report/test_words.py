@@ -48,8 +48,7 @@ def test_an_effect_is_told_by_what_it_does(effect, words):
 
 
 def test_a_drag_is_told_by_its_force_on_four_rotors():
-    effect = named("rotor_drag", kdx=1e-6)
-    found = amount(effect, "kdx", VEHICLE)
+    found = amount(named("rotor_drag", kdx=1e-6), "kdx", VEHICLE)
     assert found.value == pytest.approx(1e3 * 4.0 * 1e-6 * VEHICLE.hover_rate)
     assert (found.unit, found.where, found.when) == ("mN", "along x", "at 1 m/s")
 

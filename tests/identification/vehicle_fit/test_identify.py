@@ -7,6 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm, pinv
+from numpy.random import default_rng
 from scipy.signal import butter, sosfiltfilt
 
 from tests.identification.vehicle_fit.flown import (
@@ -76,7 +78,7 @@ def check(found, name, truth, within):
 
 def test_results_are_those_kept():
     """All that identification says of made flights: predictions, changes and faults beside."""
-    assert_alike(json.loads(json.dumps(made())), json.loads(GOLDEN.read_text(encoding="utf-8")))
+    assert_alike(json.loads(json.dumps(made())), json.loads(GOLDEN.read_bytes()))
 
 
 def test_commanded_speeds_show_the_vehicle_and_its_lag(commanded):
@@ -104,17 +106,16 @@ def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from():
     log = recorded("shake", 15.0, vehicle=CRAZYFLIE)
     log = replace(log, rotor_speeds=step * np.round(log.rotor_speeds / step))
     assert np.median(log.rotor_speeds) > 1.5 * 255 * step
-    found = of_crazyflie([log])
-    again = parse_vehicle(dump_vehicle(found.vehicle))
+    again = parse_vehicle(dump_vehicle(of_crazyflie([log]).vehicle))
     assert again.omega_lsb == pytest.approx(step)
     assert not any("reads" in note for note in screen_log(log, again)[1])
     force = estimate_log(log, again).force
-    assert np.abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
+    assert abs(np.mean(force[len(force) // 2 :], axis=0)).max() < 0.02 * again.weight
 
 
 def test_noise_of_rotor_speeds_is_no_torque():
     """Of 2 % of the speed, which makes more torque than the flight: inertia came out double."""
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
 
     def shaken(log):
         return 1.0 + 0.02 * rng.standard_normal(log.rotor_speeds.shape)
@@ -137,8 +138,7 @@ def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
 
 
 def test_a_hover_does_not_show_what_it_does_not_excite():
-    hover = [recorded("hover", 12.0, vehicle=CRAZYFLIE)]
-    found = of_crazyflie(hover)
+    found = of_crazyflie([recorded("hover", 12.0, vehicle=CRAZYFLIE)])
     assert found.estimates["Jzz"].status == "assumed"
     assert found.estimates["motor_lag"].status == "not identifiable"
     assert any("Yaw at" in line for line in found.advice)
@@ -186,11 +186,12 @@ def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
 
 def test_tapers_lose_what_the_intervals_add():
     """A regression of white noise on white noise, of density 0.01: its variance by its weight."""
-    rng, off = np.random.default_rng(0), []
+    rng = default_rng(0)
+    off = []
     for noise in rng.standard_normal((2000, 500, 2)):
         (s,) = segments_of(noise, 0.01, 0, np.inf)
         x, y = np.moveaxis(s.columns * np.sqrt(s.weight)[:, None], 2, 0)
-        off.append(np.vdot(x, y).real / np.linalg.norm(x))
+        off.append(np.vdot(x, y).real / norm(x))
     assert np.var(off) == pytest.approx(0.01 * LOSS, rel=0.08)  # 1.17: 1 would be off
 
 
@@ -225,7 +226,7 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monk
         assert found.estimates[name].status in ("assumed", "not identifiable")
         assert "(2 against 1 rad/s after 0.5 s)" in found.estimates[name].how
     assert found.estimates["Jxx"].high > 3.0 * found.estimates["Jxx"].low
-    assert np.all(found.vehicle.com == 0.0)
+    assert (found.vehicle.com == 0.0).all()
     assert any("roll movements" in line for line in found.advice)
     with pytest.raises(
         InputError, match=r"2 against 1 rad/s.*no arm is given; expected --geometry"
@@ -257,7 +258,8 @@ def test_the_simplest_model_that_is_not_worse_stands(whole, keeps_rate, simplest
 
 
 def test_a_vehicle_that_is_refuted_keeps_its_motion(commanded):
-    log, status = commanded[0], ModelStatus("refuted", "refuted")
+    log = commanded[0]
+    status = ModelStatus("refuted", "refuted")
     path = predict(log, replace(CRAZYFLIE, status=status), every=200)
     state = causal_states(log, CRAZYFLIE)[path.start]
     ahead = path.period * np.arange(1, path.velocity.shape[1] + 1)[:, None]
@@ -319,16 +321,19 @@ def test_rotors_in_another_order_are_refused(inertial):
 
 def test_turning_is_compared_with_torque_at_its_own_delay():
     """60 ms of 4 to 7 Hz are more than a quarter of a turn: at no delay all looks opposed."""
-    rng, period, late = np.random.default_rng(3), 0.01, 6
+    rng = default_rng(3)
+    period = 0.01
+    late = 6
     n = 3000
     band = butter(2, [8.0 * period, 14.0 * period], btype="bandpass", output="sos")
     turn = sosfiltfilt(band, rng.standard_normal((n, 3)), axis=0) * [3.0, 3.0, 1.0]
     mixing = np.array([Y, -X, -REACH * SPIN])
     torque = INERTIA @ np.roll(turn, -late, axis=0).T
-    square = np.maximum((FULL * HOVER) ** 2 + (np.linalg.pinv(mixing) @ torque / K).T, 0.0)
+    square = np.maximum((FULL * HOVER) ** 2 + (pinv(mixing) @ torque / K).T, 0.0)
     still, force = np.zeros((2, n, 3))
     force[:, 2] = K / MASS * square.sum(axis=1)
-    t, rate = period * np.arange(n), period * np.cumsum(turn, axis=0)
+    t = period * np.arange(n)
+    rate = period * np.cumsum(turn, axis=0)
     piece = MotionPiece(0, t, period, force, turn, rate, still, np.sqrt(square), None, None)
     drive = Drive(GIVEN.positions, SPIN)
     sources = Sources("accelerometer", "gyro", "rotor speeds", True)
@@ -376,7 +381,8 @@ def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
         EffectSetting("body_drag", {"cx": 4e-4, "cy": 6e-4}),
     )
     it = found(*effects)
-    v, speed = it.vehicle, 3.0
+    v = it.vehicle
+    speed = 3.0
     set_to = dict(re.findall(r"param set (\S+) (\S+)", EXPORTS["px4"](it)))
     predicted = float(set_to["EKF2_MCOEF"]) * speed
     predicted += 0.5 * 1.225 * speed**2 / float(set_to["EKF2_BCOEF_Y"])
@@ -389,7 +395,8 @@ def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
 
 
 def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
-    full, bend = 0.15, 0.7
+    full = 0.15
+    bend = 0.7
     it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)), commands=True)
     text = EXPORTS["px4"](it)
     set_to = {k: float(x) for k, x in re.findall(r"param set (\S+) (\S+)", text)}
@@ -404,7 +411,8 @@ def test_rotorpy_makes_the_same_forces_and_torques():
     it = found(EffectSetting("rotor_drag", {"kdx": 2e-6, "kdy": 3e-6}))
     names = {"np": np}
     exec(EXPORTS["rotorpy"](it), names)
-    p, v = names["quad_params"], it.vehicle
+    p = names["quad_params"]
+    v = it.vehicle
     speeds = np.array([1500.0, 1600.0, 1700.0, 1800.0])
     thrust = v.k * speeds**2
     place = np.array(list(p["rotor_pos"].values()))

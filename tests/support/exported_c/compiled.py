@@ -126,21 +126,23 @@ def differences(c, python):
     in the Python filter's; that of the stated standard deviations, relative; and whether status or
     restarts differ.
     """
-    e, p = c.estimate, python.estimate
+    e = c.estimate
+    p = python.estimate
     std = p.std.reshape(6, 3).copy()
     std[0] *= 4.0  # an MRP is a quarter of an angle
     stated = np.concatenate([std[:4], p.std_wrench.reshape(2, 3)])
     out = {}
     for k, name in enumerate(PARTS):
         if name == "attitude":
-            q, r = np.array(e.quaternion, dtype=float), p.quaternion
+            q = np.array(e.quaternion, dtype=float)
+            r = p.quaternion
             turn = r[0] * q[1:] - q[0] * r[1:] - np.cross(q[1:], r[1:])
             difference = 2.0 * np.abs(turn)
         else:
-            difference = np.abs(np.array(getattr(e, name), dtype=float) - getattr(p, name))
+            difference = abs(np.array(getattr(e, name), dtype=float) - getattr(p, name))
         out[name] = float(np.max(difference / std[k]))
         mine = np.array(getattr(e, f"std_{name}"), dtype=float)
-        out["std"] = max(out.get("std", 0.0), float(np.max(np.abs(mine / stated[k] - 1.0))))
+        out["std"] = max(out.get("std", 0.0), float(abs(mine / stated[k] - 1.0).max()))
     same = STATUSES[e.status] == p.status and e.restarts == p.restarts
     out["status"] = 0.0 if same else 1.0
     return out
@@ -168,7 +170,10 @@ def compare(c, python, flight, every=1):
     """
     first = begin(c, flight)
     begin(python, flight)
-    worst, voltage, told, given = {}, flight.get("voltage"), (), ()
+    worst = {}
+    voltage = flight.get("voltage")
+    told = ()
+    given = ()
     for k in range(first + 1, len(flight["dt"])):
         if voltage is not None:
             told = (voltage[k],) if voltage[k] != voltage[k - 1] else ()

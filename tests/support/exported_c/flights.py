@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.random import default_rng
 from scipy.spatial.transform import Rotation
 
 from tests.support.exported_c.hostile import befall
@@ -51,12 +52,14 @@ def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
     log = record_flight(
         model, vehicle_of(name).effects, trajectory, max(0.1, steps * every / 200.0), seed, imu=imu
     )
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     rows = slice(0, steps * every, every)
-    position, quaternion = log["position"][rows].copy(), log["quaternion"][rows].copy()
-    n, period = len(position), every / 200.0
+    position = log["position"][rows].copy()
+    quaternion = log["quaternion"][rows].copy()
+    n = len(position)
+    period = every / 200.0
     if noise > 1.0:
-        _disturb(position, quaternion, model.mocap, noise, np.random.default_rng((seed, 1)))
+        _disturb(position, quaternion, model.mocap, noise, default_rng((seed, 1)))
     out = {
         "dt": period * (1.0 + 0.02 * rng.uniform(-1.0, 1.0, n)),
         "rotor_speeds": log["rotor_speeds"][rows],
@@ -71,7 +74,8 @@ def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
     k = round(0.5 / period) if faults else n
     while k < n:
         if rng.random() < _FAULT * period / 0.005:
-            kind, length = str(rng.choice(list(_SIZES))), float(rng.choice(_LENGTHS))
+            kind = str(rng.choice(list(_SIZES)))
+            length = float(rng.choice(_LENGTHS))
             rows = slice(k, min(k + max(1, round(length / period)), n))
             befall(kind, rows, position, quaternion, out["rotor_speeds"], rng, _SIZES[kind])
             k = rows.stop

@@ -1,6 +1,8 @@
 """Hostile sequences for C and Python: what vehicles, motion capture and radios do, at its worst."""
 
 import numpy as np
+from numpy.linalg import norm
+from numpy.random import default_rng
 
 STEPS = 1_000
 PERIOD = 0.0055  # s: no bound of the filters is a multiple of it, which rounding alone would decide
@@ -14,7 +16,7 @@ def hostile(vehicle, seed):
     """Return a hover (``STEPS`` rows, as of ``flights.flight``) to which something happens every
     half a second: for 5 ms to 0.6 s, 1 cm to 30 m far. Signs of quaternions change at random.
     """
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     position = np.array([0.0, 0.0, 1.2]) + 0.001 * rng.standard_normal((STEPS, 3))
     quaternion = np.array([1.0, 0.0, 0.0, 0.0]) + 0.002 * rng.standard_normal((STEPS, 4))
     speeds = vehicle.hover_rate * (1.0 + 0.01 * rng.standard_normal((STEPS, 4)))
@@ -23,7 +25,7 @@ def hostile(vehicle, seed):
         last = min(first + int(rng.integers(1, 120)), STEPS)
         befall(str(rng.choice(KINDS)), slice(first, last), position, quaternion, speeds, rng)
         first = last + int(rng.integers(20, 200))
-    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    quaternion /= norm(quaternion, axis=1, keepdims=True)
     quaternion *= rng.choice([-1.0, 1.0], (STEPS, 1))
     flown = {
         "dt": np.full(STEPS, PERIOD),
@@ -42,7 +44,7 @@ def befall(kind, when, x, q, W, rng, size=None):
     """
     count = when.stop - when.start
     away = rng.standard_normal(3)
-    away *= (10.0 ** rng.uniform(-2.0, 1.5) if size is None else size) / np.linalg.norm(away)
+    away *= (10.0 ** rng.uniform(-2.0, 1.5) if size is None else size) / norm(away)
     if kind in ("gap", "attitude only"):
         x[when] = np.nan
     if kind in ("gap", "position only"):
@@ -58,7 +60,8 @@ def befall(kind, when, x, q, W, rng, size=None):
         q[when] = rng.standard_normal((count, 4))
         x[when] += (kind == "random poses") * (size or 1.0) * rng.standard_normal((count, 3))
     elif kind == "frozen":
-        x[when], q[when] = x[when.start], q[when.start]
+        x[when] = x[when.start]
+        q[when] = q[when.start]
     elif kind == "not a number":
         for values in (x, q, W):
             values[when][rng.random((count, values.shape[1])) < 0.2] = np.nan
