@@ -113,9 +113,9 @@ template <class S> struct Filter {
   Model<S> vehicle;
   Belief<S> belief;
   Settings<S> settings;
+  Imu<S> imu;
   S z[11];                  // a step's sample: rotor speeds rad/s, position m, quaternion
   S centre_rotation[3][3];  // attitude at the start of the last step
-  Imu<S> imu;
 };
 
 // The numbers of one lane, out of a struct of nothing but numbers of type T, or back into it

@@ -77,10 +77,10 @@ FILTER = np.dtype(
         ("uncertain", "f8", (FACTORS,)),  # of the vehicle
         ("kappa", "f8"),
         ("period", "f8"),
+        ("imu", IMU),
         # rotor speeds, position and quaternion, for a step that is called from elsewhere
         ("z", "f8", (11,)),
         ("centre_rotation", "f8", (3, 3)),  # attitude at the start of the last step
-        ("imu", IMU),
         # the step in progress
         ("acceleration", "f8", (6,)),
         ("rotation", "f8", (3, 3)),  # of the sigma point in hand

@@ -25,10 +25,7 @@ _KEPT = fields_between("x", "last_speeds")
 _MEMORY = {"poses": LaneRecord(MEMORY, MEMORY.names or ())}
 _WORK = LaneRecord(
     FILTER,
-    (
-        *(*_KEPT, "rotor_wrench", "z", "centre_rotation"),
-        *fields_between("acceleration", "innovation"),
-    ),
+    (*_KEPT, "rotor_wrench", *fields_between("z", "innovation")),
     ("body", "effect_wrench", *fields_between("gated", "period")),
     _MEMORY,
 )

@@ -52,8 +52,7 @@ _KEPT = {
     **{f"poses_{name}": MEMORY[name] for name in MEMORY.names or ()},
     **{name: FILTER[name] for name in ("rotors", "rotor_wrench", "effect_wrench")},
     **{name: FILTER[name] for name in fields_between("x", "last_speeds")},
-    **{name: FILTER[name] for name in ("z", *fields_between("acceleration", "rows"))},
-    "centre_rotation": FILTER["centre_rotation"],
+    **{name: FILTER[name] for name in fields_between("z", "rows")},
 }
 # fields declared in templates
 _OF_IMU = {
