@@ -15,12 +15,12 @@ from numpy.testing import assert_allclose
 from tests.live.stream import Running, as_lines, flight
 from tests.live.test_pipeline import offline
 from tests.support.browser import browse, needs_browser
+from tests.support.outcomes import refused
 from tests.support.programs import started, until
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
 from windwrench.live.terminal_page import page
 from windwrench.live.web_view import WebView
-from windwrench.runtime.errors import InputError
 
 
 def run(capsys, *arguments):
@@ -102,7 +102,7 @@ def test_the_page_in_a_browser_is_served_here_alone(watched):
         other = urllib.request.Request(view.address, headers={"Host": "evil.example"})
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(other)
-        with pytest.raises(InputError, match="--port"):
+        with refused("--port"):
             WebView(watched, int(view.address.rpartition(":")[2].strip("/")))
 
 

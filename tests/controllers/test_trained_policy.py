@@ -5,6 +5,7 @@ import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
+from tests.support.outcomes import refused
 from windwrench.controllers.features import Features
 from windwrench.controllers.registry import shipped_policies
 from windwrench.controllers.trained_policy import (
@@ -13,7 +14,6 @@ from windwrench.controllers.trained_policy import (
     load_policy,
     save_policy,
 )
-from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.evaluation.benchmark import Request, fly_all
 from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds, fly_episode
@@ -108,7 +108,7 @@ def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(kind, card, weigh
 
 def test_a_policy_of_another_task_is_refused(tmp_path):
     path = save_policy(TASK_CARD, recurrent("gru", 27, 5, 3), tmp_path / "mine.npz")
-    with pytest.raises(InputError, match="a policy of WindHover, not of WindTrajectory"):
+    with refused("a policy of WindHover, not of WindTrajectory"):
         make_pilot(str(path), "WindTrajectory")
 
 

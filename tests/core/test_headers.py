@@ -9,7 +9,7 @@ import pytest
 from numpy.random import default_rng
 
 from tests.support.flights import PERIOD, yawing_flight
-from tests.support.vehicles import VEHICLE
+from tests.support.vehicles import POSE, VEHICLE
 from windwrench import _core
 from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 from windwrench.estimator.filter_record import FILTER
@@ -43,7 +43,7 @@ def flight_with_faults(seed):
 
 def begun(gate=0.999):
     ukf = WrenchUKF(VEHICLE, period=PERIOD, gate=gate)
-    ukf.reset([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
+    ukf.reset(*POSE)
     return ukf
 
 
@@ -74,7 +74,7 @@ def test_single_precision_follows_double():
         for precision in ("double", "single")
     ]
     for batch in batches:
-        batch.reset([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
+        batch.reset(*POSE)
     apart = []
     for sample in zip(*flight, strict=True):
         double, single = (batch.step(*sample) for batch in batches)

@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import replace
+from math import nan
 
 import gymnasium as gym
 import mujoco
@@ -11,8 +12,9 @@ from numba import njit
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.support.outcomes import refused
 from tests.support.vector_flights import TASKS, fly, make, make_single
-from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.lanes.flight import LOOPS, LoopBlocks, fly_freely
@@ -48,9 +50,9 @@ def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_pa
     for one in (envs, healthy):
         one.reset(seed=0)
     if plant == "mujoco":
-        envs.loops[1].data.qvel[0] = np.nan
+        envs.loops[1].data.qvel[0] = nan
     else:
-        envs._flying.loops["qvel"][0, 0, 1] = np.nan
+        envs._flying.loops["qvel"][0, 0, 1] = nan
     frames, rewards, lost, _, infos = envs.step(actions)
     assert lost.tolist() == infos["lost"].tolist() == [False, True, False]
     assert frames in envs.observation_space
@@ -65,7 +67,7 @@ def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_pa
 def test_many_environments_want_a_reset_of_all_first():
     envs = make(2)
     envs.reset(seed=0, options={"reset_mask": np.array([True, False])})
-    with pytest.raises(InputError, match="reset before step"):
+    with refused("reset before step"):
         envs.step(np.zeros((2, 1), np.float32))
 
 
@@ -83,11 +85,11 @@ def test_seeds_may_be_listed_and_a_part_reset():
     assert infos["time"].tolist() == [0.0, pytest.approx(0.16), pytest.approx(0.16)]
 
 
-@pytest.mark.parametrize("actions", [np.zeros(3), np.zeros((2, 1)), np.full((3, 1), np.nan)])
+@pytest.mark.parametrize("actions", [np.zeros(3), np.zeros((2, 1)), np.full((3, 1), nan)])
 def test_bad_actions_are_named_and_nothing_flies(actions):
     envs = make(3)
     envs.reset(seed=0)
-    with pytest.raises(InputError, match=r"shape \(3, 1\)"):
+    with refused(r"shape \(3, 1\)"):
         envs.step(actions)
     assert (envs.step(np.zeros((3, 1)))[4]["time"] == 0.08).all()
 

@@ -17,7 +17,7 @@ from tests.support.model_flights import (
     drawn,
     simulate_model,
 )
-from tests.support.vehicles import VEHICLE
+from tests.support.vehicles import POSE, VEHICLE
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import Uncertainty
 from windwrench.envs.recording import record_flight
@@ -133,9 +133,9 @@ def test_the_filter_stays_as_it_is_and_says_in_hover_what_follows_by_hand(make):
     exact = make(replace(VEHICLE, uncertainty=Uncertainty()))
     stated = make(VEHICLE)
     for ukf in (exact, stated):
-        ukf.reset((0, 0, 1), (1, 0, 0, 0))
+        ukf.reset(*POSE)
     for _ in range(1000):
-        a, b = (u.step([VEHICLE.hover_rate] * 4, (0, 0, 1), (1, 0, 0, 0)) for u in (exact, stated))
+        a, b = (u.step([VEHICLE.hover_rate] * 4, *POSE) for u in (exact, stated))
     assert_array_equal(a.state, b.state)
     assert_array_equal(a.covariance, b.covariance)
     assert_array_equal(a.std_force, a.std[15:])

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.support.flights import fly, yawing_flight
 from tests.support.model_flights import ANISOTROPIC
 from tests.support.sizes import rms
-from tests.support.vehicles import VEHICLE
+from tests.support.vehicles import POSE, VEHICLE
 from windwrench.dynamics import EffectSetting
 from windwrench.estimator import ConstantGainFilter, WrenchUKF
 
@@ -133,7 +133,7 @@ def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
     attitude /= norm(attitude, axis=1, keepdims=True)
     found = []
     for f in (full, constant):
-        f.reset([0, 0, 1], [1, 0, 0, 0])
+        f.reset(*POSE)
         found.append([f.step(speeds, *pose) for pose in zip(position, attitude, strict=True)])
     assert_close(*(estimates[2500:] for estimates in found), 0.1)
     assert_allclose(np.diag(constant.covariance), np.diag(full.covariance), rtol=1e-3)
@@ -144,7 +144,7 @@ def test_a_gap_widens_its_covariance_with_the_declared_effects():
     vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": 2e-3, "kdy": 2e-3}))
     deviations = []
     for f in (WrenchUKF(vehicle), ConstantGainFilter(vehicle), ConstantGainFilter(VEHICLE)):
-        f.reset([0, 0, 1], [1, 0, 0, 0])
+        f.reset(*POSE)
         for k in range(1225):
             pose = ([0, 0, 1], [1, 0, 0, 0]) if k < 1200 else (None, None)
             e = f.step(np.full(4, vehicle.hover_rate), *pose)

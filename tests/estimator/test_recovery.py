@@ -2,6 +2,8 @@
 right again soon, and honest all along.
 """
 
+from math import pi
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -139,7 +141,7 @@ def test_nothing_makes_numbers_overflow_or_a_covariance_indefinite(kind, example
         vehicle=st.sampled_from(("ardrone2", "crazyflie")),
         dt=st.sampled_from((0.001, 0.005, 0.01, 0.02, 0.05, 0.1)),
         gate=st.sampled_from((None, 0.99, 0.999, 0.999999)),
-        turn=st.sampled_from((0.0, 0.5, np.pi / 2, 3.0, np.pi)),
+        turn=st.sampled_from((0.0, 0.5, pi / 2, 3.0, pi)),
         faults=st.lists(FAULTS, min_size=1, max_size=4),
     )
     def live(vehicle, dt, gate, turn, faults):
@@ -183,7 +185,7 @@ SPINS = (
     ("rotors", 30, 1.0, 3),
     ("off", 60, 1.0, 4),
 )
-STARTS = ((np.pi / 2, 0.999), (3.0, None), (np.pi, 0.999))
+STARTS = ((pi / 2, 0.999), (3.0, None), (pi, 0.999))
 SLOW = (("crazyflie", 0.1), ("ardrone2", 0.05))
 LIVES = (
     *(

@@ -3,6 +3,8 @@
 ``test_ukf.py`` holds the smoother to the literal one.
 """
 
+from math import nan
+
 import numpy as np
 import pytest
 from numpy.linalg import eigvalsh, inv, solve
@@ -111,14 +113,14 @@ def test_a_link_is_cut_where_there_is_no_joint_distribution():
     link_back(P, C, 0.5 * after, G, K)
     assert not G.any()
     assert np.array_equal(K, P)
-    link_back(P, C, np.full((18, 18), np.nan), G, K)
+    link_back(P, C, np.full((18, 18), nan), G, K)
     assert not G.any()
 
 
 @pytest.mark.parametrize("block", [1, 7])
 def test_blocks_change_nothing(block, monkeypatch):
     log = model_log(300)
-    log[2][100:120] = np.nan
+    log[2][100:120] = nan
     whole = smooth(*log, covariance=True)
     monkeypatch.setattr(smoother, "_BLOCK", block)
     pieces = smooth(*log, covariance=True)
@@ -151,8 +153,8 @@ def test_covariances_stay_positive_definite_whatever_was_flown(seed):
     _, speeds, x, q = model_log(400, seed)
     x += np.cumsum(rng.choice([0.0, 1.0], (400, 1), p=[0.98, 0.02]) * rng.normal(0, 2, (400, 3)), 0)
     lost = slice(150, 150 + 40 * (seed + 1))
-    x[lost] = np.nan
-    q[lost] = np.nan
+    x[lost] = nan
+    q[lost] = nan
     t = np.cumsum(rng.choice([0.001, 0.005, 0.02], 400))
     found = smooth(t, speeds, x, q, covariance=True)
     assert np.isfinite(found.state[:, :19]).all()

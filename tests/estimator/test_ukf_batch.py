@@ -6,6 +6,7 @@ import copy
 import gc
 import pickle
 import tracemalloc
+from math import nan
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.flights import yawing_flight
-from tests.support.vehicles import VEHICLE
+from tests.support.vehicles import HOVER, POSE, VEHICLE
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs import FanTrackingEnv
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF, WrenchUKFBatch
@@ -42,10 +43,10 @@ def samples():
     flights = [yawing_flight(VEHICLE, STEPS, seed=seed) for seed in range(COUNT)]
     rotors, position, quaternion = (np.stack([f[name] for f in flights], axis=1) for name in NAMES)
     rng = default_rng(0)
-    rotors[1:][rng.random((STEPS - 1, COUNT)) < 0.02] = np.nan
-    position[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = np.nan
-    quaternion[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = np.nan
-    position[40:60, 2] = quaternion[40:60, 2] = np.nan
+    rotors[1:][rng.random((STEPS - 1, COUNT)) < 0.02] = nan
+    position[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = nan
+    quaternion[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = nan
+    position[40:60, 2] = quaternion[40:60, 2] = nan
     position[70, 1] += 0.5  # an outlier
     position[15:, 4] += [2.0, 0.0, 0.0]  # a jump for good: a gate restarts the filter
     return rotors, position, quaternion
@@ -132,8 +133,6 @@ def test_it_starts_from_what_is_given_and_coasts_as_single_filters_do(common, ea
     assert np.isnan(together[-1].nis).all()
 
 
-HOVER = np.full(4, VEHICLE.hover_rate)
-POSE = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]
 QUATERNION = np.array([0.5, 0.1, -0.2, 0.8]) / norm([0.5, 0.1, -0.2, 0.8])
 ARGUMENTS = np.array([380.0, 390.0, 400.0, 410.0]), np.array([0.01, 0.0, 1.0]), QUATERNION
 

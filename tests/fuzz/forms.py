@@ -37,6 +37,7 @@ from tests.support.map_tables import hover_columns, table_text, vehicle_of
 from tests.support.paths import ROOT
 from tests.support.sd_card_writer import sd_card, sd_card_before_2021
 from tests.support.ulog_writer import battery, control, esc, odometry, sensor_combined, ulog_bytes
+from tests.support.vehicles import POSE
 from windwrench.controllers.features import Features
 from windwrench.controllers.trained_policy import load_policy, save_policy
 from windwrench.dynamics.effects import parse_setting
@@ -194,8 +195,8 @@ def _use_vehicle(path):
     vehicle = load_vehicle(path)
     assert dump_vehicle(parse_vehicle(dump_vehicle(vehicle))) == dump_vehicle(vehicle)
     ukf = WrenchUKF(vehicle, UKFTuning.for_vehicle(vehicle))
-    ukf.reset([0, 0, 1], [1, 0, 0, 0])
-    ukf.step(np.full(4, min(vehicle.hover_rate, vehicle.omega_max)), [0, 0, 1], [1, 0, 0, 0])
+    ukf.reset(*POSE)
+    ukf.step(np.full(4, min(vehicle.hover_rate, vehicle.omega_max)), *POSE)
 
 
 @cache

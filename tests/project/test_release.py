@@ -16,7 +16,7 @@ import windwrench
 from tests.support.diagnoses import made_diagnosis, made_trace
 from tests.support.paths import ROOT
 from tests.support.programs import said
-from tests.support.vehicles import VEHICLE
+from tests.support.vehicles import HOVER, POSE, VEHICLE
 from windwrench.dynamics import EffectSetting, Mocap, Vehicle
 from windwrench.dynamics.effects.base import Coefficient, Effect
 from windwrench.dynamics.vehicle import MotorCurve
@@ -133,8 +133,6 @@ DOCUMENTED = (
     *(NoiseFit, NoiseFitSettings, ObserverTuning, Recovery),
     *(UKFTuning, FlightLog),
 )
-POSE = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
-SPEEDS = np.full(4, VEHICLE.hover_rate)
 
 
 @pytest.mark.parametrize("kind", DOCUMENTED, ids=lambda kind: kind.__name__)
@@ -159,11 +157,11 @@ def test_repr_is_short_and_says_what_it_is():
     ukf, batch = filters()
     assert repr(ukf) == "<WrenchUKF of ardrone2: period 0.005 s, tracking>"
     assert repr(batch) == "<WrenchUKFBatch of 2 x ardrone2: period 0.005 s>"
-    estimate = ukf.step(SPEEDS, *POSE)
+    estimate = ukf.step(HOVER, *POSE)
     assert repr(estimate).startswith("<WrenchEstimate tracking: force (")
     assert " Nm, NIS " in repr(estimate)
-    assert "coasting" in repr(ukf.step(SPEEDS))
-    assert repr(batch.step(np.tile(SPEEDS, (2, 1)))) == "<WrenchEstimate of 2: 2 coasting>"
+    assert "coasting" in repr(ukf.step(HOVER))
+    assert repr(batch.step(np.tile(HOVER, (2, 1)))) == "<WrenchEstimate of 2: 2 coasting>"
     assert "0 late, 0 too late: <WrenchUKF" in repr(TimedFilter(ukf))
     made = made_diagnosis(made_trace(5.0))
     log = FlightLog(np.arange(3.0), np.zeros((3, 3)), np.tile(POSE[1], (3, 1)), np.ones((3, 4)))

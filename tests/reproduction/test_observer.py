@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, fly, yawing_flight
 from tests.support.sizes import rms
-from tests.support.vehicles import VEHICLE
+from tests.support.vehicles import HOVER, POSE, VEHICLE
 from windwrench.dynamics import EffectSetting
 from windwrench.reproduction import NonlinearObserver
 
@@ -96,10 +96,9 @@ def test_declared_effects_are_not_a_wrench():
     force = {}
     for vehicle in (VEHICLE, VEHICLE.with_effects(drag, offset)):
         observer = NonlinearObserver(vehicle)
-        observer.reset([0, 0, 1], [1, 0, 0, 0], None, [1.0, 0, 0])
-        speeds = np.full(4, VEHICLE.hover_rate)
+        observer.reset(*POSE, None, [1.0, 0, 0])
         for k in range(1, 2001):
-            e = observer.step(speeds, [k * PERIOD, 0, 1], [1, 0, 0, 0])
+            e = observer.step(HOVER, [k * PERIOD, 0, 1], [1, 0, 0, 0])
         force[vehicle is VEHICLE] = np.concatenate([e.force, e.torque])
     pull = 3e-4 * 4 * VEHICLE.hover_rate
     torque = VEHICLE.weight * np.array([-0.006, -0.01])

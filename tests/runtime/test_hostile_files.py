@@ -22,6 +22,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.fuzz.spoiling import LAUGHS
+from tests.support.outcomes import refused
 from tests.support.paths import ROOT
 from tests.support.programs import said
 from windwrench.controllers.trained_policy import FORMAT, load_policy
@@ -30,7 +31,6 @@ from windwrench.identification import read_log
 from windwrench.identification.logs import tables, text_table
 from windwrench.identification.logs.flight_log import REQUIRED
 from windwrench.runtime import regular_files
-from windwrench.runtime.errors import InputError
 from windwrench.runtime.file_limits import LIMITS
 from windwrench.runtime.regular_files import read_json
 from windwrench.runtime.yaml_file import parse_yaml
@@ -264,7 +264,7 @@ def test_what_is_no_regular_file_is_refused_at_once(kind, name, tmp_path):
         "device": "is a device",
         "folder": "(is a folder|cannot be read|no metadata)",
     }
-    with pytest.raises(InputError, match=rf"{name}: {what[kind]}"):
+    with refused(rf"{name}: {what[kind]}"):
         read_log(path, readers.get(name), load_vehicle("ardrone2"))
 
 
@@ -272,12 +272,12 @@ def test_other_files_are_regular_too(tmp_path):
     assert parse_yaml("k: &k [1, 2]\np: *k", "good.yaml") == {"k": [1, 2], "p": [1, 2]}
     for name in ("p.npz", "p.json", "v.yaml"):
         os.mkfifo(tmp_path / name)
-    with pytest.raises(InputError, match=r"p\.json: is a pipe"):
+    with refused(r"p\.json: is a pipe"):
         load_policy(tmp_path / "p.npz")
-    with pytest.raises(InputError, match=r"v\.yaml: is a pipe"):
+    with refused(r"v\.yaml: is a pipe"):
         load_vehicle(tmp_path / "v.yaml")
     (tmp_path / "large.json").write_bytes(b" " * (LIMITS.json_text + 1))
-    with pytest.raises(InputError, match=r"large\.json: more than 4194304 bytes"):
+    with refused(r"large\.json: more than 4194304 bytes"):
         read_json(tmp_path / "large.json", "a card")
 
 
@@ -296,7 +296,7 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
             )
             assert_array_equal(read_log(path).t, columns["t"])
     monkeypatch.setattr(tables, "LIMITS", replace(LIMITS, table_numbers=10_000))
-    with pytest.raises(InputError, match="more than 10000 numbers in column"):
+    with refused("more than 10000 numbers in column"):
         read_log(path)
 
 
@@ -317,17 +317,17 @@ def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
         assert_array_equal(log.position, table[:, 1:4])
         assert_array_equal(log.t, table[:, 0])
     lines[777] = lines[777].replace(",", ",here", 1)
-    with pytest.raises(InputError, match=r"column px, row 778 \(line 779\): 'here"):
+    with refused(r"column px, row 778 \(line 779\): 'here"):
         read_text(tmp_path, lines)
     monkeypatch.setattr(text_table, "LIMITS", replace(LIMITS, table_rows=99))
-    with pytest.raises(InputError, match="more than 99 rows; expected one flight"):
+    with refused("more than 99 rows; expected one flight"):
         read_text(tmp_path, lines)
 
 
 def test_a_pipe_that_takes_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "log")
     monkeypatch.setattr(regular_files, "check_regular", lambda *_: None)  # it was a file then
-    with pytest.raises(InputError, match="log: is a pipe; expected a log, a regular file"):
+    with refused("log: is a pipe; expected a log, a regular file"):
         regular_files.open_regular(tmp_path / "log", "a log")
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, forget
-from windwrench.dynamics import InputError, effects, load_vehicle
+from windwrench.dynamics import effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
 from windwrench.evaluation.tasks import make_pilot
 from windwrench.identification.report.words import effect_summary
@@ -81,15 +82,15 @@ def test_a_folder_s_files_join_the_library(folder):
 def test_what_is_no_effect_is_named(text, words, folder):
     (folder / "own_spring.py").write_text(text)
     effects.add_folder(folder)
-    with pytest.raises(InputError, match=words):
+    with refused(words):
         effects.get("own_spring")
 
 
 def test_a_name_that_is_taken_or_a_folder_that_is_not_there_leaves_the_library_as_it_was(folder):
     (folder / "rotor_drag.py").write_text(EFFECT)
-    with pytest.raises(InputError, match="an effect rotor_drag is there already"):
+    with refused("an effect rotor_drag is there already"):
         effects.add_folder(folder)
-    with pytest.raises(InputError, match="is no folder"):
+    with refused("is no folder"):
         effects.add_folder(folder / "absent")
     assert os.environ["WINDWRENCH_EFFECTS"] == ""
     assert Path(effects._files()["rotor_drag"]).parent == Path(effects.__file__).parent

@@ -19,7 +19,7 @@ from numpy.testing import assert_array_equal
 from tests.support.bad_inputs import table
 from tests.support.map_tables import hover_table
 from tests.support.paths import ROOT
-from tests.support.vehicles import VEHICLE
+from tests.support.vehicles import HOVER, POSE, VEHICLE
 from windwrench.dynamics import EffectSetting, InputError
 from windwrench.envs import Stage
 from windwrench.envs.wind import Uniform
@@ -27,9 +27,7 @@ from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 
 GOLDEN = ROOT / "tests" / "golden" / "python_errors.json"
 CASES = json.loads(GOLDEN.read_bytes())
-POSE = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
-SPEEDS = np.full(4, VEHICLE.hover_rate)
-GIVEN = dict(np=np, replace=replace, VEHICLE=VEHICLE, POSE=POSE, SPEEDS=SPEEDS)
+GIVEN = dict(np=np, replace=replace, VEHICLE=VEHICLE, POSE=POSE, SPEEDS=HOVER)
 GIVEN |= dict(EffectSetting=EffectSetting, Stage=Stage, Uniform=Uniform)
 GIVEN |= dict(gzip=gzip, table=table, hover_table=hover_table)
 

@@ -10,10 +10,10 @@ import stat
 import pytest
 from matplotlib.figure import Figure
 
+from tests.support.outcomes import refused
 from tests.support.programs import said
 from windwrench import __version__
 from windwrench.runtime import whole_files
-from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_figure, write_json, write_text
 from windwrench.runtime.provenance import commit, made_by
 from windwrench.runtime.whole_files import replaced
@@ -60,7 +60,7 @@ def test_a_file_that_cannot_be_kept_leaves_the_old_one(tmp_path, monkeypatch):
 
     monkeypatch.setattr(whole_files.os, "fsync", broken)
     with (
-        pytest.raises(InputError, match=r"file\.txt: cannot be written"),
+        refused(r"file\.txt: cannot be written"),
         replaced(path) as partial,
     ):
         partial.write_text("new")
@@ -133,5 +133,5 @@ def test_json_is_compact_finite_and_whole_or_not_there(tmp_path):
     assert path.read_text() == '{"x":1}\n'
     write_json({"x": float("inf")}, path, allow_nan=True)
     assert json.loads(path.read_bytes()) == {"x": float("inf")}
-    with pytest.raises(InputError, match="cannot be written"):
+    with refused("cannot be written"):
         write_json({}, path / "below")

@@ -1,5 +1,7 @@
 """Flights for the tests, drawn from equations of motion that share no code with the package."""
 
+from math import pi
+
 import numpy as np
 from numpy.linalg import inv, norm
 from numpy.random import default_rng
@@ -34,7 +36,7 @@ def matrix(q):
 def turn_by(vector):
     """The quaternion (4,) of a rotation vector (3,) in rad."""
     half = 0.5 * np.sqrt(vector @ vector)
-    return np.array([np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)])
+    return np.array([np.cos(half), *(0.5 * np.sinc(half / pi) * vector)])
 
 
 def yawing_flight(
@@ -58,7 +60,7 @@ def yawing_flight(
     torque = np.asarray(torque, float)
     x = np.array([0.0, 0.0, 1.5])
     v = np.zeros(3)
-    q = np.array([np.cos(np.pi / 3), 0, 0, np.sin(np.pi / 3)])
+    q = np.array([np.cos(pi / 3), 0, 0, np.sin(pi / 3)])
     w = np.array([0.0, 0.0, yaw_rate])
     turns = vehicle.arm_l * vehicle.k * [[1, 1, -1, -1], [-1, 1, 1, -1]]
     mixing = np.array([vehicle.k, *turns, vehicle.p * [1, -1, 1, -1]])

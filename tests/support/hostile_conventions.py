@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from math import nan, pi
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,7 +16,7 @@ def framed(log, position=ONE, world=ONE, body=ONE):
     """The log with positions times a matrix, and attitudes seen from another world and body."""
     quaternion = log.quaternion
     if world is not ONE or body is not ONE:
-        quaternion = np.full_like(quaternion, np.nan)
+        quaternion = np.full_like(quaternion, nan)
         seen = log.valid & np.isfinite(log.quaternion).all(axis=1)
         R = Rotation.from_quat(log.quaternion[seen], scalar_first=True).as_matrix()
         quaternion[seen] = Rotation.from_matrix(world @ R @ body).as_quat(scalar_first=True)
@@ -133,9 +134,9 @@ HOSTILE = {
     ),
     "millimetres": (partial(scaled, position=1e3), "px, py, pz look like millimetres"),
     "centimetres": (partial(scaled, position=1e2), "px, py, pz look like centimetres"),
-    "deg/s": (partial(scaled, rotor_speeds=180 / np.pi), "look like degrees per second"),
-    "rpm": (partial(scaled, rotor_speeds=30 / np.pi), "look like revolutions per minute"),
-    "Hz": (partial(scaled, rotor_speeds=0.5 / np.pi), "look like revolutions per second"),
+    "deg/s": (partial(scaled, rotor_speeds=180 / pi), "look like degrees per second"),
+    "rpm": (partial(scaled, rotor_speeds=30 / pi), "look like revolutions per minute"),
+    "Hz": (partial(scaled, rotor_speeds=0.5 / pi), "look like revolutions per second"),
     "ms": (partial(scaled, t=1e3), "t looks like milliseconds: .*divide t by 1000"),
     "us": (partial(scaled, t=1e6), "t looks like microseconds"),
     "rotors late": (

@@ -4,6 +4,7 @@ The writing shares no code with the reading: what it writes comes from the map's
 """
 
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 from numpy.random import default_rng
@@ -38,7 +39,7 @@ _VOLTS = ("vbat", "battery", "voltage", "battery_voltage", "vbat [{u}]")
 
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
-_SPEED = {"rad/s": 1.0, "rpm": np.pi / 30.0, "Hz": 2.0 * np.pi}
+_SPEED = {"rad/s": 1.0, "rpm": pi / 30.0, "Hz": 2.0 * pi}
 _SPEED_NAMES = {"rpm": "rpm{i}", "eRPM": "eRPM[{n}]"}
 
 
@@ -159,7 +160,7 @@ def _pose(log, columns, world, body, pick):
     euler = pick(("zyx", "zyx", "xyz"))
     unit = pick(("deg", "rad"))
     angles = rotation.as_euler(euler.upper())[:, [euler.index(axis) for axis in "xyz"]]
-    angles *= 1.0 if unit == "rad" else 180.0 / np.pi
+    angles *= 1.0 if unit == "rad" else 180.0 / pi
     names = _add(columns, pick(_ANGLES), angles, ("roll", "pitch", "yaw"), unit)
     out["attitude"] = Attitude(names, euler=euler, unit=unit, sense=sense)
     return out
@@ -169,7 +170,7 @@ def _imu(log, columns, body, axes, pick):
     out = {}
     for section, templates, values, units in (
         ("accelerometer", _ACCELEROMETERS, log.accelerometer, {"m/s2": 1.0, "g": 9.80665}),
-        ("gyro", _GYROS, log.gyro, {"rad/s": 1.0, "deg/s": np.pi / 180.0}),
+        ("gyro", _GYROS, log.gyro, {"rad/s": 1.0, "deg/s": pi / 180.0}),
     ):
         unit = pick(tuple(units))
         names = _add(columns, pick(templates), values * body / units[unit], unit=unit)

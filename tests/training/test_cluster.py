@@ -11,8 +11,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from tests.runtime.test_workers import work
+from tests.support.outcomes import refused
 from tests.training.tiny import TINY
-from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import Request, fly_all
 from windwrench.runtime.workers import each, every
 from windwrench.training.configuration import load_config
@@ -77,7 +77,7 @@ def test_a_task_whose_worker_is_killed_is_done_again(cluster, tmp_path):
 
 
 def test_a_task_that_fails_is_named(cluster):
-    with pytest.raises(InputError, match=r"--cluster local: a task failed: not a number: \[\]$"):
+    with refused(r"--cluster local: a task failed: not a number: \[\]$"):
         list(every(refuse, [[]], cluster=cluster))
 
 
@@ -124,5 +124,5 @@ def test_a_cluster_that_is_not_there_is_named():
     ray = pytest.importorskip("ray", reason="pip install 'windwrench[cluster]'")
     if ray.is_initialized():  # last in this file: those before have one cluster
         ray.shutdown()
-    with pytest.raises(InputError, match=r"127\.0\.0\.1:1: no Ray cluster there"):
+    with refused(r"127\.0\.0\.1:1: no Ray cluster there"):
         next(every(len, [[1]], cluster="127.0.0.1:1"))

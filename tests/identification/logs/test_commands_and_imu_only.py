@@ -1,6 +1,7 @@
 """Logs of the kit's format without a pose, and with motor commands in place of rotor speeds."""
 
 from dataclasses import replace
+from math import nan, pi
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -24,13 +25,13 @@ def curved():
 def inertial_log(**fields):
     """Two seconds of commands and inertial sensors at 100 Hz, without a pose."""
     count = 200
-    nothing = np.full((count, 3), np.nan)
+    nothing = np.full((count, 3), nan)
     command = np.tile([0.5, 0.6, 0.7, 0.8], (count, 1))
     given = {
         "t": 0.01 * np.arange(count),
         "position": nothing,
-        "quaternion": np.full((count, 4), np.nan),
-        "rotor_speeds": np.full((count, 4), np.nan),
+        "quaternion": np.full((count, 4), nan),
+        "rotor_speeds": np.full((count, 4), nan),
         "accelerometer": [0.0, 0.0, 9.81] + 0.1 * np.sin(np.outer(np.arange(count), [1, 2, 3])),
         "gyro": 0.1 * np.cos(np.outer(np.arange(count), [1, 2, 3])),
         "command": command,
@@ -69,14 +70,14 @@ def test_the_scale_of_commands_counts_the_dips_between_high_thrusts():
     """
     vehicle = load_vehicle("ardrone2")
     t = 0.01 * np.arange(2000)
-    weights = 1.0 + 0.8 * np.sin(2.0 * np.pi * t)
+    weights = 1.0 + 0.8 * np.sin(2.0 * pi * t)
     weights[t < 2.0] = 0.05  # on the ground, rotors idling
     command = np.tile(np.sqrt(weights / 4.0 * vehicle.weight / 3.0)[:, None], (1, 4))
     log = FlightLog(
         t,
         np.zeros((len(t), 3)),
         np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1)),
-        np.full((len(t), 4), np.nan),
+        np.full((len(t), 4), nan),
         command=command,
     )
     read = with_commanded_speeds(log, vehicle)

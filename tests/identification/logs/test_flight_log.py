@@ -1,4 +1,5 @@
 import warnings
+from math import nan, pi
 
 import numpy as np
 import pytest
@@ -104,8 +105,8 @@ def test_one_short_step_is_a_flight_s(read, step):
 @pytest.mark.parametrize(
     ("field", "factor", "expected"),
     [
-        ("omega", 60 / (2 * np.pi), "omega1..omega4 look like revolutions per minute"),
-        ("omega", 1 / (2 * np.pi), "revolutions per second"),
+        ("omega", 60 / (2 * pi), "omega1..omega4 look like revolutions per minute"),
+        ("omega", 1 / (2 * pi), "revolutions per second"),
         ("t", 1000.0, "milliseconds"),
     ],
 )
@@ -143,14 +144,14 @@ def flight_logs(draw):
     pose = np.where(
         valid[:, None],
         np.column_stack([draw(arrays(float, (count, 3), elements=st.floats(-9, 9))), quaternions]),
-        np.nan,
+        nan,
     )
     optional = draw(st.booleans())
     commanded = draw(st.booleans())
     inertial = np.where(
         draw(arrays(bool, (count, 2, 1))),
         draw(arrays(float, (count, 2, 3), elements=finite)),
-        np.nan,
+        nan,
     )
     read = np.isfinite(inertial[:, :, 0]).any(axis=0)
     return FlightLog(
@@ -158,7 +159,7 @@ def flight_logs(draw):
         position=pose[:, :3],
         quaternion=pose[:, [6, 3, 4, 5]],
         valid=valid,
-        rotor_speeds=np.full((count, 4), np.nan)
+        rotor_speeds=np.full((count, 4), nan)
         if commanded
         else draw(arrays(float, (count, 4), elements=st.floats(0, 3e3))),
         command=draw(arrays(float, (count, 4), elements=st.floats(0, 1))) if commanded else None,

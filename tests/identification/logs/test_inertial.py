@@ -3,6 +3,7 @@ them.
 """
 
 from dataclasses import replace
+from math import nan, pi
 
 import numpy as np
 import pytest
@@ -70,9 +71,9 @@ def test_an_acceleration_in_world_axes_is_turned_into_body_axes(gravity):
 
 WRONG = {
     "gyro": {
-        "degrees per second; expected rad/s": 180 / np.pi,
+        "degrees per second; expected rad/s": 180 / pi,
         "forward, right, down": FRD,
-        "degrees per second.*forward, right, down": 180 / np.pi * FRD,
+        "degrees per second.*forward, right, down": 180 / pi * FRD,
         "inverted": -1.0,
         "contradict the attitude's rate": [0.0, 0.0, 3.0],
     },
@@ -104,7 +105,7 @@ def test_wrong_sensors_are_left_out(tmp_path, sensor, words, factor):
 @pytest.mark.parametrize("sensor", ["gyro", "accelerometer"])
 def test_units_are_told_in_a_short_hover(sensor):
     log = flight(1.0, moving=0.0, bias=0.01)
-    factor = {"gyro": 180 / np.pi, "accelerometer": 1 / 9.81}[sensor]
+    factor = {"gyro": 180 / pi, "accelerometer": 1 / 9.81}[sensor]
     (note,) = check_inertial(scaled(log, **{sensor: factor}))[1]
     assert {"gyro": "degrees per second", "accelerometer": "look like g"}[sensor] in note
 
@@ -124,7 +125,7 @@ def test_leaps_and_gaps_of_the_pose_are_no_sensors_fault():
     quaternion = log.quaternion.copy()
     position[400:] += 5.0
     quaternion[700] = [0.0, 1.0, 0.0, 0.0]
-    position[900:1000] = quaternion[900:1000] = np.nan
+    position[900:1000] = quaternion[900:1000] = nan
     log = replace(log, position=position, quaternion=quaternion, valid=np.empty(0, dtype=bool))
     assert check_inertial(log)[1] == ()
 
@@ -134,7 +135,7 @@ def test_a_sensor_faster_than_the_pose_has_rows_of_its_own(tmp_path):
     every = np.arange(len(log.t)) % 10 == 0
     position = log.position.copy()
     quaternion = log.quaternion.copy()
-    position[~every] = quaternion[~every] = np.nan
+    position[~every] = quaternion[~every] = nan
     log = replace(log, position=position, quaternion=quaternion, valid=every)
     write_log(log, tmp_path / "flight.csv")
     read = read_log(tmp_path / "flight.csv", vehicle=VEHICLE)

@@ -1,6 +1,7 @@
 """Maps: what the columns of somebody's table mean, and the flight log that follows."""
 
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 import pytest
@@ -95,7 +96,7 @@ def test_a_map_file_is_taken_by_read_log(tmp_path):
     """Betaflight's motor 1 is the rear right one, the kit's rotor 3."""
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD))
     log = read_log(table(tmp_path / "a.csv", {"m1": 3000.0}), map=tmp_path / "map.yaml")
-    assert_allclose(log.rotor_speeds[0] * 30 / np.pi, [3600, 3600, 3000, 3600])
+    assert_allclose(log.rotor_speeds[0] * 30 / pi, [3600, 3600, 3000, 3600])
 
 
 def mapped(path, stated=GOOD):
@@ -119,7 +120,7 @@ def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path):
     found = mapped(path, GOOD | {"battery": {"column": "v"}})
     assert found.valid.all()
     assert len(found.t) == 39  # from the rotors' first sample to their last
-    assert_allclose(found.rotor_speeds[:, 0] * 30 / np.pi, 3600 + np.arange(2, 80, 2))
+    assert_allclose(found.rotor_speeds[:, 0] * 30 / pi, 3600 + np.arange(2, 80, 2))
     assert found.voltage[9] == pytest.approx(11.2)
     assert noted(found, "interpolated to the other rows") or noted(found, "missing")
 
@@ -187,7 +188,7 @@ COMMANDED = {
 }
 
 
-@pytest.mark.parametrize(("tilt", "needed"), [(0.0, 1.0), (np.pi / 3, 2.0)])
+@pytest.mark.parametrize(("tilt", "needed"), [(0.0, 1.0), (pi / 3, 2.0)])
 def test_commands_without_a_curve_say_what_is_assumed(tmp_path, tilt, needed):
     """At 1600 us each rotor carries a quarter of the weight, which is an assumption; at a tilt of
     60 degrees twice the weight flies level.

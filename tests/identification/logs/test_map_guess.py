@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from math import nan, pi
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ def test_pose_and_motors_in_rows_of_their_own_are_read(tmp_path, flown):
     rows = ["t,x,y,z,qw,qx,qy,qz,rpm1,rpm2,rpm3,rpm4"]
     for k, t in enumerate(flown.t):
         pose = [*flown.position[k], *flown.quaternion[k]] if k % 2 else [""] * 7
-        speeds = [""] * 4 if k % 2 else flown.rotor_speeds[k] * 30.0 / np.pi
+        speeds = [""] * 4 if k % 2 else flown.rotor_speeds[k] * 30.0 / pi
         rows.append(",".join(map(str, [t, *pose, *speeds])))
     path = tmp_path / "sparse.csv"
     path.write_text("\n".join(rows))
@@ -134,7 +135,7 @@ def test_what_is_missing_is_left_open_beside_what_is_known(
     columns = columns_of(flown, NAMES + "w1 w2 w3 w4")
     for name in [name for name in columns if name.startswith(("a", "g", "v"))]:
         del columns[name]
-    columns[dropped] = np.full(len(flown.t), np.nan)
+    columns[dropped] = np.full(len(flown.t), nan)
     if not is_there:
         del columns[dropped]
     found = guessed(table_of(columns, tmp_path / "a.csv"))
@@ -265,7 +266,7 @@ def test_units_are_told_by_physics_not_by_names(tmp_path, flown):
 def test_percents_are_not_silently_taken_for_turns_a_second(name, highest, expected):
     """Numbers below 100 that would carry the weight in Hz may be percents all the same."""
     vehicle = load_vehicle("ardrone2")
-    hover = np.sqrt(vehicle.weight / vehicle.k.sum()) / (2.0 * np.pi)
+    hover = np.sqrt(vehicle.weight / vehicle.k.sum()) / (2.0 * pi)
     values = np.full((100, 4), hover)
     values[0] = highest
     group = Group(tuple(f"{name}{i}" for i in range(1, 5)), name)

@@ -1,3 +1,5 @@
+from math import nan
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -100,7 +102,7 @@ TRUTH = {
     f"{topic}_groundtruth": {k: v for k, v in fields.items() if "valid" not in k}
     for topic, fields in onboard(T).items()
 }
-BARE = {"vehicle_visual_odometry": odometry(T) | {"float q": np.full((len(T), 4), np.nan)}}
+BARE = {"vehicle_visual_odometry": odometry(T) | {"float q": np.full((len(T), 4), nan)}}
 
 
 @pytest.mark.parametrize(
@@ -119,7 +121,7 @@ def test_the_best_pose_is_taken(read, topics, said):
 
 def test_lost_positions_are_not_valid(read):
     lossy = odometry(T)
-    lossy["float position"][50:60] = np.nan
+    lossy["float position"][50:60] = nan
     log = read(FLIGHT | {"vehicle_mocap_odometry": lossy})
     assert_array_equal(np.flatnonzero(~log.valid), np.arange(50, 60))
 
@@ -152,7 +154,7 @@ def assert_scaled(log, vehicle):
 
 
 def test_relative_thrust_is_scaled_to_the_weight(read):
-    values = np.full((len(WIDE), 12), np.nan)
+    values = np.full((len(WIDE), 12), nan)
     values[20:, :4] = THEIRS  # disarmed before
     topics = MOCAP | {"esc_status": esc(WIDE, 0 * PX4)} | {"actuator_motors": control(WIDE, values)}
     assert_scaled(read(topics, {"THR_MDL_FAC": 0.3}), VEHICLE)
@@ -225,7 +227,7 @@ def test_bad_pulse_limits_are_named(read):
     topics = MOCAP | {"actuator_outputs": fields}
     with refused("expected MIN below MAX"):
         read(topics, {"PWM_MAIN_MIN2": 2100})
-    assert noted(read(topics, {"THR_MDL_FAC": np.nan}), "f = 0;", "1000 to 2000 us")
+    assert noted(read(topics, {"THR_MDL_FAC": nan}), "f = 0;", "1000 to 2000 us")
 
 
 LONG = odometry(T) | {"float q": 2 * odometry(T)["float q"]}

@@ -5,6 +5,7 @@ that are cut, packed or hostile.
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
+from math import nan, pi
 
 import numpy as np
 import pytest
@@ -133,12 +134,12 @@ def px4_topics(is_new):
         return {"q": q} | xyz(place)
 
     def escs(t, at):
-        rpm = [*(PX4 * growth(t) * 30 / np.pi), 0, 0, 0, 0]
+        rpm = [*(PX4 * growth(t) * 30 / pi), 0, 0, 0, 0]
         each = [{"esc_rpm": round(w), "actuator_function": 101 + i} for i, w in enumerate(rpm)]
         return {"esc": each[::-1]}  # each says which motor it drives
 
     def control(t, at):
-        return {"timestamp_sample": at, "control": [*SHARE[THEIRS], *[np.nan] * 8]}
+        return {"timestamp_sample": at, "control": [*SHARE[THEIRS], *[nan] * 8]}
 
     def sensed(t, at):
         (gyro,), (force,) = inertial(np.array([t]))
@@ -178,7 +179,7 @@ def test_the_only_topics_that_fit_are_taken(write, kind):
 @pytest.mark.parametrize("shape", ["PoseStamped", "TransformStamped", "Odometry"])
 def test_a_map_states_topics_frames_units_and_order(write, kind, shape):
     def rpm(t):
-        return {"data": PX4 * growth(t) * 30 / np.pi}
+        return {"data": PX4 * growth(t) * 30 / pi}
 
     topics = {
         "/a": pose(shape, is_ned=True),
@@ -234,7 +235,7 @@ def test_messages_of_mavros(write, kind):
     text = " ".join(log.notes)
     assert "us, 1000 to 2000 taken as 0 to 1" in text
     assert "/mavros/imu/data (sensor_msgs/msg/Imu), chosen by its name before" in text
-    items = [{"rpm": round(w * 30 / np.pi)} for w in PX4]
+    items = [{"rpm": round(w * 30 / pi)} for w in PX4]
     topics |= {"/mavros/esc_status": of_mavros("ESCStatus", esc_status=items)}
     log = read_log(write(topics | {"/vrpn/drone/pose": pose()}, kind, name="second"))
     assert_allclose(log.rotor_speeds[0], OURS, atol=0.06)
@@ -300,7 +301,7 @@ def test_times_that_are_no_use_are_replaced_or_left_out(write, topics, delay, sa
         (FLIGHT | {"/a": pose(times=[])}, "topic /a has no messages"),
         (FLIGHT | {"/a": pose(times=[0.0])}, r"/a: 1 message\(s\); expected at least two"),
         (FLIGHT | {"/motors": motors(times=WIDE + 9)}, "do not overlap"),
-        (FLIGHT | {"/motors": motors([1, 2, np.nan, 3])}, "no two samples have four finite"),
+        (FLIGHT | {"/motors": motors([1, 2, nan, 3])}, "no two samples have four finite"),
         ({}, "(cannot be read as a ROS|The topics: none)"),
     ],
 )
@@ -318,7 +319,7 @@ def logged(name):
     ("kind", "array", "line", "wanted"),
     [
         ("mcap", numbers(OURS, "Float64"), "rotors: {topic: /m, unit: rad/s}", OURS),
-        ("mcap", numbers(OURS), "rotors: {topic: /m, unit: rev/s}", OURS * 2 * np.pi),
+        ("mcap", numbers(OURS), "rotors: {topic: /m, unit: rev/s}", OURS * 2 * pi),
         ("mcap", numbers(OURS), "commands: {topic: /m, unit: normalized, range: [0, 1000]}", SHARE),
         ("bag", logged("crazyswarm/msg/GenericLogData"), "rotors: {topic: /m, unit: rad/s}", OURS),
         (

@@ -3,6 +3,7 @@ residual, which is Newton's and Euler's balance.
 """
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from scipy.signal import butter, sosfilt, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded, resting
+from tests.support.outcomes import refused
 from tests.support.sizes import rms
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle, preset_names
+from windwrench.dynamics import EffectSetting, load_vehicle, preset_names
 from windwrench.dynamics.effects import compile_effects
 from windwrench.evidence.trials.logged_poses import FILTERS
 from windwrench.evidence.trials.practice_flights import fly_practice
@@ -96,7 +98,7 @@ def test_a_gap_ends_a_piece_and_a_lost_sample_does_not():
     valid[1200:1300] = False
     pieces = log_signals(replace(log, valid=valid))
     assert [round(piece.t[-1] - piece.t[0], 1) for piece in pieces] == [6.0, 5.5]
-    with pytest.raises(InputError, match="3 s"):
+    with refused("3 s"):
         log_signals(replace(log, valid=np.arange(len(log.t)) < 300))
 
 
@@ -141,7 +143,7 @@ def test_an_imu_at_1_khz_tells_as_much_as_one_of_half_its_noise_at_250_hz():
     for rate, size in ((1000.0, 2.0), (250.0, 1.0)):
         rng = default_rng(0)
         log = still_log(rate, 8.0)
-        position = np.full_like(log.position, np.nan)
+        position = np.full_like(log.position, nan)
         tenth = slice(None, None, round(rate / 10.0))
         position[tenth] = 0.002 * rng.standard_normal(position[tenth].shape)
         gyro = 0.01 * size * rng.standard_normal(position.shape)
@@ -150,7 +152,7 @@ def test_an_imu_at_1_khz_tells_as_much_as_one_of_half_its_noise_at_250_hz():
             replace(
                 log,
                 position=position,
-                quaternion=np.full_like(log.quaternion, np.nan),
+                quaternion=np.full_like(log.quaternion, nan),
                 valid=np.zeros(len(log.t), dtype=bool),
                 gyro=gyro,
                 accelerometer=force,
@@ -195,7 +197,7 @@ def test_white_noise_is_level(seed):
 
 def test_channels_are_asked_one_by_one(log):
     white = default_rng(1).standard_normal((len(log.t), 3))
-    gyro = np.full_like(white, np.nan)  # not read in every row
+    gyro = np.full_like(white, nan)  # not read in every row
     gyro[::2] = sosfilt(butter(2, 0.1, output="sos"), white[::2], axis=0)
     made = replace(log, accelerometer=white, gyro=gyro)
     (note,) = filtering_notes(made)

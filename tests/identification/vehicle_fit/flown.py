@@ -1,5 +1,7 @@
 """Flights for the tests: a rigid body with an IMU, integrated here, and the plant's."""
 
+from math import nan, pi
+
 import numpy as np
 from numpy.random import default_rng
 
@@ -31,8 +33,8 @@ def inertial_flights(seeds, seconds=15.0, lag=0.05, rate=250):
         waves = []
         for rng in rngs:
             f = rng.uniform(low, high, 6)
-            phase = rng.uniform(0, 2 * np.pi, 6)
-            waves.append(size * np.sin(2 * np.pi * f * t[:, None] + phase).mean(axis=1))
+            phase = rng.uniform(0, 2 * pi, 6)
+            waves.append(size * np.sin(2 * pi * f * t[:, None] + phase).mean(axis=1))
         return np.array(waves).T[:, :, None]  # (n, flights, 1)
 
     share = 1.0 + swing(0.25, 0.2, 2.0) - swing(0.5, 0.8, 3.0) * SPIN
@@ -63,6 +65,6 @@ def _log(rng, t, command, speeds, rates):
     accelerometer = 0.15 * rng.standard_normal((m, 3)) + rng.normal(0, 0.05, 3)
     accelerometer[:, 2] += K * np.square(speeds).sum(axis=1) / MASS
     gyro = rates + 0.005 * rng.standard_normal((m, 3)) + rng.normal(0, 0.01, 3)
-    nothing = np.full((m, 4), np.nan)
+    nothing = np.full((m, 4), nan)
     measured = {"accelerometer": accelerometer, "gyro": gyro, "command": command}
     return FlightLog(t, nothing[:, :3], nothing, nothing, **measured, name="inertial"), speeds

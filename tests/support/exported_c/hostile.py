@@ -1,5 +1,7 @@
 """Hostile sequences for C and Python: what vehicles, motion capture and radios do, at its worst."""
 
+from math import nan, pi
+
 import numpy as np
 from numpy.linalg import norm
 from numpy.random import default_rng
@@ -46,15 +48,15 @@ def befall(kind, when, x, q, W, rng, size=None):
     away = rng.standard_normal(3)
     away *= (10.0 ** rng.uniform(-2.0, 1.5) if size is None else size) / norm(away)
     if kind in ("gap", "attitude only"):
-        x[when] = np.nan
+        x[when] = nan
     if kind in ("gap", "position only"):
-        q[when] = np.nan
+        q[when] = nan
     if kind in ("jump", "jump for good", "burst"):
         x[{"jump": when.start, "burst": when}.get(kind, slice(when.start, None))] += away
     elif kind == "back and forth":
         x[when][1::2] += away
     elif kind in ("inverted", "tilted"):
-        half = 0.5 * (np.pi if kind == "inverted" else size or rng.uniform(0.0, np.pi))
+        half = 0.5 * (pi if kind == "inverted" else size or rng.uniform(0.0, pi))
         q[when] = np.cos(half), np.sin(half), 0.0, 0.0
     elif kind in ("random attitudes", "random poses"):
         q[when] = rng.standard_normal((count, 4))
@@ -64,7 +66,7 @@ def befall(kind, when, x, q, W, rng, size=None):
         q[when] = q[when.start]
     elif kind == "not a number":
         for values in (x, q, W):
-            values[when][rng.random((count, values.shape[1])) < 0.2] = np.nan
+            values[when][rng.random((count, values.shape[1])) < 0.2] = nan
     elif kind in ("rotors", "off"):
         W[when] *= 0.0 if kind == "off" else rng.uniform(0.0, 1.5, (count, 4))
     return away
