@@ -165,7 +165,7 @@ def test_the_activity_is_that_of_the_reward_and_the_bound_is_seen():
     flown = fly_episode(env, shaken, 5, lambda info: terms.append(info["reward_change"]), 60)
     cost = 0.002 * env.largest_action**2  # CHANGE_COST in m/s2
     assert -np.mean(terms) / cost == pytest.approx(flown.command_activity, rel=1e-6)
-    assert flown.saturated_fraction == pytest.approx(np.mean(abs(flown.action).max(1) == 1.0))
+    assert flown.saturated_fraction == pytest.approx(np.mean(np.abs(flown.action).max(1) == 1.0))
     assert 0.1 < flown.saturated_fraction < 0.5
 
 

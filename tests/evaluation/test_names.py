@@ -114,7 +114,7 @@ def test_a_class_of_a_file_is_a_task_and_has_the_laws_of_the_kit_s_task(tmp_path
     envs = known.make_many(2, "base")
     observations, _ = envs.reset(seed=3)
     assert observations.shape == (2, 27)
-    assert known.units(envs)["largest"] == 4.0
+    assert known.units(envs, known.make("base"))["largest"] == 4.0
 
 
 def test_a_reward_of_one_s_own_holds_alone_and_its_terms_stand_in_info(tmp_path):

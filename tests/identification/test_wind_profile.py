@@ -43,7 +43,7 @@ def test_the_intervals_of_a_sweep_hold_the_jet(swept):
     assert inside[0] > 0.7
     assert inside[5] > 0.8
     # and they are narrow: a third of the largest torque at most, in the jet
-    jet = abs(p.place) < 0.8
+    jet = np.abs(p.place) < 0.8
     assert np.max((p.high - p.low)[5, jet]) < true[5].max() / 1.5
     assert p.direction == pytest.approx(np.pi / 2, abs=0.03)
     assert p.beside == pytest.approx(DISTANCE, abs=0.05)
@@ -120,7 +120,7 @@ def test_a_jet_has_its_places():
     assert shape.axis == pytest.approx(0.0, abs=1e-6)
     assert_allclose(shape.peaks, (-0.46, 0.46), atol=0.011)
     assert shape.weaker == pytest.approx(0.03, rel=1e-3)
-    assert_allclose(np.interp(abs(shape.edges), PLACE, JET) / 0.03, 0.2, atol=0.02)
+    assert_allclose(np.interp(np.abs(shape.edges), PLACE, JET) / 0.03, 0.2, atol=0.02)
     assert shape.slope == pytest.approx(0.1, rel=0.1)
 
 
