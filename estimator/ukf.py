@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import deepcopy
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -667,7 +668,9 @@ class WrenchUKF:
             if not self.record[0]["x"][3:7].any():
                 raise InputError(f"{type(self).__name__}: call reset before a step")
             own = self._step_at
-            call = self._call = _core.step if own is None else own.compile(STEP.args)
+            white = self._address + int(self.record.dtype.fields["innovation"][1])
+            core = partial(_core.step, white=white)
+            call = self._call = core if own is None else own.compile(STEP.args)
         if call(self._address, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
         return self.estimate

@@ -32,6 +32,15 @@ std::int64_t step_at(std::int64_t address, std::int64_t parts, double dt, double
   return step_filter(filter_at(std::uintptr_t(address)), int(parts), dt, voltage, n);
 }
 
+// The same; a pose's whitened innovation (6) is written at an address
+std::int64_t step_and_tell(std::int64_t address, std::int64_t parts, double dt, double voltage,
+                           std::uintptr_t white) {
+  Innovation<double> n;
+  int used = step_filter(filter_at(std::uintptr_t(address)), int(parts), dt, voltage, n);
+  for (int i = 0; used > 0 && i < 6; i++) reinterpret_cast<double *>(white)[i] = n.y[i];
+  return used;
+}
+
 void take_in_imu_at(std::uintptr_t address, Sample z, bool gyro, bool accelerometer) {
   Filter<double> &f = filter_at(address);
   if (!f.imu.used) begin_imu(f);
@@ -123,13 +132,13 @@ void step_many(std::uintptr_t address, std::size_t stride, Array<const double, n
 
 void bind_filter(nb::module_ &m) {
   m.attr("FILTER_SIZE") = sizeof(Filter<double>);
-  m.def("step", &step_at, "address"_a, "parts"_a, "dt"_a, "voltage"_a,
-        "Predict the filter at an address over dt s if that is positive, then correct with the "
-        "parts\n"
-        "(1 position, 2 attitude) of the sample in its memory that were measured; voltage in V.\n\n"
-        "Return the parts that could be used, or -1, with the filter as it was, if the quaternion "
-        "is\n"
-        "no rotation.");
+  m.def(
+      "step", &step_and_tell, "address"_a, "parts"_a, "dt"_a, "voltage"_a, "white"_a,
+      "Predict the filter at an address over dt s if that is positive, then correct with the\n"
+      "parts (1 position, 2 attitude) of the sample in its memory that were measured; voltage in\n"
+      "V. The pose's whitened innovation (6,) is written at the address `white`.\n\n"
+      "Return the parts that could be used, or -1, with the filter as it was, if the quaternion\n"
+      "is no rotation.");
   m.def(
       "step_address", [] { return reinterpret_cast<std::uintptr_t>(&step_at); },
       "Return the address of `step` for compiled loops: a C function with the same arguments.");
