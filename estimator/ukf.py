@@ -668,8 +668,7 @@ class WrenchUKF:
             if not self.record[0]["x"][3:7].any():
                 raise InputError(f"{type(self).__name__}: call reset before a step")
             own = self._step_at
-            white = self._address + int(self.record.dtype.fields["innovation"][1])
-            core = partial(_core.step, white=white)
+            core = partial(_core.step, white=self.record["innovation"].ctypes.data)
             call = self._call = core if own is None else own.compile(STEP.args)
         if call(self._address, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
