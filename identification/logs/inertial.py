@@ -41,6 +41,9 @@ _FARTHEST = 0.3  # s, of the search
 _COARSE, _FINE = 0.01, 0.001  # s, of its steps
 # s: smaller offsets are delays of the sensors' own filters, and of stamps at a sample's end
 _LEAST = 0.01
+# s: between rotor speeds and motion lie a motor's lag and the search's step. Smaller offsets do not
+# show whose clock is wrong
+_MOTOR_LAG, _TELLING = 0.02, 0.06
 _PARTS = 4  # of the flight; the scatter of their offsets is the uncertainty
 _SURE = 4.0  # standard deviations
 _FEWEST_WINDOWS = 40
@@ -273,8 +276,12 @@ def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Na
             "accelerometer were left out",
         )
     whose, other = "IMU", "pose"
-    if log.has_rotor_speeds and abs(_rotor_delay(log, vehicle)) > 0.5 * abs(late):
-        # rotors and IMU share a clock
+    rotors = ", by less than the rotor speeds tell whose clock is wrong"
+    is_pose = False
+    if log.has_rotor_speeds and abs(late) > _TELLING:
+        lag = _rotor_delay(log, vehicle) - _MOTOR_LAG
+        rotors, is_pose = " and the rotor speeds", abs(lag) > abs(lag + late)
+    if is_pose:  # rotors and IMU share a clock
         whose, other, late = "pose", "IMU", -late
         pose = {"position": log.position, "quaternion": log.quaternion}
         moved = _moved(log.t, log.valid, late, pose)
@@ -284,8 +291,8 @@ def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Na
             if x is not None:
                 log = replace(log, **_moved(log.t, np.isfinite(x[:, 0]), late, {name: x}))
     return log, (
-        f"the {whose} is {abs(late):.3f} s {'late' if late > 0.0 else 'early'} against the {other} "
-        f"and the rotor speeds (standard deviation {std:.3f} s), and was moved",
+        f"the {whose} is {abs(late):.3f} s {'late' if late > 0.0 else 'early'} against the {other}"
+        f"{rotors} (standard deviation {std:.3f} s); the {whose} was moved",
     )
 
 
