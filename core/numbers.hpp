@@ -55,6 +55,9 @@ template <class T> inline Answer<T> finite(T a) { return a - a == T{}; }
 template <class T> inline T larger(T a, T b) { return choose(b > a, b, a); }
 template <class T> inline T smaller(T a, T b) { return choose(b < a, b, a); }
 template <class T> inline T absolute(T a) { return choose(a < T{}, -a, a); }
+template <class T> inline T within(T a, Single<T> low, Single<T> high) {
+  return smaller(larger(a, T{} + low), T{} + high);
+}
 
 template <class T, class F> inline T lane_by_lane(T a, F function) {
   if constexpr (is_single<T>) {
@@ -73,6 +76,19 @@ template <class T> inline T sine(T a) {
 }
 template <class T> inline T cosine(T a) {
   return lane_by_lane(a, [](Single<T> one) { return std::cos(one); });
+}
+template <class T> inline T rounded_down(T a) {
+  return lane_by_lane(a, [](Single<T> one) { return std::floor(one); });
+}
+// rad, from the first axis to the point (x, y)
+template <class T> inline T angle_to(T x, T y) {
+  if constexpr (is_single<T>) {
+    return std::atan2(y, x);
+  } else {
+    T result;
+    for (int i = 0; i < lanes_of<T>; i++) result[i] = std::atan2(y[i], x[i]);
+    return result;
+  }
 }
 
 }  // namespace windwrench
