@@ -180,36 +180,39 @@ void steer(Flight<T> &c, const T *x, const T *command, CommandKind kind, Single<
 template <class S> void foresee(Flight<S> &c, Model<S> &m, const S *x) {
   if (m.wrench_count == 0) return;
   matrix_of(x + QUATERNION, c.rotation);
-  S state[35];
+  FlightState<S> state = {};
+  Wrench<S> wrench = {};
   for (int i = 0; i < 3; i++) {
-    state[i] = c.setpoint[i];
-    state[AT_VELOCITY + i] = c.setpoint[SET_VELOCITY + i];
-    state[AT_RATE + i] = S(0);
-    state[AT_WIND + i] = m.wind[i];
-    for (int j = 0; j < 3; j++) state[AT_ROTATION + 3 * i + j] = c.rotation[i][j];
+    state.position[i] = c.setpoint[i];
+    state.velocity[i] = c.setpoint[SET_VELOCITY + i];
+    state.wind[i] = m.wind[i];
+    for (int j = 0; j < 3; j++) state.rotation[i][j] = c.rotation[i][j];
   }
   for (int i = 0; i < 4; i++) {
-    state[AT_SPEED + i] = c.wanted[i];
-    state[AT_THRUST + i] = m.body.k[i] * c.wanted[i] * c.wanted[i];
-    state[AT_ACCELERATION + i] = m.effect_state[AT_ACCELERATION + i];
+    state.rotor_speed[i] = c.wanted[i];
+    state.thrust[i] = m.body.k[i] * c.wanted[i] * c.wanted[i];
+    state.rotor_acceleration[i] = m.effect_state.rotor_acceleration[i];
   }
-  state[AT_VOLTAGE] = m.voltage;
-  state[AT_TIME] = m.time;
-  for (int i = 0; i < 6; i++) c.foreseen[i] = S(0);
+  state.voltage = m.voltage;
+  state.time = m.time;
   for (int i = 0; i < m.wrench_count; i++)
-    m.wrench_models[i](m.wrench_coefficients[i], m.constants, state, c.foreseen);
+    m.wrench_models[i](m.wrench_coefficients[i], numbers_of<S>(m.constants), numbers_of<S>(state),
+                       numbers_of<S>(wrench));
+  for (int i = 0; i < 3; i++) c.foreseen[i] = wrench.force[i], c.foreseen[3 + i] = wrench.torque[i];
 }
 
 // What the rotors deliver after the horizon at held commands (4), out (4); the model's own memory
 // stays as it is
 template <class S> void delivered(Model<S> &m, const S *commands, S *out) {
-  S rotors[7] = {commands[0], commands[1], commands[2], commands[3], S(HORIZON), m.voltage, m.time};
+  Rotors<S> rotors = {
+      {commands[0], commands[1], commands[2], commands[3]}, S(HORIZON), m.voltage, m.time};
   S memory[112];
   for (int i = 0; i < m.rotor_count; i++) {
     std::memcpy(memory, m.memory[i], sizeof(memory));
-    m.rotor_models[i](m.rotor_coefficients[i], m.constants, rotors, memory);
+    m.rotor_models[i](m.rotor_coefficients[i], numbers_of<S>(m.constants), numbers_of<S>(rotors),
+                      memory);
   }
-  for (int i = 0; i < 4; i++) out[i] = rotors[i];
+  for (int i = 0; i < 4; i++) out[i] = rotors.speed[i];
 }
 
 // Turn c.command, the wanted rotor speeds (4) rad/s, into commands that deliver them

@@ -25,12 +25,12 @@ template <class T> struct Plant {
   Model<T> vehicle;
   int64_t seen;  // parts of the last pose that were measured
   T voltage_ref, battery_life;
-  T battery;     // V now; 0: not modelled
-  T motor_keep;  // share of a rotor speed's difference to its command left after a tick
-  T omega_lsb, omega_max;               // rad/s
-  T sigma_position, sigma_attitude;     // m, rad
+  T battery;               // V now; 0: not modelled
+  T motor_keep;            // share of a rotor speed's difference to its command left after a tick
+  T omega_lsb, omega_max;  // rad/s
+  T sigma_position, sigma_attitude;  // m, rad
   T disturbance_force, disturbance_torque, disturbance_keep;
-  T applied[6];                          // a user's part of `external`, until changed
+  T applied[6];  // a user's part of `external`, until changed
   // a unit normal below loses the pose: after a pose, and after a lost one
   T dropout, dropout_kept;
   T lost;                                // 1: the last pose was lost
@@ -80,9 +80,10 @@ template <class T> void measure(Plant<T> &p, const T *pose, const T *noise) {
 template <class T> void sense(Plant<T> &p, const T *pose, const T *noise) {
   using S = Single<T>;
   Model<T> &m = p.vehicle;
-  delay<7>(p.past_poses, p.pose_late, pose, m.sample + 4);
-  rewrite_sample(m, 1 | 2, S(0), S(1));
-  measure(p, m.sample + 4, noise);
+  T *reported = m.sample.position;  // and the quaternion behind it
+  delay<7>(p.past_poses, p.pose_late, pose, reported);
+  rewrite_sample(m, 1 | 2, S(0), +1);
+  measure(p, reported, noise);
   T bound = choose(p.lost > T{}, p.dropout_kept, p.dropout);
   p.lost = choose(noise[DROPOUT_NOISE] < bound, T{} + S(1), T{});
 }
@@ -166,9 +167,9 @@ void actuate(Plant<T> &p, const T *command, Fan<T> &fan, const Single<T> *jet, c
   for (int i = 0; i < 7; i++) x[i] = qpos[i];
   for (int i = 0; i < 6; i++) x[VELOCITY + i] = qvel[i];
   follow(p, command);
-  for (int i = 0; i < 4; i++) m.sample[i] = p.speeds[i];
-  rewrite_sample(m, 4, S(TICK), S(1));
-  log_speeds(p, m.sample);
+  for (int i = 0; i < 4; i++) m.sample.speed[i] = p.speeds[i];
+  rewrite_sample(m, 4, S(TICK), +1);
+  log_speeds(p, m.sample.speed);
   drain(p);
   drive(m, p.speeds, S(TICK), p.battery);
   matrix_of(qpos + 3, p.rotation);

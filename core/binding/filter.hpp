@@ -4,3 +4,4 @@
 
 void bind_batch(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
+void bind_tick(nanobind::module_ &m);
