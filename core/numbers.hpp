@@ -91,4 +91,25 @@ template <class T> inline T angle_to(T x, T y) {
   }
 }
 
+template <class T> inline T exponential(T a) {
+  return lane_by_lane(a, [](Single<T> one) { return std::exp(one); });
+}
+
+// a function of two numbers, lane by lane
+template <class T, class F> inline T lane_by_lane(T a, T b, F function) {
+  if constexpr (is_single<T>) {
+    return function(a, b);
+  } else {
+    T result;
+    for (int i = 0; i < lanes_of<T>; i++) result[i] = function(a[i], b[i]);
+    return result;
+  }
+}
+template <class T> inline T power(T a, T b) {
+  return lane_by_lane(a, b, [](Single<T> x, Single<T> y) { return std::pow(x, y); });
+}
+template <class T> inline T angle_of(T y, T x) {
+  return lane_by_lane(y, x, [](Single<T> a, Single<T> b) { return std::atan2(a, b); });
+}
+
 }  // namespace windwrench
