@@ -95,8 +95,8 @@ template <class T> void point(Flight<T> &c, const T *x, Single<T> dt, T thrust, 
   // body z x wanted z, in the body frame: the turn that the thrust axis needs
   T bx = R[0][0] * u[0] + R[1][0] * u[1] + R[2][0] * u[2],
     by = R[0][1] * u[0] + R[1][1] * u[1] + R[2][1] * u[2];
-  T error = c.setpoint[SET_YAW] - angle_to(R[0][0], R[1][0]);
-  error = angle_to(cosine(error), sine(error));
+  T error = c.setpoint[SET_YAW] - angle_of(R[1][0], R[0][0]);
+  error = angle_of(sine(error), cosine(error));
   c.yaw_sum = within(c.yaw_sum + dt * error, S(-1), S(1));
   // the wanted yaw rate, a turn about the world's vertical, in the body frame
   T rate[3];
@@ -134,7 +134,7 @@ template <class T> void fly(Flight<T> &c, const T *x, Single<T> dt) {
 template <class T> void fly_attitude(Flight<T> &c, const T *x, const T *wanted, Single<T> dt) {
   matrix_of(x + QUATERNION, c.rotation);
   c.setpoint[SET_YAW_RATE] = wanted[2];
-  T yaw = angle_to(c.rotation[0][0], c.rotation[1][0]);
+  T yaw = angle_of(c.rotation[1][0], c.rotation[0][0]);
   T forward = sine(wanted[1]) * cosine(wanted[0]), right = sine(wanted[0]);
   const T u[3] = {cosine(yaw) * forward + sine(yaw) * right,
                   sine(yaw) * forward - cosine(yaw) * right, cosine(wanted[1]) * cosine(wanted[0])};
@@ -180,36 +180,24 @@ void steer(Flight<T> &c, const T *x, const T *command, CommandKind kind, Single<
 template <class S> void foresee(Flight<S> &c, Model<S> &m, const S *x) {
   if (m.wrench_count == 0) return;
   matrix_of(x + QUATERNION, c.rotation);
-  S state[35];
-  for (int i = 0; i < 3; i++) {
-    state[i] = c.setpoint[i];
-    state[AT_VELOCITY + i] = c.setpoint[SET_VELOCITY + i];
-    state[AT_RATE + i] = S(0);
-    state[AT_WIND + i] = m.wind[i];
-    for (int j = 0; j < 3; j++) state[AT_ROTATION + 3 * i + j] = c.rotation[i][j];
-  }
-  for (int i = 0; i < 4; i++) {
-    state[AT_SPEED + i] = c.wanted[i];
-    state[AT_THRUST + i] = m.body.k[i] * c.wanted[i] * c.wanted[i];
-    state[AT_ACCELERATION + i] = m.effect_state[AT_ACCELERATION + i];
-  }
-  state[AT_VOLTAGE] = m.voltage;
-  state[AT_TIME] = m.time;
-  for (int i = 0; i < 6; i++) c.foreseen[i] = S(0);
-  for (int i = 0; i < m.wrench_count; i++)
-    m.wrench_models[i](m.wrench_coefficients[i], m.constants, state, c.foreseen);
+  const S still[3] = {};
+  FlightState<S> state = m.effect_state;  // with the rotors' acceleration
+  fill_state(m, c.setpoint, c.rotation, c.setpoint + SET_VELOCITY, still, c.wanted, state);
+  add_wrenches(m, state, c.foreseen);
 }
 
 // What the rotors deliver after the horizon at held commands (4), out (4); the model's own memory
 // stays as it is
 template <class S> void delivered(Model<S> &m, const S *commands, S *out) {
-  S rotors[7] = {commands[0], commands[1], commands[2], commands[3], S(HORIZON), m.voltage, m.time};
+  Rotors<S> rotors = {
+      {commands[0], commands[1], commands[2], commands[3]}, S(HORIZON), m.voltage, m.time};
   S memory[112];
   for (int i = 0; i < m.rotor_count; i++) {
     std::memcpy(memory, m.memory[i], sizeof(memory));
-    m.rotor_models[i](m.rotor_coefficients[i], m.constants, rotors, memory);
+    m.rotor_models[i](m.rotor_coefficients[i], numbers_of<S>(m.constants), numbers_of<S>(rotors),
+                      memory);
   }
-  for (int i = 0; i < 4; i++) out[i] = rotors[i];
+  for (int i = 0; i < 4; i++) out[i] = rotors.speed[i];
 }
 
 // Turn c.command, the wanted rotor speeds (4) rad/s, into commands that deliver them
