@@ -28,34 +28,47 @@ template <class S> void drive(Model<S> &m, const S *speeds, S dt, S voltage) {
   rotor_wrench(m.body, m.rotors.speed, m.rotor_wrench);
 }
 
-// What the wrench effects say at a state x of attitude R, into m.effect_wrench. The first call
-// after `drive` also carries the effects' own states over the step: made at the state itself
-template <class S> void apply_effects(Model<S> &m, const S *x, const S R[3][3]) {
-  if (m.wrench_count == 0) return;
-  FlightState<S> &state = m.effect_state;
+// The flight's state for the wrench effects, all but the rotors' acceleration: position (3),
+// attitude R and velocity (3) in the world, rate (3), body, and delivered rotor speeds (4)
+template <class S>
+void fill_state(const Model<S> &m, const S *position, const S R[3][3], const S *velocity,
+                const S *rate, const S *speeds, FlightState<S> &state) {
   for (int i = 0; i < 3; i++) {
-    state.position[i] = x[i];
-    state.velocity[i] = x[VELOCITY + i];
-    state.rate[i] = x[RATE + i];
+    state.position[i] = position[i];
+    state.velocity[i] = velocity[i];
+    state.rate[i] = rate[i];
     state.wind[i] = m.wind[i];
     for (int j = 0; j < 3; j++) state.rotation[i][j] = R[i][j];
   }
   for (int i = 0; i < 4; i++) {
-    state.rotor_speed[i] = m.rotors.speed[i];
-    state.thrust[i] = m.body.k[i] * m.rotors.speed[i] * m.rotors.speed[i];
+    state.rotor_speed[i] = speeds[i];
+    state.thrust[i] = m.body.k[i] * speeds[i] * speeds[i];
   }
   state.voltage = m.voltage;
   state.time = m.time;
-  S *constants = numbers_of<S>(m.constants), *numbers = numbers_of<S>(state);
+}
+
+// What the wrench effects say at a state, out (6)
+template <class S> void add_wrenches(Model<S> &m, FlightState<S> &state, S *out) {
+  for (int i = 0; i < 6; i++) out[i] = S(0);
+  for (int i = 0; i < m.wrench_count; i++)
+    m.wrench_models[i](m.wrench_coefficients[i], numbers_of<S>(m.constants), numbers_of<S>(state),
+                       out);
+}
+
+// What the wrench effects say at a state x of attitude R, into m.effect_wrench. The first call
+// after `drive` also carries the effects' own states over the step: made at the state itself
+template <class S> void apply_effects(Model<S> &m, const S *x, const S R[3][3]) {
+  if (m.wrench_count == 0) return;
+  fill_state(m, x, R, x + VELOCITY, x + RATE, m.rotors.speed, m.effect_state);
   if (m.waiting > 0) {
     m.waiting = 0;
     for (int i = 0; i < m.wrench_count; i++)
       if (m.wrench_hooks[i])
-        m.wrench_hooks[i](m.wrench_coefficients[i], constants, numbers, numbers_of<S>(m.rotors));
+        m.wrench_hooks[i](m.wrench_coefficients[i], numbers_of<S>(m.constants),
+                          numbers_of<S>(m.effect_state), numbers_of<S>(m.rotors));
   }
-  for (int i = 0; i < 6; i++) m.effect_wrench[i] = S(0);
-  for (int i = 0; i < m.wrench_count; i++)
-    m.wrench_models[i](m.wrench_coefficients[i], constants, numbers, m.effect_wrench);
+  add_wrenches(m, m.effect_state, m.effect_wrench);
 }
 
 // Rotor speeds and pose, the first 11 numbers of m.sample, from truth to report (direction +1), or

@@ -95,8 +95,8 @@ template <class T> void point(Flight<T> &c, const T *x, Single<T> dt, T thrust, 
   // body z x wanted z, in the body frame: the turn that the thrust axis needs
   T bx = R[0][0] * u[0] + R[1][0] * u[1] + R[2][0] * u[2],
     by = R[0][1] * u[0] + R[1][1] * u[1] + R[2][1] * u[2];
-  T error = c.setpoint[SET_YAW] - angle_to(R[0][0], R[1][0]);
-  error = angle_to(cosine(error), sine(error));
+  T error = c.setpoint[SET_YAW] - angle_of(R[1][0], R[0][0]);
+  error = angle_of(sine(error), cosine(error));
   c.yaw_sum = within(c.yaw_sum + dt * error, S(-1), S(1));
   // the wanted yaw rate, a turn about the world's vertical, in the body frame
   T rate[3];
@@ -134,7 +134,7 @@ template <class T> void fly(Flight<T> &c, const T *x, Single<T> dt) {
 template <class T> void fly_attitude(Flight<T> &c, const T *x, const T *wanted, Single<T> dt) {
   matrix_of(x + QUATERNION, c.rotation);
   c.setpoint[SET_YAW_RATE] = wanted[2];
-  T yaw = angle_to(c.rotation[0][0], c.rotation[1][0]);
+  T yaw = angle_of(c.rotation[1][0], c.rotation[0][0]);
   T forward = sine(wanted[1]) * cosine(wanted[0]), right = sine(wanted[0]);
   const T u[3] = {cosine(yaw) * forward + sine(yaw) * right,
                   sine(yaw) * forward - cosine(yaw) * right, cosine(wanted[1]) * cosine(wanted[0])};
@@ -180,25 +180,10 @@ void steer(Flight<T> &c, const T *x, const T *command, CommandKind kind, Single<
 template <class S> void foresee(Flight<S> &c, Model<S> &m, const S *x) {
   if (m.wrench_count == 0) return;
   matrix_of(x + QUATERNION, c.rotation);
-  FlightState<S> state = {};
-  Wrench<S> wrench = {};
-  for (int i = 0; i < 3; i++) {
-    state.position[i] = c.setpoint[i];
-    state.velocity[i] = c.setpoint[SET_VELOCITY + i];
-    state.wind[i] = m.wind[i];
-    for (int j = 0; j < 3; j++) state.rotation[i][j] = c.rotation[i][j];
-  }
-  for (int i = 0; i < 4; i++) {
-    state.rotor_speed[i] = c.wanted[i];
-    state.thrust[i] = m.body.k[i] * c.wanted[i] * c.wanted[i];
-    state.rotor_acceleration[i] = m.effect_state.rotor_acceleration[i];
-  }
-  state.voltage = m.voltage;
-  state.time = m.time;
-  for (int i = 0; i < m.wrench_count; i++)
-    m.wrench_models[i](m.wrench_coefficients[i], numbers_of<S>(m.constants), numbers_of<S>(state),
-                       numbers_of<S>(wrench));
-  for (int i = 0; i < 3; i++) c.foreseen[i] = wrench.force[i], c.foreseen[3 + i] = wrench.torque[i];
+  const S still[3] = {};
+  FlightState<S> state = m.effect_state;  // with the rotors' acceleration
+  fill_state(m, c.setpoint, c.rotation, c.setpoint + SET_VELOCITY, still, c.wanted, state);
+  add_wrenches(m, state, c.foreseen);
 }
 
 // What the rotors deliver after the horizon at held commands (4), out (4); the model's own memory

@@ -80,17 +80,6 @@ template <class T> inline T cosine(T a) {
 template <class T> inline T rounded_down(T a) {
   return lane_by_lane(a, [](Single<T> one) { return std::floor(one); });
 }
-// rad, from the first axis to the point (x, y)
-template <class T> inline T angle_to(T x, T y) {
-  if constexpr (is_single<T>) {
-    return std::atan2(y, x);
-  } else {
-    T result;
-    for (int i = 0; i < lanes_of<T>; i++) result[i] = std::atan2(y[i], x[i]);
-    return result;
-  }
-}
-
 template <class T> inline T exponential(T a) {
   return lane_by_lane(a, [](Single<T> one) { return std::exp(one); });
 }
