@@ -85,7 +85,7 @@ struct Flying {
   const double *reference;  // (rows, REFERENCE), a row a tick; none: the set point moves by itself
   std::int64_t rows;
   const WindCall *winds;
-  std::int64_t wind_count;
+  std::int64_t wind_count, blowing;  // the core's, and all with those of a user's own
   void (*mujoco_step)(void *, void *);
   void *model, *data;
 };
@@ -101,7 +101,7 @@ struct Run {
 enum Stage { WIND, SENSE, ESTIMATE, STEER, ACTUATE, FEEL, MOVE, STAGES };
 
 inline void blow(Flying &f) {
-  if (f.wind_count == 0 || f.ticks % WIND_EVERY != 0) return;
+  if (f.blowing == 0 || f.ticks % WIND_EVERY != 0) return;
   double time = double(f.ticks > 0 ? f.ticks : 0) * TICK;
   winds_at(f.winds, f.wind_count, time, f.qpos, f.loop.fan.stations, f.points, f.air);
   for (int i = 0; i < STATIONS; i++)
