@@ -82,7 +82,7 @@ LOOP = np.dtype(
 assert LOOP.itemsize == _core.LOOP_SIZE, "the core was built for another layout"
 _ADDRESSES = (LOOP.names or ())[-14:]
 # stages of the core
-_WIND, _SENSE, _ESTIMATE, _STEER, _ACTUATE, _FEEL, _MOVE = range(7)
+WIND, SENSE, ESTIMATE, STEER, ACTUATE, FEEL, MOVE = range(7)
 # MuJoCo's own function
 _MUJOCO_STEP = ctypes.cast(ctypes.CDLL(_functions.__file__).mj_step, ctypes.c_void_p).value
 
@@ -145,10 +145,10 @@ def _core_stages(*numbers: int) -> Callable[[ClosedLoop], None]:
 # the kit's own stages, in their order
 STAGES: dict[str, Callable[[ClosedLoop], object]] = {
     "wind": lambda loop: loop.blow(),
-    "sense": _core_stages(_SENSE),
-    "estimate": _core_stages(_ESTIMATE),
-    "steer": _core_stages(_STEER),
-    "actuate": _core_stages(_ACTUATE, _FEEL),
+    "sense": _core_stages(SENSE),
+    "estimate": _core_stages(ESTIMATE),
+    "steer": _core_stages(STEER),
+    "actuate": _core_stages(ACTUATE, FEEL),
     "move": lambda loop: loop.move(),
 }
 
@@ -360,7 +360,7 @@ class ClosedLoop:
         reset_flight(loop["flight"])
         self.air[:] = 0.0
         loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal((STATIONS, 3))
-        _core.run_stage(self.address, _SENSE, self._fan_at_rest, rng.standard_normal((1, NOISE)), 0)
+        _core.run_stage(self.address, SENSE, self._fan_at_rest, rng.standard_normal((1, NOISE)), 0)
         self.ukf.reset(self.sample[4:7], self.sample[7:11])
         mujoco.mj_forward(self.model, self.data)
 
@@ -413,14 +413,14 @@ class ClosedLoop:
 
     def blow(self) -> None:
         """Write the winds at the vehicle's stations into ``air``, every second tick."""
-        self.run_stage(_WIND)
+        self.run_stage(WIND)
         if self.ticks % WIND_EVERY == 0:
             for wind in self.winds.own:
                 self.air += wind.velocity(self.points.T, max(self.ticks, 0) * TICK)
 
     def move(self) -> None:
         """Let MuJoCo integrate the rigid body over the tick."""
-        self.run_stage(_MOVE)
+        self.run_stage(MOVE)
 
     @property
     def was_reset(self) -> bool:
