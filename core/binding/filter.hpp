@@ -3,5 +3,7 @@
 #include <nanobind/nanobind.h>
 
 void bind_batch(nanobind::module_ &m);
+void bind_control(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
 void bind_tick(nanobind::module_ &m);
+void bind_winds(nanobind::module_ &m);
