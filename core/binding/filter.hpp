@@ -3,4 +3,5 @@
 #include <nanobind/nanobind.h>
 
 void bind_batch(nanobind::module_ &m);
+void bind_effects(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
