@@ -4,5 +4,6 @@
 
 void bind_batch(nanobind::module_ &m);
 void bind_control(nanobind::module_ &m);
+void bind_effects(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
 void bind_winds(nanobind::module_ &m);

@@ -12,6 +12,7 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
       "Return the instruction set that the core was built for: baseline, avx2 or avx512.");
   bind_batch(m);
   bind_control(m);
+  bind_effects(m);
   bind_filter(m);
   bind_winds(m);
 }
