@@ -6,4 +6,5 @@ void bind_batch(nanobind::module_ &m);
 void bind_control(nanobind::module_ &m);
 void bind_effects(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
+void bind_tick(nanobind::module_ &m);
 void bind_winds(nanobind::module_ &m);

@@ -14,5 +14,6 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
   bind_control(m);
   bind_effects(m);
   bind_filter(m);
+  bind_tick(m);
   bind_winds(m);
 }
