@@ -16,16 +16,16 @@ namespace {
 template <class T, class... Shape>
 using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 using Numbers = Array<double, nb::shape<-1>>;
-using Grid = Array<const double, nb::shape<JET_ROWS, JET_COLUMNS>>;
+using Grid = Array<const double, nb::shape<COUNT_X, COUNT_R>>;
 
 template <class S> struct Jet {
-  S axial[JET_ROWS * JET_COLUMNS], radial[JET_ROWS * JET_COLUMNS];
+  S axial[COUNT_X * COUNT_R], radial[COUNT_X * COUNT_R];
 };
 Jet<double> jet;
 Jet<float> single_jet;
 
 void set_jet_table(Grid axial, Grid radial) {
-  for (int i = 0; i < JET_ROWS * JET_COLUMNS; i++) {
+  for (int i = 0; i < COUNT_X * COUNT_R; i++) {
     jet.axial[i] = axial.data()[i];
     jet.radial[i] = radial.data()[i];
     single_jet.axial[i] = float(jet.axial[i]);

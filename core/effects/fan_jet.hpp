@@ -7,18 +7,17 @@
 // 8 |u| u at each of eight points of a ring on the hull, u being the wind relative to the station.
 // It is the jet of the fan-tracking environment without its gusts.
 #pragma once
+#include "../mean_jet.hpp"
 #include "parts.hpp"
 
 namespace windwrench {
 
-constexpr double AIR_DENSITY = 1.2;  // kg/m3
-constexpr int HULL_STATIONS = 8;     // on a ring of 0.26 m: x, and y two stations on
+constexpr int HULL_STATIONS = 8;  // on a ring of 0.26 m: x, and y two stations on
 constexpr double HULL_X[HULL_STATIONS] = {0.26,  0.1838477631085024,  0, -0.1838477631085024,
                                           -0.26, -0.1838477631085024, 0, 0.1838477631085024};
 
-// Axial and radial speed of a jet with u0 = 1 over a grid of distances and radii, (JET_ROWS,
-// JET_COLUMNS) each. The program that uses the effect has the table: dynamics/mean_jet.py makes it
-constexpr int JET_ROWS = 137, JET_COLUMNS = 151;
+// Axial and radial speed of a jet with u0 = 1 over a grid of distances and radii, (COUNT_X,
+// COUNT_R) each. The program that uses the effect has the table: dynamics/mean_jet.py makes it
 template <class S> struct JetTable {
   const S *axial, *radial;
 };
@@ -30,19 +29,14 @@ template <> JetTable<float> jet_table<float>();
 template <class T>
 void look_up(const JetTable<Single<T>> &table, T distance, T radius, T &axial, T &radial) {
   using S = Single<T>;
-  T row = (distance - S(0.2)) / S(0.05), column = radius / S(0.02);
+  T row = (distance - S(FIRST_X)) / S(STEP_X), column = radius / S(STEP_R);
   axial = radial = T{};
   for (int n = 0; n < lanes_of<T>; n++) {
     S x = number_of(row, n), y = number_of(column, n);
-    if (!(x >= S(0) && x < S(JET_ROWS - 1) && y < S(JET_COLUMNS - 1))) continue;
-    int i = int(x), j = int(y), at = i * JET_COLUMNS + j;
-    S a = x - S(i), b = y - S(j);
-    for (const S *speed : {table.axial, table.radial}) {
-      const S *near = speed + at, *far = near + JET_COLUMNS;
-      S value = (S(1) - a) * ((S(1) - b) * near[0] + b * near[1]);
-      value += a * ((S(1) - b) * far[0] + b * far[1]);
-      lane_of(speed == table.axial ? &axial : &radial, n)[0] = value;
-    }
+    if (!(x >= S(0) && x < S(COUNT_X - 1) && y < S(COUNT_R - 1))) continue;
+    S i = rounded_down(x), j = rounded_down(y);
+    lane_of(&axial, n)[0] = between(table.axial, i, j, x - i, y - j);
+    lane_of(&radial, n)[0] = between(table.radial, i, j, x - i, y - j);
   }
 }
 
