@@ -16,4 +16,6 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
   bind_filter(m);
   bind_tick(m);
   bind_winds(m);
+  bind_constant_gain(m);
+  bind_smoother(m);
 }
