@@ -21,6 +21,7 @@ from ...runtime.python_file import import_file
 from ..vehicle import EffectSetting, Vehicle
 from .base import PARAMETERS, ROW_SIZE, VEHICLE_SIZE, Array, Coefficient, Effect
 from .declaration import Family, Need, Role
+from .own import addresses
 from .vanishing import does_nothing_alone
 
 __all__ = [
@@ -48,7 +49,7 @@ def __dir__() -> list[str]:
 
 
 _FOLDERS = "WINDWRENCH_EFFECTS"
-_NOT_EFFECTS = {"__init__", "__main__", "base", "call", "declaration", "parts", "vanishing"}
+_NOT_EFFECTS = {"__init__", "__main__", "base", "call", "declaration", "own", "parts", "vanishing"}
 
 
 def add_folder(folder: str | Path) -> tuple[str, ...]:
@@ -111,8 +112,8 @@ def get(name: str) -> Effect:
     """Return an effect by its name.
 
     Raises:
-        InputError: no such effect, none in a user's own file, or a law without starting points
-            whose coefficients do nothing alone.
+        InputError: no such effect, none in a user's own file, an error in its function, or a law
+            without starting points whose coefficients do nothing alone.
     """
     if name not in names():
         raise unknown_name("effect", name, names())
@@ -123,7 +124,7 @@ def get(name: str) -> Effect:
             f"{getattr(effect, 'name', effect)!r}"
         )
     # tests ask the kit's own
-    if not _is_own(name) and effect.starting_points is None and does_nothing_alone(effect):
+    if not _is_own(name) and does_nothing_alone(effect) and effect.starting_points is None:
         raise InputError(
             f"{_files()[name]}: effect {name}: no coefficient does anything while the others are "
             "zero, so no diagnosis could ever find it; add starting_points=..., a function that "
@@ -264,14 +265,11 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
         coefficients = np.zeros((len(rows[kind]), width))
         for i, (_, vector) in enumerate(rows[kind]):
             coefficients[i, : len(vector)] = vector
-        addresses = np.array([effect.model.address for effect, _ in rows[kind]], dtype=np.int64)
-        return addresses, coefficients, max([1, *(effect.memory for effect, _ in rows[kind])])
+        models = np.array([addresses(effect)[0] for effect, _ in rows[kind]], dtype=np.int64)
+        return models, coefficients, max([1, *(effect.memory for effect, _ in rows[kind])])
 
     models, coefficients, _ = stack("wrench", ROW_SIZE)
-    hooks = np.array(
-        [effect.advance.address if effect.advance else 0 for effect, _ in rows["wrench"]],
-        dtype=np.int64,
-    )
+    hooks = np.array([addresses(effect)[1] for effect, _ in rows["wrench"]], dtype=np.int64)
     return Bundle(
         amended,
         constants,

@@ -44,6 +44,59 @@ _POINTER = types.CPointer(types.float64)
 EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # C function of a model
 compiled_model: Any = compiled_callback(EFFECT_MODEL)  # the decorator of an effect model
 
+# what a user's function of Python is given as attributes: the layouts of the core
+VEHICLE = np.dtype(
+    [
+        ("mass", "f8"),  # kg
+        ("gravity", "f8"),  # m/s2
+        ("rotor_radius", "f8"),  # m
+        ("floor", "f8"),  # m
+        ("ceiling", "f8"),  # m
+        ("voltage_ref", "f8"),  # V
+        ("hover_rate", "f8"),  # rad/s
+        ("com", "f8", (3,)),  # m, from the geometric centre
+        ("rotor", "f8", (4, 3)),  # m, from the geometric centre
+        ("spin", "f8", (4,)),  # turning sense about body +z
+        ("reaction", "f8", (4,)),  # Nm/(rad/s)^2
+    ]
+)
+STATE = np.dtype(
+    [
+        ("position", "f8", (3,)),  # m, world, of the geometric centre
+        ("rotation", "f8", (3, 3)),  # body to world
+        ("velocity", "f8", (3,)),  # m/s, world
+        ("rate", "f8", (3,)),  # rad/s, body
+        ("rotor_speed", "f8", (4,)),  # rad/s, delivered
+        ("thrust", "f8", (4,)),  # N, delivered
+        ("wind", "f8", (3,)),  # m/s, world
+        ("voltage", "f8"),  # V; 0: not known
+        ("time", "f8"),  # s
+        ("rotor_acceleration", "f8", (4,)),  # rad/s2, delivered, mean over the step
+    ]
+)
+ROTORS = np.dtype(
+    [
+        ("speed", "f8", (4,)),  # rad/s
+        ("step", "f8"),  # s, since the function was last called
+        ("voltage", "f8"),  # V; 0: not known
+        ("time", "f8"),  # s, since the start
+    ]
+)
+SAMPLE = np.dtype(
+    [
+        ("speed", "f8", (4,)),  # rad/s
+        ("position", "f8", (3,)),  # m, world
+        ("quaternion", "f8", (4,)),  # body to world; always readable
+        ("step", "f8"),  # s, since the function was last called
+        ("has_speed", "f8"),  # 1 where the part is given
+        ("has_position", "f8"),
+        ("has_quaternion", "f8"),
+        ("direction", "f8"),  # +1: from truth to report, -1: back
+    ]
+)
+# N, world; Nm, body, about the centre of mass
+WRENCH = np.dtype([("force", "f8", (3,)), ("torque", "f8", (3,))])
+
 # vehicle: numbers for a model
 MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
 COM = 7  # 3, m
