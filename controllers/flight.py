@@ -12,10 +12,10 @@ from .. import _core
 from ..dynamics.motion import BODY, body_record
 from ..dynamics.vehicle import Vehicle
 
-LEAST_THRUST = 0.3  # of the weight
-# what a command is: an acceleration (m/s2, world) beside the flight loop's own, or of the set
-# point; roll and pitch (rad), yaw rate (rad/s) and thrust (m/s2); angular velocities (rad/s, body)
-# and thrust; rotor speeds (rad/s)
+LEAST_THRUST = 0.3  # share of the weight
+# Kinds of commands. An acceleration (m/s2, world) beside the flight loop's own, or of the set
+# point. Roll and pitch (rad), yaw rate (rad/s) and thrust (m/s2). Angular velocities (rad/s, body)
+# and thrust. Rotor speeds (rad/s).
 BESIDE, OF_SETPOINT, ATTITUDE, RATES, ROTORS = range(5)
 # set point: position 0-2, velocity 3-5, acceleration 6-8, yaw 9, yaw rate 10
 SETPOINT_SIZE = 11
