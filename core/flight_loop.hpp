@@ -189,8 +189,10 @@ template <class T> void foresee(Flight<T> &c, Model<T> &m, const T *x) {
 // What the rotors deliver after the horizon at held commands (4), out (4); the model's own memory
 // stays as it is
 template <class T> void delivered(Model<T> &m, const T *commands, T *out) {
-  Rotors<T> rotors = {
-      {commands[0], commands[1], commands[2], commands[3]}, T{} + Single<T>(HORIZON), m.voltage, m.time};
+  Rotors<T> rotors = {{commands[0], commands[1], commands[2], commands[3]},
+                      T{} + Single<T>(HORIZON),
+                      m.voltage,
+                      m.time};
   T memory[112];
   for (int i = 0; i < m.rotor_count; i++) {
     std::memcpy(memory, m.memory[i], sizeof(memory));

@@ -38,7 +38,8 @@ bool find_effects(const EffectModel<double> *from, std::int64_t count, bool hook
     for (int i = 0; i < LIBRARY_EFFECTS && from[n]; i++) {
       const LibraryEffect<double> &known = library<double>()[i];
       const LibraryEffect<T> &same = library<T>()[i];
-      if ((hooks ? known.advance : known.model) == from[n]) to[n] = hooks ? same.advance : same.model;
+      if ((hooks ? known.advance : known.model) == from[n])
+        to[n] = hooks ? same.advance : same.model;
     }
     if (from[n] && !to[n]) return false;
   }
@@ -120,11 +121,11 @@ template <class T> void fly_freely(Block<T> &b, Single<T> dt) {
 
 // What the loops of blocks have in common
 template <class S> struct Common {
-  Filter<S> filter;          // like each of theirs
-  const S *jet;              // tables of the jet's axial and radial speed
-  bool follows;              // whether the set point is a row of the reference, or moves by itself
-  CommandKind kind;          // of the commands
-  bool moves;                // whether commands are velocities of the set point
+  Filter<S> filter;  // like each of theirs
+  const S *jet;      // tables of the jet's axial and radial speed
+  bool follows;      // whether the set point is a row of the reference, or moves by itself
+  CommandKind kind;  // of the commands
+  bool moves;        // whether commands are velocities of the set point
   const std::int64_t *places;  // (actions) of the commands in the set point, or in the action
   bool model_in_loop;
   std::int64_t size;  // unit normals of a tick

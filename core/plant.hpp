@@ -36,8 +36,8 @@ template <class T> struct Plant {
   T dropout, dropout_kept;
   T lost;                                // 1: the last pose was lost
   T actuator_late, pose_late, imu_late;  // ticks
-  T speeds[4];  // of the motors, rad/s
-  T z[11];      // the sample: logged rotor speeds of the last tick, position, quaternion
+  T speeds[4];                           // of the motors, rad/s
+  T z[11];  // the sample: logged rotor speeds of the last tick, position, quaternion
   T disturbance[6];
   T external[6];  // true external force and torque about the centre of mass, world
   T jet[6];       // the jet's part of it

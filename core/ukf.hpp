@@ -95,7 +95,7 @@ template <class S> int step(Filter<S> &f, int parts, S dt, S voltage, Innovation
 // lanes, at a voltage in V, or null
 template <class T>
 void step_lanes(const Filter<Single<T>> &of, Belief<T> &f, T *z, Model<T> *model = nullptr,
-                T voltage = {}) {
+                T voltage = T{}) {
   using S = Single<T>;
   const Settings<S> &s = of.settings;
   T scale = S(1) / root(z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10]);

@@ -13,8 +13,6 @@ using namespace windwrench;
 
 namespace {
 
-template <class T, class... Shape>
-using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 template <nb::ssize_t SIZE> using Numbers = Array<const double, nb::shape<SIZE>>;
 
 Flight<double> &flight_at(std::uintptr_t address) {

@@ -13,8 +13,6 @@ using namespace windwrench;
 
 namespace {
 
-template <class T, class... Shape>
-using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 using Numbers = Array<double, nb::shape<-1>>;
 using Grid = Array<const double, nb::shape<COUNT_X, COUNT_R>>;
 

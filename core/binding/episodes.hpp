@@ -4,13 +4,11 @@
 #include <nanobind/ndarray.h>
 
 #include "../episodes.hpp"
+#include "filter.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace windwrench;
-
-template <class T, class... Shape>
-using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 
 // Arrays of n episodes, with a row each; they live as long as this
 struct Scene {

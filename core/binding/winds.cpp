@@ -17,8 +17,6 @@ using namespace windwrench;
 
 namespace {
 
-template <class T, class... Shape>
-using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 using Vector = Array<const double, nb::shape<3>>;
 using Tables = Array<const double, nb::shape<2, COUNT_X, COUNT_R>>;
 
