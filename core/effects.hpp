@@ -30,7 +30,8 @@ template <class S> void drive(Model<S> &m, const S *speeds, S dt, S voltage) {
   for (int i = 0; i < m.rotor_count; i++)
     m.rotor_models[i](m.rotor_coefficients[i], m.constants, m.rotors, m.memory[i]);
   if (m.wrench_count > 0) {
-    S *last = m.memory[20];  // whether there are delivered rotor speeds, and their values
+    S *last =
+        m.memory[ROTORS + SENSORS];  // whether there are delivered rotor speeds, and their values
     S share = dt > S(0) ? last[0] / dt : S(0);
     last[0] = S(1);
     for (int i = 0; i < 4; i++) {
@@ -80,7 +81,7 @@ template <class S> void undo_sensing(Model<S> &m, int parts, S dt) {
   m.sample[HAS_QUATERNION] = S(parts & 2 ? 1 : 0);
   m.sample[HAS_SPEED] = S(parts & 4 ? 1 : 0);
   for (int i = int(m.sensing_count) - 1; i >= 0; i--)
-    m.sensing_models[i](m.sensing_coefficients[i], m.constants, m.sample, m.memory[16 + i]);
+    m.sensing_models[i](m.sensing_coefficients[i], m.constants, m.sample, m.memory[ROTORS + i]);
 }
 
 }  // namespace windwrench

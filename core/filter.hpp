@@ -3,8 +3,16 @@
 #pragma once
 #include "rigid_body.hpp"
 
+// room for declared effects: on the wrench, the rotors and the sensors, and numbers of each one's
+// memory. An exported vehicle has room for its own effects alone
+#ifndef WINDWRENCH_ROOM
+#define WINDWRENCH_ROOM 16, 16, 4, 112
+#endif
+
 namespace windwrench {
 
+constexpr int ROOM[] = {WINDWRENCH_ROOM};
+constexpr int WRENCHES = ROOM[0], ROTORS = ROOM[1], SENSORS = ROOM[2], MEMORY = ROOM[3];
 constexpr int NOISE = 12;            // noise inputs: motor torque, torque walk, thrust, force walk
 constexpr int BIASES = 6;            // of gyro rad/s and accelerometer m/s2
 constexpr int COMPANIONS = 12;       // the biases, and the noise of the last step
@@ -18,21 +26,22 @@ template <class S> using EffectModel = void (*)(S *, S *, S *, S *);
 template <class S> struct Model {
   Body<S> body;
   S constants[30];  // of the vehicle, for effects
-  EffectModel<S> wrench_models[16];
-  S wrench_coefficients[16][16];
-  EffectModel<S> wrench_hooks[16];  // that carry an effect's own state; null where it has none
+  EffectModel<S> wrench_models[WRENCHES];
+  S wrench_coefficients[WRENCHES][16];
+  EffectModel<S>
+      wrench_hooks[WRENCHES];  // that carry an effect's own state; null where it has none
   int64_t wrench_count, hooked, waiting;  // waiting: the states have still to be carried
-  EffectModel<S> rotor_models[16];
-  S rotor_coefficients[16][8];
+  EffectModel<S> rotor_models[ROTORS];
+  S rotor_coefficients[ROTORS][8];
   int64_t rotor_count;
-  EffectModel<S> sensing_models[4];
-  S sensing_coefficients[4][8];
+  EffectModel<S> sensing_models[SENSORS];
+  S sensing_coefficients[SENSORS][8];
   int64_t sensing_count;
-  S sample[16];              // rotor speeds and pose on their way through the sensing effects
-  S memory[21][112];         // of rotor-input and sensing effects; last: delivered rotor speeds
-  S time, voltage, wind[3];  // s, V, m/s
-  S rotors[7];               // delivered rotor speeds rad/s, step s, voltage V, time s
-  S rotor_wrench[4];         // their thrust N and torques Nm about the centre of mass
+  S sample[16];  // rotor speeds and pose on their way through the sensing effects
+  S memory[ROTORS + SENSORS + 1][MEMORY];  // of these effects; last: delivered rotor speeds
+  S time, voltage, wind[3];                // s, V, m/s
+  S rotors[7];        // delivered rotor speeds rad/s, step s, voltage V, time s
+  S rotor_wrench[4];  // their thrust N and torques Nm about the centre of mass
   S effect_state[35];
   S effect_wrench[6];  // force in the world, torque in the body frame
 };
