@@ -85,12 +85,11 @@ void gyroscopic_rest(const Body<Single<T>> &b, const T *rate, T square, Single<T
   for (int i = 0; i < 3; i++) out[i] = row_times(b.inverse_inertia[i], tx, ty, tz);
 }
 
-// the state that follows x after dt s, out, R being the matrix of its attitude: (2)-(5), (11)-(14)
+// the same over a step of dt s, whose turn may be long
 template <class T, class R4, class E6>
-void move(const Body<Single<T>> &body, const T *x, const T R[3][3], const R4 *rotors,
-          const E6 *effects, Single<T> dt, T *out) {
+void step_accelerations(const Body<Single<T>> &body, const T *x, const T R[3][3], const R4 *rotors,
+                        const E6 *effects, Single<T> dt, T *a) {
   using S = Single<T>;
-  T a[6];
   accelerations(body, R, x, rotors, effects, a);
   const T *w = x + RATE;
   T square = dt * dt * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
@@ -100,6 +99,16 @@ void move(const Body<Single<T>> &body, const T *x, const T R[3][3], const R4 *ro
     gyroscopic_rest(body, w, square, dt, rest);
     for (int i = 0; i < 3; i++) a[3 + i] += choose(far, rest[i], T{});
   }
+}
+
+// the state that follows x after dt s, out, R being the matrix of its attitude: (2)-(5), (11)-(14)
+template <class T, class R4, class E6>
+void move(const Body<Single<T>> &body, const T *x, const T R[3][3], const R4 *rotors,
+          const E6 *effects, Single<T> dt, T *out) {
+  using S = Single<T>;
+  T a[6];
+  const T *w = x + RATE;
+  step_accelerations(body, x, R, rotors, effects, dt, a);
   for (int i = 0; i < 3; i++) {
     out[i] = x[i] + dt * (x[VELOCITY + i] + S(0.5) * dt * a[i]);
     out[VELOCITY + i] = x[VELOCITY + i] + dt * a[i];

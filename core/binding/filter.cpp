@@ -2,8 +2,6 @@
 // `Filter<double>` at its beginning (estimator/filter_record.py), given by its address.
 #include "filter.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 
 #include "../imu.hpp"
@@ -14,14 +12,8 @@ using namespace windwrench;
 
 namespace {
 
-template <class T, class... Shape>
-using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 using Sample = Array<const double, nb::shape<6>>;
 using Variances = Array<double, nb::shape<N>>;
-
-Filter<double> &filter_at(std::uintptr_t address) {
-  return *reinterpret_cast<Filter<double> *>(address);
-}
 
 int step_filter(Filter<double> &f, int parts, double dt, double voltage, Innovation<double> &n) {
   return f.imu.used ? step_with_biases(f, parts, dt, voltage, n) : step(f, parts, dt, voltage, n);
@@ -61,15 +53,7 @@ void add_doubt_at(std::uintptr_t address, Variances variances) {
   add_doubt(f.settings, f.belief, variances.data());
 }
 
-// A call of a filter: a step's sample, which parts of the pose there are, s, V; or gyro and
-// accelerometer, and which of both
-struct Call {
-  double z[11];
-  std::int64_t parts;
-  double dt, voltage;
-};
 enum { GYRO = 4, ACCELEROMETER = 8 };  // beside the parts of a pose
-constexpr int NUMBERS = 30;            // of an estimate, without its covariance
 
 // an estimate's numbers (30), and its variances (18), widened by refused and unlikely poses
 void write_estimate(const Filter<double> &f, double *numbers, double *variances) {

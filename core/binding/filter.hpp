@@ -1,6 +1,27 @@
-// What the module of an instruction set takes in.
+// What the module of an instruction set takes in, and what its files share.
 #pragma once
 #include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include "../filter.hpp"
+
+template <class T, class... Shape>
+using Array = nanobind::ndarray<T, nanobind::c_contig, nanobind::device::cpu, Shape...>;
+
+// A call of a filter: a step's sample, which parts of the pose there are, s, V; or gyro and
+// accelerometer, and which of both
+struct Call {
+  double z[11];
+  std::int64_t parts;
+  double dt, voltage;
+};
+constexpr int NUMBERS = 30;  // of an estimate, without its covariance
+
+inline windwrench::Filter<double> &filter_at(std::uintptr_t address) {
+  return *reinterpret_cast<windwrench::Filter<double> *>(address);
+}
 
 void bind_batch(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
+void bind_constant_gain(nanobind::module_ &m);
+void bind_smoother(nanobind::module_ &m);
