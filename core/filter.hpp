@@ -8,6 +8,10 @@
 #ifndef WINDWRENCH_ROOM
 #define WINDWRENCH_ROOM 16, 16, 4, 112
 #endif
+// 0: no memory for inertial measurements, in a filter that takes none
+#ifndef WINDWRENCH_IMU
+#define WINDWRENCH_IMU 1
+#endif
 
 namespace windwrench {
 
@@ -118,11 +122,13 @@ template <class S> struct Imu {
   S sensitivity[6][COMPANIONS];  // of gyro and accelerometer
 };
 
+struct NoImu {};
+
 template <class S> struct Filter {
   Model<S> vehicle;
   Belief<S> belief;
   Settings<S> settings;
-  Imu<S> imu;
+  std::conditional_t<WINDWRENCH_IMU, Imu<S>, NoImu> imu;
   S z[11];                  // a step's sample: rotor speeds rad/s, position m, quaternion
   S centre_rotation[3][3];  // attitude at the start of the last step
 };

@@ -109,7 +109,8 @@ def export_c(
         "full_battery": vehicle.voltage_ref,
         "headers": headers,
         "room": room,
-        "size": _size(room, PRECISIONS[precision]),
+        "size": _size(room, PRECISIONS[precision], estimator),
+        "steady": _STEADY,
         "policy": flown,
     }
     environment = Environment(
@@ -153,13 +154,24 @@ _ROOMS = {
     "sensing_models": (2, 1),
     "sensing_coefficients": (2, PARAMETERS),
 }
+_STEADY = {
+    "gain": "of a pose (rho, x)",
+    "information": "inverse covariance of its innovation",
+    "converged": "covariance after a correction",
+    "settle": "s for which the covariance must have been near that one",
+    "hover": "derivatives of angular and linear acceleration by the error state",
+}
 _ALIGNMENT = 48  # bytes, at most, between numbers of several sizes
 
 
-def _size(room: tuple[int, int, int, int], number: str) -> str:
+def _size(room: tuple[int, int, int, int], number: str, estimator: str) -> str:
     """Return the bytes of a filter's memory with room for some effects, as an expression of C."""
+    names = fields_between(*_MEMORY)
     counts = {number: 2, "long long": 0, "void *": 0}  # two: voltage and lost time
-    for name, field in _fields(np.dtype([(n, FILTER[n]) for n in fields_between(*_MEMORY)])):
+    if estimator == "constant-gain":
+        names = tuple(name for name in names if name != "imu")
+        counts = {number: 3, "long long": 1, "void *": 0}  # near and steady
+    for name, field in _fields(np.dtype([(name, FILTER[name]) for name in names])):
         size = int(np.prod(field.shape))
         if name in _ROOMS:
             kind, row = _ROOMS[name]

@@ -153,7 +153,8 @@ struct Policy {
       }
     }
     while (kept-- > 0)
-      for (int left = int(particles[kept].drawn); left > 0; left--) particles[--k] = particles[kept];
+      for (int left = int(particles[kept].drawn); left > 0; left--)
+        particles[--k] = particles[kept];
   }
 };
 

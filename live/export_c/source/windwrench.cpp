@@ -20,7 +20,13 @@ namespace {
 
 using S = ww_number;
 
+#if WW_IMU
 struct Flying {
+#else
+struct Flying : Steady {
+  int64_t steady;  // whether the constant gain holds
+  S near;          // s for which the covariance has been near that of the gain
+#endif
   Filter<S> filter;
   S voltage;    // V, 0: not known
   S lost_time;  // s that rounding took off the sum of the steps
@@ -41,12 +47,15 @@ void copy(const S *from, S *to, int count) {
 }
 
 // One call of the core: predict over dt s if that is positive, and correct with parts of the pose
-int call(Filter<S> &f, int parts, S dt, S voltage) {
-  Innovation<S> innovation;
+int call(Flying &of, int parts, S dt) {
 #if WW_IMU
-  if (f.imu.used) return step_with_biases(f, parts, dt, voltage, innovation);
+  Filter<S> &f = of.filter;
+  Innovation<S> innovation;
+  return f.imu.used ? step_with_biases(f, parts, dt, of.voltage, innovation)
+                    : step(f, parts, dt, of.voltage, innovation);
+#else
+  return step(of, parts, dt, of.voltage);
 #endif
-  return step(f, parts, dt, voltage, innovation);
 }
 
 }  // namespace
@@ -71,13 +80,16 @@ int ww_init(ww_filter *memory, const S *position, const S *quaternion) {
   copy(f.belief.x, f.belief.poses.seen, 7);
   copy(FIRST_VARIANCES + 12, f.belief.predicted, 6);
   for (int i = 0; i < 4; i++) f.belief.last_speeds[i] = HOVER_SPEED;
-  for (int i = 0; i < N; i++) f.belief.P[i][i] = FIRST_VARIANCES[i];
 #if WW_IMU
+  for (int i = 0; i < N; i++) f.belief.P[i][i] = FIRST_VARIANCES[i];
   copy(IMU_GATE, f.imu.gate, 3);
   copy(IMU_PRIOR, f.imu.prior, BIASES);
   copy(IMU_WALK, f.imu.walk, BIASES);
   copy(IMU_BOUND, f.imu.bound, BIASES);
   forget_biases(f.imu);
+#else
+  of.steady = 1;
+  copy(Steady::converged[0], f.belief.P[0], N * N);
 #endif
   return 0;
 }
@@ -92,7 +104,7 @@ int ww_predict(ww_filter *memory, const S *rotor_speeds, S dt) {
   Filter<S> &f = of.filter;
   S time = f.vehicle.time;
   copy(rotor_speeds, f.z, 4);
-  call(f, 0, dt, of.voltage);
+  call(of, 0, dt);
   if (sizeof(S) < sizeof(double)) {  // a float loses a share of a small step
     S step = dt - of.lost_time;
     f.vehicle.time = time + step;
@@ -102,13 +114,14 @@ int ww_predict(ww_filter *memory, const S *rotor_speeds, S dt) {
 }
 
 int ww_correct_pose(ww_filter *memory, const S *position, const S *quaternion) {
-  Filter<S> &f = flying(memory).filter;
+  Flying &of = flying(memory);
+  Filter<S> &f = of.filter;
   int parts =
       (measured(position, 3) ? POSITION_PART : 0) | (measured(quaternion, 4) ? ATTITUDE_PART : 0);
   copy(f.belief.last_speeds, f.z, 4);
   if (parts & POSITION_PART) copy(position, f.z + 4, 3);
   if (parts & ATTITUDE_PART) copy(quaternion, f.z + 7, 4);
-  if (parts && call(f, parts, S(0), S(0)) < 0) return WW_BAD_QUATERNION;
+  if (parts && call(of, parts, S(0)) < 0) return WW_BAD_QUATERNION;
   return int(f.belief.status);
 }
 
