@@ -70,6 +70,84 @@ class SingleBatch:
     def __getstate__(self) -> tuple[int, bytes]: ...
     def __setstate__(self, arg: tuple[int, bytes], /) -> None: ...
 
+FLIGHT_SIZE: int
+
+def move_setpoint(
+    flight: int,
+    position: Annotated[
+        NDArray[numpy.float64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    dt: float,
+) -> None:
+    """Move the set point of the flight loop at an address with its own velocity for dt s; on an
+    axis where it runs too far ahead of the position (3,) m it waits.
+    """
+
+def steer(
+    flight: int,
+    x: Annotated[NDArray[numpy.float64], dict(shape=(20), order="C", device="cpu", writable=False)],
+    command: Annotated[
+        NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)
+    ],
+    kind: int,
+    dt: float,
+) -> None:
+    """Fly a command (4,) of a kind in the estimated state x (20,), and write the rotor speeds into
+    the flight loop at an address.
+    """
+
+def foresee(
+    flight: int,
+    model: int,
+    x: Annotated[NDArray[numpy.float64], dict(shape=(20), order="C", device="cpu", writable=False)],
+) -> None:
+    """Write the wrench of the effects of the model at an address, for the rotors to balance, into
+    the flight loop at an address; x (20,) is the estimated state.
+    """
+
+def through_the_rotors(flight: int, model: int) -> None:
+    """Turn the rotor speeds commanded by the flight loop at an address into commands that deliver
+    them by the model at an address.
+    """
+
+def weigh(
+    place: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    level: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    memory: Annotated[NDArray[numpy.float64], dict(shape=(None, 21), order="C", device="cpu")],
+    own: Annotated[
+        NDArray[numpy.float64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    seen: Annotated[
+        NDArray[numpy.float64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    tables: Annotated[
+        NDArray[numpy.float64], dict(shape=(301, 4, 3), order="C", device="cpu", writable=False)
+    ],
+    keep: Annotated[
+        NDArray[numpy.float64], dict(shape=(3, 3, 3), order="C", device="cpu", writable=False)
+    ],
+    enter: Annotated[
+        NDArray[numpy.float64], dict(shape=(3, 3), order="C", device="cpu", writable=False)
+    ],
+    regression: Annotated[
+        NDArray[numpy.float64], dict(shape=(4, 3, 3), order="C", device="cpu", writable=False)
+    ],
+    variance: Annotated[
+        NDArray[numpy.float64], dict(shape=(4, 3), order="C", device="cpu", writable=False)
+    ],
+    decision: int,
+    out: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+) -> None:
+    """Write the log-likelihood of an observation for each particle into out (n,), and carry its
+    memory (n, 21) on: places (n,) m of the fan, levels (n,) of the noise, the vehicle's own place
+    m, velocity m/s and yaw rate rad/s, the estimated torque and forces (3,), and a tracker's
+    tables; at the first decision, 0, the filter has settled on the jet where it is.
+    """
+
 FILTER_SIZE: int
 
 def step(address: int, parts: int, dt: float, voltage: float, white: int) -> int:
@@ -146,127 +224,64 @@ def make_calls(
     quaternion that is no rotation.
     """
 
-CONSTANT_GAIN_SIZE: int
+FAN_SIZE: int
 
-def step_with_gain(address: int, parts: int, dt: float, voltage: float) -> int:
-    """Do what `step` does with a filter whose gain is constant in steady flight."""
+def wind_formula(name: str, size: int) -> int:
+    """Return the address of a wind's formula, steady, waves, jets or grid, whose parameters have a
+    size in bytes.
 
-def step_with_gain_address() -> int:
-    """Return the address of `step_with_gain`: a C function with the same arguments."""
-
-def hold_still(
-    address: int,
-    z: Annotated[NDArray[numpy.float64], dict(shape=(11), order="C", device="cpu", writable=False)],
-    steps: int,
-    voltage: float,
-) -> None:
-    """Step a filter through periods with one sample (11,), rotor speeds and pose."""
-
-def hover_jacobian(
-    address: int,
-    voltage: float,
-    out: Annotated[NDArray[numpy.float64], dict(shape=(6, 18), order="C", device="cpu")],
-) -> None:
-    """Write the derivatives (6, 18) of angular (body) and linear acceleration by the error
-    state of a filter that hovers at its last rotor speeds; voltage in V.
+    Raises:
+        ValueError: no formula has this name and parameters of this size.
     """
 
-def drive(
-    address: int,
-    speeds: Annotated[
-        NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)
-    ],
-    dt: float,
-    voltage: float,
-) -> None:
-    """Let the rotors of a filter's model deliver over dt s at logged speeds (4,), rad/s."""
-
-def move(
-    address: int,
-    x: Annotated[NDArray[numpy.float64], dict(shape=(20), order="C", device="cpu", writable=False)],
-    dt: float,
-    out: Annotated[NDArray[numpy.float64], dict(shape=(20), order="C", device="cpu")],
-    jacobian: Annotated[NDArray[numpy.float64], dict(shape=(12, 18), order="C", device="cpu")]
-    | None = None,
-) -> None:
-    """Write the state (20,) that follows x (20,) after dt s by a filter's model, as driven, and
-    the first 12 rows (12, 18) of the Jacobian of its error state less the identity.
-    """
-
-def expected_imu(
-    address: int,
-    x: Annotated[NDArray[numpy.float64], dict(shape=(20), order="C", device="cpu", writable=False)],
-    out: Annotated[NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu")],
-) -> None:
-    """Write what gyro, rad/s, and accelerometer, m/s2, would measure (6,) without bias in a
-    state x (20,), as driven.
-    """
-
-ROW_SIZE: int
-
-INNOVATION_SIZE: int
-
-def smooth_block(
-    memory: int,
-    smoothed: int,
+def add_winds(
     calls: Annotated[
-        NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu", writable=False)
+        NDArray[numpy.int64], dict(shape=(None, 2), order="C", device="cpu", writable=False)
     ],
-    numbers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
-    std: Annotated[NDArray[numpy.float64], dict(shape=(None, 18), order="C", device="cpu")],
+    time: float,
+    points: Annotated[
+        NDArray[numpy.float64], dict(shape=(3, None), order="C", device="cpu", writable=False)
+    ],
+    velocities: Annotated[NDArray[numpy.float64], dict(shape=(3, None), order="C", device="cpu")],
 ) -> None:
-    """Make calls, bytes of the record CALL (n,), of the filter at the address `memory`, and go
-    back from the smoothed estimate after them to the one before, both at the address
-    `smoothed`. Write numbers (n, 30 or 354) and standard deviations (n, 18) of each.
+    """Add winds, addresses of formula and parameters (winds, 2), at points (3, n) m and a time in s
+    to velocities (3, n) m/s, world.
     """
 
-def write_smoothed(
-    address: int,
-    row: int,
-    numbers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
-    std: Annotated[NDArray[numpy.float64], dict(shape=(None, 18), order="C", device="cpu")],
+def jet_at(
+    fan: int,
+    jet: Annotated[
+        NDArray[numpy.float64], dict(shape=(2, 137, 151), order="C", device="cpu", writable=False)
+    ],
+    points: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    winds: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu")],
 ) -> None:
-    """Write the smoothed estimate at an address into a row of numbers and deviations."""
-
-def link_back(
-    P: Annotated[
-        NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu", writable=False)
-    ],
-    C: Annotated[
-        NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu", writable=False)
-    ],
-    after: Annotated[
-        NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu", writable=False)
-    ],
-    G: Annotated[NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu")],
-    K: Annotated[NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu")],
-) -> None:
-    """Write the smoother's gain, transposed, and the covariance of the estimate before, given
-    the one after, from P before a prediction, cross covariance C and P after; all (18, 18).
+    """Write the mean wind (n, 3) m/s of the fan at an address at points (n, 3) m of the world;
+    `jet` (2, 137, 151) are the tables of axial and radial speed.
     """
 
-def judge_rows(
-    address: int,
-    rows: Annotated[
-        NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu", writable=False)
+def jet_wrench(
+    fan: int,
+    jet: Annotated[
+        NDArray[numpy.float64], dict(shape=(2, 137, 151), order="C", device="cpu", writable=False)
     ],
-    log_inlier: float,
-    log_outlier: float,
-    out: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu")],
+    position: Annotated[
+        NDArray[numpy.float64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    rotation: Annotated[
+        NDArray[numpy.float64], dict(shape=(3, 3), order="C", device="cpu", writable=False)
+    ],
+    velocity: Annotated[
+        NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu", writable=False)
+    ],
+    com: Annotated[
+        NDArray[numpy.float64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu")],
 ) -> None:
-    """Carry a filter along bytes of the record ROW (n,), and write those of INNOVATION (n,).
-    Logarithms of the chance of a pose that is no outlier, and of an outlier's density.
-    """
-
-def variances_along(
-    factors: Annotated[
-        NDArray[numpy.float64], dict(shape=(9), order="C", device="cpu", writable=False)
-    ],
-    loads: Annotated[
-        NDArray[numpy.float64], dict(shape=(None, 7, 3), order="C", device="cpu", writable=False)
-    ],
-    out: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu")],
-) -> None:
-    """Write the variances (n, 6) of torque and force by the vehicle's uncertainty, at loads
-    (n, 7, 3).
+    """Write force N and torque Nm about the centre of mass (6,), world, of the wind on a vehicle in
+    front of the fan at an address: position (3,) m, rotation (3, 3) from body to world, velocity
+    (6,) m/s, world, and rad/s, body, centre of mass (3,) m.
     """

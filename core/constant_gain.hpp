@@ -199,7 +199,7 @@ template <class G, class S = NumberOf<G>> int step(G &c, int parts, S dt, S volt
   int usable = check_sample(f.settings, b, f.z, parts);
   if (usable < 0) return usable;
   true_sample(f, usable, dt);
-  S *sample = m.sample, centre[STATE], R[3][3];
+  S *sample = numbers_of<S>(m.sample), centre[STATE], R[3][3];
   for (int i = 0; i < NIS; i++) centre[i] = b.x[i];
   if (dt > S(0)) {
     drive(m, sample, dt, voltage);

@@ -1,6 +1,7 @@
 // The memory of one wrench filter. `Filter<double>` is what Python sees as a NumPy record
 // (estimator/filter_record.py): the same fields in the same order.
 #pragma once
+#include "effects/form.hpp"
 #include "rigid_body.hpp"
 
 // room for declared effects: on the wrench, the rotors and the sensors, and numbers of each one's
@@ -22,31 +23,26 @@ constexpr int BIASES = 6;            // of gyro rad/s and accelerometer m/s2
 constexpr int COMPANIONS = 12;       // the biases, and the noise of the last step
 constexpr int AGREEING_SAMPLES = 5;  // accelerometer samples in a row that make a push
 
-// An effect on the vehicle: (its coefficients and own state, the vehicle's numbers, the flight's
-// state or the rotors or the sample, the wrench or its memory); layouts of dynamics/effects/base.py
-template <class S> using EffectModel = void (*)(S *, S *, S *, S *);
-
 // A vehicle with its effects
 template <class S> struct Model {
   Body<S> body;
-  S constants[30];  // of the vehicle, for effects
+  VehicleNumbers<S> constants;  // for effects
   EffectModel<S> wrench_models[WRENCHES];
-  S wrench_coefficients[WRENCHES][16];
-  EffectModel<S>
-      wrench_hooks[WRENCHES];  // that carry an effect's own state; null where it has none
+  S wrench_coefficients[WRENCHES][ROW];
+  EffectModel<S> wrench_hooks[WRENCHES];  // carry an effect's own state; null where it has none
   int64_t wrench_count, hooked, waiting;  // waiting: the states have still to be carried
   EffectModel<S> rotor_models[ROTORS];
-  S rotor_coefficients[ROTORS][8];
+  S rotor_coefficients[ROTORS][PARAMETERS];
   int64_t rotor_count;
   EffectModel<S> sensing_models[SENSORS];
-  S sensing_coefficients[SENSORS][8];
+  S sensing_coefficients[SENSORS][PARAMETERS];
   int64_t sensing_count;
-  S sample[16];  // rotor speeds and pose on their way through the sensing effects
+  Sample<S> sample;  // rotor speeds and pose on their way through the sensing effects
   S memory[ROTORS + SENSORS + 1][MEMORY];  // of these effects; last: delivered rotor speeds
   S time, voltage, wind[3];                // s, V, m/s
-  S rotors[7];        // delivered rotor speeds rad/s, step s, voltage V, time s
-  S rotor_wrench[4];  // their thrust N and torques Nm about the centre of mass
-  S effect_state[35];
+  Rotors<S> rotors;                        // delivered
+  S rotor_wrench[4];                       // their thrust N and torques Nm about the centre of mass
+  FlightState<S> effect_state;
   S effect_wrench[6];  // force in the world, torque in the body frame
 };
 

@@ -37,7 +37,7 @@ template <class S> int check_sample(const Settings<S> &s, Belief<S> &f, S *z, in
 // f.vehicle.sample. Rotor speeds count where dt is positive. Where the attitude was not measured,
 // the estimated one stands in for it
 template <class S> const S *true_sample(Filter<S> &f, int parts, S dt) {
-  S *sample = f.vehicle.sample;
+  S *sample = numbers_of<S>(f.vehicle.sample);
   for (int i = 0; i < 11; i++) sample[i] = f.z[i];
   if (f.vehicle.sensing_count > 0) {
     if (!(parts & ATTITUDE_PART))
@@ -50,9 +50,10 @@ template <class S> const S *true_sample(Filter<S> &f, int parts, S dt) {
 // The pose of a new estimate as it was before the declared sensing effects
 template <class S> void undo_first_pose(Filter<S> &f) {
   if (f.vehicle.sensing_count == 0) return;
-  for (int i = 0; i < 7; i++) f.vehicle.sample[4 + i] = f.belief.x[i];
+  S *pose = numbers_of<S>(f.vehicle.sample) + 4;
+  for (int i = 0; i < 7; i++) pose[i] = f.belief.x[i];
   undo_sensing(f.vehicle, POSITION_PART | ATTITUDE_PART, S(0));
-  for (int i = 0; i < 7; i++) f.belief.x[i] = f.vehicle.sample[4 + i];
+  for (int i = 0; i < 7; i++) f.belief.x[i] = pose[i];
 }
 
 // Carry the filter dt s ahead at rotor speeds (4) rad/s: (18)-(27)

@@ -14,21 +14,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from .. import _core
 from ..controllers.briefing import standard_vehicle
 from ..dynamics.model import (
     MODEL_FIELDS,
-    apply_effects,
-    drive,
     load_model,
     reset_model,
-    rewrite_sample,
 )
 from ..dynamics.motion import Array
 from ..dynamics.rotation import (
     normalise,
     quaternion_from_mrp,
     quaternion_multiply,
-    quaternion_to_matrix,
 )
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
@@ -118,6 +115,9 @@ PLANT = np.dtype(
         ("past_felt", "f8", (_KEPT, 3)),
     ]
 )
+
+
+assert PLANT.itemsize == _core.PLANT_SIZE, "the core was built for another layout"
 
 
 def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray, Vehicle]:
@@ -256,24 +256,6 @@ def delay(past: Array, ticks: float, now: Array, late: Array) -> None:
 
 
 @compiled
-def sense(p: Record, qpos: Array, noise: Array) -> int:
-    """Write motion capture's present sample into ``p.z``; return its parts (3, or 0 where lost).
-
-    Sensing effects change the true pose before its noise comes on.
-
-    The attitude comes with a non-negative scalar part, as from a real system: a vehicle facing -x
-    sees its quaternion's sign flip several times a second.
-    """
-    delay(p.past_poses, p.pose_late, qpos, p.late)
-    for i in range(7):
-        p.sample[4 + i] = p.late[i]
-    rewrite_sample(p, 0.0, 3, 1.0)
-    measure(p, p.sample[4:11], noise)
-    note_loss(p, noise)
-    return 0 if p.lost[0] > 0.0 else 3
-
-
-@compiled
 def measure(p: Record, pose: Array, noise: Array) -> None:
     """Write a pose (7,) and its noise into ``p.z``."""
     for i in range(3):
@@ -358,41 +340,3 @@ def add_up(p: Record, xfrc: Array) -> None:
         for j in range(3):
             made += R[i, j] * p.rotor_wrench[1 + j]
         xfrc[3 + i] = made
-
-
-@compiled
-def actuate(
-    p: Record,
-    command: Array,
-    fan: Record,
-    jet: Array,
-    qpos: Array,
-    qvel: Array,
-    noise: Array,
-    xfrc: Array,
-) -> None:
-    """Let the motors follow their commands for one tick and write the tick's wrench into ``xfrc``
-    (6,).
-    """
-    follow(p, command)
-    load = 0.0
-    for i in range(4):
-        load += p.body.k[i] * p.speeds[i] * p.speeds[i]
-        p.sample[i] = p.speeds[i]
-    rewrite_sample(p, TICK, 4, 1.0)
-    log_speeds(p, p.sample[0:4])
-    if p.voltage_ref > 0.0:
-        # falls by a tenth over the battery's life, and by a twentieth under twice the hover load
-        full = (
-            1.05
-            - 0.1 * p.time / p.battery_life
-            - 0.05 * (load / (p.body.mass * p.body.gravity) - 1.0)
-        )
-        p.battery += 0.05 * (full * p.voltage_ref - p.battery)
-    drive(p, p.speeds, TICK, p.battery)
-    quaternion_to_matrix(qpos[3:7], p.rotation)
-    apply_effects(p, qpos[0:3], p.rotation, qvel[0:3], qvel[3:6])
-    blow(p, fan, jet, qpos, qvel, noise)
-    disturb(p, noise)
-    add_up(p, xfrc)
-    p.time += TICK

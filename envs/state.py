@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..runtime.compiled import compiled, compiled_without_gil
 from .fan import STATIONS
 from .plant import TICK
@@ -98,6 +99,7 @@ _FIRST = sum(_TRUE.values())  # column of the estimate
 _STD = _FIRST + 20
 _REST = _FIRST + sum(_ESTIMATED.values())
 _SIZE = _REST + sum(_BESIDE.values())
+assert _SIZE == _core.ROW_SIZE, "the core was built for another layout"
 
 
 def _lay(target: object, rows: Array, first: int, fields: dict[str, int]) -> None:
@@ -198,7 +200,7 @@ class State:
 
 
 @compiled
-def is_healthy(state: Array, qvel: Array) -> bool:
+def _is_healthy(state: Array, qvel: Array) -> bool:
     """Return whether an estimate (20,) is finite and each velocity (6,) a vehicle's."""
     healthy = math.isfinite(state[:19].sum())
     for velocity in qvel:
@@ -250,4 +252,4 @@ def gather(
             change += more * more
         rest[25] = change
         # in this form a number that is not finite counts as lost
-        flying[n] = not episodes.broken[n] and upright and is_healthy(estimate, v)
+        flying[n] = not episodes.broken[n] and upright and _is_healthy(estimate, v)

@@ -23,13 +23,7 @@ from ...estimator.ukf_lanes import (
 from ...runtime.addresses import call_at
 from ...runtime.compiled import Record, compiled, compiled_without_gil
 from ...runtime.vector_lanes import WIDTH, LaneRecord
-from ..closed_loop import (
-    LOOP,
-    WIND_EVERY,
-    ClosedLoop,
-    accelerate,
-    blow_at,
-)
+from ..closed_loop import ACCELEROMETER_NOISE, WIND_EVERY, ClosedLoop
 from ..fan import FAN, STATIONS
 from ..plant import (
     NOISE,
@@ -46,6 +40,21 @@ from ..plant import (
     measure,
 )
 from ..state import Episodes, Motion
+from ..wind.field import Calls, add_winds
+
+LOOP = np.dtype(
+    [
+        ("plant", PLANT),
+        ("flight", FLIGHT),
+        ("fan", FAN),
+        *[(name, "f8", (4,)) for name in ("action",)],
+        *[(name, "f8", (3,)) for name in ("specific", "thrust", "accelerometer_bias")],
+        ("accelerometer_sigma", "f8"),
+        ("qpos", "f8", (7,)),
+        *[(name, "f8", (6,)) for name in ("qvel", "xfrc", "acceleration", "none")],
+        ("noise", "f8", (NOISE + ACCELEROMETER_NOISE,)),
+    ]
+)
 
 
 def _between(form: np.dtype, first: str, last: str) -> tuple[str, ...]:
@@ -91,6 +100,51 @@ class BlockFields(NamedTuple):
     setpoint: Array
     action: Array
     stations: Array  # (blocks, STATIONS, 3)
+
+
+@compiled
+def blow_at(
+    calls: Calls,
+    time: Array,
+    pose: Array,
+    stations: Array,
+    rotation: Array,
+    points: Array,
+    air: Array,
+) -> None:
+    """Write the winds at a vehicle's stations into ``air`` (3, STATIONS) m/s, for a pose (7,).
+
+    The stations' places in the world go into ``points`` (3, STATIONS) m.
+    """
+    R, s = rotation, stations
+    quaternion_to_matrix(pose[3:7], R)
+    for i in range(STATIONS):
+        for a in range(3):
+            points[a, i] = pose[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+    air[:] = 0.0
+    add_winds(calls, time, points, air)
+
+
+@compiled
+def accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
+    """Add the specific force of an accelerometer in the centre of mass, in the world by the
+    estimated attitude, and that of the rotors by the declared model.
+    """
+    plant, body = loop.plant, loop.flight.body
+    R, E = plant.rotation, loop.flight.rotation
+    thrust = 0.0
+    for i in range(4):
+        thrust += body.k[i] * plant.z[i] * plant.z[i]
+    for j in range(3):
+        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[NOISE + j]
+        for i in range(3):
+            felt += R[i, j] * xfrc[i] / plant.body.mass
+        plant.scratch[j] = felt
+    delay(plant.past_felt, plant.imu_late, plant.scratch, plant.late)
+    for j in range(3):
+        for i in range(3):
+            loop.specific[i] += E[i, j] * plant.late[j]
+        loop.thrust[j] += E[j, 2] * thrust / body.mass
 
 
 @compiled
@@ -305,6 +359,7 @@ class LoopBlocks:
 def _single(loop: ClosedLoop) -> dict[str, Any]:
     """Return the contents of a closed loop's record and of MuJoCo, by the names of ``LOOPS``."""
     record = loop.record[0]
-    names = ("plant", "flight", "fan", *_OWN, *_COMMON)
-    pose = {"qpos": loop.world.qpos, "qvel": loop.world.qvel}
-    return {name: record[name] for name in names} | pose
+    single = {name: np.zeros(LOOP[name].shape) for name in (*_OWN, *_COMMON)}
+    known = ("plant", "flight", "fan", "action", "specific", "thrust", "accelerometer_bias")
+    single |= {name: record[name] for name in (*known, "accelerometer_sigma")}
+    return single | {"qpos": loop.world.qpos, "qvel": loop.world.qvel}

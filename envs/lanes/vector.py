@@ -10,7 +10,7 @@ from numba import typed, typeof
 from ...controllers.flight import BESIDE
 from ...dynamics.motion import Array
 from ...estimator.ukf_lanes import new_work, step_address
-from ...runtime.compiled import compiled
+from ...runtime.compiled import compiled, specialised
 from ...runtime.errors import InputError
 from ...runtime.vector_lanes import WIDTH
 from ..closed_loop import ClosedLoop
@@ -69,6 +69,9 @@ class TaskLanes(TaskVectorEnv):
         self._winds = np.array([len(winds.calls) for winds in self._blowing])
         for i, winds in enumerate(self._blowing):
             self._calls[i, : len(winds.calls)] = winds.calls
+
+    def _call(self, function: Any, *arguments: Any) -> Any:
+        return specialised(function, *arguments)(*arguments)
 
     def truth(self) -> dict[str, Array]:
         """Return an oracle's true motion and the flight loop's integral, a row an environment."""

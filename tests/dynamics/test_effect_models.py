@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.outcomes import refused
 from tests.support.vehicles import VEHICLE
+from windwrench import _core
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import compile_effects
 from windwrench.dynamics.effects.base import (
@@ -26,7 +27,7 @@ from windwrench.dynamics.effects.base import (
 from windwrench.dynamics.effects.call import deliver, report
 from windwrench.dynamics.mean_jet import jet_table
 from windwrench.dynamics.motion import body_record, effect_wrench
-from windwrench.envs.fan import Fan, fan_record, jet_wrench
+from windwrench.envs.fan import Fan, fan_record
 
 PERIOD = 0.005
 # a tilted vehicle that moves, turns and has four different rotors
@@ -307,14 +308,13 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
     out = np.zeros(6)
     turn = Rotation.from_euler("z", heading).as_matrix()
     record = fan_record(fan, VEHICLE.positions, PERIOD)
-    jet_wrench(
-        record[0],
+    _core.jet_wrench(
+        record.ctypes.data,
         np.stack(jet_table(fan.radius, fan.hub_radius)),
         position,
         np.ascontiguousarray(turn.T @ R),
         np.concatenate([turn.T @ V, OMEGA]),
         com,
-        np.zeros(3),
         out,
     )
     place = {"x": where[0], "y": where[1], "z": fan.height, "heading": heading}
