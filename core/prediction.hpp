@@ -11,6 +11,11 @@
 #include "linear_algebra.hpp"
 #include "vehicle_uncertainty.hpp"
 
+// 0: sigma points one after the other, for processors without vector registers; the same bits
+#ifndef WINDWRENCH_REGISTERS
+#define WINDWRENCH_REGISTERS 1
+#endif
+
 namespace windwrench {
 
 // What a prediction leaves for the companions of an inertial measurement
@@ -288,7 +293,7 @@ void carry(const Body<Single<T>> &body, const Settings<Single<T>> &s, const T *r
   decay_wrench(w.walk, w.centre);
   carry_linear_part(body, s, rotors, none, dt, f, w);
   const Spread<Single<T>> spread(s.kappa);
-  if constexpr (is_single<T>) {
+  if constexpr (is_single<T> && WINDWRENCH_REGISTERS) {
     pairs_together(body, f.x, spread, rotors, dt, w);
   } else {
     pairs_in_turn<6>(
