@@ -17,7 +17,7 @@ template <class T> void drive(Model<T> &m, const T *speeds, Single<T> dt, T volt
     m.rotor_models[i](m.rotor_coefficients[i], numbers_of<T>(m.constants), numbers_of<T>(m.rotors),
                       m.memory[i]);
   if (m.wrench_count > 0) {
-    T *last = m.memory[20];  // whether there are delivered rotor speeds, and their values
+    T *last = m.memory[ROTORS + SENSORS];  // are there delivered rotor speeds, and their values
     T share = dt > S(0) ? last[0] / dt : T{};
     last[0] = T{} + S(1);
     for (int i = 0; i < 4; i++) {
@@ -85,7 +85,7 @@ void rewrite_sample(Model<T> &m, T position, T quaternion, T speed, Single<T> dt
   for (int n = 0; n < m.sensing_count; n++) {
     int i = direction > 0 ? n : int(m.sensing_count) - 1 - n;
     m.sensing_models[i](m.sensing_coefficients[i], numbers_of<T>(m.constants),
-                        numbers_of<T>(m.sample), m.memory[16 + i]);
+                        numbers_of<T>(m.sample), m.memory[ROTORS + i]);
   }
 }
 // parts: 1 position, 2 attitude, 4 rotor speeds

@@ -4,8 +4,20 @@
 #include "effects/form.hpp"
 #include "rigid_body.hpp"
 
+// room for declared effects: on the wrench, the rotors and the sensors, and numbers of each one's
+// memory. An exported vehicle has room for its own effects alone
+#ifndef WINDWRENCH_ROOM
+#define WINDWRENCH_ROOM 16, 16, 4, 112
+#endif
+// 0: no memory for inertial measurements, in a filter that takes none
+#ifndef WINDWRENCH_IMU
+#define WINDWRENCH_IMU 1
+#endif
+
 namespace windwrench {
 
+constexpr int ROOM[] = {WINDWRENCH_ROOM};
+constexpr int WRENCHES = ROOM[0], ROTORS = ROOM[1], SENSORS = ROOM[2], MEMORY = ROOM[3];
 constexpr int NOISE = 12;            // noise inputs: motor torque, torque walk, thrust, force walk
 constexpr int BIASES = 6;            // of gyro rad/s and accelerometer m/s2
 constexpr int COMPANIONS = 12;       // the biases, and the noise of the last step
@@ -15,21 +27,21 @@ constexpr int AGREEING_SAMPLES = 5;  // accelerometer samples in a row that make
 template <class S> struct Model {
   Body<S> body;
   VehicleNumbers<S> constants;  // for effects
-  EffectModel<S> wrench_models[16];
-  S wrench_coefficients[16][ROW];
-  EffectModel<S> wrench_hooks[16];  // that carry an effect's own state; null where it has none
+  EffectModel<S> wrench_models[WRENCHES];
+  S wrench_coefficients[WRENCHES][ROW];
+  EffectModel<S> wrench_hooks[WRENCHES];  // carry an effect's own state; null where it has none
   int64_t wrench_count, hooked, waiting;  // waiting: the states have still to be carried
-  EffectModel<S> rotor_models[16];
-  S rotor_coefficients[16][PARAMETERS];
+  EffectModel<S> rotor_models[ROTORS];
+  S rotor_coefficients[ROTORS][PARAMETERS];
   int64_t rotor_count;
-  EffectModel<S> sensing_models[4];
-  S sensing_coefficients[4][PARAMETERS];
+  EffectModel<S> sensing_models[SENSORS];
+  S sensing_coefficients[SENSORS][PARAMETERS];
   int64_t sensing_count;
-  Sample<S> sample;          // rotor speeds and pose on their way through the sensing effects
-  S memory[21][112];         // of rotor-input and sensing effects; last: delivered rotor speeds
-  S time, voltage, wind[3];  // s, V, m/s
-  Rotors<S> rotors;          // delivered
-  S rotor_wrench[4];         // their thrust N and torques Nm about the centre of mass
+  Sample<S> sample;  // rotor speeds and pose on their way through the sensing effects
+  S memory[ROTORS + SENSORS + 1][MEMORY];  // of these effects; last: delivered rotor speeds
+  S time, voltage, wind[3];                // s, V, m/s
+  Rotors<S> rotors;                        // delivered
+  S rotor_wrench[4];                       // their thrust N and torques Nm about the centre of mass
   FlightState<S> effect_state;
   S effect_wrench[6];  // force in the world, torque in the body frame
 };
@@ -85,9 +97,10 @@ template <class S> struct Settings {
   S response;           // s
   S fastest;            // rad/s, beyond which a rotor speed counts as not measured
   S motor_torque[3], torque_walk[3], thrust[3], force_walk[3];  // variances in a period
-  S noise[6], imu_noise[6];  // variances of (rho, x), of gyro and accelerometer
-  S uncertain[9];            // of the vehicle
-  S kappa, period;           // -, s
+  S torque_rate[3], force_rate[3];  // 1/s, at which torque and force decay; 0: they only walk
+  S noise[6], imu_noise[6];         // variances of (rho, x), of gyro and accelerometer
+  S uncertain[9];                   // of the vehicle
+  S kappa, period;                  // -, s
 };
 
 // An inertial measurement's biases, and the noise of the last step: imu.hpp
@@ -106,11 +119,13 @@ template <class S> struct Imu {
   S sensitivity[6][COMPANIONS];  // of gyro and accelerometer
 };
 
+struct NoImu {};
+
 template <class S> struct Filter {
   Model<S> vehicle;
   Belief<S> belief;
   Settings<S> settings;
-  Imu<S> imu;
+  std::conditional_t<WINDWRENCH_IMU, Imu<S>, NoImu> imu;
   S z[11];                  // a step's sample: rotor speeds rad/s, position m, quaternion
   S centre_rotation[3][3];  // attitude at the start of the last step
 };

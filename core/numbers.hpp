@@ -13,6 +13,8 @@
 
 namespace windwrench {
 
+constexpr double PI = 3.14159265358979323846;  // M_PI is not in every C library
+
 template <class S, int LANES> struct Register {
   typedef S type __attribute__((vector_size(LANES * sizeof(S))));
 };

@@ -3,6 +3,8 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include "filter.hpp"
+
 #include "../episodes.hpp"
 #include "filter.hpp"
 

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ... import _core
 from ...runtime.errors import InputError
-from .base import PARAMETERS, ROTORS, ROW_SIZE, SAMPLE, STATE, VEHICLE, WRENCH, Effect
+from .base import MEMORY, PARAMETERS, ROTORS, ROW_SIZE, SAMPLE, STATE, VEHICLE, WRENCH, Effect
 
 Function = Callable[..., None]
 Layout = np.dtype[Any] | int  # a record, or so many numbers
@@ -48,25 +49,32 @@ def _view(address: int, layout: Layout) -> Any:
 def addresses(effect: Effect) -> tuple[int, int]:
     """Return the addresses of an effect's model and ``advance``, C functions of four arrays; 0
     where there is none.
+
+    Raises:
+        InputError: the core has no equation of the model's name and the effect's kind.
     """
-    memory = max(effect.memory, 1)
+    if isinstance(effect.model, str):
+        known = _core.effect_addresses(effect.model, effect.kind)
+        if not known[0]:
+            raise InputError(
+                f"effect {effect.name}: model {effect.model!r} is no {effect.kind} of the core"
+            )
+        return known
     third, fourth, size = {
         "wrench": (STATE, WRENCH, ROW_SIZE),
-        "rotor input": (ROTORS, memory, PARAMETERS),
-        "sensing": (SAMPLE, memory, PARAMETERS),
+        "rotor input": (ROTORS, MEMORY, PARAMETERS),
+        "sensing": (SAMPLE, MEMORY, PARAMETERS),
     }[effect.kind]
-    return (
-        _address(effect.model, effect.name, (size, VEHICLE, third, fourth)),
-        _address(effect.advance, effect.name, (size, VEHICLE, third, ROTORS)),
+    model, advance = (
+        ctypes.cast(_wrapped(function, effect.name, layouts), ctypes.c_void_p).value or 0
+        if function
+        else 0
+        for function, layouts in (
+            (effect.model, (size, VEHICLE, third, fourth)),
+            (effect.advance, (size, VEHICLE, third, ROTORS)),
+        )
     )
-
-
-def _address(model: Any, name: str, layouts: tuple[Layout, ...]) -> int:
-    if model is None:
-        return 0
-    if hasattr(model, "address"):
-        return int(model.address)
-    return ctypes.cast(_wrapped(model, name, layouts), ctypes.c_void_p).value or 0
+    return model, advance
 
 
 @cache

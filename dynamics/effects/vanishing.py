@@ -14,6 +14,7 @@ from .base import (
     HAS_POSITION,
     HAS_QUATERNION,
     HAS_SPEED,
+    MEMORY,
     ROTORS_SIZE,
     ROW_SIZE,
     SAMPLE_SIZE,
@@ -61,7 +62,7 @@ def _flown(effect: Effect, coefficients: Array) -> Array:
     model, advance = addresses(effect)
     c, wrench = np.zeros(ROW_SIZE), np.zeros(6)
     c[: len(coefficients)] = coefficients
-    memory = np.zeros(max(effect.memory, 1))
+    memory = np.zeros(MEMORY)
     vehicle, state, rotor, sample = (
         rng.uniform(*_SIZES, size) for size in (VEHICLE_SIZE, STATE_SIZE, ROTORS_SIZE, SAMPLE_SIZE)
     )
