@@ -1,4 +1,4 @@
-"""The filter for a flight controller, as C."""
+"""The filter for a flight controller."""
 
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,9 @@ def export_c(
     out: Path = Path("results/export_c"),
     overwrite: bool = False,
 ) -> dict[str, Any]:
-    """Write the filter as C for a flight controller. One header and one C99 source, in single
-    precision unless said otherwise, and without a heap; with an example and a CMake file.
+    """Write the filter for a flight controller: the core's C++17 headers, one header of numbers and
+    a C interface, in single precision unless said otherwise, and without a heap; with an example
+    and a CMake file.
 
     Example: windwrench export-c --vehicle ardrone2 --estimator ukf --out filter
     """
@@ -29,16 +30,12 @@ def export_c(
     from ..dynamics.vehicle_file import load_vehicle
     from ..live.export_c import export_c as export
     from ..live.export_c import exportable_policy
-    from ..live.export_c.export import FILES
     from ..runtime.page_files import write_text
 
     model = load_vehicle(vehicle)
     if effects == "none":
         model = replace(model, effects=())
     flown = None if policy is None else exportable_policy(policy)
-    there = [out / name for name in FILES if (out / name).exists()]
-    if there and not overwrite:
-        raise InputError(f"{there[0]}: is there already; expected a new folder, or --overwrite")
     with working("exporting"):
         found = export(
             model,
@@ -50,14 +47,18 @@ def export_c(
             command_line(),
             precision,
         )
-    results_folder(out, vehicle=model.name, estimator=estimator, files=list(FILES))
+    there = [out / name for name in found.files if (out / name).exists()]
+    if there and not overwrite:
+        raise InputError(f"{there[0]}: is there already; expected a new folder, or --overwrite")
+    results_folder(out, vehicle=model.name, estimator=estimator, files=list(found.files))
     for name, text in found.files.items():
+        (out / name).parent.mkdir(parents=True, exist_ok=True)
         write_text(text, out / name)
     console.print(
         f"{estimator} of {model.name} for {1.0 / found.filter.period:g} poses a second, with "
         f"{', '.join(found.effects) or 'no effects'}.",
     )
-    say(*(out / name for name in found.files))
+    say(*(out / name for name in found.files if "/" not in name))
     return {
         "vehicle": model.name,
         "estimator": estimator,

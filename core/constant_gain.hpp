@@ -25,6 +25,10 @@ template <class S> struct ConstantGain {
   S hover[6][N];        // derivatives of angular and linear acceleration at hover, error state
 };
 
+// the number of a ConstantGain, or of another struct with these fields: those that do not change in
+// flight may be constants
+template <class G> using NumberOf = std::remove_reference_t<decltype(std::declval<G>().near)>;
+
 // Turn the horizontal part of `count` vectors, one behind the other, about the vertical. A
 // difference here and a sum there GCC would fuse, told not to
 template <class S> void turn_vectors(S *values, int count, S cosine, S sine) {
@@ -80,7 +84,7 @@ void turn_world(Filter<S> &f, S *pose, Heading<S> h, const S *before, const S *a
 }
 
 // Carry the covariance dt s ahead by the model at hover
-template <class S> void carry_at_hover(ConstantGain<S> &c, S dt) {
+template <class G, class S = NumberOf<G>> void carry_at_hover(G &c, S dt) {
   Filter<S> &f = c.filter;
   S A[12][N] = {}, B[6][N];
   for (int i = 0; i < 3; i++)
@@ -103,7 +107,7 @@ template <class S> void carry_at_hover(ConstantGain<S> &c, S dt) {
 }
 
 // Carry the covariance over the time since the last measurement
-template <class S> void catch_up(ConstantGain<S> &c) {
+template <class G, class S = NumberOf<G>> void catch_up(G &c) {
   const Poses<S> &m = c.filter.belief.poses;
   S since = larger(m.position_age, m.attitude_age);
   if (since <= S(0)) return;
@@ -124,7 +128,7 @@ template <class S> void correct_with_covariance(Filter<S> &f, S *sample, int usa
 }
 
 // Return to the constant gain once the covariance has stayed near the converged one for a while
-template <class S> void look_for_steady_state(ConstantGain<S> &c) {
+template <class G, class S = NumberOf<G>> void look_for_steady_state(G &c) {
   Belief<S> &f = c.filter.belief;
   bool near = f.status == S(TRACKING);
   S noise = S(1) + larger(f.poses.widened[0], f.poses.widened[1]);
@@ -138,8 +142,8 @@ template <class S> void look_for_steady_state(ConstantGain<S> &c) {
 
 // Correct a predicted state (20) by the constant gain with the usable parts of a sample; false, and
 // nothing is changed, where a covariance has to judge: after a gap, or at an unlikely pose
-template <class S>
-bool correct_with_gain(ConstantGain<S> &c, const S *sample, int usable, const S *centre) {
+template <class G, class S = NumberOf<G>>
+bool correct_with_gain(G &c, const S *sample, int usable, const S *centre) {
   Belief<S> &f = c.filter.belief;
   const Settings<S> &s = c.filter.settings;
   Poses<S> &m = f.poses;
@@ -189,14 +193,14 @@ bool correct_with_gain(ConstantGain<S> &c, const S *sample, int usable, const S 
 }
 
 // As `step` of the filter with a covariance
-template <class S> int step(ConstantGain<S> &c, int parts, S dt, S voltage) {
+template <class G, class S = NumberOf<G>> int step(G &c, int parts, S dt, S voltage) {
   Filter<S> &f = c.filter;
   Belief<S> &b = f.belief;
   Model<S> &m = f.vehicle;
   int usable = check_sample(f.settings, b, f.z, parts);
   if (usable < 0) return usable;
   true_sample(f, usable, dt);
-  S *sample = m.sample, centre[STATE], R[3][3];
+  S *sample = numbers_of<S>(m.sample), centre[STATE], R[3][3];
   for (int i = 0; i < NIS; i++) centre[i] = b.x[i];
   if (dt > S(0)) {
     drive(m, sample, dt, voltage);

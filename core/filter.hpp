@@ -1,39 +1,48 @@
 // The memory of one wrench filter. `Filter<double>` is what Python sees as a NumPy record
 // (estimator/filter_record.py): the same fields in the same order.
 #pragma once
+#include "effects/form.hpp"
 #include "rigid_body.hpp"
+
+// room for declared effects: on the wrench, the rotors and the sensors, and numbers of each one's
+// memory. An exported vehicle has room for its own effects alone
+#ifndef WINDWRENCH_ROOM
+#define WINDWRENCH_ROOM 16, 16, 4, 112
+#endif
+// 0: no memory for inertial measurements, in a filter that takes none
+#ifndef WINDWRENCH_IMU
+#define WINDWRENCH_IMU 1
+#endif
 
 namespace windwrench {
 
+constexpr int ROOM[] = {WINDWRENCH_ROOM};
+constexpr int WRENCHES = ROOM[0], ROTORS = ROOM[1], SENSORS = ROOM[2], MEMORY = ROOM[3];
 constexpr int NOISE = 12;            // noise inputs: motor torque, torque walk, thrust, force walk
 constexpr int BIASES = 6;            // of gyro rad/s and accelerometer m/s2
 constexpr int COMPANIONS = 12;       // the biases, and the noise of the last step
 constexpr int AGREEING_SAMPLES = 5;  // accelerometer samples in a row that make a push
 
-// An effect on the vehicle: (its coefficients and own state, the vehicle's numbers, the flight's
-// state or the rotors or the sample, the wrench or its memory); layouts of dynamics/effects/base.py
-template <class S> using EffectModel = void (*)(S *, S *, S *, S *);
-
 // A vehicle with its effects
 template <class S> struct Model {
   Body<S> body;
-  S constants[30];  // of the vehicle, for effects
-  EffectModel<S> wrench_models[16];
-  S wrench_coefficients[16][16];
-  EffectModel<S> wrench_hooks[16];  // that carry an effect's own state; null where it has none
+  VehicleNumbers<S> constants;  // for effects
+  EffectModel<S> wrench_models[WRENCHES];
+  S wrench_coefficients[WRENCHES][ROW];
+  EffectModel<S> wrench_hooks[WRENCHES];  // carry an effect's own state; null where it has none
   int64_t wrench_count, hooked, waiting;  // waiting: the states have still to be carried
-  EffectModel<S> rotor_models[16];
-  S rotor_coefficients[16][8];
+  EffectModel<S> rotor_models[ROTORS];
+  S rotor_coefficients[ROTORS][PARAMETERS];
   int64_t rotor_count;
-  EffectModel<S> sensing_models[4];
-  S sensing_coefficients[4][8];
+  EffectModel<S> sensing_models[SENSORS];
+  S sensing_coefficients[SENSORS][PARAMETERS];
   int64_t sensing_count;
-  S sample[16];              // rotor speeds and pose on their way through the sensing effects
-  S memory[21][112];         // of rotor-input and sensing effects; last: delivered rotor speeds
-  S time, voltage, wind[3];  // s, V, m/s
-  S rotors[7];               // delivered rotor speeds rad/s, step s, voltage V, time s
-  S rotor_wrench[4];         // their thrust N and torques Nm about the centre of mass
-  S effect_state[35];
+  Sample<S> sample;  // rotor speeds and pose on their way through the sensing effects
+  S memory[ROTORS + SENSORS + 1][MEMORY];  // of these effects; last: delivered rotor speeds
+  S time, voltage, wind[3];                // s, V, m/s
+  Rotors<S> rotors;                        // delivered
+  S rotor_wrench[4];                       // their thrust N and torques Nm about the centre of mass
+  FlightState<S> effect_state;
   S effect_wrench[6];  // force in the world, torque in the body frame
 };
 
@@ -110,11 +119,13 @@ template <class S> struct Imu {
   S sensitivity[6][COMPANIONS];  // of gyro and accelerometer
 };
 
+struct NoImu {};
+
 template <class S> struct Filter {
   Model<S> vehicle;
   Belief<S> belief;
   Settings<S> settings;
-  Imu<S> imu;
+  std::conditional_t<WINDWRENCH_IMU, Imu<S>, NoImu> imu;
   S z[11];                  // a step's sample: rotor speeds rad/s, position m, quaternion
   S centre_rotation[3][3];  // attitude at the start of the last step
 };

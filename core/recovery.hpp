@@ -117,7 +117,7 @@ template <class T> void after_prediction(const Settings<Single<T>> &s, Single<T>
 // As many attitudes are explained by one turn more in each, or one less
 template <class S> bool turns_between(const Belief<S> &f) {
   const S *w = f.x + RATE, age = f.poses.attitude_age;
-  return (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) * age * age > S(M_PI * M_PI);
+  return (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) * age * age > S(PI * PI);
 }
 
 // Is an unlikely pose beyond what a linear correction can follow? Just after a restart a wrench of

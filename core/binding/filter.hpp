@@ -22,6 +22,11 @@ inline windwrench::Filter<double> &filter_at(std::uintptr_t address) {
 }
 
 void bind_batch(nanobind::module_ &m);
+void bind_control(nanobind::module_ &m);
+void bind_effects(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
+void bind_lanes(nanobind::module_ &m);
+void bind_tick(nanobind::module_ &m);
+void bind_winds(nanobind::module_ &m);
 void bind_constant_gain(nanobind::module_ &m);
 void bind_smoother(nanobind::module_ &m);

@@ -11,7 +11,12 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
       "instruction_set", [] { return WINDWRENCH_INSTRUCTION_SET; },
       "Return the instruction set that the core was built for: baseline, avx2 or avx512.");
   bind_batch(m);
+  bind_control(m);
+  bind_effects(m);
   bind_filter(m);
+  bind_lanes(m);
+  bind_tick(m);
+  bind_winds(m);
   bind_constant_gain(m);
   bind_smoother(m);
 }

@@ -1,7 +1,7 @@
-"""The wrench filter of a vehicle, and a policy, as C for a flight controller."""
+"""The wrench filter of a vehicle, and a policy, for a flight controller: the core with a C interface."""
 
-from .c_numbers import PRECISIONS
 from .export import ESTIMATORS, Exported, export_c
+from .numbers import PRECISIONS
 from .policies import exportable_policy
 
 __all__ = ["ESTIMATORS", "PRECISIONS", "Exported", "export_c", "exportable_policy"]

@@ -1,65 +1,46 @@
-"""The wrench filter of one vehicle as a C header and a C99 source, in single or double precision.
+"""The wrench filter of one vehicle for a flight controller: the core's own headers, one header of
+numbers, and a C interface, in single or double precision.
 
-Gaps, outliers and restarts are translated from the Python filter (``filter_code``), and effects
-from their Python (``effect_code``). Templates hold the other equations, written after the Python.
-Every number comes from the Python filter's own record (``estimator.filter_record``), its one place.
-``tests/live/test_export_c.py`` holds C and Python together, flight by flight.
+Every number comes from the Python filter's record (``estimator.filter_record``), its one place.
+``tests/live/test_export_c.py`` flies both.
 """
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib import resources
+from posixpath import dirname, join, normpath
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ... import __version__
-from ...dynamics.effects import get
-from ...dynamics.effects.base import PARAMETERS, ROTORS_SIZE, STATE_SIZE, Effect
+from ...dynamics.effects.base import PARAMETERS, ROW_SIZE
 from ...dynamics.vehicle import Vehicle
 from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
-from ...estimator.error_state import LARGEST_MRP_VARIANCE
-from ...estimator.filter_record import AGREEING, N
-from ...estimator.hover_covariance import CATCH_UP
-from ...estimator.imu import _PATIENCE as IMU_PATIENCE
-from ...estimator.recovery import NOISE
-from ...estimator.ukf import _STRAINED, default_covariance
+from ...estimator.filter_record import FILTER, fields_between
+from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError
-from . import hover
-from .c_numbers import FUNCTIONS, PRECISIONS, in_precision, literal, shape, table
-from .c_values import UntranslatableError
-from .effect_code import definitions, exportable_effects, library, translate
-from .filter_code import constants, fields, filter_code
-from .policies import tracker_policy
+from .numbers import PRECISIONS, filters
+from .policies import policy_numbers
 
-_FILTERS: dict[str, tuple[type[WrenchUKF], str]] = {
-    "constant-gain": (ConstantGainFilter, "The filter with a constant gain"),
-    "ukf": (WrenchUKF, "The unscented Kalman filter"),
+_FILTERS: dict[str, tuple[type[WrenchUKF], str, str]] = {
+    "constant-gain": (ConstantGainFilter, "The filter with a constant gain", "constant_gain"),
+    "ukf": (WrenchUKF, "The unscented Kalman filter", "imu"),
 }
 ESTIMATORS = tuple(_FILTERS)
-# constants of the Python filters
-_KNOWN = {
-    "N": N,
-    "NOISE": NOISE,
-    "AGREEING": AGREEING,
-    "PI": math.pi,
-    "STRAINED": _STRAINED,
-    "LARGEST_MRP_VARIANCE": LARGEST_MRP_VARIANCE,
-    "LONGEST_GAP": 0.1,
-    "NEAR": 1.1,
-    "CATCH_UP": CATCH_UP,
-    "IMU_PATIENCE": IMU_PATIENCE,
-}
-# written files, each from the template of its name
-FILES = ("windwrench_filter.h", "windwrench_filter.c", "main.c", "CMakeLists.txt")
+# files written from the template of the name
+TEMPLATES = ("windwrench.h", "windwrench_numbers.hpp", "main.c", "CMakeLists.txt")
+_MEMORY = "body", "centre_rotation"  # fields of a filter's memory, from one to another
+_INCLUDE = re.compile(r'^#include "([\w./]+)"', re.M)
 
 
 @dataclass(frozen=True)
 class Exported:
-    """An export, not yet written: the texts of the files by their names, and the equivalent Python
-    filter.
+    """An export, not yet written: the texts of the files by their paths in the folder, and the
+    equivalent Python filter.
     """
 
     files: Mapping[str, str]
@@ -78,7 +59,7 @@ def export_c(
     command: str = "windwrench export-c",
     precision: str = "single",
 ) -> Exported:
-    """Return the files of a vehicle's filter in C.
+    """Return the files of a vehicle's filter for a flight controller.
 
     Args:
         vehicle: the vehicle; its declared effects are part of the filter's model.
@@ -92,8 +73,8 @@ def export_c(
             processors as fast with double numbers.
 
     Raises:
-        InputError: a setting is out of range, an effect cannot be exported, or single precision
-            does not hold a number.
+        InputError: a setting is out of range, an effect is a user's own, or single precision does
+            not hold a number.
     """
     if estimator not in _FILTERS:
         raise InputError(f"estimator: expected one of {', '.join(ESTIMATORS)}, got {estimator!r}")
@@ -104,41 +85,33 @@ def export_c(
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"{name}: expected a positive number, got {value!r}")
     period = 1.0 / rate
-    wrench, rotor_effects, sensing, effect_code = _effects(vehicle)
     tuning = UKFTuning.for_vehicle(vehicle, period, rise_time)
-    kind, title = _FILTERS[estimator]
+    kind, title, header = _FILTERS[estimator]
     made = kind(vehicle, tuning, period, gate, Recovery())
-    if policy is not None and policy["kind"] == "tracker":
-        policy = tracker_policy(vehicle, tuning, period)
+    flown = None if policy is None else policy_numbers(policy, vehicle, tuning, period)
     f = made.record[0]
-    kept = hover.kept(f)
+    headers = [f"core/{header}.hpp"]
+    room = 1, 1, 1, 5
     context: dict[str, Any] = {
         "version": __version__,
         "command": _one_line(command),
         "title": f"{title}, for the vehicle {_one_line(vehicle.name)}.",
-        "estimator": estimator,
         "precision": precision,
+        "number": PRECISIONS[precision],
         "imu": estimator != "constant-gain",
         "rate": rate,
         "f": f,
         "filter": made,
-        "known": _KNOWN,
-        "hover": hover,
-        "kept": kept,
-        "wrench_coefficients": f["wrench_coefficients"][: len(wrench), :PARAMETERS],
-        "converged": [f["converged"][i, j] for i, j in kept],
-        "first_variance": np.diag(default_covariance(vehicle, tuning)),
-        "offset": bool(np.any(f["body"]["com"] != 0.0)),
-        "wrench": wrench,
-        "rotor_effects": rotor_effects,
-        "sensing": sensing,
-        "rotor_memory": max((e.memory for e in rotor_effects), default=1) or 1,
-        "rotors_size": ROTORS_SIZE,
-        "parameters": PARAMETERS,
-        "state_size": STATE_SIZE,
-        "effect_code": effect_code,
-        "policy": policy,
-        "voltage": "WW_ROTOR_VOLTAGE]" in effect_code,
+        "body": f["body"],
+        "settings": f[list(fields_between("gated", "period"))],
+        "first_variances": np.diag(default_covariance(vehicle, tuning)),
+        "hover_speed": f["last_speeds"][0],
+        "full_battery": vehicle.voltage_ref,
+        "headers": headers,
+        "room": room,
+        "size": _size(room, PRECISIONS[precision], estimator),
+        "steady": _STEADY,
+        "policy": flown,
     }
     environment = Environment(
         loader=PackageLoader("windwrench.live.export_c", "templates"),
@@ -148,56 +121,78 @@ def export_c(
         keep_trailing_newline=True,
         autoescape=False,  # C, no page
     )
-    environment.filters |= {"literal": literal, "table": table, "shape": shape}
-    # places in arrays named by the template of the motion, beside the effects'
-    places = "WW_STEP WW_ROTOR_TIME" + (" WW_ROTOR_ACCELERATION" if wrench else "")
-    effects_c = environment.get_template("effects.c.j2").render(context | {"places": places})
-    context["places"] = definitions(effects_c)
-    context |= {"filter_code": "", "constants": "", "fields": ""}
-    source = environment.get_template("windwrench_filter.c.j2").render(context)
-    context["filter_code"] = filter_code(f, source)
-    source += context["filter_code"]
-    called = [name for name in FUNCTIONS if re.search(rf"\b{name}f\(", source)]
-    context |= {"constants": constants(f, source), "fields": fields(source)}
-    context["functions"] = ", ".join(n if precision == "double" else f"{n}f" for n in called)
-    files = {
-        name: in_precision(environment.get_template(f"{name}.j2").render(context), precision)
-        for name in FILES
-    }
+    environment.filters |= filters(precision)
+    files = {name: environment.get_template(f"{name}.j2").render(context) for name in TEMPLATES}
+    files["windwrench.cpp"] = _source("live/export_c/source/windwrench.cpp")
+    if flown is not None:
+        files["policy.hpp"] = _source(f"live/export_c/source/{flown['kind']}.hpp")
+    for path in headers:
+        _add_header(path, files)
     return Exported(files, made, tuple(e.name for e in vehicle.effects), precision)
+
+
+def _source(path: str) -> str:
+    """Return a file of the package."""
+    return resources.files("windwrench").joinpath(path).read_text(encoding="utf-8")
+
+
+def _add_header(path: str, files: dict[str, str]) -> None:
+    """Add a header of the core, and those that it includes, as they lie."""
+    if path not in files:
+        files[path] = _source(path)
+        for included in _INCLUDE.findall(files[path]):
+            _add_header(normpath(join(dirname(path), included)), files)
+
+
+# fields of a model with a row for each effect: of which kind, and numbers of a row
+_ROOMS = {
+    "wrench_models": (0, 1),
+    "wrench_hooks": (0, 1),
+    "wrench_coefficients": (0, ROW_SIZE),
+    "rotor_models": (1, 1),
+    "rotor_coefficients": (1, PARAMETERS),
+    "sensing_models": (2, 1),
+    "sensing_coefficients": (2, PARAMETERS),
+}
+_STEADY = {
+    "gain": "of a pose (rho, x)",
+    "information": "inverse covariance of its innovation",
+    "converged": "covariance after a correction",
+    "settle": "s for which the covariance must have been near that one",
+    "hover": "derivatives of angular and linear acceleration by the error state",
+}
+_ALIGNMENT = 48  # bytes, at most, between numbers of several sizes
+
+
+def _size(room: tuple[int, int, int, int], number: str, estimator: str) -> str:
+    """Return the bytes of a filter's memory with room for some effects, as an expression of C."""
+    names = fields_between(*_MEMORY)
+    counts = {number: 2, "long long": 0, "void *": 0}  # two: voltage and lost time
+    if estimator == "constant-gain":
+        names = tuple(name for name in names if name != "imu")
+        counts = {number: 3, "long long": 1, "void *": 0}  # near and steady
+    for name, field in _fields(np.dtype([(name, FILTER[name]) for name in names])):
+        size = int(np.prod(field.shape))
+        if name in _ROOMS:
+            kind, row = _ROOMS[name]
+            size = room[kind] * row
+        elif name == "memory":
+            size = (room[1] + room[2] + 1) * room[3]
+        pointer = name.endswith(("_models", "_hooks"))
+        counts["void *" if pointer else "long long" if field.base.kind == "i" else number] += size
+    return " + ".join([*(f"{n} * sizeof({t})" for t, n in counts.items()), str(_ALIGNMENT)])
+
+
+def _fields(dtype: np.dtype[Any]) -> Iterator[tuple[str, np.dtype[Any]]]:
+    """Yield the fields of a record and of the records in it."""
+    for name in dtype.names or ():
+        if dtype[name].names:
+            yield from _fields(dtype[name])
+        else:
+            yield name, dtype[name]
 
 
 def _one_line(text: str) -> str:
     """Return a text for one line of a C comment, without the comment's end."""
     kept = "".join(c if c.isprintable() else " " for c in text)
     return kept.replace("*/", "* /").replace("\\", "/")
-
-
-def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect], str]:
-    """Return the effects with a model, wrench, rotor input and sensing, in the filter's order, and
-    their code.
-
-    Raises:
-        InputError: an effect cannot be exported.
-    """
-    parts = library()
-    models: dict[str, str] = {}
-    declared: dict[str, list[Effect]] = {"wrench": [], "rotor input": [], "sensing": []}
-    for setting in vehicle.effects:
-        effect = get(setting.name)
-        if effect.kind == "body":  # its numbers are the vehicle's
-            continue
-        try:
-            code = translate(effect, parts)
-        except (UntranslatableError, OSError) as error:
-            raise InputError(
-                f"{vehicle.name}: effects: {effect.name} cannot be exported: it {error}; declare "
-                "the vehicle without it (--effects none: without any), or estimate in Python, where"
-                " ukf and constant-gain take every effect. C has "
-                f"{', '.join(exportable_effects())}"
-            ) from None
-        models[effect.name] = code
-        declared[effect.kind].append(effect)
-    declared["wrench"].sort(key=lambda effect: not effect.sets_wind)
-    code = "\n".join([*([parts.code()] if parts.done else []), *models.values()])
-    return declared["wrench"], declared["rotor input"], declared["sensing"], code

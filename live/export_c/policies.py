@@ -1,5 +1,5 @@
-"""A policy as C: weights as tables, a law with its two gains, or the tracker: a vehicle's own
-sensing of a moving fan, as tables.
+"""The numbers of an exported policy: weights, a law's two gains, or the tracker's: a vehicle's own
+sensing of a moving fan, as tables. Its code is ``source/KIND.hpp``.
 """
 
 from collections.abc import Mapping
@@ -24,28 +24,28 @@ from ...runtime.errors import InputError
 
 LAWS = ("lead", "tracker")
 PARTICLES = 400  # the tracker's, 40 kB: a flight controller can spare as much
-# the numbers of an observation in the C, in order
-_COLUMNS = (
-    *(f"e->{part}[{i}]" for part in ("force", "torque") for i in range(3)),
-    *("e->velocity[1]", "m->command"),
-)
 
 
 def exportable_policy(name: str) -> Mapping[str, Any]:
-    """Return the templates' numbers of a policy: a law, or a trained one by its name or path.
+    """Return the numbers of a policy: a law, or a trained one by its name or path.
 
     Raises:
         InputError: there is no such policy, or its kind is not exported.
     """
     if name == "lead":
+        law = Lead()
         return {
             "kind": "lead",
             "title": "Fan tracking with lead: u = -(gain x + rate_gain dx/dt), x = tau_z / f_x.",
-            "source": "controllers/fan_laws.py",
-            "law": Lead(),
+            "numbers": [
+                ("GAIN", law.gain, "m/s"),
+                ("RATE_GAIN", law.lead, "m"),
+                ("LEAST_FORCE", law.least_force, "N"),
+            ],
+            "size": (1, 1),
         }
     if name == "tracker":
-        return {"kind": "tracker"}  # the rest is the vehicle's: ``tracker_policy``
+        return {"kind": "tracker"}  # the rest is the vehicle's: ``policy_numbers``
     trained = shipped_policies()
     if name not in trained and not name.endswith((".npz", ".json")):
         raise InputError(
@@ -69,21 +69,34 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
             f"--policy {name}: sees {summed}, which is not in an estimate by itself; such a policy "
             "cannot be exported"
         )
-    places = [_COLUMNS[QUANTITIES[quantity].column] for quantity in features.frame]
-    layers = [(weights[f"weight{i}"], weights[f"bias{i}"]) for i in range(layers_of(weights))]
+    layers = layers_of(weights)
+    matrices = [weights[f"weight{i}"] for i in range(layers)]
+    widths = [features.size, *(len(matrix) for matrix in matrices)]
+    frame = len(features.frame)
+    columns = [QUANTITIES[quantity].column for quantity in features.frame]
     return {
         "kind": "dense",
-        "name": name,
         "title": f"The policy {path.stem}, trained with "
         f"{card.get('algorithm', 'an unknown algorithm')}.",
-        "source": "controllers/trained_policy.py",
-        "repeat": int(card["repeat"]),
-        "frame": list(zip(places, features.scale, strict=True)),
-        "history": features.history,
-        "layers": layers,
-        "widest": max(features.size, *(len(bias) for _, bias in layers)),
-        "activation": str(card["activation"]),
-        "squash": bool(card["squash"]),
+        "integers": [
+            ("REPEAT", int(card["repeat"]), "decisions that a command is held for"),
+            ("HISTORY", features.history, "frames"),
+            ("FRAME", frame, "numbers of a frame"),
+            ("LAYERS", layers, ""),
+            ("WIDEST", max(widths), "layer"),
+            ("RELU", int(card["activation"] == "relu"), "else the hyperbolic tangent"),
+            ("SQUASH", int(card["squash"]), "by a hyperbolic tangent at the end"),
+        ],
+        "lists": [
+            ("PLACES", columns, "of a frame's numbers in an observation"),
+            ("WIDTHS", widths, "of the layers, the input's first"),
+        ],
+        "numbers": [
+            ("SCALES", np.array(features.scale, dtype=float), "of a frame's numbers"),
+            ("WEIGHTS", np.concatenate([m.ravel() for m in matrices]), "row by row"),
+            ("OFFSETS", np.concatenate([weights[f"bias{i}"] for i in range(layers)]), ""),
+        ],
+        "size": (1, features.history * frame + 1),
     }
 
 
@@ -94,31 +107,51 @@ def briefing_of(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Briefing:
     return nominal(Briefing(vehicle=vehicle, noise=FilterNoise.of(tuning, period)))
 
 
-def tracker_policy(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Mapping[str, Any]:
-    """Return the templates' numbers of a vehicle's tracker, with the gains of ``Tracker`` and the
-    fan and the air of the scenario ``base``.
+def policy_numbers(
+    policy: Mapping[str, Any], vehicle: Vehicle, tuning: UKFTuning, period: float
+) -> Mapping[str, Any]:
+    """Return the numbers of an ``exportable_policy`` aboard a vehicle.
 
     Args:
+        policy: from ``exportable_policy``.
         vehicle: the vehicle in flight.
         tuning: its wrench filter's.
         period: the wrench filter's, s.
     """
+    common = {"max_command": MAX_COMMAND, "integers": [], "lists": []}
+    if policy["kind"] != "tracker":
+        return common | dict(policy)
     law = Tracker()
-    return {
+    model = sensor_model(briefing_of(vehicle, tuning, period))
+    return common | {
         "kind": "tracker",
-        "title": "Fan tracking by a particle filter on the fan's place and velocity.",
-        "source": "controllers/tracker.py",
+        "title": "Fan tracking by a particle filter on the fan's place and velocity, in the fan and "
+        "the air of the scenario base.",
         "particles": PARTICLES,
-        "order": ORDER,
-        "settled": SETTLED,
-        "model": sensor_model(briefing_of(vehicle, tuning, period)),
-        "law": law,
-        "drift": law.acceleration * np.sqrt(DECISION_PERIOD),
-        "jumps": law.jumps * DECISION_PERIOD,
-        "stop": STOP,
-        "turn": STOP + TURN,
-        "few": FEW,
-        "most": MAX_COMMAND,
-        "first": FIRST,
-        "per_step": 1.0 / STEP,
+        "integers": [
+            ("ORDER", ORDER, "decisions that a residual is regressed on"),
+            ("SETTLED", SETTLED, "decisions that the filter has settled before the first"),
+            ("OFFSET_COUNT", len(model.tables), "offsets from the fan's axis in the jet's map"),
+        ],
+        "numbers": [
+            ("REACH", law.reach, "m, of the fan at first"),
+            ("SPEED", law.speed, "m/s, deviation of a new velocity of the fan"),
+            ("DRIFT_STD", law.acceleration * np.sqrt(DECISION_PERIOD), "m/s, in a decision"),
+            ("JUMPS", law.jumps * DECISION_PERIOD, "chance of a new velocity, in a decision"),
+            ("STOP", STOP, "chance that the new velocity is none,"),
+            ("TURN", STOP + TURN, "and that it is none or the opposite"),
+            ("FEW", FEW, "effective share of the particles, below which they are drawn anew"),
+            ("FEED", law.feed, "of the fan's velocity"),
+            ("GAIN", law.gain, "1/s, of the offset"),
+            ("DAMPING", law.damping, "of the velocity's error"),
+            ("FIRST", FIRST, "m, first offset of the jet's map"),
+            ("PER_STEP", 1.0 / STEP, "1/m, offsets"),
+            ("JET", model.tables, "mean, slopes with velocity and yaw rate, deviation: Nm, N, N"),
+            ("KEEP", model.keep, "of the filter's error, in a decision"),
+            ("ENTER", model.enter, "of a change, into that error"),
+            ("REGRESSION", model.regression, "of residuals, at the first decisions and the others"),
+            ("REST", model.variance, "variance that the regression leaves"),
+            ("YAW", model.yaw, "integral, angle, rate after a decision; torque and its rate"),
+        ],
+        "size": (6 + PARTICLES, 6 + PARTICLES * (2 + 3 + 9 + 3 * ORDER + 2)),
     }

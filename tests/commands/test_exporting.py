@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from tests.support.paths import ROOT
 from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
 from windwrench.commands.identifying import parse_window
 from windwrench.commands.tuning_file import load_tuning, save_tuning
@@ -15,7 +16,10 @@ from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 
-FILES = {"windwrench_filter.h", "windwrench_filter.c", "main.c", "CMakeLists.txt"}
+FILES = {
+    *("windwrench.h", "windwrench.cpp", "windwrench_numbers.hpp", "main.c", "CMakeLists.txt"),
+    "core",
+}
 
 
 def test_it_writes_the_files_and_says_what_they_are(call, tmp_path):
@@ -29,10 +33,11 @@ def test_it_writes_the_files_and_says_what_they_are(call, tmp_path):
     said = json.loads(text)["result"]
     assert said["period_s"] == 0.01
     assert said["effects"] == []
-    assert {p.name for p in out.iterdir()} == FILES | {"run.json"}
-    source = (out / "windwrench_filter.c").read_text()
-    assert "--estimator ukf" in source
-    assert "ww_policy" in source
+    assert {p.name for p in out.iterdir()} == FILES | {"policy.hpp", "run.json"}
+    assert "--estimator ukf" in (out / "windwrench_numbers.hpp").read_text()
+    assert "ww_policy" in (out / "windwrench.h").read_text()
+    for header in (out / "core").rglob("*.hpp"):
+        assert header.read_bytes() == (ROOT / header.relative_to(out)).read_bytes()
 
 
 def test_files_that_are_there_stay_unless_said_otherwise(call, tmp_path):
@@ -58,8 +63,7 @@ def test_declared_effects_are_in_it_unless_none_are_wanted(call, tmp_path):
         code, text, _ = call("export-c", "--vehicle", vehicle, *words, "--out", out, "--json")
         assert code == 0
         assert json.loads(text)["result"]["effects"] == effects
-        source = (out / "windwrench_filter.c").read_text()
-        assert ("effect_rotor_drag" in source) == bool(effects)
+        assert (out / "core/effects/rotor_drag.hpp").exists() == bool(effects)
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""An exported C filter, compiled on this machine and driven from Python."""
+"""An exported filter, compiled on this machine and driven from Python."""
 
 import ctypes
 import shutil
@@ -9,7 +9,9 @@ import pytest
 from tests.support.programs import said
 from windwrench.estimator.estimate import STATUSES
 
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+_WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+STRICT = ("-std=c++17", "-fno-exceptions", "-fno-rtti", *_WARNINGS)
+STRICT_C = ("-std=c99", *_WARNINGS)
 PARTS = ("attitude", "angular_velocity", "position", "velocity", "torque", "force")
 _NUMBERS = {"single": ctypes.c_float, "double": ctypes.c_double}
 
@@ -25,13 +27,13 @@ def needs(*programs):
         pytest.skip(f"not installed: {', '.join(lacking)}")
 
 
-needs_gcc = pytest.mark.skipif(bool(missing("gcc")), reason="not installed: gcc")
+needs_gcc = pytest.mark.skipif(bool(missing("gcc", "g++")), reason="not installed: gcc")
 
 
 def write(exported, folder):
     """Write the files of an export into a folder; return it."""
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in exported.files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
     return folder
 
@@ -58,20 +60,19 @@ class CompiledFilter:
 
     def __init__(self, exported, folder):
         write(exported, folder)
-        header = exported.files["windwrench_filter.h"]
-        lines = ['#include "windwrench_filter.h"']
+        header = exported.files["windwrench.h"]
+        lines = ['#include "windwrench.h"']
         with_policy = "ww_policy" in header
         for name, type_ in (("filter", "ww_filter"), ("policy", "ww_policy_memory"))[
             : 1 + with_policy
         ]:
             head = f"unsigned size_of_{name}(void)"
-            lines += [f"{head};", f"{head} {{ return (unsigned)sizeof({type_}); }}"]
-        (folder / "size.c").write_text("\n".join([*lines, ""]))
+            lines += [f'extern "C" {head};', f"{head} {{ return (unsigned)sizeof({type_}); }}"]
+        (folder / "size.cpp").write_text("\n".join([*lines, ""]))
         library = folder / "filter.so"
-        sources = ("windwrench_filter.c", "size.c")
         run(
-            *("gcc", *STRICT, "-O1", "-fno-math-errno", "-shared", "-fPIC", *sources),
-            *("-o", library.name, "-lm"),
+            *("g++", *STRICT, "-O1", "-fno-math-errno", "-shared", "-fPIC"),
+            *("windwrench.cpp", "size.cpp", "-o", library.name, "-lm"),
             cwd=folder,
         )
         self.c = ctypes.CDLL(str(library.resolve()))

@@ -1,7 +1,7 @@
 /* Every input may be odd; every output must be a number, a standard deviation a positive one, and good poses bring the filter back. */
 #include <math.h>
 #include <stdio.h>
-#include "windwrench_filter.h"
+#include "windwrench.h"
 
 static unsigned long long seed = 1;
 static double uniform(void)

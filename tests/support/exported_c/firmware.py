@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.support.exported_c.compiled import run, write
-from windwrench.live.export_c.c_numbers import table
+from tests.support.exported_c.compiled import STRICT, run, write
+from windwrench.live.export_c.numbers import table
 
 Array = NDArray[np.float64]
 _FOLDER = Path(__file__).parent / "board"
 _CPU = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
-TOOLS = ("arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm")
+TOOLS = ("arm-none-eabi-g++", "arm-none-eabi-size", "qemu-system-arm", "arm-none-eabi-gcc")
 _COLUMNS = ("dt", "rotor_speeds", "position", "quaternion", "gyro", "accelerometer")
 
 
@@ -39,14 +39,13 @@ class Measured:
 def fly(exported, flight, folder):
     """Fly a filter along a flight on the board, at most some thousand steps."""
     write(exported, folder)
-    options = ("-std=c99", "-Os", "-fno-math-errno", *_CPU)
-    strict = ("-Wall", "-Wextra", "-Werror", "-c", "windwrench_filter.c", "-o", "filter.o")
-    run(TOOLS[0], *options, *strict, cwd=folder)
+    options = ("-Os", "-fno-math-errno", *_CPU)
+    run(TOOLS[0], *options, *STRICT, "-c", "windwrench.cpp", "-o", "filter.o", cwd=folder)
     code = int(run(TOOLS[1], "filter.o", cwd=folder).splitlines()[1].split()[0])
     columns = [np.atleast_2d(flight[name].T).T for name in _COLUMNS if name in flight]
     rows = np.concatenate(columns, axis=1)
     unmeasured = "12345.678"  # a number that no flight has, where nothing was measured
-    values = table(np.where(np.isfinite(rows), rows, float(unmeasured)), "flight")
+    values = table(np.where(np.isfinite(rows), rows, float(unmeasured)), "single", "flight")
     values = values.replace(f"{unmeasured}f", "NAN")
     (folder / "flight.h").write_text(
         f"#include <math.h>\n#define FLIGHT_STEPS {len(rows)}\n"
@@ -55,10 +54,9 @@ def fly(exported, flight, folder):
     )
     for name in ("bench.c", "mps2_an386.ld"):
         (folder / name).write_text((_FOLDER / name).read_text(encoding="utf-8"), encoding="utf-8")
-    run(
-        *(TOOLS[0], *options, "-nostartfiles", "-I.", "bench.c", "filter.o"),
-        *("-T", "mps2_an386.ld"),
-        *("-o", "bench.elf", "-lm", "-lc", "-lgcc"),
+    run(  # a C program: the filter needs no C++ library
+        *(TOOLS[3], *options, "-std=c99", "-nostartfiles", "-I.", "bench.c", "filter.o"),
+        *("-T", "mps2_an386.ld", "-o", "bench.elf", "-lm", "-lc", "-lgcc"),
         cwd=folder,
     )
     said = run(

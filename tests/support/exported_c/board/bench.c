@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "flight.h"
-#include "windwrench_filter.h"
+#include "windwrench.h"
 
 extern uint32_t _data, _data_end, _data_from, _bss, _bss_end, _stack_top;
 
