@@ -4,3 +4,4 @@
 
 void bind_batch(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
+void bind_readers(nanobind::module_ &m);

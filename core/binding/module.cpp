@@ -12,4 +12,5 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
       "Return the instruction set that the core was built for: baseline, avx2 or avx512.");
   bind_batch(m);
   bind_filter(m);
+  bind_readers(m);
 }
