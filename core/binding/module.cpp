@@ -11,6 +11,7 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
       "instruction_set", [] { return WINDWRENCH_INSTRUCTION_SET; },
       "Return the instruction set that the core was built for: baseline, avx2 or avx512.");
   bind_batch(m);
+  bind_diagnosis(m);
   bind_filter(m);
   bind_readers(m);
 }
