@@ -8,22 +8,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..dynamics.effects import compile_effects
 from .briefing import Briefing
 from .flight import FlightGains
 from .jet_map import AXES, COUNT, FIRST, STEP, jet_map
 from .observation import DECISION_PERIOD, FORCE_X, FORCE_Y, TORQUE_Z, VELOCITY_Y
-from .tracker_filter import weigh
 from .wrench_lag import ORDER, autoregressions, lags
 
 Array = NDArray[np.float64]
 
 _TYPICAL = 0.15  # m off the axis, where the noise is taken whose colour stands for all
 SETTLED = 19  # decisions of 80 ms that the filter has settled before the first observation
+# of a particle: the jet's mean that it felt last, the filter's error, residuals, newest first
+MEMORY = 4 * AXES + ORDER * AXES
 
 
 class SensorModel(NamedTuple):
-    """Arrays for ``weigh``, and the vehicle's yaw."""
+    """Arrays for ``_core.weigh``, and the vehicle's yaw."""
 
     # over the offset: mean, slopes with velocity and yaw rate, standard deviation
     tables: Array  # (COUNT, 4, AXES)
@@ -99,9 +101,9 @@ class Sensing:
         comes first.
         """
         axes = observation[TORQUE_Z], observation[FORCE_X], observation[FORCE_Y]
-        own = self.own, self.velocity, float(self._yaw[2])
-        seen = np.array(axes, dtype=np.float64)
-        weigh(place, level, memory, own, seen, self.model, self.count - 1, out)
+        own = np.array([self.own, self.velocity, self._yaw[2]])
+        seen, known = np.array(axes, dtype=np.float64), self.model[:-1]
+        _core.weigh(place, level, memory, own, seen, *known, self.count - 1, out)
 
     def look(self, observation: NDArray[np.floating]) -> None:
         """Carry the own motion on to this observation (8,)."""

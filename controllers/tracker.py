@@ -24,8 +24,7 @@ from .axis_observer import AxisFilter, AxisObserver, WrenchProcess, axis_filter
 from .briefing import PLACES, Air, Briefing
 from .observation import DECISION_PERIOD, MAX_COMMAND
 from .preview import preview, pushing
-from .sensor_model import Sensing, sensor_model
-from .tracker_filter import MEMORY
+from .sensor_model import MEMORY, Sensing, sensor_model
 from .wrench_lag import lags
 
 Array = NDArray[np.float64]

@@ -126,7 +126,7 @@ template <class S> void begin_imu(Filter<S> &f) {
   f.imu.refused = 0;
   f.imu.used = 1;
   if (f.vehicle.time > S(0) && f.belief.x[NIS] != f.belief.x[NIS]) {
-    S dt = f.vehicle.rotors[ROTOR_STEP], B[6][N], none[N][BIASES] = {};
+    S dt = f.vehicle.rotors.step, B[6][N], none[N][BIASES] = {};
     noise_inputs(f.vehicle.body, f.settings, f.centre_rotation, dt, B);
     carry_companions(f, dt, B, none);
   }

@@ -1,86 +1,100 @@
 // A vehicle's declared effects at work: what rotors deliver, what wrench effects add, what sensing
-// effects changed. The models themselves are functions of their own (`EffectModel`).
+// effects changed. The equations are functions of their own (effects/NAME.hpp, `EffectModel`).
 #pragma once
 #include "filter.hpp"
 
 namespace windwrench {
 
-// layouts of dynamics/effects/base.py
-enum {
-  AT_ROTATION = 3,
-  AT_VELOCITY = 12,
-  AT_RATE = 15,
-  AT_SPEED = 18,
-  AT_THRUST = 22,
-  AT_WIND = 26,
-  AT_VOLTAGE = 29,
-  AT_TIME = 30,
-  AT_ACCELERATION = 31
-};  // of the flight's state
-enum { ROTOR_STEP = 4, ROTOR_VOLTAGE = 5, ROTOR_TIME = 6 };                     // of the rotors
-enum { SAMPLE_STEP = 11, HAS_SPEED, HAS_POSITION, HAS_QUATERNION, DIRECTION };  // of a sample
-
 // What the rotors deliver over a step of dt s at the logged rotor speeds (4) rad/s
-template <class S> void drive(Model<S> &m, const S *speeds, S dt, S voltage) {
+template <class T> void drive(Model<T> &m, const T *speeds, Single<T> dt, T voltage) {
+  using S = Single<T>;
   m.voltage = voltage;
-  for (int i = 0; i < 4; i++) m.rotors[i] = speeds[i];
-  m.rotors[ROTOR_STEP] = dt;
-  m.rotors[ROTOR_TIME] = m.time;
-  if (m.rotor_count > 0) m.rotors[ROTOR_VOLTAGE] = voltage;
+  for (int i = 0; i < 4; i++) m.rotors.speed[i] = speeds[i];
+  m.rotors.step = T{} + dt;
+  m.rotors.time = m.time;
+  if (m.rotor_count > 0) m.rotors.voltage = voltage;
   for (int i = 0; i < m.rotor_count; i++)
-    m.rotor_models[i](m.rotor_coefficients[i], m.constants, m.rotors, m.memory[i]);
+    m.rotor_models[i](m.rotor_coefficients[i], numbers_of<T>(m.constants), numbers_of<T>(m.rotors),
+                      m.memory[i]);
   if (m.wrench_count > 0) {
-    S *last = m.memory[20];  // whether there are delivered rotor speeds, and their values
-    S share = dt > S(0) ? last[0] / dt : S(0);
-    last[0] = S(1);
+    T *last = m.memory[20];  // whether there are delivered rotor speeds, and their values
+    T share = dt > S(0) ? last[0] / dt : T{};
+    last[0] = T{} + S(1);
     for (int i = 0; i < 4; i++) {
-      m.effect_state[AT_ACCELERATION + i] = share * (m.rotors[i] - last[1 + i]);
-      last[1 + i] = m.rotors[i];
+      m.effect_state.rotor_acceleration[i] = share * (m.rotors.speed[i] - last[1 + i]);
+      last[1 + i] = m.rotors.speed[i];
     }
     m.waiting = m.hooked;
   }
-  rotor_wrench(m.body, m.rotors, m.rotor_wrench);
+  rotor_wrench(m.body, m.rotors.speed, m.rotor_wrench);
+}
+
+// The flight's state for the wrench effects, all but the rotors' acceleration: position (3),
+// attitude R and velocity (3) in the world, rate (3), body, and delivered rotor speeds (4)
+template <class T>
+void fill_state(const Model<T> &m, const T *position, const T R[3][3], const T *velocity,
+                const T *rate, const T *speeds, FlightState<T> &state) {
+  for (int i = 0; i < 3; i++) {
+    state.position[i] = position[i];
+    state.velocity[i] = velocity[i];
+    state.rate[i] = rate[i];
+    state.wind[i] = m.wind[i];
+    for (int j = 0; j < 3; j++) state.rotation[i][j] = R[i][j];
+  }
+  for (int i = 0; i < 4; i++) {
+    state.rotor_speed[i] = speeds[i];
+    state.thrust[i] = m.body.k[i] * speeds[i] * speeds[i];
+  }
+  state.voltage = m.voltage;
+  state.time = m.time;
+}
+
+// What the wrench effects say at a state, out (6)
+template <class T> void add_wrenches(Model<T> &m, FlightState<T> &state, T *out) {
+  for (int i = 0; i < 6; i++) out[i] = T{};
+  for (int i = 0; i < m.wrench_count; i++)
+    m.wrench_models[i](m.wrench_coefficients[i], numbers_of<T>(m.constants), numbers_of<T>(state),
+                       out);
 }
 
 // What the wrench effects say at a state x of attitude R, into m.effect_wrench. The first call
 // after `drive` also carries the effects' own states over the step: made at the state itself
-template <class S> void apply_effects(Model<S> &m, const S *x, const S R[3][3]) {
+template <class T> void apply_effects(Model<T> &m, const T *x, const T R[3][3]) {
   if (m.wrench_count == 0) return;
-  S *state = m.effect_state;
-  for (int i = 0; i < 3; i++) {
-    state[i] = x[i];
-    state[AT_VELOCITY + i] = x[VELOCITY + i];
-    state[AT_RATE + i] = x[RATE + i];
-    state[AT_WIND + i] = m.wind[i];
-    for (int j = 0; j < 3; j++) state[AT_ROTATION + 3 * i + j] = R[i][j];
-  }
-  for (int i = 0; i < 4; i++) {
-    state[AT_SPEED + i] = m.rotors[i];
-    state[AT_THRUST + i] = m.body.k[i] * m.rotors[i] * m.rotors[i];
-  }
-  state[AT_VOLTAGE] = m.voltage;
-  state[AT_TIME] = m.time;
+  fill_state(m, x, R, x + VELOCITY, x + RATE, m.rotors.speed, m.effect_state);
   if (m.waiting > 0) {
     m.waiting = 0;
     for (int i = 0; i < m.wrench_count; i++)
       if (m.wrench_hooks[i])
-        m.wrench_hooks[i](m.wrench_coefficients[i], m.constants, state, m.rotors);
+        m.wrench_hooks[i](m.wrench_coefficients[i], numbers_of<T>(m.constants),
+                          numbers_of<T>(m.effect_state), numbers_of<T>(m.rotors));
   }
-  for (int i = 0; i < 6; i++) m.effect_wrench[i] = S(0);
-  for (int i = 0; i < m.wrench_count; i++)
-    m.wrench_models[i](m.wrench_coefficients[i], m.constants, state, m.effect_wrench);
+  add_wrenches(m, m.effect_state, m.effect_wrench);
 }
 
-// Rotor speeds and pose, the first 11 of m.sample, from report back to truth. parts: 1 position,
-// 2 attitude, 4 rotor speeds; where the attitude is no part of it, it must still be readable
-template <class S> void undo_sensing(Model<S> &m, int parts, S dt) {
-  m.sample[SAMPLE_STEP] = dt;
-  m.sample[DIRECTION] = S(-1);
-  m.sample[HAS_POSITION] = S(parts & 1 ? 1 : 0);
-  m.sample[HAS_QUATERNION] = S(parts & 2 ? 1 : 0);
-  m.sample[HAS_SPEED] = S(parts & 4 ? 1 : 0);
-  for (int i = int(m.sensing_count) - 1; i >= 0; i--)
-    m.sensing_models[i](m.sensing_coefficients[i], m.constants, m.sample, m.memory[16 + i]);
+// Rotor speeds and pose, the first 11 numbers of m.sample, from truth to report (direction +1), or
+// back (-1) in the reverse order. position, quaternion, speed: 1 where there is one; where there is
+// no quaternion, the one in the sample must still be readable
+template <class T>
+void rewrite_sample(Model<T> &m, T position, T quaternion, T speed, Single<T> dt, int direction) {
+  m.sample.step = T{} + dt;
+  m.sample.direction = T{} + Single<T>(direction);
+  m.sample.has_position = position;
+  m.sample.has_quaternion = quaternion;
+  m.sample.has_speed = speed;
+  for (int n = 0; n < m.sensing_count; n++) {
+    int i = direction > 0 ? n : int(m.sensing_count) - 1 - n;
+    m.sensing_models[i](m.sensing_coefficients[i], numbers_of<T>(m.constants),
+                        numbers_of<T>(m.sample), m.memory[16 + i]);
+  }
+}
+// parts: 1 position, 2 attitude, 4 rotor speeds
+template <class T> void rewrite_sample(Model<T> &m, int parts, Single<T> dt, int direction) {
+  auto has = [parts](int part) { return T{} + Single<T>(parts & part ? 1 : 0); };
+  rewrite_sample(m, has(1), has(2), has(4), dt, direction);
+}
+template <class T> void undo_sensing(Model<T> &m, int parts, Single<T> dt) {
+  rewrite_sample(m, parts, dt, -1);
 }
 
 }  // namespace windwrench

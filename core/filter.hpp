@@ -1,6 +1,7 @@
 // The memory of one wrench filter. `Filter<double>` is what Python sees as a NumPy record
 // (estimator/filter_record.py): the same fields in the same order.
 #pragma once
+#include "effects/form.hpp"
 #include "rigid_body.hpp"
 
 namespace windwrench {
@@ -10,30 +11,26 @@ constexpr int BIASES = 6;            // of gyro rad/s and accelerometer m/s2
 constexpr int COMPANIONS = 12;       // the biases, and the noise of the last step
 constexpr int AGREEING_SAMPLES = 5;  // accelerometer samples in a row that make a push
 
-// An effect on the vehicle: (its coefficients and own state, the vehicle's numbers, the flight's
-// state or the rotors or the sample, the wrench or its memory); layouts of dynamics/effects/base.py
-template <class S> using EffectModel = void (*)(S *, S *, S *, S *);
-
 // A vehicle with its effects
 template <class S> struct Model {
   Body<S> body;
-  S constants[30];  // of the vehicle, for effects
+  VehicleNumbers<S> constants;  // for effects
   EffectModel<S> wrench_models[16];
-  S wrench_coefficients[16][16];
+  S wrench_coefficients[16][ROW];
   EffectModel<S> wrench_hooks[16];  // that carry an effect's own state; null where it has none
   int64_t wrench_count, hooked, waiting;  // waiting: the states have still to be carried
   EffectModel<S> rotor_models[16];
-  S rotor_coefficients[16][8];
+  S rotor_coefficients[16][PARAMETERS];
   int64_t rotor_count;
   EffectModel<S> sensing_models[4];
-  S sensing_coefficients[4][8];
+  S sensing_coefficients[4][PARAMETERS];
   int64_t sensing_count;
-  S sample[16];              // rotor speeds and pose on their way through the sensing effects
+  Sample<S> sample;          // rotor speeds and pose on their way through the sensing effects
   S memory[21][112];         // of rotor-input and sensing effects; last: delivered rotor speeds
   S time, voltage, wind[3];  // s, V, m/s
-  S rotors[7];               // delivered rotor speeds rad/s, step s, voltage V, time s
+  Rotors<S> rotors;          // delivered
   S rotor_wrench[4];         // their thrust N and torques Nm about the centre of mass
-  S effect_state[35];
+  FlightState<S> effect_state;
   S effect_wrench[6];  // force in the world, torque in the body frame
 };
 

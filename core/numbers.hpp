@@ -55,6 +55,9 @@ template <class T> inline Answer<T> finite(T a) { return a - a == T{}; }
 template <class T> inline T larger(T a, T b) { return choose(b > a, b, a); }
 template <class T> inline T smaller(T a, T b) { return choose(b < a, b, a); }
 template <class T> inline T absolute(T a) { return choose(a < T{}, -a, a); }
+template <class T> inline T within(T a, Single<T> low, Single<T> high) {
+  return smaller(larger(a, T{} + low), T{} + high);
+}
 
 template <class T, class F> inline T lane_by_lane(T a, F function) {
   if constexpr (is_single<T>) {
@@ -73,6 +76,29 @@ template <class T> inline T sine(T a) {
 }
 template <class T> inline T cosine(T a) {
   return lane_by_lane(a, [](Single<T> one) { return std::cos(one); });
+}
+template <class T> inline T rounded_down(T a) {
+  return lane_by_lane(a, [](Single<T> one) { return std::floor(one); });
+}
+template <class T> inline T exponential(T a) {
+  return lane_by_lane(a, [](Single<T> one) { return std::exp(one); });
+}
+
+// a function of two numbers, lane by lane
+template <class T, class F> inline T lane_by_lane(T a, T b, F function) {
+  if constexpr (is_single<T>) {
+    return function(a, b);
+  } else {
+    T result;
+    for (int i = 0; i < lanes_of<T>; i++) result[i] = function(a[i], b[i]);
+    return result;
+  }
+}
+template <class T> inline T power(T a, T b) {
+  return lane_by_lane(a, b, [](Single<T> x, Single<T> y) { return std::pow(x, y); });
+}
+template <class T> inline T angle_of(T y, T x) {
+  return lane_by_lane(y, x, [](Single<T> a, Single<T> b) { return std::atan2(a, b); });
 }
 
 }  // namespace windwrench

@@ -24,7 +24,7 @@ template <class S> struct Body {
 
 // total thrust N and body torques about the centre of mass Nm, out (4), at rotor speeds (4) rad/s:
 // (1), (8)-(10)
-template <class T> void rotor_wrench(const Body<Single<T>> &body, const T *speeds, T *out) {
+template <class T, class B> void rotor_wrench(const Body<B> &body, const T *speeds, T *out) {
   for (int i = 0; i < 4; i++) {
     out[i] = T{};
     for (int j = 0; j < 4; j++) out[i] += body.mixing[i][j] * speeds[j] * speeds[j];
@@ -40,8 +40,8 @@ template <class T, class S> T row_times(const S *row, T x, T y, T z) {
 // angular acceleration out (3) rad/s2, body, at the rate w (3) and an external torque (3), world:
 // (12). rotors (4): thrust and torques; effects (6): declared effects' force, world, and torque,
 // body
-template <class T, class R4, class E6>
-void angular_acceleration(const Body<Single<T>> &b, const T R[3][3], const T *w, const T *torque,
+template <class T, class B, class R4, class E6>
+void angular_acceleration(const Body<B> &b, const T R[3][3], const T *w, const T *torque,
                           const R4 *rotors, const E6 *effects, T *out) {
   T wx = w[0], wy = w[1], wz = w[2];
   T hx = row_times(b.inertia[0], wx, wy, wz), hy = row_times(b.inertia[1], wx, wy, wz),
@@ -57,11 +57,11 @@ void angular_acceleration(const Body<Single<T>> &b, const T R[3][3], const T *w,
 
 // acceleration out (3) of the geometric centre, m/s2, world, at an angular acceleration a (3) and
 // an external force (3): (4), and about the centre of mass alpha x c + omega x (omega x c)
-template <class T, class R4, class E6>
-void centre_acceleration(const Body<Single<T>> &b, const T R[3][3], const T *w, const T *a,
-                         const T *force, const R4 *rotors, const E6 *effects, T *out) {
+template <class T, class B, class R4, class E6>
+void centre_acceleration(const Body<B> &b, const T R[3][3], const T *w, const T *a, const T *force,
+                         const R4 *rotors, const E6 *effects, T *out) {
   T wx = w[0], wy = w[1], wz = w[2];
-  Single<T> cx = -b.com[0], cy = -b.com[1], cz = -b.com[2], inverse = Single<T>(1) / b.mass;
+  B cx = -b.com[0], cy = -b.com[1], cz = -b.com[2], inverse = Single<T>(1) / b.mass;
   T nx = wy * cz - wz * cy, ny = wz * cx - wx * cz, nz = wx * cy - wy * cx;
   T px = a[1] * cz - a[2] * cy + wy * nz - wz * ny, py = a[2] * cx - a[0] * cz + wz * nx - wx * nz,
     pz = a[0] * cy - a[1] * cx + wx * ny - wy * nx;
@@ -71,8 +71,8 @@ void centre_acceleration(const Body<Single<T>> &b, const T R[3][3], const T *w, 
 }
 
 // both, out (6), at a state x
-template <class T, class R4, class E6>
-void accelerations(const Body<Single<T>> &b, const T R[3][3], const T *x, const R4 *rotors,
+template <class T, class B, class R4, class E6>
+void accelerations(const Body<B> &b, const T R[3][3], const T *x, const R4 *rotors,
                    const E6 *effects, T *out) {
   angular_acceleration(b, R, x + RATE, x + TORQUE, rotors, effects, out + 3);
   centre_acceleration(b, R, x + RATE, out + 3, x + FORCE, rotors, effects, out);
@@ -95,12 +95,11 @@ void gyroscopic_rest(const Body<Single<T>> &b, const T *rate, T square, Single<T
   for (int i = 0; i < 3; i++) out[i] = row_times(b.inverse_inertia[i], tx, ty, tz);
 }
 
-// the state that follows x after dt s, out, R being the matrix of its attitude: (2)-(5), (11)-(14)
+// the same over a step of dt s, whose turn may be long
 template <class T, class R4, class E6>
-void move(const Body<Single<T>> &body, const T *x, const T R[3][3], const R4 *rotors,
-          const E6 *effects, Single<T> dt, T *out) {
+void step_accelerations(const Body<Single<T>> &body, const T *x, const T R[3][3], const R4 *rotors,
+                        const E6 *effects, Single<T> dt, T *a) {
   using S = Single<T>;
-  T a[6];
   accelerations(body, R, x, rotors, effects, a);
   const T *w = x + RATE;
   T square = dt * dt * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
@@ -110,6 +109,16 @@ void move(const Body<Single<T>> &body, const T *x, const T R[3][3], const R4 *ro
     gyroscopic_rest(body, w, square, dt, rest);
     for (int i = 0; i < 3; i++) a[3 + i] += choose(far, rest[i], T{});
   }
+}
+
+// the state that follows x after dt s, out, R being the matrix of its attitude: (2)-(5), (11)-(14)
+template <class T, class R4, class E6>
+void move(const Body<Single<T>> &body, const T *x, const T R[3][3], const R4 *rotors,
+          const E6 *effects, Single<T> dt, T *out) {
+  using S = Single<T>;
+  T a[6];
+  const T *w = x + RATE;
+  step_accelerations(body, x, R, rotors, effects, dt, a);
   for (int i = 0; i < 3; i++) {
     out[i] = x[i] + dt * (x[VELOCITY + i] + S(0.5) * dt * a[i]);
     out[VELOCITY + i] = x[VELOCITY + i] + dt * a[i];

@@ -18,9 +18,7 @@ from ..controllers.flight import (
 )
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import compiled
 from ..runtime.errors import unknown_name
-from .state import Episodes, Flags
 
 ACTIONS = ("velocity", "acceleration", "attitude", "rates", "rotors")
 LARGEST = {"velocity": 1.0, "acceleration": 4.0}  # m/s and m/s2
@@ -100,24 +98,3 @@ def make_action(
     size = np.array([first, first, yaw_rate, (1.0 - LEAST_THRUST) * g])
     kind, hover = ATTITUDE if name == "attitude" else RATES, np.array([0.0, 0.0, 0.0, g])
     return Action(name, kind, False, np.arange(4), hover, size, size)
-
-
-@compiled
-def take(
-    wanted: Array, which: Flags, scale: float, hover: Array, below: Array, above: Array, e: Episodes
-) -> bool:
-    """Write actions (n, size) over ``scale``, within -1 to 1, and their commands into the episodes
-    ``which`` (n,); return whether all numbers are finite. Nothing is written otherwise.
-    """
-    for n in range(wanted.shape[0]):
-        for i in range(wanted.shape[1]):
-            if not math.isfinite(wanted[n, i]):
-                return False
-    for n in range(wanted.shape[0]):
-        if which[n]:
-            e.decisions[n] += 1
-            for i in range(wanted.shape[1]):
-                action = min(max(wanted[n, i] / scale, -1.0), 1.0)
-                e.last_actions[n, i], e.actions[n, i] = e.actions[n, i], action
-                e.commands[n, i] = hover[i] + (below[i] if action < 0.0 else above[i]) * action
-    return True

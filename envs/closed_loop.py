@@ -19,103 +19,83 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from mujoco import _functions
 
-from ..controllers.flight import (
-    BESIDE,
-    FLIGHT,
-    ROTORS,
-    FlightGains,
-    flight_record,
-    move_setpoint,
-    reset_flight,
-    steer,
-)
-from ..controllers.model_inverse import foresee, through_the_rotors
+from .. import _core
+from ..controllers.flight import BESIDE, FLIGHT, FlightGains, flight_record, reset_flight
 from ..dynamics.effects import compile_effects
 from ..dynamics.mean_jet import COUNT_R, COUNT_X, jet_table
 from ..dynamics.model import lay_addresses, without_addresses
 from ..dynamics.motion import Array
-from ..dynamics.rotation import quaternion_of_yaw, quaternion_to_matrix
+from ..dynamics.rotation import quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
 from ..estimator.constant_gain import ConstantGainFilter
-from ..estimator.filter_record import FILTER
 from ..estimator.tuning import UKFTuning
 from ..estimator.ukf import WrenchUKF
-from ..runtime.addresses import call_at, call_step
-from ..runtime.compiled import Record, compiled, compiled_without_gil, specialised
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, STATIONS, Fan, fan_record
 from .plant import (
     NOISE,
     PLANT,
-    SUBSTEPS,
     TICK,
     PlantSettings,
-    actuate,
-    delay,
     load_world,
     plant_record,
     reset_plant,
-    sense,
 )
-from .state import REFERENCE_SIZE, Motion, is_healthy
+from .state import REFERENCE_SIZE
 from .untimed import Untimed
-from .wind.field import Calls, Sum, Wind, add_winds
+from .wind.field import Sum, Wind
 
-_C_FUNCTION = ctypes.CFUNCTYPE(None)
 WIND_EVERY = 2  # ticks between two evaluations of the winds at the stations
 ACCELEROMETER_NOISE = 3  # unit normals of a tick with an accelerometer, behind the plant's
 
 LOOP = np.dtype(
     [
         ("plant", PLANT),
-        ("filter", FILTER),
-        ("step", "i8"),  # address of the filter's compiled step
         ("flight", FLIGHT),
         ("fan", FAN),
-        ("ticks", "i8"),  # since the start of the episode; below zero while the filter settles
-        ("winds", "i8"),  # how many blow
-        ("time", "f8", (1,)),  # s, of the winds
-        ("rotation", "f8", (3, 3)),  # of the vehicle, body to world, when the winds blew last
-        ("points", "f8", (3, STATIONS)),  # m, world, of the vehicle's stations then
-        ("air", "f8", (3, STATIONS)),  # m/s, world, of the winds there
         ("action", "f8", (4,)),  # the command, of a kind that ``controllers.flight.steer`` knows
-        ("kind", "i8"),
-        ("model_in_loop", "i8"),  # whether the flight loop counters the effects of its model
         ("accelerometer_sigma", "f8"),  # m/s2, a tick
         ("accelerometer_bias", "f8", (3,)),  # m/s2, body axes
         # m/s2, world, mean over the last run: specific force of the accelerometer, and of the
         # rotors by the declared model
         ("specific", "f8", (3,)),
         ("thrust", "f8", (3,)),
-        # in lanes alone: MuJoCo's part, and the unit normals of the present tick
-        ("qpos", "f8", (7,)),
-        ("qvel", "f8", (6,)),
-        ("xfrc", "f8", (6,)),
-        ("acceleration", "f8", (6,)),
-        ("noise", "f8", (NOISE + ACCELEROMETER_NOISE,)),
-        ("none", "f8", (6,)),
+        ("ticks", "i8"),  # since the start of the episode; below zero while the filter settles
+        ("kind", "i8"),  # of the commands
+        ("model_in_loop", "i8"),  # whether the flight loop counters the effects of its model
+        ("points", "f8", (3, STATIONS)),  # m, world, of the vehicle's stations in the last winds
+        ("air", "f8", (3, STATIONS)),  # m/s, world, of the winds there
+        # addresses, and how many: the filter and its step; MuJoCo's pose, velocity and applied
+        # wrench; the jet's table; the reference; the core's winds, and how many blow in all;
+        # MuJoCo's step, model and data
+        *[(name, "i8") for name in ("filter", "step", "qpos", "qvel", "xfrc", "jet")],
+        *[(name, "i8") for name in ("reference", "rows", "winds", "wind_count", "blowing")],
+        *[(name, "i8") for name in ("mujoco_step", "model", "data")],
     ]
 )
+assert LOOP.itemsize == _core.LOOP_SIZE, "the core was built for another layout"
+_ADDRESSES = (LOOP.names or ())[-14:]
+# stages of the core
+WIND, SENSE, ESTIMATE, STEER, ACTUATE, FEEL, MOVE = range(7)
+# MuJoCo's own function
+_MUJOCO_STEP = ctypes.cast(ctypes.CDLL(_functions.__file__).mj_step, ctypes.c_void_p).value
 
 # estimators of the wrench in flight
 ESTIMATORS: dict[str, type[WrenchUKF]] = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
 
 
 class World(NamedTuple):
-    """Arrays that a tick reads and writes beside the loop's record."""
+    """MuJoCo's arrays of the vehicle."""
 
-    jet: Array  # (2, COUNT_X, COUNT_R) axial and radial speed of the jet's table
-    qpos: Array  # (7,) MuJoCo's position m and quaternion of the vehicle
-    qvel: Array  # (6,) MuJoCo's velocity m/s, world, and angular velocity rad/s, body
+    qpos: Array  # (7,) position m and quaternion
+    qvel: Array  # (6,) velocity m/s, world, and angular velocity rad/s, body
     xfrc: Array  # (6,) force N and torque Nm, world, applied by MuJoCo
-    reference: Array  # (n, REFERENCE_SIZE), a row a tick; (0, REFERENCE_SIZE): none
-    winds: Calls  # (n, 2) of the compiled winds
 
 
 @dataclass(frozen=True)
@@ -154,136 +134,10 @@ class Stage:
             raise unknown_name("stage", self.before, STAGES, f"stage {self.name!r}: before")
 
 
-@compiled
-def blow_at(
-    calls: Calls,
-    time: Array,
-    pose: Array,
-    stations: Array,
-    rotation: Array,
-    points: Array,
-    air: Array,
-) -> None:
-    """Write the winds at a vehicle's stations into ``air`` (3, STATIONS) m/s, for a pose (7,).
-
-    The stations' places in the world go into ``points`` (3, STATIONS) m.
-    """
-    R, s = rotation, stations
-    quaternion_to_matrix(pose[3:7], R)
-    for i in range(STATIONS):
-        for a in range(3):
-            points[a, i] = pose[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
-    air[:] = 0.0
-    add_winds(calls, time, points, air)
-
-
-@compiled
-def _blow(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
-    """Write the winds at the vehicle's stations into ``fan.air``, every second tick."""
-    loop = record[0]
-    if loop.winds == 0 or loop.ticks % WIND_EVERY != 0:
-        return
-    air, stations = loop.air, loop.fan.stations
-    loop.time[0] = max(loop.ticks, 0) * TICK
-    blow_at(world.winds, loop.time, world.qpos, stations, loop.rotation, loop.points, air)
-    for i in range(STATIONS):
-        for a in range(3):
-            loop.fan.air[i, a] = air[a, i]
-
-
-@compiled
-def _sense(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
-    plant = record[0].plant
-    plant.seen = sense(plant, world.qpos, noise[k])
-
-
-@compiled
-def _estimate(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
-    loop = record[0]
-    plant, ukf = loop.plant, loop.filter
-    for i in range(len(ukf.z)):
-        ukf.z[i] = plant.z[i]
-    call_step(loop.step, ukf, plant.seen, TICK, plant.battery)
-
-
-@compiled
-def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
-    """Write the rotor speeds that fly to the reference, or to the set point where there is none."""
-    loop = record[0]
-    flight, ukf, reference = loop.flight, loop.filter, world.reference
-    if len(reference) > 0:
-        row = min(max(loop.ticks, 0), len(reference) - 1)
-        for i in range(REFERENCE_SIZE):
-            flight.setpoint[i] = reference[row, i]
-    else:
-        move_setpoint(flight, ukf.x, TICK)
-    if loop.model_in_loop > 0:
-        foresee(flight, ukf, ukf.x)
-    steer(flight, ukf.x, loop.action, loop.kind, TICK)
-    if loop.model_in_loop > 0 and loop.kind != ROTORS:
-        through_the_rotors(flight, ukf)
-
-
-@compiled
-def _actuate(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
-    """Write the wrench of this tick for MuJoCo; an accelerometer feels the tick's wrench."""
-    loop = record[0]
-    plant, fan, command, xfrc = loop.plant, loop.fan, loop.flight.command, world.xfrc
-    row = min(k, len(path) - 1)
-    fan.y, fan.height = path[row, 0], path[row, 1]
-    actuate(plant, command, fan, world.jet, world.qpos, world.qvel, noise[k], xfrc)
-    if noise.shape[1] > NOISE:
-        if k == 0:
-            for j in range(3):
-                loop.specific[j] = loop.thrust[j] = 0.0
-        accelerate(loop, xfrc, noise[k])
-        if k == len(noise) - 1:
-            for j in range(3):
-                loop.specific[j] /= len(noise)
-                loop.thrust[j] /= len(noise)
-
-
-@compiled
-def accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
-    """Add the specific force of an accelerometer in the centre of mass, in the world by the
-    estimated attitude, and that of the rotors by the declared model.
-    """
-    plant, body = loop.plant, loop.flight.body
-    R, E = plant.rotation, loop.flight.rotation
-    thrust = 0.0
-    for i in range(4):
-        thrust += body.k[i] * plant.z[i] * plant.z[i]
-    for j in range(3):
-        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[NOISE + j]
-        for i in range(3):
-            felt += R[i, j] * xfrc[i] / plant.body.mass
-        plant.scratch[j] = felt
-    delay(plant.past_felt, plant.imu_late, plant.scratch, plant.late)
-    for j in range(3):
-        for i in range(3):
-            loop.specific[i] += E[i, j] * plant.late[j]
-        loop.thrust[j] += E[j, 2] * thrust / body.mass
-
-
-@compiled_without_gil
-def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int) -> None:
-    """Run a tick for each row of ``noise`` in one call, without a user's own stages and winds.
-
-    ``move`` is the address of a C function that calls MuJoCo's step.
-    """
-    for k in range(len(noise)):
-        _blow(record, world, path, noise, k)
-        _sense(record, world, path, noise, k)
-        _estimate(record, world, path, noise, k)
-        _steer(record, world, path, noise, k)
-        _actuate(record, world, path, noise, k)
-        call_at(move, 0)
-        record[0].ticks += 1
-
-
-def _compiled_stage(function: Callable[..., None]) -> Callable[[ClosedLoop], None]:
+def _core_stages(*numbers: int) -> Callable[[ClosedLoop], None]:
     def run(loop: ClosedLoop) -> None:
-        function(loop.record, loop.world, loop.fan_path, loop.noise, loop.row)
+        for number in numbers:
+            loop.run_stage(number)
 
     return run
 
@@ -291,10 +145,10 @@ def _compiled_stage(function: Callable[..., None]) -> Callable[[ClosedLoop], Non
 # the kit's own stages, in their order
 STAGES: dict[str, Callable[[ClosedLoop], object]] = {
     "wind": lambda loop: loop.blow(),
-    "sense": _compiled_stage(_sense),
-    "estimate": _compiled_stage(_estimate),
-    "steer": _compiled_stage(_steer),
-    "actuate": _compiled_stage(_actuate),
+    "sense": _core_stages(SENSE),
+    "estimate": _core_stages(ESTIMATE),
+    "steer": _core_stages(STEER),
+    "actuate": _core_stages(ACTUATE, FEEL),
     "move": lambda loop: loop.move(),
 }
 
@@ -330,7 +184,6 @@ class ClosedLoop:
         position: (3,) m, world, true, of the geometric centre; ``quaternion`` (4,), body to world,
             and ``velocity`` (3,) m/s, world, likewise.
         motion: MuJoCo's generalised position and velocity, the vehicle's first (7,) and (6,).
-            ``shown`` has them, with estimate and wrench, as a row of vehicles side by side.
         external: (6,) true external force N and torque Nm, world. Its parts are ``jet``, the
             actuators' ``disturbance``, and a user's ``applied``.
         specific: (3,) m/s2, world, specific force by the accelerometer, mean of the last run.
@@ -378,7 +231,6 @@ class ClosedLoop:
             self.noise_size += ACCELEROMETER_NOISE
             loop["accelerometer_sigma"] = accelerometer[0]
         self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
-        loop["filter"] = self.ukf.record[0]
         self.winds, self.reference = Sum(), np.zeros((0, REFERENCE_SIZE))
         self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
         self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
@@ -391,12 +243,14 @@ class ClosedLoop:
 
     def _bind(self) -> None:
         """Lay Python's arrays over the record and MuJoCo's data, and find compiled code."""
-        loop = self.record[0]
-        loop["step"] = self.ukf.step_address
+        loop, ukf = self.record[0], self.ukf.record[0]
+        self.address: int = self.record.ctypes.data
+        loop["filter"], loop["step"] = self.ukf.record.ctypes.data, self.ukf.step_address
+        loop["jet"], loop["mujoco_step"] = self.jet_table.ctypes.data, _MUJOCO_STEP
+        loop["model"], loop["data"] = self.model._address, self.data._address
         lay_addresses(loop["plant"], compile_effects(self.true))
-        lay_addresses(loop["filter"], compile_effects(self.ukf.vehicle))
-        self.state: Array = loop["filter"]["x"]
-        self.covariance: Array = loop["filter"]["P"]
+        self.state: Array = ukf["x"]
+        self.covariance: Array = ukf["P"]
         self.setpoint: Array = loop["flight"]["setpoint"]
         self.command: Array = loop["flight"]["command"]
         self.action: Array = loop["action"]
@@ -413,11 +267,6 @@ class ClosedLoop:
         self._ticks: np.ndarray = self.record["ticks"]
         self.stages = self._pipeline(self.own_stages)
         self._look_at_world()
-        given = self.record, self.world, self.fan_path, self.noise
-        self._move = _C_FUNCTION(partial(mujoco.mj_step, self.model, self.data, SUBSTEPS))
-        self._move_address = int(ctypes.cast(self._move, ctypes.c_void_p).value or 0)
-        self._run_ticks = specialised(run_ticks, *given, 0)
-        self._is_healthy = specialised(is_healthy, self.state, self.world.qvel)
 
     @staticmethod
     def _pipeline(own: Sequence[Stage]) -> dict[str, Callable[[ClosedLoop], object]]:
@@ -437,18 +286,13 @@ class ClosedLoop:
         p, v = self.motion = self.data.qpos, self.data.qvel
         self.position, self.quaternion, self.velocity = p[:3], p[3:7], v[:3]
         xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
-        self.world = World(self.jet_table, p[:7], v[:6], xfrc, self.reference, self.winds.calls)
-        shown = (
-            p[:7],
-            v[:6],
-            self.external,
-            self.state,
-            self.covariance,
-            self.specific,
-            self.thrust,
-            self.air,
-        )
-        self.shown = Motion(*(values[np.newaxis, ..., np.newaxis] for values in shown))
+        self.world = World(p[:7], v[:6], xfrc)
+        loop = self.record[0]
+        for name, array in zip(World._fields, self.world, strict=True):
+            loop[name] = array.ctypes.data
+        loop["reference"], loop["rows"] = self.reference.ctypes.data, len(self.reference)
+        loop["winds"], loop["wind_count"] = self.winds.calls.ctypes.data, len(self.winds.calls)
+        loop["blowing"] = len(self.winds.winds)
 
     @property
     def seen(self) -> bool:
@@ -504,7 +348,6 @@ class ClosedLoop:
         self.winds, self.reference = blowing, rows
         self._look_at_world()
         loop = self.record[0]
-        loop["winds"] = len(blowing.winds)
         self.action[:], loop["kind"] = 0.0, self.kind
         if self.accelerometer is not None:
             loop["accelerometer_bias"] = self.accelerometer[1] * rng.standard_normal(3)
@@ -517,10 +360,8 @@ class ClosedLoop:
         reset_flight(loop["flight"])
         self.air[:] = 0.0
         loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal((STATIONS, 3))
-        noise = rng.standard_normal(NOISE)
-        sense(self.record[0:1]["plant"][0], self.motion[0], noise)
+        _core.run_stage(self.address, SENSE, self._fan_at_rest, rng.standard_normal((1, NOISE)), 0)
         self.ukf.reset(self.sample[4:7], self.sample[7:11])
-        loop["filter"] = self.ukf.record[0]
         mujoco.mj_forward(self.model, self.data)
 
     def settle(self, rng: np.random.Generator, ticks: int, fan_path: Array | None = None) -> None:
@@ -547,7 +388,7 @@ class ClosedLoop:
             InputError: a shape is wrong.
         """
         noise = np.ascontiguousarray(noise, dtype=np.float64)
-        path = self._fan_at_rest if fan_path is None else np.asarray(fan_path, dtype=np.float64)
+        path = self._fan_at_rest if fan_path is None else np.ascontiguousarray(fan_path, np.float64)
         if path.ndim == 1:
             path = np.column_stack([path, np.full(len(path), self._fan_at_rest[0, 1])])
         count, last = len(noise), len(path) - 1
@@ -559,24 +400,27 @@ class ClosedLoop:
         self.noise, self.fan_path = noise, path
         with Untimed():
             if not self.own_stages and not self.winds.own:  # which are called from Python
-                self._run_ticks(self.record, self.world, path, noise, self._move_address)
+                _core.run_ticks(self.address, path, noise)
                 return
             for k in range(count):
                 self.row = k
                 for stage in self.stages.values():
                     stage(self)
 
+    def run_stage(self, number: int) -> None:
+        """Run a stage of the core in the present tick."""
+        _core.run_stage(self.address, number, self.fan_path, self.noise, self.row)
+
     def blow(self) -> None:
         """Write the winds at the vehicle's stations into ``air``, every second tick."""
-        _blow(self.record, self.world, self.fan_path, self.noise, self.row)
+        self.run_stage(WIND)
         if self.ticks % WIND_EVERY == 0:
             for wind in self.winds.own:
                 self.air += wind.velocity(self.points.T, max(self.ticks, 0) * TICK)
 
     def move(self) -> None:
         """Let MuJoCo integrate the rigid body over the tick."""
-        mujoco.mj_step(self.model, self.data, SUBSTEPS)
-        self._ticks += 1
+        self.run_stage(MOVE)
 
     @property
     def was_reset(self) -> bool:
@@ -588,9 +432,9 @@ class ClosedLoop:
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy's start: no views, and no addresses of this process."""
         record = self.record.copy()
-        record["step"] = 0
-        for part in ("plant", "filter"):
-            record[part] = without_addresses(record[part])
+        for name in _ADDRESSES:
+            record[name] = 0
+        record["plant"] = without_addresses(record["plant"])
         carried = {name: getattr(self, name) for name in (*self._carried, "_carried")}
         return carried | {"record": record}
 
@@ -602,4 +446,4 @@ class ClosedLoop:
         """Whether the vehicle still flies: every number of plant and filter finite, and nothing
         faster than a vehicle.
         """
-        return bool(self._is_healthy(self.state, self.world.qvel)) and not self.was_reset
+        return _core.is_healthy(self.address) and not self.was_reset

@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..runtime.errors import InputError
 from .closed_loop import ClosedLoop
 from .display import need_display
-from .fan import jet_at
 from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
 from .wind import FanWall
 
@@ -142,17 +142,16 @@ class Viewer:
         """Place the fan, and carry the drops with the air for ``step`` s; return the air (n, 3)
         m/s.
         """
-        fan, drops, jet = loop.record["fan"].copy()[0], self._drops, np.empty(3)
-        axial, radial = loop.jet_table
-        place = np.array([0.0, fan["y"], fan["height"]])
+        fan, drops = loop.record["fan"].copy(), self._drops
+        place = np.array([0.0, fan["y"][0], fan["height"][0]])
         loop.data.mocap_pos[0] = _AWAY if in_wind else place
         low, high = _WIND_BOX if in_wind else place + _BOX
         gone = ~np.all((drops >= low) & (drops <= high), axis=1) | (self._rng.random(_DROPS) < 0.01)
         drops[gone] = self._rng.uniform(low, high, (int(gone.sum()), 3))
         air = loop.winds.velocity(drops, max(loop.time, 0.0))
-        for drop, wind in zip(drops, air, strict=True):
-            jet_at(fan, axial, radial, drop[0], drop[1], drop[2], jet)
-            wind += jet
+        jet = np.empty_like(air)
+        _core.jet_at(fan.ctypes.data, loop.jet_table, drops, jet)
+        air += jet
         drops += step * air + 0.004 * self._rng.standard_normal(drops.shape)
         return air
 

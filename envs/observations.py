@@ -5,9 +5,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import compiled
 from ..runtime.errors import unknown_name
-from .state import Frame, State
+from .state import State
 
 OBSERVATIONS = ("pose", "wrench", "imu", "all")
 FELT = ("imu", "all")  # need an accelerometer
@@ -54,22 +53,6 @@ def bounds(name: str, vehicle: Vehicle, actions: int) -> tuple[list[float], list
         rows += _IMU
     limits, scales = ([row[i] for row in rows for _ in range(3)] for i in (0, 1))
     return limits + [1.0] * actions, scales + [1.0] * actions
-
-
-@compiled
-def limit(
-    seen: Array, limits: NDArray[np.float32], scales: NDArray[np.float32], si: Frame, out: Frame
-) -> None:
-    """Write frames (n, k) within ``limits`` (k,) as they are into ``si`` and over ``scales`` (k,)
-    into ``out``; 0 where a number is not finite.
-    """
-    for n in range(seen.shape[0]):
-        for i in range(seen.shape[1]):
-            value = np.float32(seen[n, i])
-            if not np.isfinite(value):
-                value = np.float32(0.0)
-            si[n, i] = min(max(value, -limits[i]), limits[i])
-            out[n, i] = si[n, i] / scales[i]
 
 
 def as_numbers(values: ArrayLike) -> NDArray[np.float32]:

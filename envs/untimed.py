@@ -3,23 +3,14 @@ take more than half of the step of a single free body.
 """
 
 import ctypes
-from functools import cache
 from threading import Lock
 from typing import Any
 
 import mujoco
-from numba import types
 
-from ..runtime.addresses import address_of
+from .. import _core
 
-
-def _no_time() -> float:
-    return 0.0
-
-
-@cache
-def _clock() -> Any:
-    return ctypes.CFUNCTYPE(ctypes.c_double)(address_of(_no_time, types.float64()))
+_STILL = ctypes.CFUNCTYPE(ctypes.c_double)(_core.no_time())  # a clock
 
 
 class Untimed:
@@ -34,7 +25,7 @@ class Untimed:
         with Untimed._lock:
             if Untimed._inside == 0:
                 Untimed._before = mujoco.get_mjcb_time()
-                mujoco.set_mjcb_time(_clock())
+                mujoco.set_mjcb_time(_STILL)
             Untimed._inside += 1
 
     def __exit__(self, *_error: object) -> None:

@@ -12,14 +12,12 @@ from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from .. import _core
 from ..dynamics.motion import Array
-from ..runtime.compiled import specialised
 from ..runtime.errors import InputError, unknown_name
-from .actions import take
 from .closed_loop import ClosedLoop
 from .definition import TaskDefinition
-from .observations import limit
-from .state import Episodes, Flags, Frame, Start, State, gather
+from .state import Episodes, Flags, Frame, Start, State
 from .untimed import Untimed
 
 Infos = dict[str, Any]
@@ -90,6 +88,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         # each environment's own generator; before its first reset a placeholder
         self.generators: list[np.random.Generator] = [np.random.default_rng(0)] * num_envs
         self.state = State(self.episodes, self.generators)
+        self._look()
         self._seeded, self._begun, self._over = np.zeros((3, num_envs), dtype=np.bool_)
         self._fresh = np.zeros(num_envs, dtype=np.bool_)  # no step since the episode's start
         self._some_fresh = self._ready = False
@@ -100,19 +99,23 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         )
         self.viewers: dict[int, Any] = {}  # of the pictures, where there are any
         self._pool: ThreadPoolExecutor | None = None
-        self._compiled: dict[Any, Callable[..., Any]] = {}
         # closed loops of each environment: in flight, and kept for its episodes
         self.loops: list[ClosedLoop] = []
         self._kept: list[dict[Any, ClosedLoop]] = [{} for _ in range(num_envs)]
         self._make_memory()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all but threads, windows and compiled code, for a copy."""
-        return self.__dict__ | {"_pool": None, "_compiled": {}, "viewers": {}}
+        """Return all but threads, windows and the core's part, for a copy."""
+        return self.__dict__ | {"_pool": None, "_scene": None, "viewers": {}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self.state.bind(self.episodes)
+        self._look()
+
+    def _look(self) -> None:
+        """Show the core the arrays of the episodes and their rows."""
+        self._scene = _core.Scene(*self.episodes, self.state.rows, self.state.flying)
 
     def reset(
         self,
@@ -227,7 +230,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         how = self.task.action_scale, flown.hover, flown.below, flown.above
         if wanted.shape != self.episodes.actions.shape:
             return False
-        return bool(self._call(take, wanted, which, *how, self.episodes))
+        return self._scene.take(wanted, which, *how)
 
     def _judge(self) -> JudgedStep:
         """Return what the task says of the present state."""
@@ -237,7 +240,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             raise InputError(
                 f"{task.name}: observe must return shape {self._si.shape}, got {seen.shape}"
             )
-        self._call(limit, seen, task.kept, task.divisors, self._si, self._frames)
+        _core.limit(seen, task.kept, task.divisors, self._si, self._frames)
         values: Infos = {"observation": self._si, "command": s.command, **task.info(s)}
         rewards = np.zeros(self.num_envs)
         for name, term in task.reward_terms(s).items():
@@ -306,6 +309,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
                 more = ((0, 0), (0, len(rows) - kept.shape[1]), (0, 0))
                 kept = np.pad(kept, more, mode="edge")
                 self.episodes = self.episodes._replace(**{name: kept})
+                self._look()
             kept[i, : len(rows)], kept[i, len(rows) :] = rows, rows[-1]
         self._labels[i] = start.labels
 
@@ -344,17 +348,11 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def _see(self, which: list[int]) -> None:
         """Gather the state of some environments."""
-        episodes, s = self.episodes, self.state
+        episodes = self.episodes
         for i in which:
             loop = self.loops[i]
             episodes.ticks[i], episodes.broken[i] = loop.ticks, loop.was_reset
-            self._call(gather, i, i + 1, i, loop.shown, episodes, s.rows, s.flying)
-
-    def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a compiled function, always with arguments of the same types."""
-        if function not in self._compiled:
-            self._compiled[function] = specialised(function, *arguments)
-        return self._compiled[function](*arguments)
+            self._scene.gather(i, loop.address)
 
     def _spread(self, work: Callable[[int], object], which: Sequence[int]) -> None:
         """Call ``work`` with each number, once: each free thread takes the next number."""

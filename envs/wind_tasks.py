@@ -6,13 +6,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..controllers.wind_observation import (
     MAX_ACCELERATION,
     OBSERVATION_LIMITS,
     OBSERVATION_SCALES,
 )
 from ..dynamics.rotation import quaternion_to_matrix
-from .fan import jet_wrench
 from .plant import TICK
 from .state import Start, State
 from .task import Task
@@ -135,8 +135,8 @@ class WindHoverEnv(Task):
         """Return ``Task._truth``, the actuators' disturbance (6,) N and Nm, world, and the winds'
         wrench (foresight, 6) over each decision to come, at the vehicle's present place.
         """
-        loop, R, wind = self.loop, np.empty((3, 3)), np.empty(3)
-        fan = loop.record["fan"].copy()[0]
+        loop, R = self.loop, np.empty((3, 3))
+        fan = loop.record["fan"].copy()
         quaternion_to_matrix(loop.quaternion, R)
         com, ahead = loop.record[0]["plant"]["body"]["com"], np.empty((self.foresight, 6))
         jet, now = loop.jet_table, (loop.position, R, loop.world.qvel, com)
@@ -144,7 +144,7 @@ class WindHoverEnv(Task):
         at = loop.time + 0.5 * period
         for k in range(self.foresight):
             fan["air"] = loop.winds.velocity(loop.points.T, at + k * period)
-            jet_wrench(fan, jet, *now, wind, ahead[k])
+            _core.jet_wrench(fan.ctypes.data, jet, *now, ahead[k])
         return super()._truth() | {
             "disturbance": loop.disturbance.copy(),
             "wrench_ahead": ahead,

@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..dynamics.mean_jet import jet_table
 from ..dynamics.rotation import matrix_of, quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
-from ..envs.fan import Fan, fan_record, jet_wrench
+from ..envs.fan import Fan, fan_record
 from ..envs.plant import TICK
 
 Array = NDArray[np.float64]
@@ -28,11 +29,11 @@ def calm_jet(fan: Fan, vehicle: Vehicle, x: Array, y: Array) -> Array:
     """
     record = fan_record(fan, vehicle.positions, TICK)  # its gusts are zero until aged
     jet = np.stack(jet_table(fan.radius, fan.hub_radius))
-    rotation, rest, wind = matrix_of(quaternion_of_yaw(math.pi)), np.zeros(6), np.empty(3)
+    rotation, rest = matrix_of(quaternion_of_yaw(math.pi)), np.zeros(6)
     wrench = np.empty((len(x), 6))
     for i in range(len(x)):
         at = np.array([x[i], y[i], fan.height])
-        jet_wrench(record[0], jet, at, rotation, rest, vehicle.com, wind, wrench[i])
+        _core.jet_wrench(record.ctypes.data, jet, at, rotation, rest, vehicle.com, wrench[i])
     return wrench
 
 

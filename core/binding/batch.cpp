@@ -1,9 +1,6 @@
 // Filters side by side for Python.
 #include "../batch.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
 #include <vector>
 
 #include "filter.hpp"
@@ -19,9 +16,6 @@ constexpr int REGISTER = 64;  // bytes
 #else
 constexpr int REGISTER = 32;
 #endif
-
-template <class T, class... Shape>
-using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 
 template <class S> class Batch {
  public:

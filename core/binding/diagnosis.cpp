@@ -1,8 +1,5 @@
 // What a diagnosis computes at each row of a log, for Python. A model's memory is Python's: a NumPy
 // record, laid out as `Model<double>` at its beginning, given by its address.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
 #include "../diagnosis/causal_filter.hpp"
 #include "../diagnosis/evidence.hpp"
 #include "../diagnosis/flights.hpp"
@@ -15,8 +12,6 @@ using namespace windwrench;
 
 namespace {
 
-template <class T, class... Shape>
-using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 template <int... SHAPE> using In = Array<const double, nb::shape<SHAPE...>>;
 template <int... SHAPE> using Out = Array<double, nb::shape<SHAPE...>>;
 template <int... SHAPE> using Ints = Array<const std::int64_t, nb::shape<SHAPE...>>;
@@ -33,10 +28,6 @@ auto rows(const Array<T, nb::shape<-1, V, W>> &array) {
 
 Model<double> &model_at(std::uintptr_t address) {
   return *reinterpret_cast<Model<double> *>(address);
-}
-
-template <class... Arrays> void check_rows(std::size_t count, const Arrays &...arrays) {
-  if (((arrays.shape(0) != count) || ...)) throw nb::value_error("expected a row for each sample");
 }
 
 LoggedRotors rotors_of(const In<-1, 4> &speeds, const In<-1> &voltage) {

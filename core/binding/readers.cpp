@@ -1,7 +1,4 @@
 // Readers of flight logs for Python.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
 #include "../readers/blackbox.hpp"
 #include "../readers/dataflash.hpp"
 #include "filter.hpp"
@@ -12,8 +9,6 @@ using namespace windwrench;
 
 namespace {
 
-template <class T, class... Shape>
-using Array = nb::ndarray<T, nb::c_contig, nb::device::cpu, Shape...>;
 using Bytes = Array<const std::uint8_t, nb::shape<-1>>;
 template <class... Shape> using Ints = Array<const std::int64_t, Shape...>;
 using Pair = nb::typed<nb::tuple, std::int64_t, std::int64_t>;

@@ -20,11 +20,11 @@ struct SteadyGains {
   const double (*gain)[3][2], *keep;
 };
 
-struct Heading {
+struct LevelAxes {
   double cosine = 1, sine = 0;
 
-  explicit Heading(const double *both) : cosine(both[0]), sine(both[1]) {}
-  Heading() = default;
+  explicit LevelAxes(const double *both) : cosine(both[0]), sine(both[1]) {}
+  LevelAxes() = default;
   void follow(const double R[3][3]) {
     double size = std::hypot(R[0][0], R[1][0]);
     if (size > 0) cosine = R[0][0] / size, sine = R[1][0] / size;
@@ -116,7 +116,7 @@ class CausalFilter {
   double moving_[3][3] = {};   // position m, velocity m/s, disturbance m/s2, world
   double turning_[2][3] = {};  // rate rad/s, disturbance rad/s2, body
   double q_[4], R_[3][3], before_[6] = {};
-  Heading heading_;
+  LevelAxes heading_;
 
   // Add corrections of pose, rate and disturbance; the attitude's is a turn, body
   void add(const double said[6][3], double *turn) {
@@ -204,7 +204,7 @@ inline void sensitivities(const SteadyGains &steady, const SensitivityInput &in,
   auto of = [&](int i, int s) { return state + (3 * i + s) * c; };  // the columns of a state
   constexpr int STRAIGHT[4] = {0, 1, 2, 5};                         // not turned by the heading
   for (int64_t k = 0; k < in.n; k++) {
-    const Heading heading(in.heading[k]);
+    const LevelAxes heading(in.heading[k]);
     double *seen = out + 6 * c * k, x, y;
     const double *jumps = in.jumps + 6 * e * k, *moved = in.moved + 6 * b * k,
                  *acting = in.acting + 6 * a * k;

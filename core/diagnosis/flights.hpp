@@ -54,12 +54,13 @@ inline void acting_wrench(Model<double> &m, double period, const LoggedRotors &r
 inline void undo_log_sensing(Model<double> &m, int64_t n, const double *t, const bool *seen,
                              double (*samples)[11]) {
   if (m.sensing_count == 0) return;
-  m.sample[7] = 1;
+  double *sample = numbers_of<double>(m.sample);
+  m.sample.quaternion[0] = 1;
   for (int64_t k = 0; k < n; k++) {
     int given = seen[k] ? 11 : 4;
-    std::copy_n(samples[k], given, m.sample);
+    std::copy_n(samples[k], given, sample);
     undo_sensing(m, seen[k] ? 7 : 4, k > 0 ? t[k] - t[k - 1] : 0.0);
-    std::copy_n(m.sample, given, samples[k]);
+    std::copy_n(sample, given, samples[k]);
   }
 }
 

@@ -12,8 +12,8 @@ constexpr double BUTTERWORTH = 0.7071067811865476;  // damping
 constexpr double FORGOTTEN = 4;  // delays of a filter after which exp(-4) of its past is left
 
 struct LowPass {
-  double frequency, delay;  // rad/s; s, of a slow signal
-  double transition[2][2];  // of output and its rate over a step
+  double frequency, delay;   // rad/s; s, of a slow signal
+  double transition[2][2];   // of output and its rate over a step
   double old[2], latest[2];  // what the last sample adds, and the present one: a straight line
 };
 
@@ -22,8 +22,8 @@ struct Observer {
   double force_decay[3], torque_decay[3];
   double p[3], v[3], q[4], dq[4];  // the filtered pose: centre of mass, quaternion, their rates
   double force[3], force_rate[3], torque[3], torque_rate[3];  // of the model, world, filtered
-  double R[3][3], omega[3];        // of the filtered attitude; rad/s, body
-  double angular_momentum[3];      // of the filtered pose, world axes
+  double R[3][3], omega[3];                         // of the filtered attitude; rad/s, body
+  double angular_momentum[3];                       // of the filtered pose, world axes
   double sample_p[3], sample_q[4], sample_R[3][3];  // the last sample, or the expected one
   double position_gap, attitude_gap;                // s since the last sample
 };
@@ -186,8 +186,7 @@ inline void look_ahead(Filter<double> &f, Observer &o) {
   times(R, body.com, a);
   for (int i = 0; i < 3; i++) {
     double acceleration = (o.force[i] + x[FORCE + i]) / body.mass;
-    x[VELOCITY + i] =
-        o.v[i] + delay * acceleration + o.force_rate[i] / (body.mass * square) - b[i];
+    x[VELOCITY + i] = o.v[i] + delay * acceleration + o.force_rate[i] / (body.mass * square) - b[i];
     x[i] = o.p[i] + delay * o.v[i] + acceleration / square - a[i];
   }
 }
@@ -245,11 +244,7 @@ inline int step(Filter<double> &f, Observer &o, int parts, double dt, double vol
   observe_torque(f, o, torque, old_q, attitude, dt);
   observe_force(f, o, force, old_p, position, dt);
   look_ahead(f, o);
-  if (!position) {
-    matrix_of(x + QUATERNION, R);
-    times(R, m.body.com, lever);
-    for (int i = 0; i < 3; i++) o.sample_p[i] = x[i] + lever[i];
-  }
+  for (int i = 0; !position && i < 3; i++) o.sample_p[i] = x[i] + lever[i];
   m.time += dt;
   return parts;
 }

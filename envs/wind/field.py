@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from ...runtime.addresses import address_of, call_at
-from ...runtime.compiled import compiled, specialised
+from ... import _core
+from ...runtime.addresses import call_at
+from ...runtime.compiled import compiled
 from ...runtime.errors import InputError
 
 Array = NDArray[np.float64]
 Calls = NDArray[np.int64]
-
-# A compiled wind's function takes the address of its parameters, a count of points, and three more
-# addresses: time (1,) in s, points (3, count) in m, and velocities (3, count) in m/s, to be added
-# to.
-SIGNATURE = types.void(*[types.int64] * 5)
 
 
 @runtime_checkable
@@ -52,35 +46,36 @@ def add_winds(calls: Calls, time: Array, points: Array, velocities: Array) -> No
 
 
 class CompiledWind:
-    """A wind of this room: its formula as a compiled function, and the formula's parameters.
+    """A wind of this room: one of the core's formulas, and the formula's parameters.
 
     A flight adds up the winds at the stations of a vehicle without Python. A flight holds the
-    addresses of function and parameters alone, and calls all kinds of winds alike.
+    addresses of formula and parameters alone, and calls all kinds of winds alike.
 
     Args:
-        function: the formula, a plain function of ``SIGNATURE``, compiled at its first use.
+        formula: ``steady``, ``waves``, ``jets`` or ``grid``.
         parameters: (1,) of a structured type, with stated fields and units.
         tables: arrays, by the fields with the address of their first number.
 
     Attributes:
-        calls: as ``add_winds`` takes them.
+        calls: (1, 2) addresses of the formula and of its parameters; of a sum (winds, 2).
     """
 
     def __init__(
         self,
-        function: Callable[..., None],
+        formula: str,
         parameters: np.ndarray,
         tables: dict[str, np.ndarray] | None = None,
     ) -> None:
-        self._formula = function, parameters, tables or {}
+        self._formula = formula, parameters, tables or {}
         self._bind()
 
     def _bind(self) -> None:
         """Write down this process's addresses of the formula, its parameters and its tables."""
-        function, parameters, tables = self._formula
+        formula, parameters, tables = self._formula
         for name, table in tables.items():
             parameters[name] = table.ctypes.data
-        self.calls = np.array([[address_of(function, SIGNATURE), parameters.ctypes.data]])
+        address = _core.wind_formula(formula, parameters.itemsize)
+        self.calls = np.array([[address, parameters.ctypes.data]])
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "calls"}
@@ -96,9 +91,9 @@ class CompiledWind:
         Raises:
             InputError: points have another shape, or numbers are not finite.
         """
-        rows, now = _check_points(points, time), np.array([time], dtype=np.float64)
+        rows = _check_points(points, time)
         out = np.zeros_like(rows)
-        specialised(add_winds, self.calls, now, rows, out)(self.calls, now, rows, out)
+        _core.add_winds(self.calls, time, rows, out)
         return np.ascontiguousarray(out.T)
 
     def __add__(self, other: Wind) -> Sum:

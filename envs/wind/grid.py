@@ -14,10 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import carray
 from numpy.typing import ArrayLike
 
-from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.errors import InputError
 from ...runtime.extras import need
 from ...runtime.regular_files import check_archive, read_bytes
@@ -36,33 +34,6 @@ GRID = np.dtype(
         ("counts", "i8", (4,)),  # points along each
     ]
 )
-
-
-def _grid(parameters: int, count: int, time: int, points: int, velocities: int) -> None:
-    w, now = carray(pointer_to(parameters), 1, GRID)[0], numbers_at(time, (1,))[0]
-    first, step, n = w.first, w.step, w.counts
-    field = numbers_at(w.field, (n[0], n[1], n[2], n[3], 3))
-    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
-    low, part = np.zeros(4, dtype=np.int64), np.zeros(4)
-    for j in range(count):
-        for a in range(4):
-            value = now if a == 0 else p[a - 1, j]
-            at = min(max((value - first[a]) / step[a], 0.0), float(field.shape[a] - 1))
-            low[a] = min(int(at), max(field.shape[a] - 2, 0))
-            part[a] = at - low[a]
-        for corner in range(16):
-            weight, i0, i1, i2, i3 = 1.0, low[0], low[1], low[2], low[3]
-            for a in range(4):
-                far = (corner >> a) & 1
-                weight *= part[a] if far else 1.0 - part[a]
-            if weight == 0.0:
-                continue
-            i0 += corner & 1
-            i1 += (corner >> 1) & 1
-            i2 += (corner >> 2) & 1
-            i3 += (corner >> 3) & 1
-            for i in range(3):
-                out[i, j] += weight * field[i0, i1, i2, i3, i]
 
 
 class GridWind(CompiledWind):
@@ -101,7 +72,7 @@ class GridWind(CompiledWind):
         first = [axis[0] for axis in self.axes]
         widths = [np.ptp(axis) / (len(axis) - 1) if len(axis) > 1 else 1.0 for axis in self.axes]
         parameters = np.array([(first, widths, 0, shape[:4])], dtype=GRID)
-        super().__init__(_grid, parameters, {"field": self.wind})
+        super().__init__("grid", parameters, {"field": self.wind})
 
 
 def on_grid(

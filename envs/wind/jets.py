@@ -10,27 +10,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray
 from numpy.typing import ArrayLike
 
-from ...dynamics.mean_jet import (
-    AIR_DENSITY,
-    COUNT_R,
-    COUNT_X,
-    FIRST_X,
-    STEP_R,
-    STEP_X,
-    jet_table,
-)
-from ...dynamics.rotation import product
-from ...runtime.addresses import numbers_at, pointer_to
+from ...dynamics.mean_jet import AIR_DENSITY, jet_table
 from ...runtime.errors import InputError
-from ..fan import between
 from .field import Array, CompiledWind, number, vector
-from .turbulence import add_modes, waves
+from .turbulence import waves
 
 TABLE_PERIOD = 0.02  # s, of the tables of places and speeds
-_SLOWEST = 1e-3  # m/s, at which a jet counts as off
 
 
 JETS = np.dtype(
@@ -43,48 +30,6 @@ JETS = np.dtype(
         ("advection", "f8", (3,)),  # m/s, of the gusts
     ]
 )
-
-
-def _jets(parameters: int, count: int, time: int, positions: int, velocities: int) -> None:
-    w, now = carray(pointer_to(parameters), 1, JETS)[0], numbers_at(time, (1,))[0]
-    axial, radial = (
-        numbers_at(w.axial, (COUNT_X, COUNT_R)),
-        numbers_at(w.radial, (COUNT_X, COUNT_R)),
-    )
-    places = numbers_at(w.places, (w.place_steps, w.jets, 3))
-    speeds, R = numbers_at(w.speeds, (w.steps, w.jets)), w.axes
-    p, out = numbers_at(positions, (3, count)), numbers_at(velocities, (3, count))
-    gusts, off = np.zeros((3, count)), np.empty(3)
-    if w.waves > 0:
-        add_modes(numbers_at(w.modes, (w.waves, 7)), w.advection, now, p, gusts)
-    at = min(max(now / TABLE_PERIOD, 0.0), 1e9)
-    share = at - int(at)
-    k, kp = min(int(at), len(speeds) - 1), min(int(at), len(places) - 1)
-    after, after_p = min(k + 1, len(speeds) - 1), min(kp + 1, len(places) - 1)
-    for j in range(count):
-        momentum, in_y, in_z = 0.0, 0.0, 0.0
-        for n in range(speeds.shape[1]):
-            speed = (1.0 - share) * speeds[k, n] + share * speeds[after, n]
-            if speed < _SLOWEST:
-                continue
-            for i in range(3):
-                place = (1.0 - share) * places[kp, n, i], share * places[after_p, n, i]
-                off[i] = p[i, j] - place[0] - place[1]
-            x, y, z = product(R, off[0], off[1], off[2])
-            r = math.sqrt(y * y + z * z)
-            row, column = (x - FIRST_X) / STEP_X, r / STEP_R
-            if row < 0.0 or row >= COUNT_X - 1 or column >= COUNT_R - 1:
-                continue
-            i, c = int(row), int(column)
-            a, b = row - i, column - c
-            u, v = between(axial, i, c, a, b), between(radial, i, c, a, b)
-            momentum += speed * speed * u * u
-            if r > 1e-9:
-                in_y += speed * v * y / r
-                in_z += speed * v * z / r
-        along = math.sqrt(momentum)
-        for i in range(3):
-            out[i, j] += R[0, i] * along + R[1, i] * in_y + R[2, i] * in_z + along * gusts[i, j]
 
 
 def _axes(direction: Array) -> Array:
@@ -123,7 +68,7 @@ class _Jets(CompiledWind):
         # gusts travel with the shear layer's eddies, at half the speed of the jet
         w["waves"], w["axes"] = len(table), self.axes
         w["advection"] = 0.5 * float(self.speeds.max()) * self.axes[0]
-        super().__init__(_jets, parameters, dict(zip(JETS.names or (), tables, strict=False)))
+        super().__init__("jets", parameters, dict(zip(JETS.names or (), tables, strict=False)))
 
 
 class FanWall(_Jets):

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numba import carray
 from numpy.typing import ArrayLike
 
-from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.errors import InputError, unknown_name
 from .field import CompiledWind, number, vector
 
@@ -35,34 +31,6 @@ STEADY = np.dtype(
 )
 
 
-def _steady(parameters: int, count: int, time: int, points: int, velocities: int) -> None:
-    w, now = carray(pointer_to(parameters), 1, STEADY)[0], numbers_at(time, (1,))[0]
-    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
-    for j in range(count):
-        scale = 1.0
-        if w.law > 0:
-            height = max(p[2, j], w.floor)
-            if w.law == 1:
-                scale = max(math.log(height / w.roughness), 0.0) / math.log(
-                    w.reference / w.roughness
-                )
-            else:
-                scale = (height / w.reference) ** w.roughness
-        if w.length > 0.0:
-            ahead = 0.0
-            for i in range(3):
-                ahead += w.travel[i] * (p[i, j] - w.front[i])
-            inside = (w.speed * (now - w.start) - ahead) / w.length
-            if inside <= 0.0:
-                scale = 0.0
-            elif inside < 1.0 or (w.falls > 0 and inside < 2.0):
-                scale = 0.5 * (1.0 - math.cos(math.pi * inside))
-            else:
-                scale = 0.0 if w.falls > 0 else 1.0
-        for i in range(3):
-            out[i, j] += scale * w.velocity[i]
-
-
 class Uniform(CompiledWind):
     """The same wind everywhere and always.
 
@@ -73,7 +41,7 @@ class Uniform(CompiledWind):
     def __init__(self, velocity: ArrayLike) -> None:
         parameters = np.zeros(1, dtype=STEADY)
         parameters["velocity"] = vector(velocity, "velocity")
-        super().__init__(_steady, parameters)
+        super().__init__("steady", parameters)
 
 
 class Shear(CompiledWind):
@@ -117,7 +85,7 @@ class Shear(CompiledWind):
                 )
         else:
             w["roughness"] = number(exponent, "exponent", 0.0)
-        super().__init__(_steady, parameters)
+        super().__init__("steady", parameters)
 
 
 class Gust(CompiledWind):
@@ -160,4 +128,4 @@ class Gust(CompiledWind):
         w["travel"], w["front"] = travel / size, vector(front, "front")
         w["speed"], w["length"] = number(speed, "speed", 0.0), number(length, "length", 0.0)
         w["start"], w["falls"] = number(start, "start"), bool(falls)
-        super().__init__(_steady, parameters)
+        super().__init__("steady", parameters)

@@ -16,64 +16,24 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray
 from numpy.typing import ArrayLike, NDArray
 
-from ...runtime.addresses import numbers_at, pointer_to
-from ...runtime.compiled import compiled_for_vectors
 from ...runtime.errors import InputError, unknown_name
 from .field import Array, CompiledWind, number, vector
 
 _FOOT = 0.3048  # m
 _KARMAN = 1.339
-# cos(2 pi s) of -1/2 <= s <= 1/2 by powers of s^2, right to 1e-10
-_COS = tuple((-1.0) ** n * (2.0 * math.pi) ** (2 * n) / math.factorial(2 * n) for n in range(12))
-
-
-@compiled_for_vectors
-def add_modes(table: Array, advection: Array, time: float, p: Array, out: Array) -> None:
-    """Add a field of plane waves at points (3, n) m to velocities (3, n) m/s.
-
-    Args:
-        table: (count, 7) wave number (3) in turns per m, phase in turns, amplitude (3) in m/s.
-        advection: (3,) m/s, velocity of the waves.
-        time: s.
-        p: points.
-        out: velocities.
-    """
-    for m in range(len(table)):
-        kx, ky, kz = table[m, 0], table[m, 1], table[m, 2]
-        begin = table[m, 3] - time * (kx * advection[0] + ky * advection[1] + kz * advection[2])
-        begin -= np.floor(begin)
-        for j in range(p.shape[1]):
-            s = begin + kx * p[0, j] + ky * p[1, j] + kz * p[2, j]
-            s -= np.floor(s + 0.5)
-            y = s * s
-            c = _COS[-1]
-            for power in range(len(_COS) - 2, -1, -1):
-                c = c * y + _COS[power]
-            for i in range(3):
-                out[i, j] += table[m, 4 + i] * c
 
 
 TURBULENCE = np.dtype(
     [
-        ("waves", "i8"),  # address of the table (count, 7) of ``add_modes``
+        # address of the table (count, 7): wave number (3) in turns per m, phase in turns,
+        # amplitude (3) in m/s
+        ("waves", "i8"),
         ("count", "i8"),
         ("advection", "f8", (3,)),  # m/s
     ]
 )
-
-
-def _turbulence(parameters: int, count: int, time: int, points: int, velocities: int) -> None:
-    w = carray(pointer_to(parameters), 1, TURBULENCE)[0]
-    add_modes(
-        numbers_at(w.waves, (w.count, 7)),
-        w.advection,
-        numbers_at(time, (1,))[0],
-        numbers_at(points, (3, count)),
-        numbers_at(velocities, (3, count)),
-    )
 
 
 def spectrum(form: str, axis: str, wave_number: ArrayLike, sigma: float, length: float) -> Array:
@@ -197,7 +157,7 @@ class Turbulence(CompiledWind):
         table[:, :3], table[:, 4:] = table[:, :3] @ turn.T, table[:, 4:] @ turn.T
         table = np.ascontiguousarray(table)
         parameters = np.array([(0, len(table), carried)], dtype=TURBULENCE)
-        super().__init__(_turbulence, parameters, {"waves": table})
+        super().__init__("waves", parameters, {"waves": table})
 
 
 def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:

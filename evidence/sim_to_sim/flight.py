@@ -11,59 +11,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from windwrench.dynamics.rotation import quaternion_to_matrix
 from windwrench.dynamics.vehicle import Vehicle
-from windwrench.envs.closed_loop import ClosedLoop, Stage, World, accelerate
+from windwrench.envs.closed_loop import ACTUATE, FEEL, ClosedLoop, Stage
 from windwrench.envs.fan import Fan
-from windwrench.envs.plant import TICK, add_up, blow, disturb, log_speeds
+from windwrench.envs.plant import TICK
 from windwrench.envs.wind_tasks import WindHoverEnv
-from windwrench.runtime.compiled import Record, compiled
 
 from .peers import Peer
 
 Array = NDArray[np.float64]
 
 
-@compiled
-def _press(record: Record, world: World, noise: Array, k: int) -> None:
-    """Write a tick's external wrench, of wind and disturbance, into ``external``."""
-    loop = record[0]
-    quaternion_to_matrix(world.qpos[3:7], loop.plant.rotation)
-    blow(loop.plant, loop.fan, world.jet, world.qpos, world.qvel, noise[k])
-    disturb(loop.plant, noise[k])
-    add_up(loop.plant, world.xfrc)
-
-
-@compiled
-def _report(record: Record, world: World, noise: Array, k: int, speeds: Array) -> None:
-    """Log rotor speeds (4,), and the accelerometer by the force in ``xfrc``, mean of the run."""
-    loop = record[0]
-    plant, count = loop.plant, len(noise)
-    for i in range(4):
-        plant.speeds[i] = plant.sample[i] = speeds[i]
-    log_speeds(plant, speeds)
-    if k == 0:
-        loop.specific[:] = 0.0
-        loop.thrust[:] = 0.0
-    accelerate(loop, world.xfrc, noise[k])
-    if k == count - 1:
-        for j in range(3):
-            loop.specific[j] /= count
-            loop.thrust[j] /= count
-    plant.time += TICK
-
-
 def _actuate(peer: Peer, loop: ClosedLoop) -> None:
-    """Fly a tick in the other simulator."""
-    world, vehicle = loop.world, peer.vehicle
-    _press(loop.record, world, loop.noise, loop.row)
+    """Fly a tick in the other simulator; the accelerometer is by the force in ``xfrc``."""
+    world, vehicle, plant = loop.world, peer.vehicle, loop.record[0]["plant"]
+    loop.run_stage(ACTUATE)  # of which wind and disturbance are kept
     before = loop.velocity.copy()
     pose, velocity, speeds = peer.step(loop.command, loop.external)
     world.qpos[:], world.qvel[:] = pose, velocity
     # what is not gravity, mean over the tick
     world.xfrc[:3] = vehicle.mass * (loop.velocity - before) / TICK
     world.xfrc[2] += vehicle.weight
-    _report(loop.record, world, loop.noise, loop.row, np.ascontiguousarray(speeds))
+    plant["speeds"] = loop.unrounded[:] = loop.sample[:4] = speeds
+    if plant["omega_lsb"] > 0.0:
+        loop.sample[:4] = plant["omega_lsb"] * np.floor(speeds / plant["omega_lsb"] + 0.5)
+    loop.run_stage(FEEL)
 
 
 def _move(loop: ClosedLoop) -> None:

@@ -20,7 +20,6 @@ from ...dynamics.effects import get
 from ...dynamics.effects.base import PARAMETERS, ROTORS_SIZE, STATE_SIZE, Effect
 from ...dynamics.vehicle import Vehicle
 from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
-from ...estimator.constant_gain import _LONGEST_GAP, _NEAR
 from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
 from ...estimator.hover_covariance import CATCH_UP
@@ -48,8 +47,8 @@ _KNOWN = {
     "PI": math.pi,
     "STRAINED": _STRAINED,
     "LARGEST_MRP_VARIANCE": LARGEST_MRP_VARIANCE,
-    "LONGEST_GAP": _LONGEST_GAP,
-    "NEAR": _NEAR,
+    "LONGEST_GAP": 0.1,
+    "NEAR": 1.1,
     "CATCH_UP": CATCH_UP,
     "IMU_PATIENCE": IMU_PATIENCE,
 }

@@ -52,7 +52,8 @@ _KEPT = {
     **{f"poses_{name}": MEMORY[name] for name in MEMORY.names or ()},
     **{name: FILTER[name] for name in ("rotors", "rotor_wrench", "effect_wrench")},
     **{name: FILTER[name] for name in fields_between("x", "last_speeds")},
-    **{name: FILTER[name] for name in fields_between("z", "rows")},
+    **{name: FILTER[name] for name in fields_between("z", "innovation")},
+    **{name: FILTER[name] for name in fields_between("acceleration", "rows")},
 }
 # fields declared in templates
 _OF_IMU = {

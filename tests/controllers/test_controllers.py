@@ -10,10 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.sizes import rms
 from tests.support.vehicles import VEHICLE
+from windwrench import _core
 from windwrench.controllers import CONTROLLERS, AdmittancePID, make_controller
 from windwrench.controllers import wind_observation as seen
 from windwrench.controllers.axis_models import PLACE, axis_models
-from windwrench.controllers.flight import flight_record, fly, move_setpoint
+from windwrench.controllers.flight import BESIDE, flight_record
 from windwrench.controllers.lqg import LQG
 from windwrench.controllers.observation import (
     DECISION_PERIOD,
@@ -198,9 +199,18 @@ def test_the_flight_loop_s_commands_can_be_flown():
         c = flight_record(VEHICLE)[0]
         for index, value in where.items():
             c["setpoint"][index] = value
-        fly(c, turning, 0.005)
+        fly(c, turning)
         assert np.isfinite(c["command"]).all()
         assert np.all((c["command"] >= 0) & (c["command"] <= VEHICLE.omega_max))
+
+
+def fly(c, x):
+    """Let a flight loop's record command the rotors in a state (20,)."""
+    _core.steer(np.asarray(c).ctypes.data, x, np.zeros(4), BESIDE, TICK)
+
+
+def move_setpoint(c, position):
+    _core.move_setpoint(np.asarray(c).ctypes.data, position, TICK)
 
 
 def flown(c, q, rate=(0.0, 0.0, 0.0)):
@@ -212,7 +222,7 @@ def flown(c, q, rate=(0.0, 0.0, 0.0)):
 
 def commanded(c, x):
     """Thrust (N) and torques (Nm, body) that a flight loop commands in a state."""
-    fly(c, x, 0.005)
+    fly(c, x)
     thrust, *torque = VEHICLE.mixing @ c["command"] ** 2
     return thrust, np.array(torque)
 
@@ -257,11 +267,11 @@ def test_a_moving_set_point_waits_for_the_vehicle():
     c = flight_record(VEHICLE)[0]
     c["setpoint"][4] = 1.0
     for _ in range(400):
-        move_setpoint(c, np.zeros(3), 0.005)
+        move_setpoint(c, np.zeros(3))
     # it stops within one step of 5 mm of the leash's end
     assert c["leash"] - 0.0051 <= c["setpoint"][1] <= c["leash"]
     c["setpoint"][4] = -1.0
-    move_setpoint(c, np.zeros(3), 0.005)
+    move_setpoint(c, np.zeros(3))
     assert c["setpoint"][1] < c["leash"] - 0.005
 
 
@@ -278,7 +288,7 @@ def test_a_set_point_beyond_the_leash_still_comes_back(velocity, vehicle, there)
     c["setpoint"][3:6] = velocity
     expected = np.concatenate([there, c["setpoint"][3:]])
     for _ in range(200):
-        move_setpoint(c, np.array(vehicle), 0.005)
+        move_setpoint(c, np.array(vehicle))
     assert_allclose(c["setpoint"], expected, atol=1e-12)
 
 
@@ -295,7 +305,7 @@ def test_a_vehicle_held_for_long_is_not_thrown_on():
         return thrust / VEHICLE.mass - VEHICLE.gravity, torque[2] / VEHICLE.inertia[2, 2]
 
     for _ in range(60 * 200):
-        fly(c, x, 0.005)
+        fly(c, x)
     x[2] = 1.0
     c["setpoint"][9] = 0.0
     assert_allclose(pushed(), [2.0, 4.0], rtol=1e-9)

@@ -9,33 +9,33 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.vehicles import VEHICLE
+from windwrench import _core
 from windwrench.controllers.flight import flight_record
-from windwrench.controllers.model_inverse import HORIZON, foresee, through_the_rotors
 from windwrench.dynamics.effects import get, names, parse_setting
-from windwrench.dynamics.effects.call import deliver
 from windwrench.dynamics.model import MODEL_FIELDS, drive, load_model
 from windwrench.dynamics.rotation import quaternion_of_yaw
 from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 
 _SPEEDS = np.array([380.0, 370.0, 390.0, 375.0])
+HORIZON = 0.02  # s, of the core
 _LATE = ("latency", "motor_lag")
 
 
 def made(*texts):
-    """A flight loop and a model that flies at ``_SPEEDS`` and has effects."""
+    """A flight loop and a model (1,) that flies at ``_SPEEDS`` and has effects."""
     declared = VEHICLE.with_effects(*[parse_setting(text, VEHICLE) for text in texts])
     model = np.zeros(1, dtype=MODEL_FIELDS)
     amended = load_model(model[0], declared)
     for _ in range(40):
         drive(model[0], _SPEEDS, 0.005, 0.95 * VEHICLE.voltage_ref)
-    return flight_record(amended)[0:1][0], model[0]
+    return flight_record(amended), model
 
 
 def commanded(wanted, *texts):
     flight, model = made(*texts)
     flight["command"] = wanted
-    through_the_rotors(flight, model)
-    return flight["command"].copy(), flight, model
+    _core.through_the_rotors(flight.ctypes.data, model.ctypes.data)
+    return flight["command"][0], model[0]
 
 
 STATIC = [n for n in names() if get(n).kind == "rotor input" and n not in _LATE]
@@ -44,25 +44,14 @@ STATIC = [n for n in names() if get(n).kind == "rotor input" and n not in _LATE]
 @pytest.mark.parametrize("name", STATIC)
 def test_commands_deliver_the_wanted_rotor_speeds(name):
     wanted = _SPEEDS * np.array([1.05, 0.97, 1.02, 0.9])
-    command, flight, model = commanded(wanted, name)
-    rotors = flight["rotors"].copy()
-    rotors[:4] = command
-    count = int(model["rotor_count"])
-    assert count == 1
-    deliver(
-        model["rotor_models"][:count],
-        model["rotor_coefficients"],
-        model["constants"],
-        model["memory"].copy(),
-        HORIZON,
-        float(model["voltage"]),
-        rotors,
-    )
-    assert_allclose(rotors[:4], wanted, rtol=1e-6)
+    command, model = commanded(wanted, name)
+    assert model["rotor_count"] == 1
+    drive(model, command, HORIZON, float(model["voltage"]))
+    assert_allclose(model["rotors"][:4], wanted, rtol=1e-6)
 
 
 def test_a_lag_is_led_by_what_remains_after_the_horizon():
-    command, _, model = commanded(_SPEEDS + 10.0, "motor_lag:tau=0.035")
+    command, model = commanded(_SPEEDS + 10.0, "motor_lag:tau=0.035")
     share = 1.0 - math.exp(-HORIZON / 0.035)
     assert_allclose(command, _SPEEDS + 10.0 / share, rtol=1e-9)
     # and looking ahead has not moved the model's own rotors
@@ -71,13 +60,14 @@ def test_a_lag_is_led_by_what_remains_after_the_horizon():
 
 def test_drag_is_foreseen_at_the_reference_and_not_at_the_vehicle():
     flight, model = made("rotor_drag:kdx=0.0001,kdy=0.0001")
-    flight["setpoint"][3:6] = 1.5, 0.0, 0.0
+    flight["setpoint"][0, 3:6] = 1.5, 0.0, 0.0
     flight["wanted"] = _SPEEDS
     state = np.zeros(20)
     state[3:7] = quaternion_of_yaw(0.4)
     state[7:10] = -3.0, 2.0, 1.0
-    foresee(flight, model, state)
-    assert_allclose(flight["foreseen"][:3], [-1e-4 * _SPEEDS.sum() * 1.5, 0.0, 0.0], atol=1e-12)
+    _core.foresee(flight.ctypes.data, model.ctypes.data, state)
+    expected = [-1e-4 * _SPEEDS.sum() * 1.5, 0.0, 0.0]
+    assert_allclose(flight["foreseen"][0, :3], expected, atol=1e-12)
 
 
 def test_without_effects_the_flight_is_the_same_bit_for_bit():

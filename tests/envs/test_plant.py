@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 from numpy.linalg import eigvalsh, norm
@@ -13,21 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.sizes import rms
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.dynamics.mean_jet import jet_table
 from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.fan import Fan, fan_record
-from windwrench.envs.plant import (
-    NOISE,
-    SUBSTEPS,
-    TICK,
-    PlantSettings,
-    actuate,
-    disturb,
-    load_world,
-    plant_record,
-    reset_plant,
-    sense,
-)
+from windwrench.envs.plant import NOISE, SUBSTEPS, TICK, PlantSettings
 from windwrench.envs.recording import TRAJECTORIES, record_flight
 
 QUIET = PlantSettings(
@@ -41,26 +27,26 @@ class Bench:
     """A plant driven by rotor speeds, without filter and flight loop."""
 
     def __init__(self, vehicle=VEHICLE, settings=QUIET, quaternion=(1.0, 0.0, 0.0, 0.0)):
-        self.record, body = plant_record(vehicle, settings)
-        self.plant = self.record[0]
-        reset_plant(self.plant, body)
-        self.model, self.data = load_world(body)
-        self.data.qpos[:] = 0.0, 0.0, 5.0, *quaternion
-        self.fan = fan_record(Fan(speed=0.0), vehicle.positions, TICK)
-        self.table = np.stack(jet_table(0.45, 0.10))
+        self.loop = loop = ClosedLoop(vehicle, settings=settings)
+        loop.reset(default_rng(0), np.array([0.0, 0.0, 5.0]))
+        loop.quaternion[:] = quaternion
+        self.plant = loop.record[0]["plant"]
+
+    def play(self, noise, *stages):
+        """Run stages of a tick with the noise (NOISE,)."""
+        self.loop.noise = noise[None]
+        for name in stages:
+            self.loop.stages[name](self.loop)
 
     def run(self, command, ticks):
         """Hold rotor speeds (4,) for some ticks; return position, attitude, velocity and body rate
         after each (n, 13).
         """
         rows = np.empty((ticks, 13))
-        rotors = np.asarray(command, float)
-        motion = self.data.qpos, self.data.qvel
-        xfrc = self.data.xfrc_applied[self.model.body("vehicle").id]
-        for k in range(ticks):
-            actuate(self.plant, rotors, self.fan[0], self.table, *motion, np.zeros(NOISE), xfrc)
-            mujoco.mj_step(self.model, self.data, SUBSTEPS)
-            rows[k] = np.concatenate(motion)
+        self.loop.command[:] = command
+        for row in rows:
+            self.play(np.zeros(NOISE), "actuate", "move")
+            row[:] = np.concatenate(self.loop.motion)
         return rows
 
 
@@ -127,7 +113,7 @@ def test_the_disturbance_has_its_declared_size_and_lasts_as_long_as_it_says():
     bench = Bench(settings=settings)
     disturbed = np.empty((20_000, 6))
     for row in disturbed:
-        disturb(bench.plant, rng.standard_normal(NOISE))
+        bench.play(rng.standard_normal(NOISE), "actuate")
         row[:] = bench.plant["disturbance"]
     sizes = np.repeat([settings.disturbance_force, settings.disturbance_torque], 3)
     unit = disturbed[1000:] / sizes
@@ -149,7 +135,7 @@ def sensed(quaternion, count=400):
     rng = default_rng(0)
     rows = np.empty((count, 7))
     for row in rows:
-        sense(bench.plant, bench.data.qpos, rng.standard_normal(NOISE))
+        bench.play(rng.standard_normal(NOISE), "sense")
         row[:] = bench.plant["z"][4:11]
     return rows
 

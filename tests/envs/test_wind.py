@@ -11,9 +11,10 @@ from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
 
 from tests.support.outcomes import refused
+from windwrench import _core
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.mean_jet import AIR_DENSITY, jet_table
-from windwrench.envs.fan import Fan, fan_record, jet_at, jet_wrench
+from windwrench.envs.fan import Fan, fan_record
 from windwrench.envs.wind import (
     FanWall,
     Gust,
@@ -197,14 +198,14 @@ def test_a_file_that_lacks_an_axis_or_numbers_is_named(tmp_path):
 
 
 FAN = Fan(turbulence=0.0)
-RECORD = fan_record(FAN, load_vehicle("ardrone2").positions, 0.005)[0]
+RECORD = fan_record(FAN, load_vehicle("ardrone2").positions, 0.005)
 JET = np.stack(jet_table(FAN.radius, FAN.hub_radius))
 
 
 def wind(x, y, z):
-    out = np.full(3, nan)
-    jet_at(RECORD, *JET, x, y, z, out)
-    return out
+    out = np.full((1, 3), nan)
+    _core.jet_at(RECORD.ctypes.data, JET, np.array([[x, y, z]]), out)
+    return out[0]
 
 
 def wrench(y, yaw=pi, velocity=(0.0, 0.0, 0.0)):
@@ -213,7 +214,7 @@ def wrench(y, yaw=pi, velocity=(0.0, 0.0, 0.0)):
     place = np.array([2.3, y, FAN.height])
     attitude = Rotation.from_euler("z", yaw).as_matrix()
     motion = np.array([*velocity, 0, 0, 0.0])
-    jet_wrench(RECORD, JET, place, attitude, motion, np.zeros(3), np.empty(3), out)
+    _core.jet_wrench(RECORD.ctypes.data, JET, place, attitude, motion, np.zeros(3), out)
     return out
 
 

@@ -21,14 +21,12 @@ from tests.support.reference_filters import (
     rotor_effects,
 )
 from tests.support.vehicles import VEHICLE
+from windwrench import _core
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF
-from windwrench.estimator.filter_record import drive, propagate
-from windwrench.estimator.linear_model import model_jacobian
 from windwrench.estimator.reference import difference, displaced
 from windwrench.estimator.smoother import RecordingUKF
-from windwrench.runtime.compiled import compiled
 
 OFFSET = EffectSetting("com_offset", {"cx": 0.01, "cy": -0.006, "cz": 0.02})
 DRAG = EffectSetting("rotor_drag", {"kdx": 1.5e-4, "kdy": 1.5e-4})
@@ -86,13 +84,12 @@ def test_asynchronous_measurements_agree_with_regular_ones():
     assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
 
 
-@compiled
-def one_step(record, speeds, dt, A):
-    """Write the state after a step into ``centre``, and the Jacobian into ``A``."""
-    f = record[0]
-    drive(f, speeds, dt, 11.1)
-    propagate(f, f.x, dt, f.centre)
-    model_jacobian(f, dt, A, True)
+def one_step(record, x, speeds):
+    """Return the state (20,) a step after ``x`` and the Jacobian (12, 18)."""
+    after, A = np.zeros(20), np.zeros((12, 18))
+    _core.drive(record.ctypes.data, speeds, PERIOD, 11.1)
+    _core.move(record.ctypes.data, x, PERIOD, after, A)
+    return after, A
 
 
 @pytest.mark.parametrize(
@@ -123,10 +120,9 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
     start = x[KIT_ORDER]
 
     def stepped(error):
-        A = np.zeros((12, 18))
-        record[0]["x"][KIT_ORDER] = displaced(start, error)
-        one_step(record, speeds, PERIOD, A)
-        return record[0]["centre"][KIT_ORDER], A
+        x[KIT_ORDER] = displaced(start, error)
+        after, A = one_step(record, x, speeds)
+        return after[KIT_ORDER], A
 
     centre, A = stepped(np.zeros(18))
     F = np.eye(18)

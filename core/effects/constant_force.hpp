@@ -1,0 +1,13 @@
+// Constant force: a steady force, fixed in the world frame, at the centre of mass.
+#pragma once
+#include "form.hpp"
+
+namespace windwrench {
+
+// c: fx, fy, fz N
+template <class T, class C>
+void constant_force(const C *c, const VehicleNumbers<C> &, const FlightState<T> &, Wrench<T> &w) {
+  for (int i = 0; i < 3; i++) w.force[i] += c[i];
+}
+
+}  // namespace windwrench

@@ -1,0 +1,14 @@
+// Constant torque: a steady torque, fixed in the body frame (a bent arm, an unequal set of
+// propellers).
+#pragma once
+#include "form.hpp"
+
+namespace windwrench {
+
+// c: tx, ty, tz Nm
+template <class T, class C>
+void constant_torque(const C *c, const VehicleNumbers<C> &, const FlightState<T> &, Wrench<T> &w) {
+  for (int i = 0; i < 3; i++) w.torque[i] += c[i];
+}
+
+}  // namespace windwrench

@@ -1,0 +1,24 @@
+// Inflow drag: the part of a rotor's drag in its plane that grows with the air through its disc.
+//
+// At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kl u_iz (u_ix, u_iy, 0),
+// applied at the rotor. A rotor that climbs into its inflow drags more, one that sinks less. The
+// part in proportion to the rotor speed is rotor_drag.
+#pragma once
+#include "parts.hpp"
+
+namespace windwrench {
+
+// c: kl N/(m/s)2
+template <class T, class C>
+void inflow_drag(const C *c, const VehicleNumbers<C> &v, const FlightState<T> &s, Wrench<T> &w) {
+  C r[3];
+  T u[3];
+  for (int i = 0; i < 4; i++) {
+    rotor_place(v, i, C{}, r);
+    air_velocity(s, r, u);
+    T kl = c[0] * u[2], f[3] = {-kl * u[0], -kl * u[1], T{}};
+    add_force_at(v, s, r, f, w);
+  }
+}
+
+}  // namespace windwrench

@@ -1,0 +1,20 @@
+// Latency: what the rotors do is what was logged a while ago, a pure delay.
+//
+// The delivered rotor speeds at t are the logged ones at t - d, between samples by a cubic. In
+// front of the first sample the first one holds.
+#pragma once
+#include "parts.hpp"
+
+namespace windwrench {
+
+constexpr int KEPT_ROTORS = 22;  // samples, 0.105 s at 200 Hz
+
+// c: d s; memory: the delay line
+template <class T, class C>
+void latency(const C *c, const VehicleNumbers<C> &, Rotors<T> &rotors, T *memory) {
+  memory[1] += rotors.step;
+  for (int i = 0; i < lanes_of<T>; i++)
+    delay(lane_of(memory, i), 4, KEPT_ROTORS, number_of(c[0], i), lane_of(rotors.speed, i));
+}
+
+}  // namespace windwrench

@@ -1,0 +1,23 @@
+// Motor lag: the rotors follow the logged (commanded) rotor speeds as a first-order system.
+//
+// dW/dt = (W_logged - W) / tau, integrated exactly over a step at constant W_logged; the rotors
+// start at the first W_logged.
+#pragma once
+#include "form.hpp"
+
+namespace windwrench {
+
+// c: tau s; memory: whether the rotors have started, and their speeds (4)
+template <class T, class C>
+void motor_lag(const C *c, const VehicleNumbers<C> &, Rotors<T> &rotors, T *memory) {
+  using S = Single<T>;
+  T tau = T{} + c[0], one = T{} + S(1);
+  T blend = choose((tau > T{}) & (memory[0] > T{}), one - exponential(-rotors.step / tau), one);
+  memory[0] = one;
+  for (int i = 0; i < 4; i++) {
+    memory[1 + i] += blend * (rotors.speed[i] - memory[1 + i]);
+    rotors.speed[i] = memory[1 + i];
+  }
+}
+
+}  // namespace windwrench
