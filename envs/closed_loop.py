@@ -60,7 +60,7 @@ LOOP = np.dtype(
         ("plant", PLANT),
         ("flight", FLIGHT),
         ("fan", FAN),
-        ("action", "f8", (4,)),  # the command, of a kind that ``controllers.flight.steer`` knows
+        ("action", "f8", (4,)),  # the command, of a kind of ``controllers.flight``
         ("accelerometer_sigma", "f8"),  # m/s2, a tick
         ("accelerometer_bias", "f8", (3,)),  # m/s2, body axes
         # m/s2, world, mean over the last run: specific force of the accelerometer, and of the
@@ -177,7 +177,7 @@ class ClosedLoop:
         covariance: (18, 18) of the estimate.
         setpoint: (11,) position, velocity, acceleration, yaw and yaw rate to fly to.
         action: (4,) the command, of the kind ``kind``: in m/s2, world, beside the flight loop's own
-            acceleration, or as of ``controllers.flight.steer``.
+            acceleration, or as ``controllers.flight`` says.
         command: (4,) rad/s, of the rotors.
         sample: (11,) rotor speeds, position and quaternion of the last measurement.
         unrounded: (4,) rad/s, these rotor speeds before rounding.

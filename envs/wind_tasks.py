@@ -18,7 +18,7 @@ from .state import Start, State
 from .task import Task
 from .wind_scenarios import START, draw_reference
 
-CHANGE_COST = 0.032  # of a change of an action from 0 to 1
+CHANGE_COST = 0.032  # a change of an action from 0 to 1
 
 
 class WindHoverEnv(Task):
@@ -63,7 +63,7 @@ class WindHoverEnv(Task):
     | 21-23 | specific force of the rotors by the declared model, likewise | 40 | 10    | m/s2 |
     | 24-26 | last action                                              | 4     | 4     | m/s2 |
 
-    The accelerometer sits in the centre of mass and has a noise of 0.15 m/s2 a tick (5 ms) and a bias of
+    The accelerometer sits in the centre of mass. Its noise is 0.15 m/s2 a tick (5 ms), and its bias
     0.05 m/s2, drawn each episode. The estimated attitude turns its axes into the world. The filter does
     not use the accelerometer. Wind and true force are not observed: ``info`` has them.
 

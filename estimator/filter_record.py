@@ -72,6 +72,9 @@ FILTER = np.dtype(
         ("torque_walk", "f8", (3,)),
         ("thrust", "f8", (3,)),
         ("force_walk", "f8", (3,)),
+        # 1/s, at which torque and force decay; 0: they only walk
+        ("torque_rate", "f8", (3,)),
+        ("force_rate", "f8", (3,)),
         ("noise", "f8", (6,)),  # of the measurement (rho, x)
         ("imu_noise", "f8", (6,)),  # of gyro and accelerometer
         ("uncertain", "f8", (FACTORS,)),  # of the vehicle
@@ -162,6 +165,8 @@ def filter_record(
         ("force_walk", tuning.force_walk),
     ):
         f[name] = np.square(deviation)
+    f["torque_rate"] = 1.0 / np.asarray(tuning.torque_time)
+    f["force_rate"] = 1.0 / np.asarray(tuning.force_time)
     f["noise"][:3] = np.square(np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0)  # (16)
     f["noise"][3:] = np.square(tuning.position_noise)
     f["imu_noise"][:3], f["imu_noise"][3:] = (

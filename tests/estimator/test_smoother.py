@@ -11,7 +11,13 @@ from numpy.linalg import eigvalsh, inv, solve
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
-from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
+from tests.support.model_flights import (
+    ANISOTROPIC,
+    GUSTS,
+    WITH_EFFECTS,
+    YAWED,
+    simulate_model,
+)
 from tests.support.sizes import rms
 from tests.support.vehicles import VEHICLE
 from windwrench import _core
@@ -50,8 +56,9 @@ def smooth(t, speeds, x, q, restarted=(), covariance=False):
     [
         pytest.param(VEHICLE, UKFTuning(), 100, 800, range(400, 440), marks=pytest.mark.slow),
         (WITH_EFFECTS, ANISOTROPIC, 20, 150, ()),
+        (VEHICLE, GUSTS, 20, 150, ()),
     ],
-    ids=["with a gap", "effects and anisotropic noise"],
+    ids=["with a gap", "effects and anisotropic noise", "gusts"],
 )
 def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
     """Truth drawn from the filter's own model: NEES of the whole state, of torque and of force."""

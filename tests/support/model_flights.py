@@ -15,6 +15,7 @@ from windwrench.estimator import UKFTuning
 from windwrench.estimator.estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array
 from windwrench.estimator.filter_record import BIASES, N, filter_record
 from windwrench.estimator.reference import displaced, multiply, rotation_matrix, to_quaternion
+from windwrench.estimator.tuning import decay_of
 from windwrench.estimator.ukf import default_covariance
 
 YAWED = {"quaternion": (0.5, 0.0, 0.0, 0.75**0.5), "angular_velocity": (0.0, 0.0, 3.0)}
@@ -26,6 +27,8 @@ ANISOTROPIC = UKFTuning(
     position_noise=(0.001, 0.002, 0.003),
     attitude_noise=(0.003, 0.005, 0.008),
 )
+# force and torque as gusts, which have a memory; along y a walk
+GUSTS = replace(ANISOTROPIC, force_time=(0.3, np.inf, 0.05), torque_time=(0.2, np.inf, 0.02))
 WITH_EFFECTS = load_vehicle("ardrone2").with_effects(
     EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
     EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
@@ -112,8 +115,15 @@ def simulate_model(
     steps = len(speeds)
     # of a step: rotor torque and force, the walks of torque and force, attitude (16) and position
     noise = np.hstack([rng.standard_normal((steps, 12)), rng.standard_normal((steps, 6))])
+    torque_walk, force_walk = (
+        np.broadcast_to(walk, 3) * np.sqrt(decay_of(np.broadcast_to(time, 3), period, period)[1])
+        for walk, time in (
+            (tuning.torque_walk, tuning.torque_time),
+            (tuning.force_walk, tuning.force_time),
+        )
+    )
     noise *= _deviations(
-        *(tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk, tuning.force_walk),
+        *(tuning.motor_torque_noise, tuning.thrust_noise, torque_walk, force_walk),
         *(np.asarray(tuning.attitude_noise) / 4.0, tuning.position_noise),
     )
     if push is not None:
