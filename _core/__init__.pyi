@@ -150,9 +150,10 @@ def weigh(
 
 MODEL_SIZE: int
 
-def effect_addresses(name: str) -> tuple[int, int]:
+def effect_addresses(name: str, kind: str) -> tuple[int, int]:
     """Return the addresses of an effect's equation and of its `advance`, C functions of four
-    arrays of doubles; 0 where the library has none.
+    arrays of doubles; 0 where the library has none of this kind: wrench, rotor input,
+    sensing.
     """
 
 def call_effect(
