@@ -125,8 +125,7 @@ def policy_numbers(
     model = sensor_model(briefing_of(vehicle, tuning, period))
     return common | {
         "kind": "tracker",
-        "title": "Fan tracking by a particle filter on the fan's place and velocity, in the fan and "
-        "the air of the scenario base.",
+        "title": "Fan tracking by a particle filter on the fan's place and velocity.",
         "particles": PARTICLES,
         "integers": [
             ("ORDER", ORDER, "decisions that a residual is regressed on"),
