@@ -4,6 +4,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from ..estimator.tuning import PERIOD, UKFTuning
@@ -20,6 +21,8 @@ def save_tuning(tuning: UKFTuning, period: float, path: Path) -> None:
         InputError: the file cannot be written.
     """
     data = plain(tuning.scaled(period, PERIOD), 9)
+    for name in ("torque_time", "force_time"):  # of a walk: infinite, which YAML can say
+        data[name] = np.asarray(getattr(tuning, name), dtype=np.float64).tolist()
     write_text(yaml.safe_dump(data, sort_keys=False, default_flow_style=None), path)
 
 

@@ -148,7 +148,7 @@ void carry_with_points(const Filter<S> &f, S dt, const Prediction<S> &w, S cross
   for (int i = 6; i < pairs; i++)
     for (int m = 0; m < BIASES; m++) cross[i][m] = S(0);
   carry_linear<BIASES, S>(
-      f.vehicle.body, w.R, dt, [&](int i, int j) { return cross[6 + i][j]; },
+      f.vehicle.body, w.R, dt, w.walk, [&](int i, int j) { return cross[6 + i][j]; },
       [&](int i, int j) -> S & { return out[i][j]; });
   for (int i = 0; i < N; i++)
     for (int m = 0; m < BIASES; m++)

@@ -98,9 +98,10 @@ template <class G, class S = NumberOf<G>> void carry_at_hover(G &c, S dt) {
     A[6 + i][9 + i] += dt;
     for (int j = 0; j < 3; j++) f.centre_rotation[i][j] = S(i == j);
   }
-  carry_by_jacobian(f.belief.P, A);
+  WrenchWalk<S> walk(f.settings, dt);
+  carry_by_jacobian(walk, A, f.belief.P);
   noise_inputs(f.vehicle.body, f.settings, f.centre_rotation, dt, B);
-  add_noise(f.vehicle.body, f.settings, dt, B, f.belief.P);
+  add_noise(f.vehicle.body, walk, B, f.belief.P);
   symmetrise<N>(f.belief.P);
   for (int i = 0; i < 3; i++) bound_variance<N>(f.belief.P, i, S(LARGEST_MRP_VARIANCE));
 }
@@ -205,8 +206,10 @@ template <class G, class S = NumberOf<G>> int step(G &c, int parts, S dt, S volt
     drive(m, sample, dt, voltage);
     matrix_of(b.x + QUATERNION, R);
     apply_effects(m, b.x, R);
+    WrenchWalk<S> walk(f.settings, dt);
     move(m.body, b.x, R, m.rotor_wrench, m.effect_wrench, dt, centre);
-    follow_loads(f.settings, R, m.rotor_wrench, m.effect_wrench, dt, b);
+    decay_wrench(walk, centre);
+    follow_loads(f.settings, walk, R, m.rotor_wrench, m.effect_wrench, b);
     m.time += dt;
   }
   if (c.steady) {

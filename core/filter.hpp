@@ -97,9 +97,10 @@ template <class S> struct Settings {
   S response;           // s
   S fastest;            // rad/s, beyond which a rotor speed counts as not measured
   S motor_torque[3], torque_walk[3], thrust[3], force_walk[3];  // variances in a period
-  S noise[6], imu_noise[6];  // variances of (rho, x), of gyro and accelerometer
-  S uncertain[9];            // of the vehicle
-  S kappa, period;           // -, s
+  S torque_rate[3], force_rate[3];  // 1/s, at which torque and force decay; 0: they only walk
+  S noise[6], imu_noise[6];         // variances of (rho, x), of gyro and accelerometer
+  S uncertain[9];                   // of the vehicle
+  S kappa, period;                  // -, s
 };
 
 // An inertial measurement's biases, and the noise of the last step: imu.hpp

@@ -3,6 +3,7 @@
 #pragma once
 #include "effects.hpp"
 #include "linear_algebra.hpp"
+#include "wrench_walk.hpp"
 
 namespace windwrench {
 
@@ -157,8 +158,8 @@ void model_jacobian(Model<S> &m, const S *x, const S R[3][3], const S *alpha, S 
   }
 }
 
-// P = F P F' = P + A P + (A P)' + A P A', A (12 rows) being sparse
-template <class S> void carry_by_jacobian(S P[N][N], const S A[12][N]) {
+// P = F P F' = P + A P + (A P)' + A P A', A (12 rows) being sparse; torque and force then decay
+template <class S> void carry_by_jacobian(const WrenchWalk<S> &walk, const S A[12][N], S P[N][N]) {
   S G[12][N] = {};
   for (int i = 0; i < 12; i++)
     for (int k = 0; k < N; k++)
@@ -173,6 +174,11 @@ template <class S> void carry_by_jacobian(S P[N][N], const S A[12][N]) {
       if (A[i][k] != S(0))
         for (int j = 0; j < 12; j++) P[j][i] += A[i][k] * G[j][k];
   }
+  for (int i = 0; i < 6; i++)
+    for (int j = 0; j < N; j++) {
+      P[12 + i][j] *= walk.decay[i];
+      P[j][12 + i] *= walk.decay[i];
+    }
 }
 
 }  // namespace windwrench

@@ -28,7 +28,13 @@ template <class T> struct Prediction {
   T mean[N];        // (26)
   T centre[STATE];  // where the central point is after the step
   T R[3][3];        // attitude before it
+  WrenchWalk<Single<T>> walk;
 };
+
+// A state after the step: torque and force decay
+template <class T, class W> void decay_wrench(const W &walk, T *x) {
+  for (int i = 0; i < 6; i++) x[TORQUE + i] *= walk.decay[i];
+}
 
 // Six columns of the root, from `first` on, into S; rows (6) lack the columns before
 template <class T> void six_columns(const T P[N][N], const T rows[6][N], int first, T S[6][N]) {
@@ -86,7 +92,8 @@ template <class T> void root_of_twelve(const T P[N][N], Prediction<T> &w) {
 // The linear part A of the model (2)-(5), (12): rows (x, v, torque, force) of `in` to rows (rho,
 // omega, x, v, torque, force) of `out`, column by column
 template <int COLUMNS, class T, class In, class Out>
-void carry_linear(const Body<Single<T>> &body, const T R[3][3], Single<T> dt, In in, Out out) {
+void carry_linear(const Body<Single<T>> &body, const T R[3][3], Single<T> dt,
+                  const WrenchWalk<Single<T>> &walk, In in, Out out) {
   using S = Single<T>;
   T A[3][3];  // rate from torque
   for (int i = 0; i < 3; i++)
@@ -110,25 +117,24 @@ void carry_linear(const Body<Single<T>> &body, const T R[3][3], Single<T> dt, In
       out(6 + i, j) = in(i, j) + dt * (in(3 + i, j) + S(0.5) * v[i]);
       out(9 + i, j) = in(3 + i, j) + v[i];
     }
-    out(12, j) = t0, out(13, j) = t1, out(14, j) = t2;
-    for (int i = 0; i < 3; i++) out(15 + i, j) = in(9 + i, j);
+    for (int i = 0; i < 6; i++) out(12 + i, j) = walk.decay[i] * in(6 + i, j);
   }
 }
 
 // A M A' into P. The attitude's columns are zero
 template <class T>
-void carry_covariance(const Body<Single<T>> &body, const T R[3][3], Single<T> dt, const T M[12][12],
+void carry_covariance(const Body<Single<T>> &body, const Prediction<T> &w, Single<T> dt,
                       T P[N][N]) {
   T Z[12][N], Y[N][12];
   carry_linear<12, T>(
-      body, R, dt, [&](int i, int j) { return M[i][j]; },
+      body, w.R, dt, w.walk, [&](int i, int j) { return w.M[i][j]; },
       [&](int i, int j) -> T & { return Y[i][j]; });
   for (int i = 0; i < N; i++)
     for (int j = 0; j < 12; j++) Z[j][i] = Y[i][j];
   for (int i = 0; i < N; i++)
     for (int j = 0; j < 3; j++) P[i][j] = T{};
   carry_linear<N - 3, T>(
-      body, R, dt, [&](int i, int j) { return Z[i][3 + j]; },
+      body, w.R, dt, w.walk, [&](int i, int j) { return Z[i][3 + j]; },
       [&](int i, int j) -> T & { return P[i][3 + j]; });
 }
 
@@ -163,14 +169,10 @@ void noise_inputs(const Body<Single<T>> &body, const Settings<Single<T>> &s, con
 
 // P += B Q B': the sum of 24 of the 61 sigma points, (27)
 template <class T>
-void add_noise(const Body<Single<T>> &body, const Settings<Single<T>> &s, Single<T> dt,
-               const T B[6][N], T P[N][N]) {
+void add_noise(const Body<Single<T>> &body, const WrenchWalk<Single<T>> &walk, const T B[6][N],
+               T P[N][N]) {
   using S = Single<T>;
-  S walk = dt / s.period;  // a walk grows
-  for (int n = 0; n < 3; n++) {
-    P[12 + n][12 + n] += walk * s.torque_walk[n];
-    P[15 + n][15 + n] += walk * s.force_walk[n];
-  }
+  for (int n = 0; n < 6; n++) P[12 + n][12 + n] += walk.variance[n];
   if (body.com[0] != S(0) || body.com[1] != S(0) || body.com[2] != S(0)) {
     add_squares<N>(P, B, S(1));
     return;
@@ -246,6 +248,7 @@ void pairs_together(const Body<S> &body, const S *x, const Spread<S> &s, const S
     displace(x, along, point);
     matrix_of(point + QUATERNION, R);
     move(body, point, R, rotors, none, dt, after);
+    decay_wrench(w.walk, after);
     difference(after, w.centre, error);
     for (int i = 0; i < N; i++)
       for (int n = 0; n < 4; n++) errors[4 * k + n][i] = error[i][n];
@@ -272,10 +275,10 @@ template <int PAIRS, class T> void gather(Belief<T> &f, Prediction<T> &w) {
 template <class T, class E6>
 void carry_linear_part(const Body<Single<T>> &body, const Settings<Single<T>> &s, const T *rotors,
                        const E6 *effects, Single<T> dt, Belief<T> &f, Prediction<T> &w) {
-  follow_loads(s, w.R, rotors, effects, dt, f);
-  carry_covariance(body, w.R, dt, w.M, f.P);
+  follow_loads(s, w.walk, w.R, rotors, effects, f);
+  carry_covariance(body, w, dt, f.P);
   noise_inputs(body, s, w.R, dt, w.B);
-  add_noise(body, s, dt, w.B, f.P);
+  add_noise(body, w.walk, w.B, f.P);
 }
 
 // Carry a filter, or lanes of filters, without wrench effects dt s ahead, at the rotors' wrench (4)
@@ -283,9 +286,11 @@ template <class T>
 void carry(const Body<Single<T>> &body, const Settings<Single<T>> &s, const T *rotors, Single<T> dt,
            Belief<T> &f, Prediction<T> &w) {
   static const Single<T> none[6] = {};
+  w.walk = WrenchWalk<Single<T>>(s, dt);
   matrix_of(f.x + QUATERNION, w.R);
   root_of_six(f.P, w);
   move(body, f.x, w.R, rotors, none, dt, w.centre);
+  decay_wrench(w.walk, w.centre);
   carry_linear_part(body, s, rotors, none, dt, f, w);
   const Spread<Single<T>> spread(s.kappa);
   if constexpr (is_single<T> && WINDWRENCH_REGISTERS) {
@@ -297,6 +302,7 @@ void carry(const Body<Single<T>> &body, const Settings<Single<T>> &s, const T *r
           T R[3][3];
           matrix_of(x + QUATERNION, R);
           move(body, x, R, rotors, none, dt, out);
+          decay_wrench(w.walk, out);
         },
         w);
   }
@@ -312,7 +318,9 @@ void carry_with_effects(Model<S> &model, const Settings<S> &s, S dt, Belief<S> &
     matrix_of(x + QUATERNION, R);
     apply_effects(model, x, R);
     move(model.body, x, R, model.rotor_wrench, model.effect_wrench, dt, out);
+    decay_wrench(w.walk, out);
   };
+  w.walk = WrenchWalk<S>(s, dt);
   root_of_twelve(f.P, w);
   matrix_of(f.x + QUATERNION, w.R);
   propagate(f.x, w.centre);

@@ -19,6 +19,7 @@ template <class S> struct Link {
   S K[N][N];           // covariance of the estimate before, given this one
   S load[7][3];        // as of the filter
   S passed[6];         // of torque and force, share of a change that the one before makes
+  S decay[6];          // of torque and force, over the step
 };
 
 // Make a link across which nothing passes, from an estimate of covariance P
@@ -33,7 +34,7 @@ void cross_covariance(const Model<S> &m, const Prediction<S> &w, S dt, S C[N][N]
   int pairs = m.wrench_count == 0 ? 6 : 12;
   S carried[N][12];
   carry_linear<12, S>(
-      m.body, w.R, dt, [&](int i, int j) { return w.M[i][j]; },
+      m.body, w.R, dt, w.walk, [&](int i, int j) { return w.M[i][j]; },
       [&](int i, int j) -> S & { return carried[i][j]; });
   for (int i = 0; i < N; i++)
     for (int j = 0; j < N; j++) {
@@ -103,12 +104,15 @@ template <class S> void step_with_link(Filter<S> &f, int parts, S dt, S voltage,
       before[i][j] = b.P[i][j];
       link.G[i][j] = S(i == j), link.K[i][j] = S(0);  // without a prediction: both of one state
     }
-  for (int i = 0; i < 6; i++) link.passed[i] = S(1);
+  for (int i = 0; i < 6; i++) link.passed[i] = link.decay[i] = S(1);
   if (dt > S(0)) {
     Prediction<S> w;
     S C[N][N];
     predict(f, sample, dt, voltage, w);
-    for (int i = 0; i < 6; i++) link.passed[i] = before[12 + i][12 + i] / b.P[12 + i][12 + i];
+    for (int i = 0; i < 6; i++) {
+      link.decay[i] = w.walk.decay[i];
+      link.passed[i] = link.decay[i] * (before[12 + i][12 + i] / b.P[12 + i][12 + i]);
+    }
     cross_covariance(f.vehicle, w, dt, C);
     link_back(before, C, b.P, link.G, link.K);
     if (lost_position(f.settings, b) || lost_attitude(f.settings, b))  // held, not predicted
@@ -147,11 +151,12 @@ template <class S> void step_back(const Link<S> &link, const S *earlier, S *x, S
 }
 
 // Replace smoothed loads by those one link earlier, where the filter had the loads `earlier`
-template <class S> void loads_back(const S *passed, const S earlier[7][3], S load[7][3]) {
+template <class S> void loads_back(const Link<S> &link, const S earlier[7][3], S load[7][3]) {
   for (int row = 0; row < 7; row++)
     for (int i = 0; i < 3; i++) {
-      S share = passed[(row == 2 || row == 3 ? 3 : 0) + i], before = earlier[row][i];
-      load[row][i] = before + share * (load[row][i] - before);
+      int of = (row == 2 || row == 3 ? 3 : 0) + i;
+      S before = earlier[row][i];
+      load[row][i] = before + link.passed[of] * (load[row][i] - link.decay[of] * before);
     }
 }
 
@@ -160,7 +165,7 @@ template <class S> void loads_back(const S *passed, const S earlier[7][3], S loa
 template <class S>
 void go_back(const Settings<S> &s, const Link<S> &earlier, const Link<S> &link, S dt,
              Belief<S> &f) {
-  loads_back(link.passed, earlier.load, f.load);
+  loads_back(link, earlier.load, f.load);
   step_back(link, earlier.x, f.x, f.P);
   f.poses.strain -= smaller(dt / s.patience, S(1)) * f.poses.strain;
 }

@@ -72,6 +72,9 @@ FILTER = np.dtype(
         ("torque_walk", "f8", (3,)),
         ("thrust", "f8", (3,)),
         ("force_walk", "f8", (3,)),
+        # 1/s, at which torque and force decay; 0: they only walk
+        ("torque_rate", "f8", (3,)),
+        ("force_rate", "f8", (3,)),
         ("noise", "f8", (6,)),  # of the measurement (rho, x)
         ("imu_noise", "f8", (6,)),  # of gyro and accelerometer
         ("uncertain", "f8", (FACTORS,)),  # of the vehicle
@@ -81,6 +84,16 @@ FILTER = np.dtype(
         # rotor speeds, position and quaternion, for a step that is called from elsewhere
         ("z", "f8", (11,)),
         ("centre_rotation", "f8", (3, 3)),  # attitude at the start of the last step
+        ("innovation", "f8", (6,)),  # of the last pose, (rho, x), whitened
+        # of the filter with a constant gain, facing along x: the gain, and the inverse covariance
+        # of the innovation
+        ("gain", "f8", (N, 6)),
+        ("information", "f8", (6, 6)),
+        ("steady", "i8"),  # whether that gain holds now
+        ("converged", "f8", (N, N)),  # the covariance that goes with it
+        ("near", "f8"),  # s for which the covariance has been near that
+        ("settle", "f8"),  # s for which it must have been
+        ("hover", "f8", (6, N)),  # derivatives of the accelerations at hover by the error state
         # the step in progress
         ("acceleration", "f8", (6,)),
         ("rotation", "f8", (3, 3)),  # of the sigma point in hand
@@ -105,7 +118,6 @@ FILTER = np.dtype(
         ("L", "f8", (6, 6)),
         ("scales", "f8", (6,)),  # inverse diagonal of a root
         ("W", "f8", (6, N)),
-        ("innovation", "f8", (6,)),
         # derivatives of the torque, body, by the error state: of the linearised model
         ("torques", "f8", (3, N)),
         # twelve sigma points side by side, one a column
@@ -115,15 +127,6 @@ FILTER = np.dtype(
         ("turns", "f8", (3, 12)),
         ("errors", "f8", (N, 12)),
         ("rows", "f8", (12, N)),  # the errors, one point a row
-        # of the filter with a constant gain, facing along x: the gain, and the inverse covariance
-        # of the innovation
-        ("gain", "f8", (N, 6)),
-        ("information", "f8", (6, 6)),
-        ("steady", "i8"),  # whether that gain holds now
-        ("converged", "f8", (N, N)),  # the covariance that goes with it
-        ("near", "f8"),  # s for which the covariance has been near that
-        ("settle", "f8"),  # s for which it must have been
-        ("hover", "f8", (6, N)),  # derivatives of the accelerations at hover by the error state
     ]
 )
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to the estimate
@@ -162,6 +165,8 @@ def filter_record(
         ("force_walk", tuning.force_walk),
     ):
         f[name] = np.square(deviation)
+    f["torque_rate"] = 1.0 / np.asarray(tuning.torque_time)
+    f["force_rate"] = 1.0 / np.asarray(tuning.force_time)
     f["noise"][:3] = np.square(np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0)  # (16)
     f["noise"][3:] = np.square(tuning.position_noise)
     f["imu_noise"][:3], f["imu_noise"][3:] = (

@@ -1,52 +1,12 @@
-"""The covariance of the filter with a constant gain while its gain is not constant: after a gap, a
-restart, a refused measurement.
-
-The model is linearised at hover, in the frame of the vehicle's heading. So the covariance depends
-on the measurements and their times, not on the vehicle's path: a filter in C with single precision
-comes back to its constant gain at the same step, and needs no Jacobian. At large tilts and fast
-turns the covariance is an approximation, as is the constant gain itself.
-"""
+"""Turns about the vertical, for the export to C."""
 
 import math
 
-import numpy as np
-
-from ..runtime.compiled import Record, compiled, compiled_without_gil
-from .covariance import add_noise, carry_by_jacobian
-from .error_state import symmetrise
+from ..runtime.compiled import Record, compiled
 from .estimate import Array
-from .filter_record import N, drive, propagate
-from .linear_model import acceleration_jacobian
 
 CATCH_UP = 32  # predictions, at most, that make up for a gap.
-_NOTHING = 1e-9  # of the largest part of an acceleration's deviation: rounding of a derivative
 _NO_HEADING = 1e-6  # of a quaternion squared: thrust points down, and there is none
-
-
-@compiled
-def carry_at_hover(f: Record, dt: float) -> None:
-    """Carry the covariance ``dt`` s ahead by the model at hover."""
-    P, A, G, J = f.P, f.S, f.H, f.hover
-    A[0:3], A[3:6], A[9:12] = 0.0, dt * J[:3], dt * J[3:]
-    A[6:9] = 0.5 * dt * A[9:12]
-    for i in range(3):
-        A[i, 3 + i] = 0.25 * dt  # an MRP is a quarter of an angle
-        A[6 + i, 9 + i] += dt
-    carry_by_jacobian(P, A, G)
-    f.centre_rotation[:] = np.eye(3)
-    add_noise(f, f.centre_rotation, dt)
-    symmetrise(P)
-
-
-@compiled
-def catch_up(f: Record) -> None:
-    """Carry the covariance over the time since the last measurement."""
-    since = max(f.poses.position_age, f.poses.attitude_age)
-    if since <= 0.0:
-        return
-    count = max(1, int(min(since / f.period, 1.0 * CATCH_UP) + 0.5))
-    for _ in range(count):
-        carry_at_hover(f, since / count)
 
 
 @compiled
@@ -103,29 +63,3 @@ def turn_vectors(values: Array, count: int, cosine: float, sine: float) -> None:
         a, b = values[3 * k], values[3 * k + 1]
         values[3 * k] = cosine * a - sine * b
         values[3 * k + 1] = sine * a + cosine * b
-
-
-@compiled_without_gil
-def _jacobian_at(record: np.ndarray, voltage: float, out: Array) -> None:
-    f = record[0]
-    drive(f, f.last_speeds, f.period, voltage)
-    propagate(f, f.x, f.period, f.centre)
-    acceleration_jacobian(f, f.S, True)
-    out[:3], out[3:] = f.S[3:6], f.S[9:12]
-
-
-def jacobian_at_hover(record: np.ndarray, voltage: float, deviations: Array) -> Array:
-    """Return the derivatives (6, 18) of angular (body) and linear acceleration by the error state
-    of a filter that hovers facing along x, without rounding errors.
-
-    Args:
-        record: the filter's, overwritten.
-        voltage: V.
-        deviations: (18,) of the error state: the scale of an acceleration's parts.
-    """
-    out = np.zeros((6, N))
-    record[0]["S"] = 0.0
-    _jacobian_at(record, voltage, out)
-    size = np.abs(out) * deviations
-    out[size < _NOTHING * size.max(axis=1, keepdims=True)] = 0.0
-    return out

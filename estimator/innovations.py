@@ -1,4 +1,4 @@
-"""How likely a flight's innovations are under a tuning: one compiled pass of the filter.
+"""How likely a flight's innovations are under a tuning: one pass of the filter.
 
 Prediction error decomposition (Schweppe, *Evaluation of likelihood functions for Gaussian signals*,
 IEEE Trans. Information Theory 11, 1965): the likelihood of a flight is the product of its
@@ -14,23 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import Record, compiled_without_gil
 from .estimate import Array
-from .recovery import remember
-from .sample import undo_sensing
 from .tuning import UKFTuning
-from .ukf import WrenchUKF, innovate, predict, take_in
+from .ukf import WrenchUKF
 
 Mask = NDArray[np.bool_]
 
-_SLACK = 0.1  # of a period: a step so little too long is still one.
 _TWIST = 0.03  # s between the poses whose difference starts a piece's velocity
 _MRP_VOLUME = 4.0 * math.pi / 3.0  # of all attitudes: MRPs of at most length 1
-_CONSTANT = -3.0 * math.log(2.0 * math.pi)  # of a normal density of six numbers
 
-# A row of a flight
+# A row of a flight; layouts of ``core/innovations.hpp``
 ROW = np.dtype(
     [
         ("t", "f8"),  # s
@@ -39,7 +35,8 @@ ROW = np.dtype(
         ("voltage", "f8"),  # V
         ("measured", "?"),  # a pose is there
         ("counted", "?"),  # and the filter's start is over
-    ]
+    ],
+    align=True,
 )
 # The result of a pass at a pose
 INNOVATION = np.dtype(
@@ -51,7 +48,8 @@ INNOVATION = np.dtype(
         ("innovation", "f8", (6,)),  # of (rho, x), rho an MRP
         ("white", "f8", (6,)),  # the same as the filter expects it: six normal numbers of size 1
         ("root", "f8", (6, 6)),  # of its covariance, lower triangular
-    ]
+    ],
+    align=True,
 )
 Innovations = Any  # a record array of INNOVATION
 
@@ -161,46 +159,11 @@ def innovations(
         twist = {"velocity": piece.velocity, "angular_velocity": piece.angular_velocity}
         ukf.reset(piece.position, piece.quaternion, covariance, **twist)
         out = np.zeros(len(piece.rows), dtype=INNOVATION)
-        _pass(ukf.record, piece.rows, period, math.log1p(-outlier_chance), outlier, out)
+        inlier = math.log1p(-outlier_chance)
+        memory = piece.rows.view(np.uint8), out.view(np.uint8)
+        _core.judge_rows(ukf.record.ctypes.data, memory[0], inlier, outlier, memory[1])
         found.append(out[piece.rows["counted"]])
     return np.concatenate(found).view(np.recarray)
-
-
-@compiled_without_gil
-def _pass(
-    record: Record,
-    rows: np.ndarray,
-    period: float,
-    log_inlier: float,
-    log_outlier: float,
-    out: np.ndarray,
-) -> None:
-    f = record[0]
-    for k in range(len(rows)):
-        row, found = rows[k], out[k]
-        z = undo_sensing(f, row.sample, 3 if row.measured else 0, row.dt)
-        steps = max(1, math.ceil(row.dt / period - _SLACK))
-        for _ in range(steps):
-            predict(f, z[0:4], row.dt / steps, row.voltage)
-        if not row.measured:
-            continue
-        # the filter's own gate and restarts stay out: the likelihood of outliers is stated here
-        nis = innovate(f, z[4:11], True, True)
-        found.t, found.nis, found.white[:] = row.t, nis, f.innovation
-        log_normal = log_inlier + _CONSTANT - 0.5 * nis
-        for i in range(6):
-            log_normal -= math.log(f.L[i, i])
-            for j in range(i + 1):
-                found.root[i, j] = f.L[i, j]
-                found.innovation[i] += f.L[i, j] * f.innovation[j]  # which is whitened
-        found.outlier = not log_normal > log_outlier  # an outlier, or numbers that are none
-        likelier, other = max(log_normal, log_outlier), min(log_normal, log_outlier)
-        found.log_likelihood = log_outlier if math.isnan(log_normal) else likelier
-        if other > likelier - 40.0:
-            found.log_likelihood += math.log1p(math.exp(other - likelier))
-        if not found.outlier:
-            take_in(f)
-            remember(f, z[4:11], True, True)
 
 
 def fisher_information(found: Innovations, moved: Sequence[Innovations], step: float) -> Array:

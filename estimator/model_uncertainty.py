@@ -22,6 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import _core
 from ..dynamics.vehicle import Uncertainty, Vehicle
 from ..runtime.compiled import Record, compiled_for_vectors
 from ..runtime.vector_lanes import choose
@@ -92,12 +93,10 @@ def variances(factors: Array, load: Array, out: Array) -> None:
         out[3 + i] = mass * w * w + (thrust + command) * t * t
 
 
-@compiled_for_vectors
 def variances_along(factors: Array, loads: Array) -> Array:
-    """Return the same (n, 6) of a series of loads (n, 7, 3)."""
+    """Return the variances (n, 6) of torque and force at a series of loads (n, 7, 3)."""
     out = np.empty((len(loads), 6))
-    for k in range(len(loads)):
-        variances(factors, loads[k], out[k])
+    _core.variances_along(factors, np.ascontiguousarray(loads), out)
     return out
 
 
@@ -124,18 +123,6 @@ def follow_loads(f: Record, R: Array, dt: float) -> None:
         load[5, i] += turn * (around - load[5, i])
         load[6, i] += turn * (across + around + of_effects + x[13 + i] - load[6, i])
     variances(f.uncertain, load, f.model)
-
-
-@compiled_for_vectors
-def follow_back(load: Array, passed: Array, earlier: Array) -> None:
-    """Replace smoothed loads (7, 3) by those one step earlier; ``earlier``: the loads of the filter
-    there; ``passed`` (6,): variance of torque and force there, as a share of the predicted one.
-    """
-    for row in range(7):
-        first = 3 if row in (2, 3) else 0
-        for i in range(3):
-            before = earlier[row, i]
-            load[row, i] = before + passed[first + i] * (load[row, i] - before)
 
 
 @compiled_for_vectors

@@ -86,6 +86,11 @@ def _variance(*deviations: ArrayLike) -> Array:
     return np.diag(np.square(np.concatenate([np.broadcast_to(d, 3) for d in deviations])))
 
 
+def _stationary(period: float, time: float) -> float:
+    """Return the variance of a step of a process with a correlation time, s, over a walk's."""
+    return 1.0 if np.isinf(time) else (1 - np.exp(-2 * period / time)) * time / (2 * period)
+
+
 class ReferenceUKF:
     """The unscented filter of the paper.
 
@@ -111,9 +116,16 @@ class ReferenceUKF:
     ) -> None:
         self.vehicle, self.period, self.kappa = vehicle, period, tuning.kappa
         self.effect_wrench = effect_wrench
-        self.Q = _variance(
-            tuning.motor_torque_noise, tuning.torque_walk, tuning.thrust_noise, tuning.force_walk
+        # an Ornstein-Uhlenbeck process, exactly over a step: w' = exp(-T / time) w + n, and n of
+        # such variance that w keeps its own, walk^2 time / (2 T); without an end it walks
+        times = tuning.torque_time, tuning.force_time
+        decay = [np.exp(-period / np.broadcast_to(time, 3)) for time in times]
+        self.torque_decay, self.force_decay = decay
+        torque_walk, force_walk = (
+            np.asarray(walk) * np.sqrt([_stationary(period, t) for t in np.broadcast_to(time, 3)])
+            for walk, time in zip((tuning.torque_walk, tuning.force_walk), times, strict=True)
         )
+        self.Q = _variance(tuning.motor_torque_noise, torque_walk, tuning.thrust_noise, force_walk)
         self.R = _variance(np.asarray(tuning.attitude_noise) / 4, tuning.position_noise)  # (16)
         self.nis = float("nan")
 
@@ -179,8 +191,8 @@ class ReferenceUKF:
                 omega + T * alpha,
                 s[:, POSITION] + T * s[:, VELOCITY] + T**2 / 2 * a,
                 s[:, VELOCITY] + T * a,
-                s[:, TORQUE] + n_tau,
-                s[:, FORCE] + n_f,
+                self.torque_decay * s[:, TORQUE] + n_tau,
+                self.force_decay * s[:, FORCE] + n_f,
             ]
         )
 

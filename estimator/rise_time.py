@@ -5,7 +5,7 @@ from scipy.linalg import solve_discrete_are
 
 from ..dynamics.vehicle import Vehicle
 from .estimate import Array
-from .tuning import UKFTuning
+from .tuning import UKFTuning, decay_of
 
 _LONGEST = 1_000_000  # steps
 
@@ -24,30 +24,38 @@ def rise_times(vehicle: Vehicle, tuning: UKFTuning, period: float) -> tuple[Arra
     """
     of, mass, inertia = tuning, np.full(3, vehicle.mass), np.diagonal(vehicle.inertia)
     return (
-        _rise(period, mass, of.thrust_noise, of.force_walk, of.position_noise),
-        _rise(period, inertia, of.motor_torque_noise, of.torque_walk, of.attitude_noise),
+        _rise(period, mass, of.thrust_noise, of.force_walk, of.force_time, of.position_noise),
+        _rise(
+            *(period, inertia, of.motor_torque_noise, of.torque_walk),
+            *(of.torque_time, of.attitude_noise),
+        ),
     )
 
 
 @np.vectorize(otypes=[float])
-def _rise(dt: float, inertia: float, white: float, walk: float, noise: float) -> float:
-    """Return the rise time (s) of the wrench w in ``inertia * x'' = w``, x being measured."""
+def _rise(dt: float, inertia: float, white: float, walk: float, time: float, noise: float) -> float:
+    """Return the rise time (s) of the wrench w in ``inertia * x'' = w``, x being measured: to what
+    is shown of a steady wrench, which is all of a walk.
+    """
     # in units of the noise, time in periods: w is then the change of x in a step squared
     scale = dt * dt / inertia / noise
-    A = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
+    decay, grown = decay_of(time, dt, dt)
+    A = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, decay]])
     b = np.array([0.5, 1.0, 0.0]) * white * scale
     Q = np.outer(b, b)
-    Q[2, 2] = (walk * scale) ** 2
+    Q[2, 2] = grown * (walk * scale) ** 2
     C = np.array([[1.0, 0.0, 0.0]])
     P = solve_discrete_are(A.T, C.T, Q, np.eye(1))
     gain = P[:, 0] / (P[0, 0] + 1.0)
-    error = np.array([0.0, 0.0, 1.0])  # a step of one: truth minus estimate
+    kept = np.eye(3) - np.outer(gain, C[0])
+    input_ = kept @ [0.0, 0.0, 1.0 - decay]  # the truth does not decay
+    rest = np.linalg.solve(np.eye(3) - kept @ A, input_)[2]  # of a step of one, never shown
+    error = np.array([0.0, 0.0, 1.0])  # truth minus estimate
     response = [0.0]
     while response[-1] < 0.9:
         if len(response) > _LONGEST:
             return float("inf")
-        error = A @ error
-        error -= gain * error[0]
-        response.append(1.0 - float(error[2]))
+        error = kept @ (A @ error) + input_
+        response.append((1.0 - float(error[2])) / (1.0 - rest))
     start, end = np.interp((0.1, 0.9), response, np.arange(len(response)))
     return float(end - start) * dt

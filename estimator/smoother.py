@@ -1,8 +1,27 @@
 """The fixed-interval smoother: the wrench at every time from all of a log, before and after it.
 
-The filter runs forwards; ``rauch_tung_striebel`` says how one goes back. A step's link needs 8 kB,
-so only a block of steps is in memory at a time: the filter's memory is kept at the start of each
-block, and the block is run again, to the same bits, on the way back.
+Rauch, Tung and Striebel, *Maximum likelihood estimates of linear dynamic systems*, AIAA Journal
+3(8), 1965; for sigma points Sarkka, *Unscented Rauch-Tung-Striebel smoother*, IEEE TAC 53(3), 2008.
+With the covariance P of the filter before a prediction, P- after it, and the cross covariance C of
+both errors, the estimate before, given the one after, has
+
+    gain G = C P-^-1 and covariance K = P - G P- G',
+
+    x_s = x + G (x_s' - x-'),  P_s = K + G P_s' G',
+
+a prime being the later time. Differences of states are error states (rho, omega, x, v, torque,
+force) with the world-frame MRP of (24) and (25). K is a conditional covariance and P_s a sum of two
+positive matrices, so nothing is subtracted on the way back. C comes from the sigma points of the
+filter's own prediction. With the columns S of the root of P and half differences H after the step,
+C is ``S' H`` plus the linear part ``M A'``, exactly as of 61 points.
+
+``G = 0, K = P`` cuts: later measurements say nothing about earlier states. A restart cuts. A
+covariance held at a bound cuts, too: it shares no probability distribution with the covariance
+before.
+
+A step's link, ``core/smoother.hpp``, needs 6 kB. So only a block of steps is in memory at a time:
+the filter's memory is kept at the start of each block, and the block is run again, to the same
+bits, on the way back.
 """
 
 from __future__ import annotations
@@ -12,75 +31,14 @@ import struct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..runtime.compiled import compiled
+from .. import _core
 from ..runtime.errors import InputError
-from .estimate import (
-    ESTIMATE_SIZE,
-    EXCESS,
-    MODEL,
-    NIS,
-    RESTARTS,
-    STATE_SIZE,
-    STATUS,
-    WITHOUT_COVARIANCE,
-    Array,
-    WrenchEstimate,
-)
+from .estimate import ESTIMATE_SIZE, NIS, WITHOUT_COVARIANCE, WrenchEstimate
 from .filter_record import N
-from .model_uncertainty import LOAD, follow_back, variances
-from .rauch_tung_striebel import LINK, step_back, step_with_link
+from .model_uncertainty import LOAD
 from .ukf import CALL, WrenchUKF, make_calls
 
-_BLOCK = 1024  # steps in memory at a time: 10 MB
-
-
-@compiled
-def _forward_with_links(
-    record: np.ndarray, events: np.ndarray, links: np.ndarray, numbers: Array, strains: Array
-) -> None:
-    f = record[0]
-    for k in range(len(events)):
-        event = events[k]
-        f.z[:] = event.z  # a step brings its quaternion to length 1 in place
-        step_with_link(f, f.z, event.parts, event.dt, event.voltage, links[1 + k])
-        strains[k] = f.poses.strain
-        numbers[k, STATUS], numbers[k, RESTARTS] = f.status, f.restarts
-        numbers[k, EXCESS] = f.excess
-
-
-@compiled
-def _write(record: np.ndarray, numbers: Array, std: Array, k: int) -> None:
-    f = record[0]
-    widened = (1.0 + f.poses.strain) * np.diag(f.P)
-    numbers[k, :STATE_SIZE], numbers[k, MODEL], std[k] = f.x, f.model, np.sqrt(widened)
-    if numbers.shape[1] == ESTIMATE_SIZE:
-        numbers[k, WITHOUT_COVARIANCE:] = f.P.flatten()
-        numbers[k, WITHOUT_COVARIANCE :: N + 1] = widened
-
-
-@compiled
-def _backward(
-    links: np.ndarray,
-    events: np.ndarray,
-    strains: Array,
-    record: np.ndarray,
-    numbers: Array,
-    std: Array,
-) -> None:
-    """Write the smoothed estimates of a block, from the last, in ``record``, backwards. ``record``
-    then holds the estimate before the block; its link is the first.
-
-    Unlikely poses taken in widen smoothed estimates before and after them alike: the ``strains``
-    (n,) of the filter fall backwards at the same rate.
-    """
-    f = record[0]
-    for k in range(len(numbers) - 1, -1, -1):
-        f.poses.strain = max(f.poses.strain, strains[k])
-        variances(f.uncertain, f.load, f.model)
-        _write(record, numbers, std, k)
-        follow_back(f.load, links[k + 1].passed, links[k].load)
-        step_back(f.x, f.P, links[k + 1], links[k].x)
-        f.poses.strain -= min(events[k].dt / f.patience, 1.0) * f.poses.strain
+_BLOCK = 1024  # steps in memory at a time: 6 MB
 
 
 class RecordingUKF(WrenchUKF):
@@ -148,13 +106,12 @@ class RecordingUKF(WrenchUKF):
                 blocks.append((here, record.copy()))
                 calls, loads = events[here], np.empty((here.stop - first, *LOAD))
                 make_calls(record, calls, np.arange(len(calls)), numbers[here], std[here], loads)
-            links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
-            strains = np.empty(_BLOCK)
+            smoothed = record.ctypes.data
             for here, memory in reversed(blocks):
-                links["x"][0], links["load"][0] = memory["x"][0], memory["load"][0]
-                _forward_with_links(memory, events[here], links, numbers[here], strains)
-                _backward(links, events[here], strains, record, numbers[here], std[here])
-            _write(record, numbers, std, begin)
+                calls = events[here].view(np.uint8)
+                address = memory.ctypes.data
+                _core.smooth_block(address, smoothed, calls, numbers[here], std[here])
+            _core.write_smoothed(smoothed, begin, numbers, std)
         finite = np.isfinite(numbers[:, :NIS]).all(axis=1) & np.isfinite(std).all(axis=1)
         if not finite.all():
             raise InputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -9,11 +10,23 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import check_positive
+from .estimate import Array
 
 # The vehicle and period for which the default tuning is stated: AR.Drone 2.0 at 200 Hz
 PERIOD = 0.005
 _WEIGHT = 0.465 * 9.81
 _ARM = 0.1262
+
+
+def decay_of(time: ArrayLike, dt: float, period: float) -> tuple[Array, Array]:
+    """Return how a wrench with a correlation time, s, changes by itself over ``dt`` s: the factor
+    that multiplies it, and the variance that is added, as a multiple of the squared walk of a step
+    of ``period`` s.
+    """
+    rate = 1.0 / np.asarray(time, dtype=np.float64)
+    with np.errstate(invalid="ignore"):
+        grown = -np.expm1(-2.0 * rate * dt) / (2.0 * rate * period)
+    return np.exp(-rate * dt), np.where(rate > 0.0, grown, dt / period)
 
 
 @dataclass(frozen=True)
@@ -26,6 +39,13 @@ class UKFTuning:
     ``motor_torque_noise`` far below the model's real error the filter loses the attitude when the
     torque steps. A wrong lateral force is the sign.
 
+    The external wrench is the paper's random walk, which has no size: unseen, its variance grows
+    without bound. Gusts have a size and a memory. With ``force_time`` and ``torque_time`` the
+    wrench is an Ornstein-Uhlenbeck process: unseen, it falls to 1/e in that time, and its standard
+    deviation rests at ``walk * sqrt(time / (2 period))``. The walk stays the change in a step
+    (Gelb, *Applied Optimal Estimation*, 1974, section 2.3). A steady wrench is then underestimated:
+    choose times well beyond the time in which measurements show a wrench, the rise time.
+
     The biases of an IMU begin with the deviations of PX4's EKF2 (``GBIAS_INIT`` 0.1 rad/s,
     ``ABIAS_INIT`` 0.2 m/s2). They walk within a factor of five of EKF2's process noise, 7e-6 rad/s
     and 2e-5 m/s2 in 5 ms. The accelerometer's walks faster, for temperature and vibration. Their
@@ -36,6 +56,8 @@ class UKFTuning:
         torque_walk: Nm, world frame: change of the external torque in a step.
         thrust_noise: N, body frame: force that the rotor model misses, new each step.
         force_walk: N, world frame: change of the external force in a step.
+        torque_time: s, correlation time of the external torque; infinite: a random walk.
+        force_time: s, correlation time of the external force; infinite: a random walk.
         position_noise: m, one measurement.
         attitude_noise: rad, one measurement; the quarter of an MRP is handled inside.
         kappa: spread of the sigma points, (28)
@@ -53,6 +75,8 @@ class UKFTuning:
     torque_walk: ArrayLike = 3.26e-4
     thrust_noise: ArrayLike = 0.3
     force_walk: ArrayLike = 3.26e-3
+    torque_time: ArrayLike = math.inf
+    force_time: ArrayLike = math.inf
     position_noise: ArrayLike = 0.001
     attitude_noise: ArrayLike = 0.005
     kappa: float = 2.0
@@ -66,7 +90,7 @@ class UKFTuning:
     accelerometer_bias_bound: ArrayLike = 0.8
 
     def __post_init__(self) -> None:
-        check_positive(self, vars(self).keys() - {"kappa"})
+        check_positive(self, vars(self).keys() - {"kappa"}, ("torque_time", "force_time"))
 
     @classmethod
     def for_vehicle(

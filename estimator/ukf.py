@@ -22,7 +22,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import deepcopy
-from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -33,7 +32,6 @@ from ..dynamics.effects import compile_effects
 from ..dynamics.model import lay_addresses, reset_model, without_addresses
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from ..runtime.addresses import STEP, address_of
 from ..runtime.arguments import real_numbers
 from ..runtime.compiled import Record, compiled, compiled_inline
 from ..runtime.errors import InputError
@@ -391,8 +389,9 @@ class WrenchUKF:
         InputError: period or gate out of range.
     """
 
-    # a function of the record's address, compiled here, in place of the core's step
-    _step_at: Any = None
+    # the step of a filter at an address, and the address of that function
+    _step_at: Callable[..., int] = staticmethod(_core.step)
+    _step_address: Callable[[], int] = staticmethod(_core.step_address)
     _no_imu = ""  # why a kind of filter takes no inertial measurements
 
     def __init__(
@@ -442,13 +441,13 @@ class WrenchUKF:
         self._now: Array = np.ndarray(ESTIMATE_SIZE, buffer=self.record, offset=ESTIMATE)
         # phase, strain and astray, read at a third of an array's cost
         self._doubts = memoryview(np.ndarray(3, buffer=self.record, offset=_POSES))  # type: ignore[arg-type]
-        self._call: Callable[..., int] | None = None
+        self._begun = False
 
     def __getstate__(self) -> dict[str, object]:
         return {
             name: value
             for name, value in self.__dict__.items()
-            if name not in ("_sample", "_address", "_now", "_doubts", "_call")
+            if name not in ("_sample", "_address", "_now", "_doubts", "_begun")
         } | {"record": without_addresses(self.record)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
@@ -532,9 +531,7 @@ class WrenchUKF:
         """
         if self.record[0]["imu"]["used"]:
             raise InputError("step_address: a filter that was given an IMU steps in Python only")
-        if self._step_at is None:
-            return _core.step_address()
-        return address_of(self._step_at.py_func)
+        return self._step_address()
 
     @property
     def memory(self) -> tuple[NDArray[np.uint8], ...]:
@@ -663,14 +660,12 @@ class WrenchUKF:
         return self.estimate
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
-        call = self._call
-        if call is None:
-            if not self.record[0]["x"][3:7].any():
+        if not self._begun:
+            self._begun = bool(self.record[0]["x"][3:7].any())
+            if not self._begun:
                 raise InputError(f"{type(self).__name__}: call reset before a step")
-            own = self._step_at
-            core = partial(_core.step, white=self.record["innovation"].ctypes.data)
-            call = self._call = core if own is None else own.compile(STEP.args)
-        if call(self._address, parts, dt, self._voltage if voltage is None else voltage) < 0:
+        volts = self._voltage if voltage is None else voltage
+        if self._step_at(self._address, parts, dt, volts) < 0:
             raise self._sample.bad_quaternion()
         return self.estimate
 

@@ -25,7 +25,12 @@ _KEPT = fields_between("x", "last_speeds")
 _MEMORY = {"poses": LaneRecord(MEMORY, MEMORY.names or ())}
 _WORK = LaneRecord(
     FILTER,
-    (*_KEPT, "rotor_wrench", *fields_between("z", "innovation")),
+    (
+        *_KEPT,
+        "rotor_wrench",
+        *fields_between("z", "innovation"),
+        *fields_between("acceleration", "W"),
+    ),
     ("body", "effect_wrench", *fields_between("gated", "period")),
     _MEMORY,
 )

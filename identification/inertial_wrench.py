@@ -29,6 +29,7 @@ from ..estimator.estimate import (
     WITHOUT_COVARIANCE,
 )
 from ..estimator.model_uncertainty import LOAD, factors_of, variances_along
+from ..estimator.tuning import decay_of
 from .logs.flight_log import FlightLog
 from .logs.table import Array, ArrayPair, Names, Pair
 from .motion.inertial_signals import InertialSignals, imu_noise, inertial_signals, pose_rate
@@ -96,6 +97,11 @@ def _piece(
         np.broadcast_to(np.asarray(getattr(tuning, name), dtype=np.float64), 3)
         for name in ("force_walk", "torque_walk", "thrust_noise", "motor_torque_noise")
     )
+    # an Ornstein-Uhlenbeck process, or a walk: the factor of a step, and its squared walks
+    (keep_force, new_force), (keep_torque, new_torque) = (
+        decay_of(np.broadcast_to(time, 3), s.period, period)
+        for time in (tuning.force_time, tuning.torque_time)
+    )
     pushes, turns = _loads(s, body, needed)
     needs = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
     inverse = np.linalg.inv(body.inertia)
@@ -104,17 +110,17 @@ def _piece(
     spread = np.empty(6)
     for i in range(3):
         variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
-        walk = walk_force[i] ** 2 * steps
+        walk = np.diag([walk_force[i] ** 2 * new_force[i]])
         # a walk hidden by white noise of this variance
-        y = needs[:, i]
-        walked, std = _two_sided(y, np.zeros_like(y)[:, None], np.eye(1), np.diag([walk]), variance)
+        y, model = needs[:, i], keep_force[i] * np.eye(1)
+        walked, std = _two_sided(y, np.zeros_like(y)[:, None], model, walk, variance)
         force[:, i], spread[i] = walked[:, 0], std[0]
         own = inverse[i, i]
         torque[:, i], spread[3 + i] = _smoothed_turning(
             s.angular_velocity[:, i],
             driven[:, i],
-            s.period,
-            (own * walk_torque[i]) ** 2 * steps,
+            np.array([[1.0, s.period], [0.0, keep_torque[i]]]),
+            (own * walk_torque[i]) ** 2 * new_torque[i],
             (own * miss_torque[i] * s.period) ** 2 / steps,
             max(noise[0], 1e-6) ** 2,
         )
@@ -150,13 +156,12 @@ def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array
 
 
 def _smoothed_turning(
-    rate: Array, driven: Array, period: float, walk: float, miss: float, variance: float
+    rate: Array, driven: Array, model: Array, walk: float, miss: float, variance: float
 ) -> tuple[Array, float]:
     """Return the angular acceleration (n, c) rad/s2 of an angular velocity (n,) beside the first
     drive, its standard deviation, and the same of each other drive in action beside it.
     """
-    model = np.array([[1.0, period], [0.0, 1.0]])
-    acting = 0.5 * period * (driven[:-1] + driven[1:])
+    acting = 0.5 * model[0, 1] * (driven[:-1] + driven[1:])
     drive = np.zeros((len(rate), 2, driven.shape[1]))
     drive[1:, 0] = acting
     shown = np.column_stack([rate, np.cumsum(drive[:, 0, 1:], axis=0)])

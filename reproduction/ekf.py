@@ -5,6 +5,7 @@ covariance differs: ``F P F' + B Q B'`` with the Jacobian F of the model at the 
 """
 
 import math
+from functools import partial
 
 from numba import carray
 
@@ -16,7 +17,7 @@ from ..estimator.linear_model import model_jacobian
 from ..estimator.recovery import after_prediction
 from ..estimator.sample import check_sample, undo_sensing
 from ..estimator.ukf import WrenchUKF, correct_parts
-from ..runtime.addresses import pointer_to
+from ..runtime.addresses import address_of, pointer_to
 from ..runtime.compiled import Record, compiled
 
 
@@ -50,4 +51,5 @@ class WrenchEKF(WrenchUKF):
     """``WrenchUKF``, linearised; without IMU, and without the vehicle's stated uncertainty."""
 
     _step_at = staticmethod(_step_at)
+    _step_address = staticmethod(partial(address_of, _step_at.py_func))
     _no_imu = "this filter takes no inertial measurements"

@@ -25,9 +25,11 @@ def real_numbers(value: object) -> NDArray[np.float64] | None:
         return None
 
 
-def check_positive(settings: Any, three: Collection[str] = ()) -> None:
+def check_positive(
+    settings: Any, three: Collection[str] = (), endless: Collection[str] = ()
+) -> None:
     """Check all fields of a data class: positive finite numbers; fields named in ``three`` may be
-    three of x, y and z.
+    three of x, y and z, fields in ``endless`` infinite.
 
     Raises:
         InputError: one is not.
@@ -38,9 +40,10 @@ def check_positive(settings: Any, three: Collection[str] = ()) -> None:
         if (
             array is None
             or array.shape not in shapes
-            or not np.all(np.isfinite(array) & (array > 0))
+            or not np.all((array > 0) & (np.isfinite(array) | (name in endless)))
         ):
-            what = f"positive and finite, a number{' or three' if several else ''}"
+            size = "positive" if name in endless else "positive and finite"
+            what = f"{size}, a number{' or three' if several else ''}"
             raise InputError(f"{type(settings).__name__}: {name} must be {what}, got {value!r}")
 
 

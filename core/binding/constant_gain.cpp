@@ -42,11 +42,13 @@ void drive_at(std::uintptr_t address, Array<const double, nb::shape<4>> speeds, 
 void move_from(std::uintptr_t address, State x, double dt, Array<double, nb::shape<STATE>> out,
                std::optional<Array<double, nb::shape<12, N>>> jacobian) {
   Model<double> &m = filter_at(address).vehicle;
+  WrenchWalk<double> walk(filter_at(address).settings, dt);
   double R[3][3], a[6];
   matrix_of(x.data() + QUATERNION, R);
   apply_effects(m, x.data(), R);
   step_accelerations(m.body, x.data(), R, m.rotor_wrench, m.effect_wrench, dt, a);
   move(m.body, x.data(), R, m.rotor_wrench, m.effect_wrench, dt, out.data());
+  decay_wrench(walk, out.data());
   if (jacobian)
     model_jacobian(m, x.data(), R, a + 3, dt, true,
                    reinterpret_cast<double (*)[N]>(jacobian->data()));

@@ -4,6 +4,7 @@
 
 #include <nanobind/stl/optional.h>
 
+#include "../constant_gain.hpp"
 #include "../imu.hpp"
 
 namespace nb = nanobind;
@@ -24,12 +25,12 @@ std::int64_t step_at(std::int64_t address, std::int64_t parts, double dt, double
   return step_filter(filter_at(std::uintptr_t(address)), int(parts), dt, voltage, n);
 }
 
-// The same; a pose's whitened innovation (6) is written at an address
-std::int64_t step_and_tell(std::int64_t address, std::int64_t parts, double dt, double voltage,
-                           std::uintptr_t white) {
+// The same; a pose's whitened innovation is left in the record
+std::int64_t step_and_tell(std::uintptr_t address, int parts, double dt, double voltage) {
   Innovation<double> n;
-  int used = step_filter(filter_at(std::uintptr_t(address)), int(parts), dt, voltage, n);
-  for (int i = 0; used > 0 && i < 6; i++) reinterpret_cast<double *>(white)[i] = n.y[i];
+  int used = step_filter(filter_at(address), parts, dt, voltage, n);
+  auto &record = *reinterpret_cast<ConstantGain<double> *>(address);
+  for (int i = 0; used > 0 && i < 6; i++) record.innovation[i] = n.y[i];
   return used;
 }
 
@@ -117,10 +118,10 @@ void step_many(std::uintptr_t address, std::size_t stride, Array<const double, n
 void bind_filter(nb::module_ &m) {
   m.attr("FILTER_SIZE") = sizeof(Filter<double>);
   m.def(
-      "step", &step_and_tell, "address"_a, "parts"_a, "dt"_a, "voltage"_a, "white"_a,
+      "step", &step_and_tell, "address"_a, "parts"_a, "dt"_a, "voltage"_a,
       "Predict the filter at an address over dt s if that is positive, then correct with the\n"
       "parts (1 position, 2 attitude) of the sample in its memory that were measured; voltage in\n"
-      "V. The pose's whitened innovation (6,) is written at the address `white`.\n\n"
+      "V. The memory then also has the pose's whitened innovation.\n\n"
       "Return the parts that could be used, or -1, with the filter as it was, if the quaternion\n"
       "is no rotation.");
   m.def(

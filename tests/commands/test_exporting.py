@@ -120,7 +120,7 @@ def test_a_part_of_a_log():
     assert parse_window("b.csv")[1] == (0.0, math.inf)
 
 
-TRUE = UKFTuning(force_walk=(0.02, 0.02, 0.008), thrust_noise=0.3)
+TRUE = UKFTuning(force_walk=(0.02, 0.02, 0.008), thrust_noise=0.3, force_time=(0.5, 0.5, math.inf))
 
 
 def test_a_tuning_is_kept_in_a_file_for_any_period(tmp_path):

@@ -48,7 +48,8 @@ def begun(gate=0.999):
 
 
 def test_the_record_of_python_begins_with_the_memory_of_the_core():
-    assert FILTER.fields["acceleration"][1] == _core.FILTER_SIZE
+    assert FILTER.fields["innovation"][1] == _core.FILTER_SIZE
+    assert FILTER.fields["acceleration"][1] == _core.CONSTANT_GAIN_SIZE
 
 
 @pytest.mark.parametrize("gate", [None, 0.999])

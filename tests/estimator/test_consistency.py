@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.model_flights import (
     ANISOTROPIC,
+    GUSTS,
     WITH_EFFECTS,
     YAWED,
     drawn,
@@ -34,8 +35,8 @@ def share_within(values, band):
 
 @pytest.mark.parametrize(
     ("vehicle", "tuning"),
-    [(VEHICLE, UKFTuning()), (WITH_EFFECTS, ANISOTROPIC)],
-    ids=["plain", "with effects"],
+    [(VEHICLE, UKFTuning()), (WITH_EFFECTS, ANISOTROPIC), (VEHICLE, GUSTS)],
+    ids=["plain", "with effects", "gusts"],
 )
 def test_a_filter_is_consistent(vehicle, tuning):
     """Truth drawn from the filter's own model, yawed by 120 degrees and turning at 3 rad/s."""

@@ -7,7 +7,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.flights import fly, yawing_flight
-from tests.support.model_flights import ANISOTROPIC
+from tests.support.model_flights import ANISOTROPIC, GUSTS
 from tests.support.sizes import rms
 from tests.support.vehicles import POSE, VEHICLE
 from windwrench.dynamics import EffectSetting
@@ -122,9 +122,10 @@ def test_it_knows_the_declared_effects():
     assert largest_differences(full, plain)["force"] > 0.1
 
 
-def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
-    full = WrenchUKF(VEHICLE, ANISOTROPIC)
-    constant = ConstantGainFilter(VEHICLE, ANISOTROPIC)
+@pytest.mark.parametrize("tuning", [ANISOTROPIC, GUSTS], ids=["walks", "gusts"])
+def test_noise_of_its_own_on_every_axis_is_exact_at_hover(tuning):
+    full = WrenchUKF(VEHICLE, tuning)
+    constant = ConstantGainFilter(VEHICLE, tuning)
     rng = default_rng(0)
     steps = 3000
     speeds = VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, np.zeros(3))

@@ -12,13 +12,14 @@ from tests.support import flights
 from tests.support.flights import PERIOD, matrix, yawing_flight
 from tests.support.model_flights import simulate_model
 from tests.support.outcomes import refused
+from tests.support.reference_filters import KIT_ORDER
 from tests.support.sizes import rms
 from tests.support.vehicles import HOVER, POSE, VEHICLE
+from windwrench import _core
 from windwrench.dynamics import EffectSetting
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band, state_error
-from windwrench.estimator.error_state import displace
-from windwrench.estimator.imu import expected_imu
+from windwrench.estimator.reference import displaced
 
 FORCE = np.array([0.3, -0.2, -0.1])
 TORQUE = np.array([0.0, 0.0, 0.02])
@@ -114,20 +115,19 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     z = np.concatenate([flight.gyro[40], flight.accelerometer[40]])
 
     # h and its Jacobian by the error state, from the filter's own model, at the estimate
-    record = f.record[0]
+    record, address = f.record[0], f.record.ctypes.data
     point = np.zeros(20)
+    start = x[KIT_ORDER]
     out = np.zeros((2, 6))
     H = np.zeros((6, 24))
     columns = 1e-6 * np.eye(18)
-    rho = np.zeros(3)
-    q = np.zeros(4)
     for j in range(18):
         for s, sign in enumerate((1.0, -1.0)):
-            displace(x, columns[j], sign, rho, q, point)
-            expected_imu(record, point, out[s])
+            point[KIT_ORDER] = displaced(start, sign * columns[j])
+            _core.expected_imu(address, point, out[s])
         H[:, j] = (out[0] - out[1]) / 2e-6
     H[:, 18:] = np.eye(6)
-    expected_imu(record, x, out[0])
+    _core.expected_imu(address, x, out[0])
     # the noise of a step: torque n_m and thrust n_c in body axes, through centre of mass and mass
     R = record["centre_rotation"].copy()
     com = vehicle.com

@@ -11,11 +11,18 @@ from numpy.linalg import eigvalsh, inv, solve
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
-from tests.support.model_flights import ANISOTROPIC, WITH_EFFECTS, YAWED, simulate_model
+from tests.support.model_flights import (
+    ANISOTROPIC,
+    GUSTS,
+    WITH_EFFECTS,
+    YAWED,
+    simulate_model,
+)
 from tests.support.sizes import rms
 from tests.support.vehicles import VEHICLE
+from windwrench import _core
 from windwrench.envs.recording import record_flight
-from windwrench.estimator import UKFTuning, rauch_tung_striebel, smoother
+from windwrench.estimator import UKFTuning, smoother
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.row_steps import steps_between
 from windwrench.estimator.smoother import RecordingUKF
@@ -49,8 +56,9 @@ def smooth(t, speeds, x, q, restarted=(), covariance=False):
     [
         pytest.param(VEHICLE, UKFTuning(), 100, 800, range(400, 440), marks=pytest.mark.slow),
         (WITH_EFFECTS, ANISOTROPIC, 20, 150, ()),
+        (VEHICLE, GUSTS, 20, 150, ()),
     ],
-    ids=["with a gap", "effects and anisotropic noise"],
+    ids=["with a gap", "effects and anisotropic noise", "gusts"],
 )
 def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
     """Truth drawn from the filter's own model: NEES of the whole state, of torque and of force."""
@@ -105,15 +113,14 @@ def test_a_link_is_cut_where_there_is_no_joint_distribution():
     K = np.empty((18, 18))
     C = P @ F.T
     after = F @ P @ F.T + np.eye(18)
-    link_back = rauch_tung_striebel.link_back.py_func  # nobody calls it compiled by itself
-    link_back(P, C, after, G, K)
+    _core.link_back(P, C, after, G, K)
     gain = C @ inv(after)
     assert np.allclose(G.T, gain)
     assert np.allclose(K, P - gain @ C.T, atol=1e-9)
-    link_back(P, C, 0.5 * after, G, K)
+    _core.link_back(P, C, 0.5 * after, G, K)
     assert not G.any()
     assert np.array_equal(K, P)
-    link_back(P, C, np.full((18, 18), nan), G, K)
+    _core.link_back(P, C, np.full((18, 18), nan), G, K)
     assert not G.any()
 
 

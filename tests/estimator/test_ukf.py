@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, begin, fly, yawing_flight
-from tests.support.model_flights import ANISOTROPIC
+from tests.support.model_flights import ANISOTROPIC, GUSTS
 from tests.support.reference_filters import (
     KIT_ORDER,
     ReferenceSmoother,
@@ -21,14 +21,12 @@ from tests.support.reference_filters import (
     rotor_effects,
 )
 from tests.support.vehicles import VEHICLE
+from windwrench import _core
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF
-from windwrench.estimator.filter_record import drive, propagate
-from windwrench.estimator.linear_model import model_jacobian
 from windwrench.estimator.reference import difference, displaced
 from windwrench.estimator.smoother import RecordingUKF
-from windwrench.runtime.compiled import compiled
 
 OFFSET = EffectSetting("com_offset", {"cx": 0.01, "cy": -0.006, "cz": 0.02})
 DRAG = EffectSetting("rotor_drag", {"kdx": 1.5e-4, "kdy": 1.5e-4})
@@ -36,22 +34,26 @@ GROUND = EffectSetting("ground_effect", {"rho": 3.0})
 
 
 @pytest.mark.parametrize(
-    ("effects", "steps", "wrench", "yaw_rate"),
+    ("effects", "steps", "wrench", "yaw_rate", "tuning"),
     [
-        ((), 600, {}, 3.0),
-        ((), 60, {}, 60.0),
-        ((OFFSET,), 100, {}, 3.0),
-        ((DRAG, GROUND), 80, {"drag": 1.5e-4, "ground": 3.0}, 3.0),
-        ((DRAG, OFFSET), 50, {"drag": 1.5e-4}, 3.0),
+        ((), 600, {}, 3.0, ANISOTROPIC),
+        ((), 60, {}, 60.0, ANISOTROPIC),
+        ((), 200, {}, 3.0, GUSTS),
+        ((OFFSET,), 100, {}, 3.0, ANISOTROPIC),
+        ((DRAG, GROUND), 80, {"drag": 1.5e-4, "ground": 3.0}, 3.0, ANISOTROPIC),
+        ((DRAG, OFFSET), 50, {"drag": 1.5e-4}, 3.0, GUSTS),
     ],
-    ids=["plain", "sixty radians a second", "offset", "drag and ground", "drag and offset"],
+    ids=[
+        *("plain", "sixty radians a second", "gusts", "offset", "drag and ground"),
+        "drag, offset and gusts",
+    ],
 )
-def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_rate):
+def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_rate, tuning):
     vehicle = VEHICLE.with_effects(*effects)
     flight = yawing_flight(VEHICLE, steps, seed=3, yaw_rate=yaw_rate)
-    fast = RecordingUKF(vehicle, ANISOTROPIC, PERIOD)
+    fast = RecordingUKF(vehicle, tuning, PERIOD)
     acting = rotor_effects(vehicle, **wrench) if wrench else None
-    slow = ReferenceSmoother(compile_effects(vehicle).vehicle, ANISOTROPIC, PERIOD, acting)
+    slow = ReferenceSmoother(compile_effects(vehicle).vehicle, tuning, PERIOD, acting)
     begin(slow, flight, initial_covariance())
     missing = range(25, 40)
     for k, e in enumerate(fly(fast, flight, missing, initial_covariance()), 1):
@@ -67,6 +69,29 @@ def test_filter_and_smoother_equal_the_literal_ones(effects, steps, wrench, yaw_
         size = np.sqrt(np.diag(P))
         assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
         assert abs((e.covariance - P) / np.outer(size, size)).max() < 1e-7
+
+
+def test_gusts_rest_at_their_size_and_a_long_memory_is_a_walk():
+    """Unseen, a force has mean zero and a standard deviation of walk sqrt(time / (2 period))."""
+    walk, time = 3e-3, 0.2
+    gusts = WrenchUKF(
+        VEHICLE, UKFTuning(force_walk=walk, force_time=time, torque_time=time), PERIOD
+    )
+    flight = yawing_flight(VEHICLE, 300, seed=8)
+    fly(gusts, flight)
+    seen = gusts.estimate.force
+    for _ in range(10):  # 0.05 s, in steps of another length
+        gusts.predict(flight["rotors"][-1], 0.5 * PERIOD)
+        gusts.predict(flight["rotors"][-1], 0.5 * PERIOD)
+    assert_allclose(gusts.estimate.force, seen * np.exp(-10 * PERIOD / time), rtol=1e-9)
+    for _ in range(400):
+        e = gusts.predict(flight["rotors"][-1])
+    assert_allclose(e.std[15:], walk * np.sqrt(time / (2.0 * PERIOD)), rtol=1e-3)
+    assert abs(e.force).max() < 1e-4
+    long = UKFTuning(force_time=1e9, torque_time=1e9)
+    estimates = [fly(WrenchUKF(VEHICLE, t, PERIOD), flight)[-1] for t in (UKFTuning(), long)]
+    assert_allclose(estimates[1].state[:19], estimates[0].state[:19], rtol=1e-6, atol=1e-9)
+    assert_allclose(estimates[1].covariance, estimates[0].covariance, rtol=1e-6, atol=1e-12)
 
 
 def test_asynchronous_measurements_agree_with_regular_ones():
@@ -86,13 +111,12 @@ def test_asynchronous_measurements_agree_with_regular_ones():
     assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
 
 
-@compiled
-def one_step(record, speeds, dt, A):
-    """Write the state after a step into ``centre``, and the Jacobian into ``A``."""
-    f = record[0]
-    drive(f, speeds, dt, 11.1)
-    propagate(f, f.x, dt, f.centre)
-    model_jacobian(f, dt, A, True)
+def one_step(record, x, speeds):
+    """Return the state (20,) a step after ``x`` and the Jacobian (12, 18)."""
+    after, A = np.zeros(20), np.zeros((12, 18))
+    _core.drive(record.ctypes.data, speeds, PERIOD, 11.1)
+    _core.move(record.ctypes.data, x, PERIOD, after, A)
+    return after, A
 
 
 @pytest.mark.parametrize(
@@ -123,10 +147,9 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
     start = x[KIT_ORDER]
 
     def stepped(error):
-        A = np.zeros((12, 18))
-        record[0]["x"][KIT_ORDER] = displaced(start, error)
-        one_step(record, speeds, PERIOD, A)
-        return record[0]["centre"][KIT_ORDER], A
+        x[KIT_ORDER] = displaced(start, error)
+        after, A = one_step(record, x, speeds)
+        return after[KIT_ORDER], A
 
     centre, A = stepped(np.zeros(18))
     F = np.eye(18)

@@ -15,6 +15,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.flights import yawing_flight
+from tests.support.model_flights import GUSTS
 from tests.support.vehicles import HOVER, POSE, VEHICLE
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs import FanTrackingEnv
@@ -53,23 +54,25 @@ def samples():
 
 
 @pytest.mark.parametrize(
-    ("vehicles", "gate"),
+    ("vehicles", "gate", "tuning"),
     [
-        (VEHICLE, None),
-        (VEHICLE, 0.999),
-        (with_effects(1e-4), None),
+        (VEHICLE, None, None),
+        (VEHICLE, 0.999, None),
+        (VEHICLE, 0.999, GUSTS),
+        (with_effects(1e-4), None, None),
         (
             [VEHICLE, load_vehicle("hummingbird"), with_effects(1e-4), VEHICLE, with_effects(2e-4)]
             + 6 * [VEHICLE],
             None,
+            None,
         ),
     ],
-    ids=["one vehicle", "gated", "effects", "one each"],
+    ids=["one vehicle", "gated", "gusts", "effects", "one each"],
 )
-def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
-    batch = WrenchUKFBatch(vehicles, COUNT, gate=gate)
+def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate, tuning):
+    batch = WrenchUKFBatch(vehicles, COUNT, tuning, gate=gate)
     each = vehicles if isinstance(vehicles, list) else [vehicles] * COUNT
-    singles = [WrenchUKF(vehicle, gate=gate) for vehicle in each]
+    singles = [WrenchUKF(vehicle, tuning, gate=gate) for vehicle in each]
     rotors, position, quaternion = samples
     batch.reset(position[0], quaternion[0])
     for n, ukf in enumerate(singles):

@@ -2,21 +2,21 @@
 its assumptions holds to the letter.
 """
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.linalg import inv
+from numpy.linalg import inv, norm
 from numpy.random import default_rng
 
+from tests.support.reference_filters import KIT_ORDER
+from windwrench import _core
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply
 from windwrench.estimator import UKFTuning
 from windwrench.estimator.estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array
-from windwrench.estimator.filter_record import BIASES, N, drive, filter_record, propagate
-from windwrench.estimator.imu import expected_imu
+from windwrench.estimator.filter_record import BIASES, N, filter_record
+from windwrench.estimator.reference import displaced, multiply, rotation_matrix, to_quaternion
+from windwrench.estimator.tuning import decay_of
 from windwrench.estimator.ukf import default_covariance
-from windwrench.runtime.compiled import compiled
 
 YAWED = {"quaternion": (0.5, 0.0, 0.0, 0.75**0.5), "angular_velocity": (0.0, 0.0, 3.0)}
 ANISOTROPIC = UKFTuning(
@@ -27,6 +27,8 @@ ANISOTROPIC = UKFTuning(
     position_noise=(0.001, 0.002, 0.003),
     attitude_noise=(0.003, 0.005, 0.008),
 )
+# force and torque as gusts, which have a memory; along y a walk
+GUSTS = replace(ANISOTROPIC, force_time=(0.3, np.inf, 0.05), torque_time=(0.2, np.inf, 0.02))
 WITH_EFFECTS = load_vehicle("ardrone2").with_effects(
     EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
     EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
@@ -113,8 +115,15 @@ def simulate_model(
     steps = len(speeds)
     # of a step: rotor torque and force, the walks of torque and force, attitude (16) and position
     noise = np.hstack([rng.standard_normal((steps, 12)), rng.standard_normal((steps, 6))])
+    torque_walk, force_walk = (
+        np.broadcast_to(walk, 3) * np.sqrt(decay_of(np.broadcast_to(time, 3), period, period)[1])
+        for walk, time in (
+            (tuning.torque_walk, tuning.torque_time),
+            (tuning.force_walk, tuning.force_time),
+        )
+    )
     noise *= _deviations(
-        *(tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk, tuning.force_walk),
+        *(tuning.motor_torque_noise, tuning.thrust_noise, torque_walk, force_walk),
         *(np.asarray(tuning.attitude_noise) / 4.0, tuning.position_noise),
     )
     if push is not None:
@@ -162,57 +171,32 @@ def _inertial_noise(tuning, steps, seed):
     return biases + white * _deviations(tuning.gyro_noise, tuning.accelerometer_noise), biases
 
 
-@compiled
 def _simulate(record, start, error, speeds, rate_loop, fastest, noises, dt, voltage, out):
     """Write state, measured pose and IMU, which holds its own noise, of each step: (K, 20 + 7 + 6).
     ``noises`` (K, 12 + 6) are those of the step and of the pose.
     """
-    f = record[0]
-    x, after = f.x, f.next
-    inertial = np.empty(6)
-    quaternion_from_mrp(error[0:3], f.q)
-    quaternion_multiply(f.q, start[3:7], x[3:7])
-    normalise(x[3:7])
-    for i in range(3):
-        x[i] = start[i] + error[6 + i]
-        x[7 + i] = start[7 + i] + error[9 + i]
-        x[10 + i] = start[10 + i] + error[3 + i]
-        x[13 + i] = error[12 + i]
-        x[16 + i] = error[15 + i]
-    for k in range(len(speeds)):
-        noise, state, pose, imu = noises[k], out[k, :20], out[k, 20:27], out[k, 27:]
-        for i in range(4):
-            square = speeds[k, i] * speeds[k, i]
-            for j in range(3):
-                square += rate_loop[i, j] * (start[10 + j] - x[10 + j])
-            speeds[k, i] = min(math.sqrt(max(square, 0.0)), fastest)
-        drive(f, speeds[k], dt, voltage)
-        for i in range(3):
-            f.rotor_wrench[1 + i] += noise[i]
-        propagate(f, x, dt, after)
+    f, address = record[0], record.ctypes.data
+    x, after, inertial = np.zeros(20), np.zeros(20), np.empty(6)
+    x[KIT_ORDER] = displaced(start[KIT_ORDER], error)
+    for k, noise in enumerate(noises):
+        square = np.square(speeds[k]) + rate_loop @ (start[RATE] - x[RATE])
+        speeds[k] = np.minimum(np.sqrt(np.maximum(square, 0.0)), fastest)
+        _core.drive(address, speeds[k], dt, voltage)
+        f["rotor_wrench"][1:] += noise[:3]
+        _core.move(address, x, dt, after)
         # the force error is in the body frame and acts through the mass alone
-        for i in range(3):
-            push = (
-                f.rotation[i, 0] * noise[3]
-                + f.rotation[i, 1] * noise[4]
-                + f.rotation[i, 2] * noise[5]
-            )
-            push *= dt / f.body.mass
-            after[i] += 0.5 * dt * push
-            after[7 + i] += push
-            after[13 + i] += noise[6 + i]
-            after[16 + i] += noise[9 + i]
-        normalise(after[3:7])
-        for i in range(19):
-            x[i] = after[i]
-        f.time += dt
-        state[:] = x
-        quaternion_from_mrp(noise[12:15], f.q)
-        quaternion_multiply(f.q, x[3:7], pose[3:7])
-        for i in range(3):
-            pose[i] = x[i] + noise[15 + i]
+        push = rotation_matrix(x[QUATERNION]) @ noise[3:6] * (dt / f["body"]["mass"])
+        after[POSITION] += 0.5 * dt * push
+        after[VELOCITY] += push
+        after[TORQUE] += noise[6:9]
+        after[FORCE] += noise[9:12]
+        after[QUATERNION] /= norm(after[QUATERNION])
+        x[:19] = after[:19]
+        f["time"] += dt
+        out[k, :20] = x
+        out[k, 20:23] = x[POSITION] + noise[15:18]
+        out[k, 23:27] = multiply(to_quaternion(noise[12:15]), x[QUATERNION])
         # the accelerometer feels the step's noise: the torque's is in the rotors' wrench already
-        expected_imu(f, x, inertial)
-        for i in range(3):
-            imu[i] += inertial[i]
-            imu[3 + i] += inertial[3 + i] + noise[3 + i] / f.body.mass
+        _core.expected_imu(address, x, inertial)
+        out[k, 27:] += inertial
+        out[k, 30:] += noise[3:6] / f["body"]["mass"]
