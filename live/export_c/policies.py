@@ -152,5 +152,5 @@ def policy_numbers(
             ("REST", model.variance, "variance that the regression leaves"),
             ("YAW", model.yaw, "integral, angle, rate after a decision; torque and its rate"),
         ],
-        "size": (6 + PARTICLES, 6 + PARTICLES * (2 + 3 + 9 + 3 * ORDER + 2)),
+        "size": (6, 6 + PARTICLES * (2 + 3 + 9 + 3 * ORDER + 3)),
     }
