@@ -150,10 +150,10 @@ def weigh(
 
 FILTER_SIZE: int
 
-def step(address: int, parts: int, dt: float, voltage: float) -> int:
+def step(address: int, parts: int, dt: float, voltage: float, white: int) -> int:
     """Predict the filter at an address over dt s if that is positive, then correct with the
     parts (1 position, 2 attitude) of the sample in its memory that were measured; voltage in
-    V. The memory then also has the pose's whitened innovation.
+    V. The pose's whitened innovation (6,) is written at the address `white`.
 
     Return the parts that could be used, or -1, with the filter as it was, if the quaternion
     is no rotation.

@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..dynamics.effects import compile_effects
 from ..dynamics.effects.base import POSITION, RATE, ROTATION, STATE_SIZE, VELOCITY
-from ..dynamics.effects.call import add_wrenches
 from ..dynamics.mean_jet import (
     AIR_DENSITY,
     FIRST_X,
@@ -52,6 +52,7 @@ def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> JetMap:
         compile_effects(vehicle).vehicle, effects=(EffectSetting("fan_jet", coefficients),)
     )
     bundle = compile_effects(alone)
+    (model,), (coefficients,) = bundle.wrench_models, bundle.wrench_coefficients
     state, wrench = np.zeros(STATE_SIZE), np.zeros(6)
     state[POSITION] = jet.distance
     state[[ROTATION, ROTATION + 4, ROTATION + 8]] = -1.0, -1.0, 1.0  # it faces the fan
@@ -63,13 +64,7 @@ def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> JetMap:
         for i, offset in enumerate(offsets):
             state[POSITION + 1] = offset
             wrench[:] = 0.0
-            add_wrenches(
-                bundle.wrench_models,
-                bundle.wrench_coefficients,
-                bundle.constants,
-                state,
-                wrench,
-            )
+            _core.call_effect(model, coefficients, bundle.constants, state, wrench)
             table[:, i] = wrench[5], wrench[0], wrench[1]
         return table
 

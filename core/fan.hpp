@@ -62,9 +62,9 @@ template <class T> void gust(Fan<T> &f, const T *noise) {
 // a position (3) and attitude R. Drag acts at the stations, each in its own wind: so a symmetric
 // vehicle feels a torque as the jet falls off across its span. velocity (6): the geometric
 // centre's in the world, and the angular velocity in the body frame
-template <class T>
+template <class T, class C>
 void jet_wrench(const Fan<T> &f, const Single<T> *jet, const T *position, const T R[3][3],
-                const T *velocity, const Single<T> *com, T *out) {
+                const T *velocity, const C *com, T *out) {
   using S = Single<T>;
   const T *w = velocity + 3;
   T turning[3], centre[3];

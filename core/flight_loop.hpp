@@ -40,8 +40,8 @@ template <class T> struct Flight {
   T sum[3], yaw_sum;  // integrals of the errors
   T rotation[3][3];   // estimated, body to world
   T command[4];       // rotor speeds, rad/s
-  S foreseen[6];      // wrench of the model's effects: force world, torque body
-  S wanted[4];        // rotor speeds to deliver, rad/s
+  T foreseen[6];      // wrench of the model's effects: force world, torque body
+  T wanted[4];        // rotor speeds to deliver, rad/s
   S scratch[53 + 16 * 112];
 };
 
@@ -177,44 +177,47 @@ void steer(Flight<T> &c, const T *x, const T *command, CommandKind kind, Single<
 // control of vehicles with drag (Faessler, Franchi and Scaramuzza, RA-L 3(2), 2018). An effect's
 // further part at the vehicle's own velocity is damping: a loop without this damping would
 // oscillate more. Attitude: as estimated. Rotor speeds: as wanted last
-template <class S> void foresee(Flight<S> &c, Model<S> &m, const S *x) {
+template <class T> void foresee(Flight<T> &c, Model<T> &m, const T *x) {
   if (m.wrench_count == 0) return;
   matrix_of(x + QUATERNION, c.rotation);
-  const S still[3] = {};
-  FlightState<S> state = m.effect_state;  // with the rotors' acceleration
+  const T still[3] = {};
+  FlightState<T> state = m.effect_state;  // with the rotors' acceleration
   fill_state(m, c.setpoint, c.rotation, c.setpoint + SET_VELOCITY, still, c.wanted, state);
   add_wrenches(m, state, c.foreseen);
 }
 
 // What the rotors deliver after the horizon at held commands (4), out (4); the model's own memory
 // stays as it is
-template <class S> void delivered(Model<S> &m, const S *commands, S *out) {
-  Rotors<S> rotors = {
-      {commands[0], commands[1], commands[2], commands[3]}, S(HORIZON), m.voltage, m.time};
-  S memory[112];
+template <class T> void delivered(Model<T> &m, const T *commands, T *out) {
+  Rotors<T> rotors = {{commands[0], commands[1], commands[2], commands[3]},
+                      T{} + Single<T>(HORIZON),
+                      m.voltage,
+                      m.time};
+  T memory[112];
   for (int i = 0; i < m.rotor_count; i++) {
     std::memcpy(memory, m.memory[i], sizeof(memory));
-    m.rotor_models[i](m.rotor_coefficients[i], numbers_of<S>(m.constants), numbers_of<S>(rotors),
+    m.rotor_models[i](m.rotor_coefficients[i], numbers_of<T>(m.constants), numbers_of<T>(rotors),
                       memory);
   }
   for (int i = 0; i < 4; i++) out[i] = rotors.speed[i];
 }
 
 // Turn c.command, the wanted rotor speeds (4) rad/s, into commands that deliver them
-template <class S> void through_the_rotors(Flight<S> &c, Model<S> &m) {
+template <class T> void through_the_rotors(Flight<T> &c, Model<T> &m) {
+  using S = Single<T>;
   for (int i = 0; i < 4; i++) c.wanted[i] = c.command[i];
   if (m.rotor_count == 0) return;
   for (int round = 0; round < ROUNDS; round++) {
-    S now[4], then[4], probe[4];
+    T now[4], then[4], probe[4];
     for (int i = 0; i < 4; i++) probe[i] = S(PROBE) * c.command[i] + S(1);
     delivered(m, c.command, now);
     delivered(m, probe, then);
     for (int i = 0; i < 4; i++) {
-      S missing = c.wanted[i] - now[i], gained = then[i] - (c.wanted[i] - missing);
-      S slope = gained / (probe[i] - c.command[i]);
-      if (slope > S(NO_SLOPE))
-        c.command[i] =
-            within(c.command[i] + missing / larger(slope, S(LEAST_SLOPE)), S(0), c.omega_max);
+      T missing = c.wanted[i] - now[i], gained = then[i] - (c.wanted[i] - missing);
+      T slope = gained / (probe[i] - c.command[i]);
+      T led = c.command[i] + missing / larger(slope, T{} + S(LEAST_SLOPE));
+      c.command[i] =
+          choose(slope > T{} + S(NO_SLOPE), within(led, S(0), c.omega_max), c.command[i]);
     }
   }
 }

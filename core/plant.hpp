@@ -23,9 +23,9 @@ enum {
 // The plant's memory. `Plant<double>` is what Python sees as a NumPy record (envs/plant.py)
 template <class T> struct Plant {
   Model<T> vehicle;
+  int64_t seen;  // parts of the last pose that were measured
   T voltage_ref, battery_life;
   T battery;                         // V now; 0: not modelled
-  int64_t seen;                      // parts of the last pose that were measured
   T motor_keep;                      // share of a speed's difference to its command after a tick
   T omega_lsb;                       // rad/s
   T sigma_position, sigma_attitude;  // m, rad
@@ -36,14 +36,12 @@ template <class T> struct Plant {
   T dropout, dropout_kept;
   T lost;                                // 1: the last pose was lost
   T actuator_late, pose_late, imu_late;  // ticks
-  T late[7];
-  T speeds[4];  // of the motors, rad/s
-  T z[11];      // the sample: logged rotor speeds of the last tick, position, quaternion
+  T speeds[4];                           // of the motors, rad/s
+  T z[11];  // the sample: logged rotor speeds of the last tick, position, quaternion
   T disturbance[6];
   T external[6];  // true external force and torque about the centre of mass, world
   T jet[6];       // the jet's part of it
   T rotation[3][3];
-  T scratch[10];
   // the last ticks, the newest first: rad/s; m and quaternion; m/s2, body
   T past_commands[KEPT][4], past_poses[KEPT][7], past_felt[KEPT][3];
 };

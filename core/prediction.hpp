@@ -309,23 +309,23 @@ void carry(const Body<Single<T>> &body, const Settings<Single<T>> &s, const T *r
   gather<6>(f, w);
 }
 
-// The same of a single filter with wrench effects, which may depend on any of the state
-template <class S>
-void carry_with_effects(Model<S> &model, const Settings<S> &s, S dt, Belief<S> &f,
-                        Prediction<S> &w) {
-  auto propagate = [&](const S *x, S *out) {
-    S R[3][3];
+// The same with wrench effects, which may depend on any of the state
+template <class T>
+void carry_with_effects(const Body<Single<T>> &body, Model<T> &model, const Settings<Single<T>> &s,
+                        Single<T> dt, Belief<T> &f, Prediction<T> &w) {
+  auto propagate = [&](const T *x, T *out) {
+    T R[3][3];
     matrix_of(x + QUATERNION, R);
     apply_effects(model, x, R);
-    move(model.body, x, R, model.rotor_wrench, model.effect_wrench, dt, out);
+    move(body, x, R, model.rotor_wrench, model.effect_wrench, dt, out);
     decay_wrench(w.walk, out);
   };
-  w.walk = WrenchWalk<S>(s, dt);
+  w.walk = WrenchWalk<Single<T>>(s, dt);
   root_of_twelve(f.P, w);
   matrix_of(f.x + QUATERNION, w.R);
   propagate(f.x, w.centre);
-  carry_linear_part(model.body, s, model.rotor_wrench, model.effect_wrench, dt, f, w);
-  pairs_in_turn<12>(f.x, Spread<S>(s.kappa), propagate, w);
+  carry_linear_part(body, s, model.rotor_wrench, model.effect_wrench, dt, f, w);
+  pairs_in_turn<12>(f.x, Spread<Single<T>>(s.kappa), propagate, w);
   gather<12>(f, w);
 }
 

@@ -24,7 +24,7 @@ template <class S> struct Body {
 
 // total thrust N and body torques about the centre of mass Nm, out (4), at rotor speeds (4) rad/s:
 // (1), (8)-(10)
-template <class T> void rotor_wrench(const Body<Single<T>> &body, const T *speeds, T *out) {
+template <class T, class B> void rotor_wrench(const Body<B> &body, const T *speeds, T *out) {
   for (int i = 0; i < 4; i++) {
     out[i] = T{};
     for (int j = 0; j < 4; j++) out[i] += body.mixing[i][j] * speeds[j] * speeds[j];
@@ -40,8 +40,8 @@ template <class T, class S> T row_times(const S *row, T x, T y, T z) {
 // accelerations out (6) of the geometric centre, m/s2 world, and of the attitude, rad/s2 body: (4),
 // (12). rotors (4): thrust and torques; effects (6): declared effects' force, world, and torque,
 // body
-template <class T, class R4, class E6>
-void accelerations(const Body<Single<T>> &b, const T R[3][3], const T *x, const R4 *rotors,
+template <class T, class B, class R4, class E6>
+void accelerations(const Body<B> &b, const T R[3][3], const T *x, const R4 *rotors,
                    const E6 *effects, T *out) {
   T wx = x[RATE], wy = x[RATE + 1], wz = x[RATE + 2];
   const T *t = x + TORQUE, *f = x + FORCE;
@@ -56,7 +56,7 @@ void accelerations(const Body<Single<T>> &b, const T R[3][3], const T *x, const 
     ay = row_times(b.inverse_inertia[1], tx, ty, tz),
     az = row_times(b.inverse_inertia[2], tx, ty, tz);
   // the geometric centre about the centre of mass: alpha x c + omega x (omega x c)
-  Single<T> cx = -b.com[0], cy = -b.com[1], cz = -b.com[2], inverse = Single<T>(1) / b.mass;
+  B cx = -b.com[0], cy = -b.com[1], cz = -b.com[2], inverse = Single<T>(1) / b.mass;
   T nx = wy * cz - wz * cy, ny = wz * cx - wx * cz, nz = wx * cy - wy * cx;
   T px = ay * cz - az * cy + wy * nz - wz * ny, py = az * cx - ax * cz + wz * nx - wx * nz,
     pz = ax * cy - ay * cx + wx * ny - wy * nx;

@@ -4,6 +4,7 @@
 #include "flight_loop.hpp"
 #include "plant.hpp"
 #include "ukf.hpp"
+#include "wind.hpp"
 
 namespace windwrench {
 
@@ -24,14 +25,6 @@ template <class T> struct Loop {
   T specific[3], thrust[3];
 };
 
-// a wind: (address of its parameters, count of points, time (1) s, points (3, count) m, velocities
-// (3, count) m/s, to be added to)
-using WindFunction = void (*)(std::int64_t, std::int64_t, const double *, const double *, double *);
-struct WindCall {
-  WindFunction add;
-  std::int64_t parameters;
-};
-
 // The winds at the stations (3, body, m) of a vehicle at a pose (7), air (3, STATIONS) m/s; points
 // (3, STATIONS) m: where these are in the world
 template <class S>
@@ -45,8 +38,7 @@ void winds_at(const WindCall *winds, std::int64_t count, double time, const doub
       points[a][i] = pose[a] + R[a][0] * s[0] + R[a][1] * s[1] + R[a][2] * s[2];
       air[a][i] = 0.0;
     }
-  for (std::int64_t k = 0; k < count; k++)
-    winds[k].add(winds[k].parameters, STATIONS, &time, points[0], air[0]);
+  add_winds(winds, count, STATIONS, time, points[0], air[0]);
 }
 
 // Add the specific force of an accelerometer in the centre of mass, in the world by the estimated

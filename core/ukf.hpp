@@ -61,7 +61,7 @@ template <class S> void predict(Filter<S> &f, const S *speeds, S dt, S voltage, 
   Model<S> &m = f.vehicle;
   drive(m, speeds, dt, voltage);
   if (m.wrench_count == 0) carry(m.body, f.settings, m.rotor_wrench, dt, f.belief, w);
-  else carry_with_effects(m, f.settings, dt, f.belief, w);
+  else carry_with_effects(m.body, m, f.settings, dt, f.belief, w);
   after_prediction(f.settings, dt, f.belief);
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) f.centre_rotation[i][j] = w.R[i][j];
@@ -90,9 +90,12 @@ template <class S> int step(Filter<S> &f, int parts, S dt, S voltage, Innovation
   return usable;
 }
 
-// Step lanes of filters of one vehicle without effects, `of` being like each of them, over a
-// period: z (11) rotor speeds, position and quaternion, NaN where nothing was measured
-template <class T> void step_lanes(const Filter<Single<T>> &of, Belief<T> &f, T *z) {
+// Step lanes of filters of one vehicle, `of` being like each of them, over a period: z (11) rotor
+// speeds, position and quaternion, NaN where nothing was measured; model: the vehicle's effects in
+// lanes, at a voltage in V, or null
+template <class T>
+void step_lanes(const Filter<Single<T>> &of, Belief<T> &f, T *z, Model<T> *model = nullptr,
+                T voltage = T{}) {
   using S = Single<T>;
   const Settings<S> &s = of.settings;
   T scale = S(1) / root(z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10]);
@@ -101,13 +104,28 @@ template <class T> void step_lanes(const Filter<Single<T>> &of, Belief<T> &f, T 
     z[i] = choose(absolute(z[i]) <= T{} + s.fastest, z[i], f.last_speeds[i]);
     f.last_speeds[i] = z[i];
   }
+  auto position = finite(z[4] + z[5] + z[6]), attitude = finite(z[7] + z[8] + z[9] + z[10]);
   T rotors[4];
   Prediction<T> w;
-  rotor_wrench(of.vehicle.body, z, rotors);
-  carry(of.vehicle.body, s, rotors, s.period, f, w);
+  if (model && model->sensing_count > 0) {
+    T one = T{} + S(1), *sample = numbers_of<T>(model->sample);
+    for (int i = 0; i < 7; i++) sample[i] = z[i];
+    for (int i = 0; i < 4; i++) sample[7 + i] = choose(attitude, z[7 + i], f.x[QUATERNION + i]);
+    rewrite_sample(*model, choose(position, one, T{}), choose(attitude, one, T{}), one, s.period,
+                   -1);
+    for (int i = 0; i < 11; i++) z[i] = sample[i];
+  }
+  if (model) drive(*model, z, s.period, voltage);
+  if (model && model->wrench_count > 0) {
+    carry_with_effects(of.vehicle.body, *model, s, s.period, f, w);
+  } else {
+    if (!model) rotor_wrench(of.vehicle.body, z, rotors);
+    carry(of.vehicle.body, s, model ? model->rotor_wrench : rotors, s.period, f, w);
+  }
   after_prediction(s, s.period, f);
+  if (model) model->time += s.period;
   Innovation<T> n;
-  correct(s, f, z + 4, finite(z[4] + z[5] + z[6]), finite(z[7] + z[8] + z[9] + z[10]), n);
+  correct(s, f, z + 4, position, attitude, n);
 }
 
 }  // namespace windwrench

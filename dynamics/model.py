@@ -6,11 +6,13 @@ undeclared ones.
 
 import numpy as np
 
+from .. import _core
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .effects import Bundle, compile_effects
 from .effects.base import (
     HIDDEN,
+    MEMORY,
     PARAMETERS,
     ROTOR_ACCELERATION,
     ROTOR_TIME,
@@ -28,7 +30,6 @@ from .vehicle import Vehicle
 
 MAX_EFFECTS = 16  # a kind
 MAX_SENSING = 4
-MEMORY = 112  # numbers of a rotor-input or sensing effect
 _SENSING_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
 # the model's: whether there are delivered rotor speeds, and their values
 _OWN_ROW = MAX_EFFECTS + MAX_SENSING
@@ -62,6 +63,8 @@ MODEL_FIELDS: list[tuple[object, ...]] = [
     ("effect_wrench", "f8", (6,)),  # force in the world, torque in the body frame
 ]
 
+assert np.dtype(MODEL_FIELDS).itemsize == _core.MODEL_SIZE, "the core was built for another layout"
+
 
 def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
     """Fill the model's fields of a record; return the vehicle with its body effects applied.
@@ -78,7 +81,6 @@ def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
             f"{vehicle.name}: effects: a model holds at most {MAX_EFFECTS} of a kind, and "
             f"{MAX_SENSING} of sensing"
         )
-    assert max(bundle.rotor_memory, bundle.sensing_memory) <= MEMORY
     record["body"] = body_record(bundle.vehicle)[0]
     record["constants"] = bundle.constants
     for kind, coefficients in (

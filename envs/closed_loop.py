@@ -28,6 +28,7 @@ from mujoco import _functions
 from .. import _core
 from ..controllers.flight import BESIDE, FLIGHT, FlightGains, flight_record, reset_flight
 from ..dynamics.effects import compile_effects
+from ..dynamics.effects.own import raise_errors
 from ..dynamics.mean_jet import COUNT_R, COUNT_X, jet_table
 from ..dynamics.model import lay_addresses, without_addresses
 from ..dynamics.motion import Array
@@ -385,7 +386,7 @@ class ClosedLoop:
                 After the last row the fan stands still. Default: y = 0.
 
         Raises:
-            InputError: a shape is wrong.
+            InputError: a shape is wrong, or an effect of a user's own raised an error.
         """
         noise = np.ascontiguousarray(noise, dtype=np.float64)
         path = self._fan_at_rest if fan_path is None else np.ascontiguousarray(fan_path, np.float64)
@@ -401,11 +402,13 @@ class ClosedLoop:
         with Untimed():
             if not self.own_stages and not self.winds.own:  # which are called from Python
                 _core.run_ticks(self.address, path, noise)
+                raise_errors()
                 return
             for k in range(count):
                 self.row = k
                 for stage in self.stages.values():
                     stage(self)
+                raise_errors()
 
     def run_stage(self, number: int) -> None:
         """Run a stage of the core in the present tick."""

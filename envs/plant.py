@@ -22,16 +22,9 @@ from ..dynamics.model import (
     reset_model,
 )
 from ..dynamics.motion import Array
-from ..dynamics.rotation import (
-    normalise,
-    quaternion_from_mrp,
-    quaternion_multiply,
-)
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
-from ..runtime.vector_lanes import any_of, choose
-from .fan import STATIONS, gust, jet_wrench
+from .fan import STATIONS
 
 TICK = 0.005  # s
 SUBSTEPS = 2
@@ -76,11 +69,10 @@ class PlantSettings:
 PLANT = np.dtype(
     [
         *MODEL_FIELDS,
+        ("seen", "i8"),  # parts of the last pose that were measured
         ("voltage_ref", "f8"),
         ("battery_life", "f8"),
         ("battery", "f8"),  # V now; 0: not modelled
-        ("seen", "i8"),
-        # in lanes common to a block
         ("motor_keep", "f8"),
         ("omega_lsb", "f8"),
         ("sigma_position", "f8"),
@@ -89,7 +81,6 @@ PLANT = np.dtype(
         ("disturbance_torque", "f8"),
         ("disturbance_keep", "f8"),
         ("applied", "f8", (6,)),  # a user's part of ``external``, until changed
-        # in lanes each lane's own
         ("omega_max", "f8"),
         # a unit normal below loses the pose: after a pose, and after a lost one
         ("dropout", "f8"),
@@ -98,7 +89,6 @@ PLANT = np.dtype(
         ("actuator_late", "f8"),  # ticks
         ("pose_late", "f8"),
         ("imu_late", "f8"),
-        ("late", "f8", (7,)),  # now arriving, from one of ``past``
         ("speeds", "f8", (4,)),  # of the motors, rad/s
         # the sample: logged rotor speeds of the last tick, position, quaternion
         ("z", "f8", (11,)),
@@ -106,9 +96,6 @@ PLANT = np.dtype(
         ("external", "f8", (6,)),  # true external force and torque about the centre of mass, world
         ("jet", "f8", (6,)),  # the jet's part of it
         ("rotation", "f8", (3, 3)),
-        ("q", "f8", (4,)),
-        ("rho", "f8", (3,)),
-        ("scratch", "f8", (3,)),
         # the last ticks, the newest first: rad/s; m and quaternion; m/s2, body
         ("past_commands", "f8", (_KEPT, 4)),
         ("past_poses", "f8", (_KEPT, 7)),
@@ -240,103 +227,3 @@ def load_world(
     for lengths in (model.geom_pos, model.geom_size):
         lengths[parts] *= vehicle.arm_l / 0.1262
     return model, mujoco.MjData(model)
-
-
-@compiled
-def delay(past: Array, ticks: float, now: Array, late: Array) -> None:
-    """Write ``now`` (n,) of ``ticks`` ago into ``late``, and keep ``past`` (_KEPT, n)."""
-    late_in_any = any_of(ticks > 0.0)
-    for i in range(past.shape[1]):
-        late[i] = now[i]
-        if late_in_any:
-            for j in range(past.shape[0] - 1, 0, -1):
-                past[j, i] = past[j - 1, i]
-                late[i] = choose(ticks == float(j), past[j, i], late[i])
-            past[0, i] = now[i]
-
-
-@compiled
-def measure(p: Record, pose: Array, noise: Array) -> None:
-    """Write a pose (7,) and its noise into ``p.z``."""
-    for i in range(3):
-        p.z[4 + i] = pose[i] + p.sigma_position * noise[_POSE + i]
-        p.rho[i] = 0.25 * p.sigma_attitude * noise[_POSE + 3 + i]
-    quaternion_from_mrp(p.rho, p.q)
-    quaternion_multiply(p.q, pose[3:7], p.z[7:11])
-    normalise(p.z[7:11])
-    sign = choose(p.z[7] < 0.0, -1.0, 1.0)
-    for i in range(7, 11):
-        p.z[i] *= sign
-
-
-@compiled
-def note_loss(p: Record, noise: Array) -> None:
-    """Write into ``p.lost`` whether this pose is lost; losses come in runs."""
-    bound = choose(p.lost[0] > 0.0, p.dropout_kept, p.dropout)
-    p.lost[0] = choose(noise[_DROPOUT] < bound, 1.0, 0.0)
-
-
-@compiled
-def lose_pose(p: Record, noise: Array) -> None:
-    """Write NaN for a lost pose in ``p.z``: the answer of ``sense``, as numbers."""
-    note_loss(p, noise)
-    for i in range(4, 11):
-        p.z[i] = choose(p.lost[0] > 0.0, math.nan, p.z[i])
-
-
-@compiled
-def follow(p: Record, command: Array) -> None:
-    """Let the motors follow their commands (4,) rad/s for one tick."""
-    delay(p.past_commands, p.actuator_late, command, p.late)
-    for i in range(4):
-        p.speeds[i] = p.late[i] + p.motor_keep * (p.speeds[i] - p.late[i])
-        p.speeds[i] = min(max(p.speeds[i], 0.0), p.omega_max)
-
-
-@compiled
-def log_speeds(p: Record, speeds: Array) -> None:
-    """Write rotor speeds (4,) rad/s into ``p.z``, rounded as in the log."""
-    for i in range(4):
-        if p.omega_lsb == 0.0:
-            p.z[i] = speeds[i]
-        else:
-            p.z[i] = p.omega_lsb * math.floor(speeds[i] / p.omega_lsb + 0.5)
-
-
-@compiled
-def blow(p: Record, fan: Record, jet: Array, qpos: Array, qvel: Array, noise: Array) -> None:
-    """Let the gusts age by one tick and write the jet's wrench at ``p.rotation`` into ``p.jet``."""
-    blows = any_of(fan.speed > 0.0)
-    if blows:
-        gust(fan, noise[_GUSTS:_DROPOUT])
-    if blows or fan.blown > 0:
-        jet_wrench(fan, jet, qpos, p.rotation, qvel, p.body.com, p.scratch, p.jet)
-
-
-@compiled
-def disturb(p: Record, noise: Array) -> None:
-    """Let the unmodelled disturbance age by one tick."""
-    fresh = math.sqrt(1.0 - p.disturbance_keep * p.disturbance_keep)
-    for i in range(6):
-        size = p.disturbance_force if i < 3 else p.disturbance_torque
-        kept = p.disturbance_keep * p.disturbance[i]
-        p.disturbance[i] = kept + fresh * size * noise[_DISTURBANCE + i]
-
-
-@compiled
-def add_up(p: Record, xfrc: Array) -> None:
-    """Write the wrench on the vehicle at ``p.rotation`` into ``xfrc`` (6,), and its external part
-    into ``p.external``.
-    """
-    R = p.rotation
-    for i in range(3):
-        p.external[i] = p.effect_wrench[i] + p.jet[i] + p.disturbance[i] + p.applied[i]
-        xfrc[i] = p.external[i] + R[i, 2] * p.rotor_wrench[0]
-        torque = 0.0
-        for j in range(3):
-            torque += R[i, j] * p.effect_wrench[3 + j]
-        p.external[3 + i] = torque + p.jet[3 + i] + p.disturbance[3 + i] + p.applied[3 + i]
-        made = p.external[3 + i]
-        for j in range(3):
-            made += R[i, j] * p.rotor_wrench[1 + j]
-        xfrc[3 + i] = made

@@ -1,6 +1,5 @@
 """The state of n worlds as arrays with n rows: what a task's functions are given."""
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -8,16 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..runtime.compiled import compiled, compiled_without_gil
-from .fan import STATIONS
-from .plant import TICK
 
 Frame = NDArray[np.float32]
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-FASTEST = 200.0  # m/s and rad/s, beyond any vehicle
-UPRIGHT = 0.34  # cosine of 70 degrees
 REFERENCE_SIZE = 10  # position, velocity, acceleration, yaw
 
 
@@ -62,20 +56,7 @@ class Episodes(NamedTuple):
         return cls(ticks, decisions, paths, references, commands, now, last, broken)
 
 
-class Motion(NamedTuple):
-    """Vehicles side by side: vehicle i in row ``i // lanes`` and lane ``i % lanes``."""
-
-    position: Array  # (rows, 7, lanes) m, and quaternion
-    velocity: Array  # (rows, 6, lanes) m/s, world, and rad/s, body
-    wrench: Array  # (rows, 6, lanes) N and Nm, world, the true external one
-    state: Array  # (rows, 20, lanes) as the filter estimates it
-    covariance: Array  # (rows, 18, 18, lanes) of the estimate
-    specific: Array  # (rows, 3, lanes) m/s2, as of ``ClosedLoop``
-    thrust: Array  # (rows, 3, lanes) m/s2, likewise
-    air: Array  # (rows, STATIONS, 3, lanes) m/s, of the winds at the stations
-
-
-# columns of a world's row, in the order of ``gather``
+# columns of a world's row, in the core's order
 _TRUE = {"position": 3, "quaternion": 4, "velocity": 3, "angular_velocity": 3} | {
     "force": 3,
     "torque": 3,
@@ -99,7 +80,7 @@ _FIRST = sum(_TRUE.values())  # column of the estimate
 _STD = _FIRST + 20
 _REST = _FIRST + sum(_ESTIMATED.values())
 _SIZE = _REST + sum(_BESIDE.values())
-assert _SIZE == _core.ROW_SIZE, "the core was built for another layout"
+assert _SIZE == _core.WORLD_SIZE, "the core was built for another layout"
 
 
 def _lay(target: object, rows: Array, first: int, fields: dict[str, int]) -> None:
@@ -197,59 +178,3 @@ class State:
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: self.__dict__[name] for name in ("rows", "flying", "rng", "memory")}
-
-
-@compiled
-def _is_healthy(state: Array, qvel: Array) -> bool:
-    """Return whether an estimate (20,) is finite and each velocity (6,) a vehicle's."""
-    healthy = math.isfinite(state[:19].sum())
-    for velocity in qvel:
-        healthy = healthy and abs(velocity) < FASTEST
-    return healthy
-
-
-@compiled_without_gil
-def gather(
-    begin: int, end: int, shift: int, motion: Motion, episodes: Episodes, rows: Array, flying: Flags
-) -> None:
-    """Write the rows of worlds ``begin`` to ``end - 1``; world n moves as vehicle ``n - shift``."""
-    lanes = motion.state.shape[2]
-    for n in range(begin, end):
-        b, lane = (n - shift) // lanes, (n - shift) % lanes
-        row, estimate = rows[n], rows[n, _FIRST:_STD]
-        p, v = motion.position[b, :, lane], motion.velocity[b, :, lane]
-        row[0:7], row[7:13], row[13:19] = p, v, motion.wrench[b, :, lane]
-        estimate[:] = motion.state[b, :, lane]
-        for i in range(6):
-            row[_STD + i] = math.sqrt(motion.covariance[b, 12 + i, 12 + i, lane])
-        k = min(max(episodes.ticks[n], 0), episodes.references.shape[1] - 1)
-        reference = episodes.references[n, k]
-        w, q = estimate[3:7], row[_STD + 6 : _STD + 9]
-        c, s = math.cos(0.5 * reference[9]), math.sin(0.5 * reference[9])
-        turned = 2.0 if c * w[0] + s * w[3] >= 0.0 else -2.0
-        q[0] = turned * (c * w[1] + s * w[2])
-        q[1] = turned * (c * w[2] - s * w[1])
-        q[2] = turned * (c * w[3] - s * w[0])
-        square, rest = 0.0, row[_REST:]
-        for i in range(3):
-            rest[i], rest[3 + i] = motion.specific[b, i, lane], motion.thrust[b, i, lane]
-            wind = 0.0
-            for station in range(STATIONS):
-                wind += motion.air[b, station, i, lane]
-            rest[6 + i] = wind / STATIONS
-            square += (p[i] - reference[i]) * (p[i] - reference[i])
-        rest[9:19] = reference
-        path = episodes.paths[n]
-        k = min(max(episodes.ticks[n], 0), len(path) - 1)
-        for i in range(2):
-            rest[19 + i] = path[max(k - 1, 0), i]
-            rest[21 + i] = (path[k, i] - rest[19 + i]) / TICK
-        rest[23], rest[24] = math.sqrt(square), episodes.ticks[n] * TICK
-        upright = 1.0 - 2.0 * (p[4] * p[4] + p[5] * p[5]) >= UPRIGHT
-        change = 0.0
-        for i in range(episodes.actions.shape[1]):
-            more = episodes.actions[n, i] - episodes.last_actions[n, i]
-            change += more * more
-        rest[25] = change
-        # in this form a number that is not finite counts as lost
-        flying[n] = not episodes.broken[n] and upright and _is_healthy(estimate, v)

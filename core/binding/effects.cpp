@@ -33,10 +33,11 @@ void set_jet_table(Grid axial, Grid radial) {
 
 using Addresses = nb::typed<nb::tuple, std::uintptr_t, std::uintptr_t>;
 
-Addresses effect_addresses(const char *name) {
+Addresses effect_addresses(const char *name, const char *kind) {
   const LibraryEffect<double> *found = find_effect<double>(name);
-  return Addresses(nb::make_tuple(found ? reinterpret_cast<std::uintptr_t>(found->model) : 0,
-                                  found ? reinterpret_cast<std::uintptr_t>(found->advance) : 0));
+  if (!found || std::strcmp(found->kind, kind) != 0) return Addresses(nb::make_tuple(0, 0));
+  return Addresses(nb::make_tuple(reinterpret_cast<std::uintptr_t>(found->model),
+                                  reinterpret_cast<std::uintptr_t>(found->advance)));
 }
 
 void call_effect(std::uintptr_t address, Numbers c, Numbers vehicle, Numbers third,
@@ -58,9 +59,10 @@ template <> JetTable<float> jet_table<float>() { return {single_jet.axial, singl
 
 void bind_effects(nb::module_ &m) {
   m.attr("MODEL_SIZE") = sizeof(Model<double>);
-  m.def("effect_addresses", &effect_addresses, "name"_a,
+  m.def("effect_addresses", &effect_addresses, "name"_a, "kind"_a,
         "Return the addresses of an effect's equation and of its `advance`, C functions of four\n"
-        "arrays of doubles; 0 where the library has none.");
+        "arrays of doubles; 0 where the library has none of this kind: wrench, rotor input,\n"
+        "sensing.");
   m.def("call_effect", &call_effect, "address"_a, "c"_a, "vehicle"_a, "third"_a, "fourth"_a,
         "Call the effect at an address with its four arrays, in place.");
   m.def("set_jet_table", &set_jet_table, "axial"_a, "radial"_a,

@@ -6,6 +6,7 @@
 #include "filter.hpp"
 
 #include "../episodes.hpp"
+#include "filter.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -25,6 +25,7 @@ void bind_batch(nanobind::module_ &m);
 void bind_control(nanobind::module_ &m);
 void bind_effects(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
+void bind_lanes(nanobind::module_ &m);
 void bind_tick(nanobind::module_ &m);
 void bind_winds(nanobind::module_ &m);
 void bind_constant_gain(nanobind::module_ &m);

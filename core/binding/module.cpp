@@ -14,6 +14,7 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
   bind_control(m);
   bind_effects(m);
   bind_filter(m);
+  bind_lanes(m);
   bind_tick(m);
   bind_winds(m);
   bind_constant_gain(m);

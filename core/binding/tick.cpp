@@ -36,7 +36,7 @@ double no_time() { return 0.0; }
 void bind_tick(nb::module_ &m) {
   m.attr("LOOP_SIZE") = sizeof(Flying);
   m.attr("PLANT_SIZE") = sizeof(Plant<double>);
-  m.attr("ROW_SIZE") = int(ROW_SIZE);
+  m.attr("WORLD_SIZE") = int(ROW_SIZE);
   m.def("run_ticks", &run_ticks, "address"_a, "path"_a, "noise"_a,
         "Run a tick of the loop at an address for each row of noise (n, size), unit normals; path\n"
         "(m, 2): the fan's y and height in m, tick by tick. Winds and stages of a user's own do\n"

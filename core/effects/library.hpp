@@ -32,10 +32,8 @@
 
 namespace windwrench {
 
-enum Kind { WRENCH, ROTOR_INPUT, SENSING };
 template <class T> struct LibraryEffect {
-  const char *name;
-  Kind kind;
+  const char *name, *kind;
   EffectModel<T> model, advance;  // advance: null without a state of its own
 };
 constexpr int LIBRARY_EFFECTS = 28;
@@ -46,34 +44,34 @@ template <class T> const LibraryEffect<T> *library() {
 #define EFFECT(kind, name) \
   { #name, kind, CALLED(name), nullptr }
   static constexpr LibraryEffect<T> all[LIBRARY_EFFECTS] = {
-      EFFECT(SENSING, attitude_gain),
-      EFFECT(ROTOR_INPUT, battery_sag),
-      EFFECT(WRENCH, body_drag),
-      EFFECT(WRENCH, ceiling_effect),
-      EFFECT(SENSING, clock_offset),
-      EFFECT(WRENCH, constant_force),
-      EFFECT(WRENCH, constant_torque),
-      EFFECT(WRENCH, fan_jet),
-      EFFECT(WRENCH, flapping_moment),
-      EFFECT(WRENCH, ground_effect),
-      EFFECT(WRENCH, inflow_drag),
-      EFFECT(WRENCH, inflow_thrust),
-      EFFECT(ROTOR_INPUT, latency),
-      EFFECT(SENSING, marker_offset),
-      EFFECT(ROTOR_INPUT, motor_lag),
-      EFFECT(WRENCH, rate_damping),
-      EFFECT(WRENCH, rotor_drag),
-      EFFECT(ROTOR_INPUT, rotor_efficiency),
-      EFFECT(WRENCH, rotor_inertia),
-      EFFECT(WRENCH, rotor_interaction),
-      {"slung_payload", WRENCH, CALLED(slung_payload), CALLED(advance_slung_payload)},
-      EFFECT(WRENCH, thrust_axis_tilt),
-      EFFECT(ROTOR_INPUT, thrust_curvature),
-      EFFECT(ROTOR_INPUT, thrust_fade),
-      EFFECT(ROTOR_INPUT, thrust_scale),
-      EFFECT(WRENCH, translational_lift),
-      EFFECT(WRENCH, wind),
-      EFFECT(SENSING, world_tilt),
+      EFFECT("sensing", attitude_gain),
+      EFFECT("rotor input", battery_sag),
+      EFFECT("wrench", body_drag),
+      EFFECT("wrench", ceiling_effect),
+      EFFECT("sensing", clock_offset),
+      EFFECT("wrench", constant_force),
+      EFFECT("wrench", constant_torque),
+      EFFECT("wrench", fan_jet),
+      EFFECT("wrench", flapping_moment),
+      EFFECT("wrench", ground_effect),
+      EFFECT("wrench", inflow_drag),
+      EFFECT("wrench", inflow_thrust),
+      EFFECT("rotor input", latency),
+      EFFECT("sensing", marker_offset),
+      EFFECT("rotor input", motor_lag),
+      EFFECT("wrench", rate_damping),
+      EFFECT("wrench", rotor_drag),
+      EFFECT("rotor input", rotor_efficiency),
+      EFFECT("wrench", rotor_inertia),
+      EFFECT("wrench", rotor_interaction),
+      {"slung_payload", "wrench", CALLED(slung_payload), CALLED(advance_slung_payload)},
+      EFFECT("wrench", thrust_axis_tilt),
+      EFFECT("rotor input", thrust_curvature),
+      EFFECT("rotor input", thrust_fade),
+      EFFECT("rotor input", thrust_scale),
+      EFFECT("wrench", translational_lift),
+      EFFECT("wrench", wind),
+      EFFECT("sensing", world_tilt),
   };
 #undef EFFECT
 #undef CALLED

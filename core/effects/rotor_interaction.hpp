@@ -13,6 +13,7 @@
 // fast flight and in climbs, and grows in descents. v is that of momentum theory, of the mean
 // rotor: v sqrt(u_h^2 + w^2) = T / (2 rho A).
 #pragma once
+#include "../mean_jet.hpp"
 #include "parts.hpp"
 
 namespace windwrench {
@@ -22,7 +23,8 @@ template <class T, class C>
 void rotor_interaction(const C *c, const VehicleNumbers<C> &v, const FlightState<T> &s,
                        Wrench<T> &w) {
   using S = Single<T>;
-  const S four_rotors = S(8.0 * 1.2 * 3.141592653589793);  // 4 x 2 rho A over the square of R
+  const S four_rotors =
+      S(8.0 * AIR_DENSITY * 3.141592653589793);  // 4 x 2 rho A over the square of R
   C centre[3] = {}, r[3];
   T u[3], thrust = {}, force[3] = {};
   air_velocity(s, centre, u);

@@ -1,7 +1,7 @@
 """The library of physical effects: one file an effect, found by its file's name.
 
 ``get("rotor_drag")`` is the ``EFFECT`` of ``rotor_drag.py``. ``compile_effects`` prepares a
-vehicle's effects for compiled code. Folders of a user's own join the library: the environment
+vehicle's effects for the core. Folders of a user's own join the library: the environment
 variable ``WINDWRENCH_EFFECTS`` names some, for every command and its workers, and ``add_folder``
 adds more.
 """
@@ -21,6 +21,7 @@ from ...runtime.python_file import import_file
 from ..vehicle import EffectSetting, Vehicle
 from .base import PARAMETERS, ROW_SIZE, VEHICLE_SIZE, Array, Coefficient, Effect
 from .declaration import Family, Need, Role
+from .own import addresses
 from .vanishing import does_nothing_alone
 
 __all__ = [
@@ -48,7 +49,7 @@ def __dir__() -> list[str]:
 
 
 _FOLDERS = "WINDWRENCH_EFFECTS"
-_NOT_EFFECTS = {"__init__", "__main__", "base", "call", "declaration", "parts", "vanishing"}
+_NOT_EFFECTS = {"__init__", "__main__", "base", "call", "declaration", "own", "vanishing"}
 
 
 def add_folder(folder: str | Path) -> tuple[str, ...]:
@@ -111,8 +112,8 @@ def get(name: str) -> Effect:
     """Return an effect by its name.
 
     Raises:
-        InputError: no such effect, none in a user's own file, or a law without starting points
-            whose coefficients do nothing alone.
+        InputError: no such effect, none in a user's own file, an error in its function, or a law
+            without starting points whose coefficients do nothing alone.
     """
     if name not in names():
         raise unknown_name("effect", name, names())
@@ -123,7 +124,7 @@ def get(name: str) -> Effect:
             f"{getattr(effect, 'name', effect)!r}"
         )
     # tests ask the kit's own
-    if not _is_own(name) and effect.starting_points is None and does_nothing_alone(effect):
+    if not _is_own(name) and does_nothing_alone(effect) and effect.starting_points is None:
         raise InputError(
             f"{_files()[name]}: effect {name}: no coefficient does anything while the others are "
             "zero, so no diagnosis could ever find it; add starting_points=..., a function that "
@@ -222,7 +223,7 @@ def parse_setting(text: str, vehicle: Vehicle | None = None) -> EffectSetting:
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """A vehicle's effects, ready for compiled code: the addresses of effect models and their
+    """A vehicle's effects, ready for the core: the addresses of effect models and their
     coefficients, kind by kind.
     """
 
@@ -233,14 +234,12 @@ class Bundle:
     wrench_hooks: np.ndarray  # (n,) int64 addresses of ``advance``; 0: no state of its own
     rotor_models: np.ndarray  # (m,) int64 addresses
     rotor_coefficients: Array  # (m, 8)
-    rotor_memory: int  # columns of the rotor models' memory (m, rotor_memory)
     sensing_models: np.ndarray  # (k,) int64 addresses
     sensing_coefficients: Array  # (k, 8)
-    sensing_memory: int  # columns of the sensing models' memory (k, sensing_memory)
 
 
 def compile_effects(vehicle: Vehicle) -> Bundle:
-    """Return the effects of a vehicle, ready for compiled code."""
+    """Return the effects of a vehicle, ready for the core."""
     amended = vehicle
     rows: dict[str, list[tuple[Effect, Array]]] = {"wrench": [], "rotor input": [], "sensing": []}
     for setting in vehicle.effects:
@@ -259,19 +258,16 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
     )
     assert constants.size == VEHICLE_SIZE
 
-    def stack(kind: str, width: int) -> tuple[np.ndarray, Array, int]:
-        """Return addresses, coefficients (n, width) and the largest memory of a kind's models."""
+    def stack(kind: str, width: int) -> tuple[np.ndarray, Array]:
+        """Return addresses and coefficients (n, width) of a kind's models."""
         coefficients = np.zeros((len(rows[kind]), width))
         for i, (_, vector) in enumerate(rows[kind]):
             coefficients[i, : len(vector)] = vector
-        addresses = np.array([effect.model.address for effect, _ in rows[kind]], dtype=np.int64)
-        return addresses, coefficients, max([1, *(effect.memory for effect, _ in rows[kind])])
+        models = np.array([addresses(effect)[0] for effect, _ in rows[kind]], dtype=np.int64)
+        return models, coefficients
 
-    models, coefficients, _ = stack("wrench", ROW_SIZE)
-    hooks = np.array(
-        [effect.advance.address if effect.advance else 0 for effect, _ in rows["wrench"]],
-        dtype=np.int64,
-    )
+    models, coefficients = stack("wrench", ROW_SIZE)
+    hooks = np.array([addresses(effect)[1] for effect, _ in rows["wrench"]], dtype=np.int64)
     return Bundle(
         amended,
         constants,

@@ -1,90 +1,109 @@
 """The form of a physical effect, written once and used by the plant, the estimator and the residual
 of a log.
 
-An effect is one file in this folder with an ``EFFECT``. Its equation, the effect model, is compiled
-to a C function, called through its address. All its callers (a tick of the plant, a sigma point of
-the filter, a sample of a log) run the same machine code. A new effect recompiles none of them.
-There are four kinds:
+An effect is one file in this folder with an ``EFFECT``. Its equation, the effect model, is a
+function of the core, ``core/effects/NAME.hpp``, called through its address by a tick of the plant,
+a sigma point of the filter and a sample of a log. The model of a user's own effect may be a Python
+function in the effect's file. There are four kinds:
 
 ``rotor input``
-    changes the delivered rotor speeds. Model ``(c, vehicle, rotors, memory)``: rewrites the four
-    rotor speeds in ``rotors``, once a step, in the order in which the vehicle lists the effects.
+    changes the delivered rotor speeds. Model ``(c, vehicle, rotors, memory)``: rewrites
+    ``rotors.speed``, once a step, in the order in which the vehicle lists the effects.
 ``wrench``
     adds force (world frame) and torque (body frame, about the centre of mass). Model
-    ``(c, vehicle, state, wrench)``: adds to the six numbers in ``wrench``. It is called many times
-    a step. A state of its own lies in ``c`` from ``HIDDEN`` on, all zero at the start. ``advance(c,
-    vehicle, state, rotors)`` carries the state on, once a step before the first call of the model;
-    ``rotors[STEP]`` is the step's length.
+    ``(c, vehicle, state, wrench)``: adds to ``wrench.force`` and ``wrench.torque``. It is called
+    many times a step. A state of its own lies in ``c[HIDDEN:]``, all zero at the start.
+    ``advance(c, vehicle, state, rotors)`` carries the state on, once a step before the first call
+    of the model; ``rotors.step`` is the step's length.
 ``body``
     changes the rigid body itself. ``amend(vehicle, coefficients)`` returns the changed vehicle.
 ``sensing``
     changes the logged values. Model ``(c, vehicle, sample, memory)``: rewrites the given parts of
-    ``sample``. With ``sample[DIRECTION]`` +1 (the plant) it turns truth into report, with -1 (an
+    ``sample``. With ``sample.direction`` +1 (the plant) it turns truth into report, with -1 (an
     estimator with the effect in its model) report into truth.
 
-``c`` holds the coefficients in their declared order. The constants below lay out ``vehicle``,
-``state``, ``rotors`` and ``sample``.
+``c`` holds the coefficients in their declared order, and ``memory`` (MEMORY,) what a model keeps
+from step to step, all zero at first. The records below lay out ``vehicle``, ``state``, ``rotors``,
+``sample`` and ``wrench``. A Python function gets their fields as attributes: arrays, and arrays of
+shape () of single numbers, all of them views of the core's memory.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from ...runtime.compiled import compiled_callback
 from ..vehicle import Vehicle
 from .declaration import Family, Implausible, Need, Role, StartingPoints, check_role, check_words
 
 Array = NDArray[np.float64]
 
-_POINTER = types.CPointer(types.float64)
-EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # C function of a model
-compiled_model: Any = compiled_callback(EFFECT_MODEL)  # the decorator of an effect model
+VEHICLE = np.dtype(
+    [
+        ("mass", "f8"),  # kg
+        ("gravity", "f8"),  # m/s2
+        ("rotor_radius", "f8"),  # m
+        ("floor", "f8"),  # m
+        ("ceiling", "f8"),  # m
+        ("voltage_ref", "f8"),  # V
+        ("hover_rate", "f8"),  # rad/s
+        ("com", "f8", (3,)),  # m, from the geometric centre
+        ("rotor", "f8", (4, 3)),  # m, from the geometric centre
+        ("spin", "f8", (4,)),  # turning sense about body +z
+        ("reaction", "f8", (4,)),  # Nm/(rad/s)^2
+    ]
+)
+STATE = np.dtype(
+    [
+        ("position", "f8", (3,)),  # m, world, of the geometric centre
+        ("rotation", "f8", (3, 3)),  # body to world
+        ("velocity", "f8", (3,)),  # m/s, world
+        ("rate", "f8", (3,)),  # rad/s, body
+        ("rotor_speed", "f8", (4,)),  # rad/s, delivered
+        ("thrust", "f8", (4,)),  # N, delivered
+        ("wind", "f8", (3,)),  # m/s, world
+        ("voltage", "f8"),  # V; 0: not known
+        ("time", "f8"),  # s
+        ("rotor_acceleration", "f8", (4,)),  # rad/s2, delivered, mean over the step
+    ]
+)
+ROTORS = np.dtype(
+    [
+        ("speed", "f8", (4,)),  # rad/s
+        ("step", "f8"),  # s, since the function was last called
+        ("voltage", "f8"),  # V; 0: not known
+        ("time", "f8"),  # s, since the start
+    ]
+)
+SAMPLE = np.dtype(
+    [
+        ("speed", "f8", (4,)),  # rad/s
+        ("position", "f8", (3,)),  # m, world
+        ("quaternion", "f8", (4,)),  # body to world; always readable
+        ("step", "f8"),  # s, since the function was last called
+        ("has_speed", "f8"),  # 1 where the part is given
+        ("has_position", "f8"),
+        ("has_quaternion", "f8"),
+        ("direction", "f8"),  # +1: from truth to report, -1: back
+    ]
+)
+# N, world; Nm, body, about the centre of mass
+WRENCH = np.dtype([("force", "f8", (3,)), ("torque", "f8", (3,))])
 
-# vehicle: numbers for a model
-MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
-COM = 7  # 3, m
-ROTOR_POSITION = 10  # 4 x 3, m, from the geometric centre
-SPIN = 22  # 4, turning sense about body +z
-REACTION = 26  # 4, Nm/(rad/s)^2
-VEHICLE_SIZE = 30
-
-# state of the flight for a wrench model
-POSITION = 0  # 3, m, world, of the geometric centre
-ROTATION = 3  # 3 x 3, body to world
-VELOCITY = 12  # 3, m/s, world
-RATE = 15  # 3, rad/s, body
-ROTOR_SPEED = 18  # 4, rad/s, delivered
-ROTOR_THRUST = 22  # 4, N, delivered
-WIND = 26  # 3, m/s, world
-VOLTAGE = 29  # V; 0: not known
-TIME = 30  # s
-ROTOR_ACCELERATION = 31  # 4, rad/s2, delivered, mean over the step
-STATE_SIZE = 35
-
-# rotors: the rotor speeds rewritten by a rotor-input model, and further inputs
-SPEED = 0  # 4, rad/s
-STEP = 4  # s, since the model was last called
-ROTOR_VOLTAGE = 5  # V; 0: not known
-ROTOR_TIME = 6  # s, since the start
-ROTORS_SIZE = 7
-
-# sample: values rewritten by a sensing model, and inputs
-SAMPLE_SPEED = 0  # 4, rad/s
-SAMPLE_POSITION = 4  # 3, m, world
-SAMPLE_QUATERNION = 7  # 4, body to world
-SAMPLE_STEP = 11  # s, since the model was last called
-# 1 where the part is given; a quaternion is always readable
-HAS_SPEED, HAS_POSITION, HAS_QUATERNION = 12, 13, 14
-DIRECTION = 15  # +1: from truth to report, -1: back
-SAMPLE_SIZE = 16
-
+VEHICLE_SIZE, STATE_SIZE, ROTORS_SIZE, SAMPLE_SIZE = (
+    layout.itemsize // 8 for layout in (VEHICLE, STATE, ROTORS, SAMPLE)
+)
 PARAMETERS = 8  # most coefficients of an effect
 HIDDEN = 8  # first place of a wrench effect's own state in ``c``
 ROW_SIZE = 16  # size of ``c`` of a wrench effect
+MEMORY = 112  # numbers of a rotor-input or sensing effect
+
+# places of the numbers, for compiled loops
+POSITION, ROTATION, VELOCITY, RATE, ROTOR_SPEED, ROTOR_THRUST, WIND = 0, 3, 12, 15, 18, 22, 26
+VOLTAGE, TIME, ROTOR_ACCELERATION = 29, 30, 31
+STEP, ROTOR_VOLTAGE, ROTOR_TIME = 4, 5, 6
+SAMPLE_STEP, HAS_SPEED, HAS_POSITION, HAS_QUATERNION, DIRECTION = 11, 12, 13, 14, 15
 
 
 @dataclass(frozen=True)
@@ -151,9 +170,9 @@ class Effect:
         coefficients: each with its unit.
         source: of equation and sizes.
         excitation: flight to tell the effect from others with much the same traces in a log.
-        model: compiled C function, for rotor input, wrench and sensing.
-        advance: compiled C function, for a wrench with a state of its own.
-        memory: numbers kept by a rotor-input or sensing model from step to step; all zero at first.
+        model: name of an equation of the core, or a Python function; for rotor input, wrench and
+            sensing.
+        advance: Python function, for a wrench with a state of its own.
         sets_wind: a wrench effect changes the wind in ``state``: called before all others.
         amend: function from a vehicle and coefficients to the changed vehicle, for an effect on
             the rigid body.
@@ -178,9 +197,8 @@ class Effect:
     coefficients: tuple[Coefficient, ...]
     source: str
     excitation: str
-    model: Any = None
-    advance: Any = None
-    memory: int = 0
+    model: str | Callable[..., None] | None = None
+    advance: Callable[..., None] | None = None
     sets_wind: bool = False
     amend: Callable[[Vehicle, Mapping[str, float]], Vehicle] | None = None
     family: Family = Family.OTHER

@@ -5,17 +5,8 @@ voltage_ref)^(n/2). It applies where the rotor speeds are commands, or worked ou
 the reference voltage. Nothing changes where the voltage is not known.
 """
 
-from .base import ROTOR_VOLTAGE, VOLTAGE_REF, Coefficient, Effect, compiled_model
+from .base import Coefficient, Effect
 from .declaration import Family, Role
-
-
-@compiled_model
-def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
-    if rotors[ROTOR_VOLTAGE] > 0.0 and vehicle[VOLTAGE_REF] > 0.0:
-        scale = (rotors[ROTOR_VOLTAGE] / vehicle[VOLTAGE_REF]) ** (0.5 * c[0])
-        for i in range(4):
-            rotors[i] *= scale
-
 
 EFFECT = Effect(
     name="battery_sag",
@@ -28,7 +19,7 @@ EFFECT = Effect(
     source="thrust goes with the square of the voltage at constant duty cycle (n = 2), less behind "
     "a regulated drive",
     excitation="a whole battery, with loads that come and go, and the voltage in the log",
-    model=effect_model,
+    model="battery_sag",
     family=Family.THRUST,
     role=Role.THRUST_OVER_VOLTAGE,
 )

@@ -5,36 +5,16 @@ With u = R'(v - wind) the airspeed in body axes, F = -diag(dx, dy, dz) u - |u| d
 body axes. The quadratic part is the parasitic drag of RotorPy, c_Dx, c_Dy, c_Dz.
 """
 
-import math
-
 import numpy as np
 
-from .base import Effect, along, compiled_model
+from .base import Effect, along
 from .declaration import Family, Found, Role
-from .parts import add_force_at, air_velocity
 
 # share of a body's drag along its most exposed axis, that another axis must have. On six seeds true
 # drags had 0.78 and more, RotorPy's 0.34 and more. Without the rotors' inflow in the library,
 # wrongly named ones had 0.00 to 0.02
 _LEAST_SHARE_OF_LARGEST = 0.15
 _SIGNIFICANCE = 2.0  # standard deviations of the difference
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    x, y, z = air_velocity(state, 0.0, 0.0, 0.0)
-    speed = math.sqrt(x * x + y * y + z * z)
-    add_force_at(
-        vehicle,
-        state,
-        wrench,
-        0.0,
-        0.0,
-        0.0,
-        -(c[0] + c[3] * speed) * x,
-        -(c[1] + c[4] * speed) * y,
-        -(c[2] + c[5] * speed) * z,
-    )
 
 
 def implausible(found: Found) -> str:
@@ -59,7 +39,7 @@ EFFECT = Effect(
     "= 0.03 m2, 8 cm2",
     excitation="several speeds up to 2 m/s and more for the quadratic part, at several loads "
     "(climbs, hard turns) to tell it from rotor drag, whose force grows with the rotor speeds",
-    model=effect_model,
+    model="body_drag",
     family=Family.DRAG,
     role=Role.BODY_DRAG,
     implausible=implausible,

@@ -6,16 +6,8 @@ torque. The distance is taken as no less than where the factor reaches 2. Nothin
 vehicle states no ceiling.
 """
 
-from .base import CEILING, CENTRAL, Coefficient, Effect, compiled_model
+from .base import CENTRAL, Coefficient, Effect
 from .declaration import Family
-from .parts import lift_near_plane
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    if vehicle[CEILING] < 1e6:
-        lift_near_plane(c, vehicle, state, wrench, vehicle[CEILING], -1.0)
-
 
 EFFECT = Effect(
     name="ceiling_effect",
@@ -28,6 +20,6 @@ EFFECT = Effect(
     "ceiling raises thrust too: Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017; "
     "size assumed as near the ground",
     excitation="several distances from the ceiling, the nearest of one to two rotor diameters",
-    model=effect_model,
+    model="ceiling_effect",
     family=Family.SURROUNDINGS,
 )

@@ -1,14 +1,7 @@
 """Constant force: a steady force, fixed in the world frame, at the centre of mass."""
 
-from .base import Effect, along, compiled_model
+from .base import Effect, along
 from .declaration import Family, Role
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        wrench[i] += c[i]
-
 
 EFFECT = Effect(
     name="constant_force",
@@ -17,7 +10,7 @@ EFFECT = Effect(
     source="definition",
     excitation="yaw through half a turn and more, and vertical accelerations of 1 m/s2 and more; "
     "in hover fz is a mass or a thrust scale",
-    model=effect_model,
+    model="constant_force",
     family=Family.STEADY,
     role=Role.STEADY_FORCE,
     any_size=True,

@@ -2,15 +2,8 @@
 propellers).
 """
 
-from .base import Effect, along, compiled_model
+from .base import Effect, along
 from .declaration import Family, Need
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        wrench[3 + i] += c[i]
-
 
 EFFECT = Effect(
     name="constant_torque",
@@ -19,7 +12,7 @@ EFFECT = Effect(
     source="definition",
     excitation="climbs and drops: the torque of an offset centre of mass or a weak rotor grows "
     "with thrust",
-    model=effect_model,
+    model="constant_torque",
     family=Family.STEADY,
     needs=(Need.MOMENTS,),
     any_size=True,

@@ -14,71 +14,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..mean_jet import AIR_DENSITY, FIRST_X, HULL_RADIUS, HULL_STATIONS, STEP_R, STEP_X, jet_table
-from .base import (
-    POSITION,
-    RATE,
-    ROTATION,
-    VELOCITY,
-    Coefficient,
-    Effect,
-    compiled_model,
-)
+from ... import _core
+from ..mean_jet import jet_table
+from .base import Coefficient, Effect
 from .declaration import Coefficients, Family, Found, Unexplained
-from .parts import add_force_at, rotor_place
 
-_AXIAL, _RADIAL = jet_table(0.45, 0.10)
-_ROWS, _COLUMNS = _AXIAL.shape
-_ANGLES = np.arange(HULL_STATIONS) * math.pi / 4
-_RING_X, _RING_Y = HULL_RADIUS * np.cos(_ANGLES), HULL_RADIUS * np.sin(_ANGLES)
+_core.set_jet_table(*jet_table(0.45, 0.10))  # m, radii of the fan and its hub
 
 _LEAST_SPEED_RATIO = 2.0  # times the vehicle's speed, of a jet at its source
 # where a fan may stand as a fit starts: the way it blows (rad), m from the flight against that
 # way, and m across
 _HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
 _DISTANCES, _ACROSS = (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    cosine, sine = math.cos(c[4]), math.sin(c[4])
-    hull = 0.5 * AIR_DENSITY * c[6] / HULL_STATIONS
-    R = ROTATION
-    for n in range(4 + HULL_STATIONS):
-        if n < 4:
-            sx, sy, sz = rotor_place(vehicle, n, 0.0)
-        else:
-            sx, sy, sz = _RING_X[n - 4], _RING_Y[n - 4], 0.0
-        # the station as seen from the fan: distance along its axis, and offset across it
-        px = state[POSITION] + state[R] * sx + state[R + 1] * sy + state[R + 2] * sz - c[1]
-        py = state[POSITION + 1] + state[R + 3] * sx + state[R + 4] * sy + state[R + 5] * sz - c[2]
-        dz = state[POSITION + 2] + state[R + 6] * sx + state[R + 7] * sy + state[R + 8] * sz - c[3]
-        distance, dy = cosine * px + sine * py, cosine * py - sine * px
-        r = math.sqrt(dy * dy + dz * dz)
-        row, column = (distance - FIRST_X) / STEP_X, r / STEP_R
-        u, v = 0.0, 0.0
-        if row >= 0.0 and row < _ROWS - 1 and column < _COLUMNS - 1:
-            i, j = int(row), int(column)
-            a, b = row - i, column - j
-            u = (1 - a) * ((1 - b) * _AXIAL[i, j] + b * _AXIAL[i, j + 1])
-            u += a * ((1 - b) * _AXIAL[i + 1, j] + b * _AXIAL[i + 1, j + 1])
-            v = (1 - a) * ((1 - b) * _RADIAL[i, j] + b * _RADIAL[i, j + 1])
-            v += a * ((1 - b) * _RADIAL[i + 1, j] + b * _RADIAL[i + 1, j + 1])
-        u *= c[0]
-        v *= c[0] / r if r > 1e-9 else 0.0
-        # relative to the vehicle, in body axes
-        ax = cosine * u - sine * v * dy - state[VELOCITY]
-        ay = sine * u + cosine * v * dy - state[VELOCITY + 1]
-        az = v * dz - state[VELOCITY + 2]
-        wx, wy, wz = state[RATE], state[RATE + 1], state[RATE + 2]
-        bx = state[R] * ax + state[R + 3] * ay + state[R + 6] * az - (wy * sz - wz * sy)
-        by = state[R + 1] * ax + state[R + 4] * ay + state[R + 7] * az - (wz * sx - wx * sz)
-        bz = state[R + 2] * ax + state[R + 5] * ay + state[R + 8] * az - (wx * sy - wy * sx)
-        if n < 4:
-            add_force_at(vehicle, state, wrench, sx, sy, sz, c[5] * bx, c[5] * by, 0.0)
-        else:
-            scale = hull * math.sqrt(bx * bx + by * by + bz * bz)
-            add_force_at(vehicle, state, wrench, sx, sy, sz, scale * bx, scale * by, scale * bz)
 
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
@@ -126,7 +73,7 @@ EFFECT = Effect(
     "wrench that McKinnon and Schoellig, IROS 2016, measured in the jet of a drum fan",
     excitation="flight across the jet and out of it: force and torque depend on the place; its "
     "still-air drag is like rotor and body drag",
-    model=effect_model,
+    model="fan_jet",
     family=Family.SURROUNDINGS,
     starting_points=starting_points,
     implausible=implausible,

@@ -5,19 +5,8 @@ At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: the torque -kflap
 body axes. It is the k_flap of RotorPy. The force that goes with flapping is ``rotor_drag``.
 """
 
-from .base import ROTOR_SPEED, Coefficient, Effect, compiled_model
+from .base import Coefficient, Effect
 from .declaration import Family, Need, Role
-from .parts import air_velocity, rotor_place
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    for i in range(4):
-        x, y, z = rotor_place(vehicle, i, 0.0)
-        ux, uy, _ = air_velocity(state, x, y, z)
-        wrench[3] -= c[0] * state[ROTOR_SPEED + i] * uy
-        wrench[4] += c[0] * state[ROTOR_SPEED + i] * ux
-
 
 EFFECT = Effect(
     name="flapping_moment",
@@ -27,7 +16,7 @@ EFFECT = Effect(
     "Kumar, RotorPy, 2023; sizes: a thirtieth of the typical rotor drag times the arm's length",
     excitation="speeds of 1 m/s and more along both body axes: its torque follows the velocity and "
     "changes sign with it",
-    model=effect_model,
+    model="flapping_moment",
     family=Family.AERODYNAMICS,
     needs=(Need.MOMENTS,),
     role=Role.FLAPPING_MOMENT,

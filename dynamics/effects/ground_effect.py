@@ -6,16 +6,8 @@ Applied rotor by rotor, so a tilted vehicle feels a torque. The height is taken 
 where the factor reaches 2, as the equation has a pole below it.
 """
 
-from .base import CENTRAL, FLOOR, Coefficient, Effect, compiled_model
+from .base import CENTRAL, Coefficient, Effect
 from .declaration import Family
-from .parts import lift_near_plane
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    if vehicle[FLOOR] > -1e6:
-        lift_near_plane(c, vehicle, state, wrench, vehicle[FLOOR], 1.0)
-
 
 EFFECT = Effect(
     name="ground_effect",
@@ -34,6 +26,6 @@ EFFECT = Effect(
     source="Cheeseman and Bennett, ARC R&M 3021, 1955; Sanchez-Cuevas, Heredia and Ollero, Int. J. "
     "Aerospace Eng. 2017",
     excitation="several heights, the lowest of one to two rotor diameters",
-    model=effect_model,
+    model="ground_effect",
     family=Family.SURROUNDINGS,
 )

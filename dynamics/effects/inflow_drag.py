@@ -5,19 +5,8 @@ applied at the rotor. A rotor that climbs into its inflow drags more, one that s
 in proportion to the rotor speed is ``rotor_drag``.
 """
 
-from .base import Coefficient, Effect, compiled_model
+from .base import Coefficient, Effect
 from .declaration import Family
-from .parts import add_force_at, air_velocity, rotor_place
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    for i in range(4):
-        x, y, z = rotor_place(vehicle, i, 0.0)
-        ux, uy, uz = air_velocity(state, x, y, z)
-        kl = c[0] * uz
-        add_force_at(vehicle, state, wrench, x, y, z, -kl * ux, -kl * uy, 0.0)
-
 
 EFFECT = Effect(
     name="inflow_drag",
@@ -27,6 +16,6 @@ EFFECT = Effect(
     "Bramwell's Helicopter Dynamics, 2001; size: least squares on a 0.77 kg racer at 3 to 14 m/s "
     "(docs/trust.md), in proportion to the disc area",
     excitation="climbs and descents of 3 m/s and more together with 5 m/s and more across the disc",
-    model=effect_model,
+    model="inflow_drag",
     family=Family.FAST_FLIGHT,
 )

@@ -5,18 +5,8 @@ At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kz W_i u_i
 applied at the rotor. Roll and pitch so feel a damping torque. It is the k_z of RotorPy.
 """
 
-from .base import CENTRAL, ROTOR_SPEED, Coefficient, Effect, compiled_model
+from .base import CENTRAL, Coefficient, Effect
 from .declaration import Family, Role
-from .parts import add_force_at, air_velocity, rotor_place
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    for i in range(4):
-        x, y, z = rotor_place(vehicle, i, c[1])
-        uz = air_velocity(state, x, y, z)[2]
-        add_force_at(vehicle, state, wrench, x, y, z, 0.0, 0.0, -c[0] * state[ROTOR_SPEED + i] * uz)
-
 
 EFFECT = Effect(
     name="inflow_thrust",
@@ -29,7 +19,7 @@ EFFECT = Effect(
     "Flight Dynamics and Control, AIAA GNC 2007; sizes: Folk, Paulos and Kumar, RotorPy, 2023",
     excitation="climbs and descents of 0.5 m/s and more; quick roll and pitch for its damping "
     "torque",
-    model=effect_model,
+    model="inflow_thrust",
     family=Family.AERODYNAMICS,
     role=Role.INFLOW_THRUST,
 )

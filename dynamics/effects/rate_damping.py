@@ -1,17 +1,11 @@
 """Rate damping: a torque against the body rate, tau = -diag(dx, dy, dz) omega in body axes."""
 
-from .base import RATE, Effect, along, compiled_model
+from .base import Effect, along
 from .declaration import Family, Found, Need, Role
 
 # least share of the damping about z, about x and y: rotors at the arms climb and sink, and damp
 # these axes more
 _LEAST_SHARE_OF_YAW = 0.3
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        wrench[3 + i] -= c[i] * state[RATE + i]
 
 
 def implausible(found: Found) -> str:
@@ -29,7 +23,7 @@ EFFECT = Effect(
     source="linear damping; sizes: what typical rotor drag and inflow make at the rotors' arms",
     excitation="steady yaw rates of 1 rad/s and more, and quick roll and pitch, with little "
     "translation",
-    model=effect_model,
+    model="rate_damping",
     family=Family.AERODYNAMICS,
     role=Role.RATE_DAMPING,
     implausible=implausible,

@@ -4,17 +4,8 @@ Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered rotor spee
 e_i).
 """
 
-import math
-
-from .base import Coefficient, Effect, compiled_model
+from .base import Coefficient, Effect
 from .declaration import Family, Need, Role
-
-
-@compiled_model
-def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
-    for i in range(4):
-        rotors[i] *= math.sqrt(max(1.0 + c[i], 0.0))
-
 
 EFFECT = Effect(
     name="rotor_efficiency",
@@ -35,7 +26,7 @@ EFFECT = Effect(
     source="definition; a chipped or badly seated propeller loses several per cent",
     excitation="climbs and hard manoeuvres: its torque grows with that rotor's thrust, a steady "
     "torque stays, and an offset centre of mass makes no yaw torque",
-    model=effect_model,
+    model="rotor_efficiency",
     family=Family.THRUST,
     role=Role.ROTOR_THRUSTS,
     needs=(Need.SINGLE_ROTORS,),

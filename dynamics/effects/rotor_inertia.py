@@ -4,19 +4,8 @@ With the angular momentum h = jr sum spin_i W_i along body z: tau = -dh/dt e_z -
 body axes, W being delivered rotor speeds and dW/dt their mean over the step.
 """
 
-from .base import RATE, ROTOR_ACCELERATION, ROTOR_SPEED, SPIN, Coefficient, Effect, compiled_model
+from .base import Coefficient, Effect
 from .declaration import Family, Need
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    momentum = 0.0
-    for i in range(4):
-        momentum += c[0] * vehicle[SPIN + i] * state[ROTOR_SPEED + i]
-        wrench[5] -= c[0] * vehicle[SPIN + i] * state[ROTOR_ACCELERATION + i]
-    wrench[3] -= state[RATE + 1] * momentum
-    wrench[4] += state[RATE] * momentum
-
 
 EFFECT = Effect(
     name="rotor_inertia",
@@ -28,7 +17,7 @@ EFFECT = Effect(
     "and a geared drive; 0.4 g, 0.046 m)",
     excitation="quick changes of yaw rate: rotors that speed up turn the body at once, before "
     "their drag does",
-    model=effect_model,
+    model="rotor_inertia",
     family=Family.ROTOR_DYNAMICS,
     needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS, Need.MOMENTS),
 )

@@ -14,51 +14,8 @@ flight and in climbs, and grows in descents. v is that of momentum theory, of th
 v sqrt(u_h^2 + w^2) = T / (2 rho A).
 """
 
-import math
-
-from ..mean_jet import AIR_DENSITY
-from .base import (
-    ROTOR_RADIUS,
-    ROTOR_SPEED,
-    ROTOR_THRUST,
-    Coefficient,
-    Effect,
-    compiled_model,
-)
+from .base import Coefficient, Effect
 from .declaration import Family, Need
-from .parts import add_force_at, air_velocity, rotor_place
-
-_FOUR_ROTORS = 8.0 * AIR_DENSITY * math.pi  # 4 x 2 rho A over the square of the radius
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    ux, uy, uz = air_velocity(state, 0.0, 0.0, 0.0)
-    along = ux * ux + uy * uy
-    thrust = 0.0
-    for i in range(4):
-        thrust += state[ROTOR_THRUST + i]
-    lean = 1.0
-    if thrust > 0.0:
-        hover = math.sqrt(thrust / _FOUR_ROTORS) / vehicle[ROTOR_RADIUS]  # induced, m/s
-        induced = hover
-        for _step in range(6):  # Newton; bounds keep it out of the vortex ring, where no v solves
-            w = uz + induced
-            flow = max(math.sqrt(along + w * w), 0.1 * hover)
-            slope = max(flow + induced * w / flow, 0.5 * hover)
-            induced -= (induced * flow - hover * hover) / slope
-            induced = min(max(induced, 0.05 * hover), 2.5 * hover)
-        w = uz + induced
-        lean = 2.0 * induced / max(math.sqrt(along + w * w) + w, hover)
-    force = 0.0
-    for i in range(4):
-        x, y, _ = rotor_place(vehicle, i, 0.0)
-        arm = math.sqrt(x * x + y * y)
-        if arm > 0.0:
-            leads = (x * ux + y * uy) / arm
-            force -= state[ROTOR_SPEED + i] * (c[0] * lean * leads + c[1] * max(-leads, 0.0))
-    add_force_at(vehicle, state, wrench, 0.0, 0.0, 0.0, 0.0, 0.0, force)
-
 
 EFFECT = Effect(
     name="rotor_interaction",
@@ -73,7 +30,7 @@ EFFECT = Effect(
     "airspeed over induced velocity",
     excitation="flight at 5 m/s and more along both body axes, with turns that set the rotors "
     "apart; in hover it does nothing",
-    model=effect_model,
+    model="rotor_interaction",
     family=Family.FAST_FLIGHT,
     needs=(Need.SINGLE_ROTORS,),
 )

@@ -17,83 +17,13 @@ import math
 from collections.abc import Sequence
 
 from ..vehicle import Vehicle
-from .base import (
-    HIDDEN,
-    MASS,
-    ROTATION,
-    ROTOR_THRUST,
-    STEP,
-    VELOCITY,
-    WIND,
-    Coefficient,
-    Effect,
-    compiled_model,
-)
+from .base import Coefficient, Effect
 from .declaration import Coefficients, Family, Found, Role, Unexplained
-from .parts import add_force_at
 
 _LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, cables at the start of a fit
 _DAMPINGS = (0.3, 2.0)  # 1/s, the same
 _LEAST_LENGTH = 0.1  # typical lengths
 _MOST_DAMPING_RATIO = 0.2  # of a load that swings in air
-# the effect's own state, from HIDDEN on: 0 whether it has started, 1-3 n, 4-6 n'
-_N, _RATE = HIDDEN + 1, HIDDEN + 4
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    if not (c[0] > 0.0 and c[1] > 0.0):
-        return
-    specific = 0.0
-    for i in range(4):
-        specific += state[ROTOR_THRUST + i] / vehicle[MASS]
-    nx, ny, nz = 0.0, 0.0, -1.0
-    if c[HIDDEN] > 0.0:
-        nx, ny, nz = c[_N], c[_N + 1], c[_N + 2]
-    pull = 0.0
-    for i in range(3):
-        n = nx if i == 0 else ny if i == 1 else nz
-        rate = c[_RATE + i]
-        drag = c[2] * (state[VELOCITY + i] + c[1] * rate - state[WIND + i])
-        pull += c[1] * rate * rate - n * (state[ROTATION + 3 * i + 2] * specific + drag)
-    tension = max(pull / (1.0 / c[0] + 1.0 / vehicle[MASS]), 0.0)
-    # the cable's pull in body axes
-    bx = state[ROTATION] * nx + state[ROTATION + 3] * ny + state[ROTATION + 6] * nz
-    by = state[ROTATION + 1] * nx + state[ROTATION + 4] * ny + state[ROTATION + 7] * nz
-    bz = state[ROTATION + 2] * nx + state[ROTATION + 5] * ny + state[ROTATION + 8] * nz
-    add_force_at(vehicle, state, wrench, 0.0, 0.0, 0.0, tension * bx, tension * by, tension * bz)
-
-
-@compiled_model
-def advance(c, vehicle, state, rotors):  # type: ignore[no-untyped-def]
-    if not (c[0] > 0.0 and c[1] > 0.0):
-        return
-    if c[HIDDEN] == 0.0:
-        c[HIDDEN], c[_N + 2] = 1.0, -1.0
-    dt, specific, pull = rotors[STEP], 0.0, 0.0
-    for i in range(4):
-        specific += state[ROTOR_THRUST + i] / vehicle[MASS]
-    for i in range(3):
-        drag = c[2] * (state[VELOCITY + i] + c[1] * c[_RATE + i] - state[WIND + i])
-        pull += c[1] * c[_RATE + i] ** 2 - c[_N + i] * (
-            state[ROTATION + 3 * i + 2] * specific + drag
-        )
-    pull = max(pull, 0.0)
-    length, turning = 0.0, 0.0
-    for i in range(3):
-        drag = c[2] * (state[VELOCITY + i] + c[1] * c[_RATE + i] - state[WIND + i])
-        c[_RATE + i] -= (
-            dt * (state[ROTATION + 3 * i + 2] * specific + drag + pull * c[_N + i]) / c[1]
-        )
-    for i in range(3):
-        c[_N + i] += dt * c[_RATE + i]
-        length += c[_N + i] ** 2
-    length = math.sqrt(length)
-    for i in range(3):
-        c[_N + i] /= length
-        turning += c[_N + i] * c[_RATE + i]
-    for i in range(3):
-        c[_RATE + i] -= turning * c[_N + i]
 
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
@@ -148,8 +78,7 @@ EFFECT = Effect(
     "Cable-Suspended Load, ICRA 2013; sizes: a tenth of the vehicle's mass",
     excitation="horizontal starts and stops, then hover: the load goes on swinging at its own "
     "frequency, which gives the cable's length",
-    model=effect_model,
-    advance=advance,
+    model="slung_payload",
     family=Family.LOAD,
     role=Role.SUSPENDED_LOAD,
     any_size=True,

@@ -6,18 +6,8 @@ W times the root of that. The time t runs from the start of the flight; in an es
 ``reset``.
 """
 
-import math
-
-from .base import ROTOR_TIME, Coefficient, Effect, compiled_model
+from .base import Coefficient, Effect
 from .declaration import Family, Role
-
-
-@compiled_model
-def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
-    scale = math.sqrt(max(1.0 - c[0] * rotors[ROTOR_TIME], 0.1))
-    for i in range(4):
-        rotors[i] *= scale
-
 
 EFFECT = Effect(
     name="thrust_fade",
@@ -30,7 +20,7 @@ EFFECT = Effect(
     source="definition; size: 6 % in a minute where the logged rates are commands",
     excitation="a minute and more of flight with the battery voltage logged: loads that come and "
     "go move the voltage, and with it sag, but not time",
-    model=effect_model,
+    model="thrust_fade",
     family=Family.THRUST,
     role=Role.THRUST_OVER_TIME,
 )

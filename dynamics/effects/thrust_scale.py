@@ -3,18 +3,8 @@
 Thrust and reaction torque scale by 1 + s: the delivered rotor speed is W sqrt(1 + s).
 """
 
-import math
-
-from .base import Coefficient, Effect, compiled_model
+from .base import Coefficient, Effect
 from .declaration import Family, Role
-
-
-@compiled_model
-def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
-    scale = math.sqrt(max(1.0 + c[0], 0.0))
-    for i in range(4):
-        rotors[i] *= scale
-
 
 EFFECT = Effect(
     name="thrust_scale",
@@ -25,7 +15,7 @@ EFFECT = Effect(
     source="definition; air density and propeller wear change thrust by several per cent",
     excitation="vertical accelerations of 1 m/s2 and more tell it from a mass (both cancel at "
     "hover) and a steady force; a whole battery tells it from sag",
-    model=effect_model,
+    model="thrust_scale",
     family=Family.THRUST,
     role=Role.THRUST,
     any_size=True,

@@ -6,15 +6,15 @@ to them, and they would never be proposed. Such a law must say where a fit start
 (``starting_points``).
 """
 
-import ctypes
-
 import numpy as np
 
+from ... import _core
 from .base import (
     DIRECTION,
     HAS_POSITION,
     HAS_QUATERNION,
     HAS_SPEED,
+    MEMORY,
     ROTORS_SIZE,
     ROW_SIZE,
     SAMPLE_SIZE,
@@ -23,6 +23,7 @@ from .base import (
     Array,
     Effect,
 )
+from .own import addresses, raise_errors
 
 _SAMPLES = 60
 _SIZES = (0.5, 1.5)  # between which every number of vehicle and flight is drawn
@@ -35,6 +36,9 @@ def does_nothing_alone(effect: Effect) -> bool:
 
     Without an action at any state nothing is known; nor for a body effect, without a model of a
     flight.
+
+    Raises:
+        InputError: an error in a user's function.
     """
     if effect.model is None:
         return False
@@ -55,9 +59,10 @@ def does_nothing_alone(effect: Effect) -> bool:
 def _flown(effect: Effect, coefficients: Array) -> Array:
     """Return a law's result at each random state (samples, ...)."""
     rng = np.random.default_rng(1)
+    model, advance = addresses(effect)
     c, wrench = np.zeros(ROW_SIZE), np.zeros(6)
     c[: len(coefficients)] = coefficients
-    memory = np.zeros(max(effect.memory, 1))
+    memory = np.zeros(MEMORY)
     vehicle, state, rotor, sample = (
         rng.uniform(*_SIZES, size) for size in (VEHICLE_SIZE, STATE_SIZE, ROTORS_SIZE, SAMPLE_SIZE)
     )
@@ -72,12 +77,9 @@ def _flown(effect: Effect, coefficients: Array) -> Array:
             numbers[:] = rng.uniform(*_SIZES, len(numbers))
         sample[[DIRECTION, HAS_SPEED, HAS_POSITION, HAS_QUATERNION]] = 1.0
         wrench[:] = 0.0
-        if effect.advance is not None:
-            effect.advance.ctypes(*map(_pointer, (c, vehicle, state, rotor)))
-        effect.model.ctypes(*map(_pointer, (c, vehicle, read, other)))
+        if advance:
+            _core.call_effect(advance, c, vehicle, state, rotor)
+        _core.call_effect(model, c, vehicle, read, other)
+        raise_errors()
         out[k] = written
     return out
-
-
-def _pointer(x: Array) -> "ctypes._Pointer[ctypes.c_double]":
-    return x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))

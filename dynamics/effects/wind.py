@@ -12,25 +12,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .base import VELOCITY, WIND, Coefficient, Effect, compiled_model
+from .base import Coefficient, Effect
 from .declaration import Coefficients, Family, Found, Unexplained
 
 _LEAST_SPEED = 1e-9  # m/s, against a division by zero
 # typical sizes of the wind's own drag, where no other drag feels it: true winds had 0.98 to 1.3,
 # tilted frames 0.01 to 0.04
 _LEAST_DRAG = 0.1
-
-
-@compiled_model
-def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
-    air, ground = 0.0, 0.0
-    for i in range(3):
-        state[WIND + i] += c[i]
-        air += (c[i] - state[VELOCITY + i]) ** 2
-        ground += state[VELOCITY + i] ** 2
-    air, ground = c[3] * math.sqrt(air), c[3] * math.sqrt(ground)
-    for i in range(3):
-        wrench[i] += air * (c[i] - state[VELOCITY + i]) + ground * state[VELOCITY + i]
 
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
@@ -81,7 +69,7 @@ EFFECT = Effect(
     "hangar door",
     excitation="flight with and against the wind at 1 m/s and more; in hover it is a constant "
     "force. Declared drag makes it identifiable",
-    model=effect_model,
+    model="wind",
     sets_wind=True,
     family=Family.SURROUNDINGS,
     starting_points=starting_points,

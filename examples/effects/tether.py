@@ -4,34 +4,21 @@ F = k (hook - x) in the world frame at the geometric centre, with the hook 2.5 m
 origin.
 """
 
-from windwrench.dynamics.effects.base import (
-    COM,
-    POSITION,
-    ROTATION,
-    Coefficient,
-    Effect,
-    compiled_model,
-)
+import numpy as np
 
-HOOK = (0.0, 0.0, 2.5)  # m, world
+from windwrench.dynamics.effects.base import Coefficient, Effect
+
+HOOK = np.array([0.0, 0.0, 2.5])  # m, world
 
 
-@compiled_model
 def effect_model(c, vehicle, state, wrench):
-    """Add force (world) and torque (body, about the centre of mass) to ``wrench`` (6,)."""
-    fx = c[0] * (HOOK[0] - state[POSITION])
-    fy = c[0] * (HOOK[1] - state[POSITION + 1])
-    fz = c[0] * (HOOK[2] - state[POSITION + 2])
-    wrench[0] += fx
-    wrench[1] += fy
-    wrench[2] += fz
-    # the force in body axes; its lever is from the centre of mass to the geometric centre
-    bx = state[ROTATION] * fx + state[ROTATION + 3] * fy + state[ROTATION + 6] * fz
-    by = state[ROTATION + 1] * fx + state[ROTATION + 4] * fy + state[ROTATION + 7] * fz
-    bz = state[ROTATION + 2] * fx + state[ROTATION + 5] * fy + state[ROTATION + 8] * fz
-    wrench[3] -= vehicle[COM + 1] * bz - vehicle[COM + 2] * by
-    wrench[4] -= vehicle[COM + 2] * bx - vehicle[COM] * bz
-    wrench[5] -= vehicle[COM] * by - vehicle[COM + 1] * bx
+    """Add force (3,) in the world, and torque (3,) in the body about the centre of mass."""
+    force = c[0] * (HOOK - state.position)
+    wrench.force += force
+    # the lever is from the centre of mass to the geometric centre; np.cross takes 16 us
+    x, y, z = -vehicle.com
+    fx, fy, fz = force @ state.rotation  # in body axes
+    wrench.torque += y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
 
 EFFECT = Effect(

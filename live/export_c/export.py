@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
-from importlib.resources.abc import Traversable
 from posixpath import dirname, join, normpath
 from typing import Any
 
@@ -19,7 +18,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ... import __version__
 from ...dynamics.effects import get
-from ...dynamics.effects.base import PARAMETERS, ROW_SIZE, Effect
+from ...dynamics.effects.base import MEMORY, PARAMETERS, ROW_SIZE, Effect
 from ...dynamics.mean_jet import jet_table
 from ...dynamics.vehicle import Vehicle
 from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
@@ -37,6 +36,7 @@ ESTIMATORS = tuple(_FILTERS)
 # files written from the template of the name
 TEMPLATES = ("windwrench.h", "windwrench_numbers.hpp", "main.c", "CMakeLists.txt")
 _MEMORY = "body", "centre_rotation"  # fields of a filter's memory, from one to another
+_SHORT_MEMORY = {"motor_lag"}  # equations that remember no more than the model itself: 5 numbers
 _FAN = 0.45, 0.10  # m, radii of the fan and its hub in the effect fan_jet
 _INCLUDE = re.compile(r'^#include "([\w./]+)"', re.M)
 
@@ -95,7 +95,7 @@ def export_c(
     made = kind(vehicle, tuning, period, gate, Recovery())
     flown = None if policy is None else policy_numbers(policy, vehicle, tuning, period)
     f = made.record[0]
-    names = sorted({effect.name for kind in effects.values() for effect in kind})
+    names = sorted({effect.model for kind in effects.values() for effect in kind})
     headers = [f"core/{header}.hpp", *(f"core/effects/{name}.hpp" for name in names)]
     if names:
         headers.append("core/effects/called.hpp")
@@ -154,7 +154,7 @@ def _effects(vehicle: Vehicle) -> dict[str, list[Effect]]:
         effect = get(setting.name)
         if effect.kind == "body":  # its numbers are the vehicle's
             continue
-        if not _file(f"core/effects/{effect.name}.hpp").is_file():
+        if not isinstance(effect.model, str):
             raise InputError(
                 f"{vehicle.name}: effects: {effect.name} is your own, in Python, and cannot be "
                 "exported; expected effects of the kit, or --effects none"
@@ -166,21 +166,21 @@ def _effects(vehicle: Vehicle) -> dict[str, list[Effect]]:
 
 def _room(effects: Mapping[str, list[Effect]]) -> tuple[int, int, int, int]:
     """Return how many effects on wrench, rotors and sensors a model has room for, and numbers of
-    memory of each; the model itself keeps five.
+    memory of each: all, unless no equation delays what it changes.
     """
     wrench, rotor, sensing = (max(1, len(kind)) for kind in effects.values())
-    memory = max(5, *(effect.memory for kind in effects.values() for effect in kind), 0)
-    return wrench, rotor, sensing, memory
-
-
-def _file(path: str) -> Traversable:
-    """Return a file of the package."""
-    return resources.files("windwrench").joinpath(path)
+    remembered = [
+        _source(f"core/effects/{effect.model}.hpp")
+        for effect in effects["rotor"] + effects["sensing"]
+        if effect.model not in _SHORT_MEMORY
+    ]
+    long = any("T *memory" in source for source in remembered)
+    return wrench, rotor, sensing, MEMORY if long else 5
 
 
 def _source(path: str) -> str:
     """Return the text of a file of the package."""
-    return _file(path).read_text(encoding="utf-8")
+    return resources.files("windwrench").joinpath(path).read_text(encoding="utf-8")
 
 
 def _add_header(path: str, files: dict[str, str]) -> None:

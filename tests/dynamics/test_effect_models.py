@@ -17,16 +17,9 @@ from tests.support.vehicles import VEHICLE
 from windwrench import _core
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import compile_effects
-from windwrench.dynamics.effects.base import (
-    ROTOR_ACCELERATION,
-    ROTOR_TIME,
-    ROTORS_SIZE,
-    SAMPLE_SIZE,
-    STATE_SIZE,
-)
-from windwrench.dynamics.effects.call import deliver, report
+from windwrench.dynamics.effects.base import ROTOR_ACCELERATION
 from windwrench.dynamics.mean_jet import jet_table
-from windwrench.dynamics.motion import body_record, effect_wrench
+from windwrench.dynamics.model import MODEL_FIELDS, load_model
 from windwrench.envs.fan import Fan, fan_record
 
 PERIOD = 0.005
@@ -35,6 +28,16 @@ R = Rotation.from_euler("zyx", [2.0, 0.2, -0.3]).as_matrix()
 V = np.array([1.5, -0.7, 0.4])
 OMEGA = np.array([0.5, -1.0, 2.0])
 W = np.array([380.0, 400.0, 420.0, 410.0])
+
+
+class Model:
+    """A vehicle's effects in the core."""
+
+    def __init__(self, vehicle):
+        record = np.zeros(1, dtype=MODEL_FIELDS)
+        load_model(record[0], vehicle)
+        self.memory, self.address = record[0], record.ctypes.data
+        self.record = record
 
 
 def wrench(
@@ -46,49 +49,37 @@ def wrench(
     speeds=W,
 ):
     """Force (world) and torque (body) of a vehicle's effects in the state above."""
-    bundle = compile_effects(vehicle)
-    out = np.full(6, nan)
-    state = np.full(STATE_SIZE, nan)
-    state[ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = acceleration
-    effects = bundle.wrench_models, bundle.wrench_coefficients, bundle.constants
-    place = np.asarray(position, float)
-    wind = np.asarray(wind, float)
-    body = body_record(bundle.vehicle)[0]
-    effect_wrench(*effects, body, place, R, V, omega, speeds, wind, 11.0, 0.0, state, out)
+    model = Model(vehicle)
+    model.memory["effect_state"] = nan
+    model.memory["effect_state"][ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = acceleration
+    model.memory["wind"], model.memory["voltage"] = wind, 11.0
+    model.memory["rotors"][:4] = speeds
+    x = np.concatenate([position, np.full(4, nan), V, omega])
+    _core.apply_effects(model.address, x, np.ascontiguousarray(R))
+    out = model.memory["effect_wrench"]
     return out[:3], out[3:]
 
 
-class Called:
-    """A vehicle's effects on rotor speeds or on what is sensed, called once a period."""
-
-    def __init__(self, vehicle, kind):
-        bundle = compile_effects(vehicle)
-        models = getattr(bundle, f"{kind}_models")
-        size = getattr(bundle, f"{kind}_memory")
-        memory = np.zeros((len(models), size))
-        self.given = models, getattr(bundle, f"{kind}_coefficients"), bundle.constants, memory
-
-
-class Rotors(Called):
-    def __init__(self, vehicle):
-        super().__init__(vehicle, "rotor")
+class Rotors(Model):
+    """A vehicle's effects on rotor speeds, called once a period."""
 
     def __call__(self, speeds, voltage=0.0, dt=PERIOD, time=0.0):
-        rotors = np.zeros(ROTORS_SIZE)
-        rotors[:4], rotors[ROTOR_TIME] = speeds, time
-        deliver(*self.given, dt, voltage, rotors)
-        return rotors[:4]
+        self.memory["time"] = time
+        _core.drive(self.address, np.array(speeds, dtype=float), dt, voltage)
+        return self.memory["rotors"][:4].copy()
 
 
-class Sensing(Called):
+class Sensing(Model):
+    """A vehicle's effects on what is sensed, called once a period."""
+
     def __init__(self, vehicle, direction):
-        super().__init__(vehicle, "sensing")
-        self.direction = direction
+        super().__init__(vehicle)
+        self.direction = int(direction)
 
     def __call__(self, speeds, position, quaternion, parts=7, dt=PERIOD):
-        sample = np.zeros(SAMPLE_SIZE)
-        sample[:11] = np.concatenate([speeds, position, quaternion])
-        report(*self.given, dt, parts, self.direction, sample)
+        self.memory["sample"][:11] = np.concatenate([speeds, position, quaternion])
+        _core.rewrite_sample(self.address, dt, parts, self.direction)
+        sample = self.memory["sample"].copy()
         return sample[:4], sample[4:7], sample[7:11]
 
 

@@ -14,12 +14,11 @@ HOSE = '''"""A pull that comes and goes."""
 
 import math
 
-from windwrench.dynamics.effects.base import TIME, Coefficient, Effect, compiled_model
+from windwrench.dynamics.effects.base import Coefficient, Effect
 
 
-@compiled_model
 def model(c, vehicle, state, wrench):
-    wrench[0] += c[0] * math.sin(c[1] * state[TIME])
+    wrench.force[0] += c[0] * math.sin(c[1] * state.time)
 
 
 EFFECT = Effect(
