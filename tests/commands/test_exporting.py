@@ -7,8 +7,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from tests.support.paths import ROOT
 from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
+from tests.support.paths import ROOT
 from windwrench.commands.identifying import parse_window
 from windwrench.commands.tuning_file import load_tuning, save_tuning
 from windwrench.dynamics import load_vehicle
