@@ -12,7 +12,7 @@ from tests.support.vehicles import VEHICLE
 from windwrench import _core
 from windwrench.controllers.flight import flight_record
 from windwrench.dynamics.effects import get, names, parse_setting
-from windwrench.dynamics.model import MODEL_FIELDS, drive, load_model
+from windwrench.dynamics.model import MODEL_FIELDS, load_model
 from windwrench.dynamics.rotation import quaternion_of_yaw
 from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 
@@ -27,7 +27,7 @@ def made(*texts):
     model = np.zeros(1, dtype=MODEL_FIELDS)
     amended = load_model(model[0], declared)
     for _ in range(40):
-        drive(model[0], _SPEEDS, 0.005, 0.95 * VEHICLE.voltage_ref)
+        _core.drive(model.ctypes.data, _SPEEDS, 0.005, 0.95 * VEHICLE.voltage_ref)
     return flight_record(amended), model
 
 
@@ -46,7 +46,7 @@ def test_commands_deliver_the_wanted_rotor_speeds(name):
     wanted = _SPEEDS * np.array([1.05, 0.97, 1.02, 0.9])
     command, model = commanded(wanted, name)
     assert model["rotor_count"] == 1
-    drive(model, command, HORIZON, float(model["voltage"]))
+    _core.drive(model.ctypes.data, command, HORIZON, float(model["voltage"]))
     assert_allclose(model["rotors"][:4], wanted, rtol=1e-6)
 
 
