@@ -19,6 +19,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import mujoco
@@ -44,6 +45,7 @@ from .plant import (
     PLANT,
     TICK,
     PlantSettings,
+    is_same_body,
     load_world,
     plant_record,
     reset_plant,
@@ -89,6 +91,16 @@ _MUJOCO_STEP = ctypes.cast(ctypes.CDLL(_functions.__file__).mj_step, ctypes.c_vo
 
 # estimators of the wrench in flight
 ESTIMATORS: dict[str, type[WrenchUKF]] = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
+
+
+_NO_JET: Array = np.zeros((2, COUNT_X, COUNT_R))
+
+
+@lru_cache(maxsize=8)
+def _jet(radius: float, hub_radius: float) -> Array:
+    """Return the tables (2, COUNT_X, COUNT_R) of axial and radial speed, one for all loops."""
+    tables: Array = np.stack(jet_table(radius, hub_radius))
+    return tables
 
 
 class World(NamedTuple):
@@ -171,6 +183,7 @@ class ClosedLoop:
         model_in_loop: whether the flight loop counters the effects of ``declared``.
         kind: of the commands in ``action``, once the filter has settled.
         stages: a user's own, in the pipeline of a tick.
+        like: a loop whose MuJoCo model is this one's, too, if the rigid bodies are the same.
 
     Attributes:
         state: (20,) estimated state, laid out as in ``estimator.estimate``.
@@ -208,12 +221,13 @@ class ClosedLoop:
         model_in_loop: bool = False,
         kind: int = BESIDE,
         stages: Sequence[Stage] = (),
+        like: ClosedLoop | None = None,
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
         self.true = declared if true is None else true
         plant, self._body = plant_record(self.true, settings or PlantSettings())
-        self.model, self.data = self._make_world(drawn)
+        self.model, self.data = self._make_world(drawn, like)
         self.own_stages = tuple(stages)
         self.record = np.zeros(1, dtype=LOOP)
         loop = self.record[0]
@@ -221,11 +235,11 @@ class ClosedLoop:
         # the flight loop's model has no effects but those of the body: mass, inertia and its centre
         loop["flight"] = flight_record(compile_effects(declared).vehicle, gains)[0]
         loop["model_in_loop"], self.kind = model_in_loop, kind
-        self.jet_table: Array = np.zeros((2, COUNT_X, COUNT_R))  # axial and radial
+        self.jet_table = _NO_JET
         if fan is not None:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
             loop["fan"]["blown"] = 1  # drag, in still air too
-            self.jet_table = np.stack(jet_table(fan.radius, fan.hub_radius))
+            self.jet_table = _jet(fan.radius, fan.hub_radius)
         self.accelerometer = accelerometer
         self.noise_size = NOISE
         if accelerometer is not None:
@@ -239,7 +253,11 @@ class ClosedLoop:
         self._carried = tuple(self.__dict__)  # to a copy, where ``_bind`` adds the rest
         self._bind()
 
-    def _make_world(self, drawn: bool) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    def _make_world(
+        self, drawn: bool, like: ClosedLoop | None
+    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        if like is not None and is_same_body(like._body, self._body):
+            return like.model, mujoco.MjData(like.model)
         return load_world(self._body, drawn)
 
     def _bind(self) -> None:
@@ -398,12 +416,12 @@ class ClosedLoop:
                 f"ClosedLoop: expected noise (n, {self.noise_size}) and fan_path (m,) or (m, 2); "
                 f"got shapes {noise.shape} and {path.shape}"
             )
-        self.noise, self.fan_path = noise, path
         with Untimed():
             if not self.own_stages and not self.winds.own:  # which are called from Python
                 _core.run_ticks(self.address, path, noise)
                 raise_errors()
                 return
+            self.noise, self.fan_path = noise, path
             for k in range(count):
                 self.row = k
                 for stage in self.stages.values():
