@@ -12,7 +12,7 @@ from ..controllers.wind_observation import (
     OBSERVATION_LIMITS,
     OBSERVATION_SCALES,
 )
-from ..dynamics.rotation import quaternion_to_matrix
+from ..dynamics.rotation import matrix_of
 from .plant import TICK
 from .state import Start, State
 from .task import Task
@@ -135,9 +135,8 @@ class WindHoverEnv(Task):
         """Return ``Task._truth``, the actuators' disturbance (6,) N and Nm, world, and the winds'
         wrench (foresight, 6) over each decision to come, at the vehicle's present place.
         """
-        loop, R = self.loop, np.empty((3, 3))
+        loop, R = self.loop, matrix_of(self.loop.quaternion)
         fan = loop.record["fan"].copy()
-        quaternion_to_matrix(loop.quaternion, R)
         com, ahead = loop.record[0]["plant"]["body"]["com"], np.empty((self.foresight, 6))
         jet, now = loop.jet_table, (loop.position, R, loop.world.qvel, com)
         period = TICK * self.decision_ticks
