@@ -31,6 +31,7 @@ SUBSTEPS = 2
 # unit normals that one tick uses: pose, disturbance, gusts, dropout
 _POSE, _DISTURBANCE, _GUSTS, _DROPOUT = 0, 6, 12, 12 + 3 * STATIONS
 NOISE = _DROPOUT + 1
+_MEMORY = 1 << 14  # bytes of a step's scratch in MuJoCo: 40 times a free body's
 MAX_DELAY = 0.1  # s, of what is kept for later
 _KEPT = round(MAX_DELAY / TICK) + 1
 
@@ -178,6 +179,14 @@ def is_a_body(inertia: Array) -> bool:
     return bool(moments[0] + moments[1] >= moments[2])
 
 
+def is_same_body(one: Vehicle, other: Vehicle) -> bool:
+    """Return whether two vehicles are the same to MuJoCo."""
+    bodies = [
+        np.hstack([v.mass, v.gravity, v.arm_l, v.com, v.inertia.ravel()]) for v in (one, other)
+    ]
+    return np.array_equal(*bodies)
+
+
 def load_world(
     vehicle: Vehicle, drawn: bool = True, add: Callable[[Any], None] | None = None
 ) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
@@ -214,6 +223,8 @@ def load_world(
     if not drawn:
         for part in (*spec.cameras, *spec.lights, spec.body("fan")):
             spec.delete(part)
+    if not drawn and add is None:
+        spec.memory = _MEMORY
     model = spec.compile()
     if add is None:  # no other constraint or spring
         flags = mujoco.mjtDisableBit

@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
 from ..dynamics.effects import compile_effects
+from ..dynamics.effects.own import raise_errors
 from ..dynamics.model import lay_addresses, reset_model, without_addresses
 from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import real_numbers
@@ -75,7 +76,9 @@ def make_calls(
     that is no rotation.
     """
     given = np.ascontiguousarray(calls).view(np.uint8)
-    return _core.make_calls(record.ctypes.data, given, rows, numbers, std, loads, innovations)
+    made = _core.make_calls(record.ctypes.data, given, rows, numbers, std, loads, innovations)
+    raise_errors()
+    return made
 
 
 class WrenchUKF:
@@ -329,7 +332,8 @@ class WrenchUKF:
 
         Raises:
             InputError: a shape or type is wrong, a rotor speed is negative, or the quaternion's
-                length is not 1; the filter stays as it was.
+                length is not 1; the filter stays as it was. Or a declared effect of a user's own
+                raised an error; the step was made without the effect.
         """
         parts = self._sample.read(rotor_speeds, position, quaternion)
         return self._run(parts, self.period, voltage)
@@ -383,6 +387,7 @@ class WrenchUKF:
         volts = self._voltage if voltage is None else voltage
         if self._step_at(self._address, parts, dt, volts) < 0:
             raise self._sample.bad_quaternion()
+        raise_errors()
         return self.estimate
 
 

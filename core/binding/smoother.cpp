@@ -87,7 +87,7 @@ void variances_along(Array<const double, nb::shape<9>> factors,
 }  // namespace
 
 void bind_smoother(nb::module_ &m) {
-  m.attr("ROW_SIZE") = sizeof(FlightRow);
+  m.attr("FLIGHT_ROW_SIZE") = sizeof(FlightRow);
   m.attr("INNOVATION_SIZE") = sizeof(PoseLikelihood);
   m.def("smooth_block", &smooth_block, "memory"_a, "smoothed"_a, "calls"_a, "numbers"_a, "std"_a,
         "Make calls, bytes of the record CALL (n,), of the filter at the address `memory`, and go\n"

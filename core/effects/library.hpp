@@ -3,6 +3,7 @@
 #include "attitude_gain.hpp"
 #include "battery_sag.hpp"
 #include "body_drag.hpp"
+#include "called.hpp"
 #include "ceiling_effect.hpp"
 #include "clock_offset.hpp"
 #include "constant_force.hpp"
@@ -31,60 +32,16 @@
 
 namespace windwrench {
 
-// An equation as a function of four arrays
-template <class T, class Equation, Equation F> struct Called;
-
-template <class T, class State,
-          void (*F)(const T *, const VehicleNumbers<T> &, State &, Wrench<T> &)>
-struct Called<T, void (*)(const T *, const VehicleNumbers<T> &, State &, Wrench<T> &), F> {
-  static void call(T *c, T *vehicle, T *state, T *wrench) {
-    F(c, *reinterpret_cast<VehicleNumbers<T> *>(vehicle), *reinterpret_cast<State *>(state),
-      *reinterpret_cast<Wrench<T> *>(wrench));
-  }
-};
-template <class T, class Values, void (*F)(const T *, const VehicleNumbers<T> &, Values &, T *)>
-struct Called<T, void (*)(const T *, const VehicleNumbers<T> &, Values &, T *), F> {
-  static void call(T *c, T *vehicle, T *values, T *memory) {
-    F(c, *reinterpret_cast<VehicleNumbers<T> *>(vehicle), *reinterpret_cast<Values *>(values),
-      memory);
-  }
-};
-// with a state of its own behind the coefficients
-template <class T, void (*F)(const T *, const T *, const VehicleNumbers<T> &,
-                             const FlightState<T> &, Wrench<T> &)>
-struct Called<T,
-              void (*)(const T *, const T *, const VehicleNumbers<T> &, const FlightState<T> &,
-                       Wrench<T> &),
-              F> {
-  static void call(T *c, T *vehicle, T *state, T *wrench) {
-    F(c, c + HIDDEN, *reinterpret_cast<VehicleNumbers<T> *>(vehicle),
-      *reinterpret_cast<FlightState<T> *>(state), *reinterpret_cast<Wrench<T> *>(wrench));
-  }
-};
-template <class T, void (*F)(const T *, T *, const VehicleNumbers<T> &, const FlightState<T> &,
-                             const Rotors<T> &)>
-struct Called<T,
-              void (*)(const T *, T *, const VehicleNumbers<T> &, const FlightState<T> &,
-                       const Rotors<T> &),
-              F> {
-  static void call(T *c, T *vehicle, T *state, T *rotors) {
-    F(c, c + HIDDEN, *reinterpret_cast<VehicleNumbers<T> *>(vehicle),
-      *reinterpret_cast<FlightState<T> *>(state), *reinterpret_cast<Rotors<T> *>(rotors));
-  }
-};
-
 template <class T> struct LibraryEffect {
   const char *name, *kind;
   EffectModel<T> model, advance;  // advance: null without a state of its own
 };
-constexpr int LIBRARY_EFFECTS = 28;
 
 // All effects with an equation
-template <class T> const LibraryEffect<T> *library() {
-#define CALLED(name) &Called<T, decltype(&name<T, T>), &name<T, T>>::call
-#define EFFECT(kind, name) \
-  { #name, kind, CALLED(name), nullptr }
-  static constexpr LibraryEffect<T> all[LIBRARY_EFFECTS] = {
+template <class T> struct Library {
+#define CALLED(name) called<T, name<T, T>>
+#define EFFECT(kind, name) {#name, kind, CALLED(name), nullptr}
+  static constexpr LibraryEffect<T> all[] = {
       EFFECT("sensing", attitude_gain),
       EFFECT("rotor input", battery_sag),
       EFFECT("wrench", body_drag),
@@ -116,8 +73,9 @@ template <class T> const LibraryEffect<T> *library() {
   };
 #undef EFFECT
 #undef CALLED
-  return all;
-}
+};
+constexpr int LIBRARY_EFFECTS = sizeof(Library<double>::all) / sizeof(LibraryEffect<double>);
+template <class T> const LibraryEffect<T> *library() { return Library<T>::all; }
 
 // The effect of a name, or null: none of the library, or one without an equation
 template <class T> const LibraryEffect<T> *find_effect(const char *name) {

@@ -1,4 +1,4 @@
-"""The wrench filter of a vehicle, and a policy, for a flight controller: the core with a C interface."""
+"""The wrench filter of a vehicle, and a policy, for a flight controller."""
 
 from .export import ESTIMATORS, Exported, export_c
 from .numbers import PRECISIONS

@@ -17,7 +17,9 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ... import __version__
-from ...dynamics.effects.base import PARAMETERS, ROW_SIZE
+from ...dynamics.effects import get
+from ...dynamics.effects.base import MEMORY, PARAMETERS, ROW_SIZE, Effect
+from ...dynamics.mean_jet import jet_table
 from ...dynamics.vehicle import Vehicle
 from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
 from ...estimator.filter_record import FILTER, fields_between
@@ -34,6 +36,8 @@ ESTIMATORS = tuple(_FILTERS)
 # files written from the template of the name
 TEMPLATES = ("windwrench.h", "windwrench_numbers.hpp", "main.c", "CMakeLists.txt")
 _MEMORY = "body", "centre_rotation"  # fields of a filter's memory, from one to another
+_SHORT_MEMORY = {"motor_lag"}  # equations that remember no more than the model itself: 5 numbers
+_FAN = 0.45, 0.10  # m, radii of the fan and its hub in the effect fan_jet
 _INCLUDE = re.compile(r'^#include "([\w./]+)"', re.M)
 
 
@@ -85,13 +89,17 @@ def export_c(
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"{name}: expected a positive number, got {value!r}")
     period = 1.0 / rate
+    effects = _effects(vehicle)
     tuning = UKFTuning.for_vehicle(vehicle, period, rise_time)
     kind, title, header = _FILTERS[estimator]
     made = kind(vehicle, tuning, period, gate, Recovery())
     flown = None if policy is None else policy_numbers(policy, vehicle, tuning, period)
     f = made.record[0]
-    headers = [f"core/{header}.hpp"]
-    room = 1, 1, 1, 5
+    names = sorted({effect.model for kind in effects.values() for effect in kind})
+    headers = [f"core/{header}.hpp", *(f"core/effects/{name}.hpp" for name in names)]
+    if names:
+        headers.append("core/effects/called.hpp")
+    room = _room(effects)
     context: dict[str, Any] = {
         "version": __version__,
         "command": _one_line(command),
@@ -108,6 +116,8 @@ def export_c(
         "hover_speed": f["last_speeds"][0],
         "full_battery": vehicle.voltage_ref,
         "headers": headers,
+        "effects": effects,
+        "jet": [table.ravel() for table in jet_table(*_FAN)] if "fan_jet" in names else None,
         "room": room,
         "size": _size(room, PRECISIONS[precision], estimator),
         "steady": _STEADY,
@@ -131,8 +141,45 @@ def export_c(
     return Exported(files, made, tuple(e.name for e in vehicle.effects), precision)
 
 
+def _effects(vehicle: Vehicle) -> dict[str, list[Effect]]:
+    """Return the effects with an equation by their kind, as a model's fields name them, in the
+    filter's order.
+
+    Raises:
+        InputError: an effect is a user's own.
+    """
+    kinds = {"wrench": "wrench", "rotor input": "rotor", "sensing": "sensing"}
+    found: dict[str, list[Effect]] = {kind: [] for kind in kinds.values()}
+    for setting in vehicle.effects:
+        effect = get(setting.name)
+        if effect.kind == "body":  # its numbers are the vehicle's
+            continue
+        if not isinstance(effect.model, str):
+            raise InputError(
+                f"{vehicle.name}: effects: {effect.name} is your own, in Python, and cannot be "
+                "exported; expected effects of the kit, or --effects none"
+            )
+        found[kinds[effect.kind]].append(effect)
+    found["wrench"].sort(key=lambda effect: not effect.sets_wind)
+    return found
+
+
+def _room(effects: Mapping[str, list[Effect]]) -> tuple[int, int, int, int]:
+    """Return how many effects on wrench, rotors and sensors a model has room for, and numbers of
+    memory of each: all, unless no equation delays what it changes.
+    """
+    wrench, rotor, sensing = (max(1, len(kind)) for kind in effects.values())
+    remembered = [
+        _source(f"core/effects/{effect.model}.hpp")
+        for effect in effects["rotor"] + effects["sensing"]
+        if effect.model not in _SHORT_MEMORY
+    ]
+    long = any("T *memory" in source for source in remembered)
+    return wrench, rotor, sensing, MEMORY if long else 5
+
+
 def _source(path: str) -> str:
-    """Return a file of the package."""
+    """Return the text of a file of the package."""
     return resources.files("windwrench").joinpath(path).read_text(encoding="utf-8")
 
 

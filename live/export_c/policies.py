@@ -125,8 +125,7 @@ def policy_numbers(
     model = sensor_model(briefing_of(vehicle, tuning, period))
     return common | {
         "kind": "tracker",
-        "title": "Fan tracking by a particle filter on the fan's place and velocity, in the fan and "
-        "the air of the scenario base.",
+        "title": "Fan tracking by a particle filter on the fan's place and velocity.",
         "particles": PARTICLES,
         "integers": [
             ("ORDER", ORDER, "decisions that a residual is regressed on"),
@@ -153,5 +152,5 @@ def policy_numbers(
             ("REST", model.variance, "variance that the regression leaves"),
             ("YAW", model.yaw, "integral, angle, rate after a decision; torque and its rate"),
         ],
-        "size": (6 + PARTICLES, 6 + PARTICLES * (2 + 3 + 9 + 3 * ORDER + 2)),
+        "size": (6, 6 + PARTICLES * (2 + 3 + 9 + 3 * ORDER + 3)),
     }

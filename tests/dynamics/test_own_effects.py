@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
 
 from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
@@ -98,6 +99,8 @@ def test_an_effect_in_python_is_the_one_of_the_core(name):
     vehicle = rng.uniform(0.5, 1.5, VEHICLE_SIZE)
     given = [rng.standard_normal((third_size, 200)), rng.standard_normal((ROTORS_SIZE, 200))]
     given[0][4 if name == "motor_lag" else 11] = given[1][4] = 0.005
+    if third_size == STATE_SIZE:
+        given[0][3:12] = Rotation.random(200, 1).as_matrix().reshape(200, 9).T
     if name == "marker_offset":  # a rotation; in every second row there is a position
         given[0][7:11] /= np.linalg.norm(given[0][7:11], axis=0)
         given[0][13] = np.arange(200) % 2
@@ -118,12 +121,12 @@ def test_an_effect_in_python_is_the_one_of_the_core(name):
 
 
 STARTS = "starting_points=lambda flights: [{'a': 0.2, 'w': 3.0}]"
-LATER = "    if state.time > 0.1: wrench.force = state.velosity\n    wrench.force[0] +="
+LATER = "    if state.time > 9.0: wrench.force = state.velosity\n    wrench.force[0] +="
 
 
 def test_an_error_in_an_effect_is_one_line_after_the_step_and_the_filter_goes_on(tmp_path):
     text = HOSE.replace("# more", STARTS).replace("    wrench.force[0] +=", LATER)
-    (tmp_path / "hose.py").write_text(text.replace("0.1:", "9.0:"))
+    (tmp_path / "hose.py").write_text(text)
     with joined(tmp_path):
         ukf = WrenchUKF(VEHICLE.with_effects(EffectSetting("hose", {"a": 0.2, "w": 3.0})))
         ukf.reset(np.zeros(3), [1.0, 0.0, 0.0, 0.0])

@@ -1,6 +1,5 @@
-"""The exported C filter and its policies against the Python ones, and what must not happen."""
+"""The exported filter and its policies against the Python ones, and what must not happen."""
 
-import ctypes
 import re
 import shutil
 from dataclasses import replace
@@ -15,6 +14,7 @@ from tests.support.exported_c import firmware
 from tests.support.exported_c.compiled import (
     PARTS,
     STRICT,
+    STRICT_C,
     CompiledFilter,
     begin,
     compare,
@@ -27,6 +27,7 @@ from tests.support.exported_c.compiled import (
 )
 from tests.support.exported_c.flights import FLIGHTS, flight, vehicle_of
 from tests.support.exported_c.hostile import PERIOD, hostile
+from tests.support.own_effects import HOSE, joined
 from tests.support.paths import ROOT
 from tests.support.synthetic_wrench import TICKS, observations
 from tests.support.vehicles import VEHICLE
@@ -34,12 +35,12 @@ from windwrench.controllers import Tracker
 from windwrench.controllers.observation import FORCE_X, TORQUE_Z, VELOCITY_Y
 from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.effects import compile_effects, get, parse_setting
-from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZE
+from windwrench.dynamics.effects import names, parse_setting
 from windwrench.estimator import UKFTuning
 from windwrench.evidence.recovery import QUIET_NOISES, exact_flight, measured
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.policies import PARTICLES, briefing_of
+from windwrench.runtime.errors import InputError
 
 LARGEST = 0.01  # of a standard deviation
 QUICK = 1_200  # steps of each of five flights
@@ -125,7 +126,7 @@ HOSTILE = [
     ("ukf", 0.9999, False, "double"),
     ("ukf", 0.9999, True, "double"),
 ]
-ROUNDING = {"single": 0.05, "double": 1e-6}  # of a standard deviation
+ROUNDING = {"single": 0.05, "double": 0.0}  # of a standard deviation
 OTHERS = [(*given, *(ROUNDING.keys() - {precision})) for *given, precision in HOSTILE]
 
 
@@ -139,7 +140,9 @@ OTHERS = [(*given, *(ROUNDING.keys() - {precision})) for *given, precision in HO
 def test_c_and_python_agree_along_hostile_sequences(
     estimator, gate, imu, precision, seeds, tmp_path
 ):
-    """Statuses and counts of restarts at every step, estimates and deviations within rounding."""
+    """Statuses and counts of restarts at every step, estimates and deviations within rounding: in
+    double to the bit.
+    """
     exported = export_c(VEHICLE, estimator, rate=1.0 / PERIOD, gate=gate, precision=precision)
     if precision == "double":
         code = exported.files["windwrench_numbers.hpp"]
@@ -152,7 +155,8 @@ def test_c_and_python_agree_along_hostile_sequences(
             del flown["gyro"], flown["accelerometer"]
         worst = compare(c, exported.filter, flown)
         assert worst["status"] == 0.0, seed
-        assert max(worst[part] for part in (*PARTS, "std")) < ROUNDING[precision], (seed, worst)
+        assert max(worst[part] for part in PARTS) <= ROUNDING[precision], (seed, worst)
+        assert worst["std"] <= max(ROUNDING[precision], 1e-15), (seed, worst)
         restarts += worst["restarts"]
     assert restarts > 0
 
@@ -182,7 +186,7 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
     """With everything in it: effects, an offset centre of mass, a policy. What gcc sees only as it
     optimises is an error wherever ``CompiledFilter`` compiles.
     """
-    compiler = "gcc" if missing("clang") else "clang"
+    compiler = "g++" if missing("clang++") else "clang++"
     effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
     model = declaring(VEHICLE, *effects)
     few = model.with_effects(model.effects[0])
@@ -194,18 +198,19 @@ def test_compilers_find_nothing_to_say(estimator, tmp_path):
             ("double", export_c(few, estimator, gate=None, policy=policy, precision="double")),
         ):
             folder = write(exported, tmp_path / f"{name}-{precision}")
-            run(compiler, *STRICT, "-fsyntax-only", "windwrench_filter.c", "main.c", cwd=folder)
+            run(compiler, *STRICT, "-fsyntax-only", "windwrench.cpp", cwd=folder)
+            run("gcc", *STRICT_C, "-fsyntax-only", "main.c", cwd=folder)
 
 
 def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
     needs("nm")
-    model = declaring(VEHICLE, *exportable_effects())
-    allowed = {*(f"{name}f" for name in FUNCTIONS), "memcpy", "memset"}
+    model = declaring(replace(VEHICLE, ceiling_z=3.0), *names()[::2])
+    functions = ("sqrt", "sin", "cos", "exp", "expm1", "log", "pow", "atan2", "tanh")
+    allowed = {*(f"{name}f" for name in functions), "memcpy", "memset"}
     folder = write(export_c(model, policy=exportable_policy("sac-0")), tmp_path)
     # a compiler that optimises may make one call of two (sincosf), or none
-    plain = ("-std=c99", "-O0", "-fno-stack-protector", "-c")
-    run("gcc", *plain, "windwrench_filter.c", cwd=folder)
-    called = run("nm", "-u", "windwrench_filter.o", cwd=folder).split()[1::2]
+    run("g++", *STRICT, "-O0", "-fno-stack-protector", "-c", "windwrench.cpp", cwd=folder)
+    called = run("nm", "-u", "windwrench.o", cwd=folder).split()[1::2]
     assert set(called) - {"_GLOBAL_OFFSET_TABLE_"} <= allowed
 
 
@@ -221,11 +226,12 @@ def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, steps, 
     write(exported, tmp_path)
     shutil.copy(ROOT / "tests/support/exported_c/faults.c", tmp_path)
     speed = float(exported.filter.record[0]["last_speeds"][0])
+    sanitised = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+    options = ("-O1" if steps > 20_000 else "-O0", *sanitised)
+    run("g++", *STRICT, *options, "-c", "windwrench.cpp", cwd=tmp_path)
     run(
-        *("gcc", "-std=c99", "-O1" if steps > 20_000 else "-O0"),
-        *("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
-        *(f"-DSTEPS={steps}L", f"-DSPEED={speed}f"),
-        *("faults.c", "windwrench_filter.c", "-o", "faults", "-lm"),
+        *("gcc", "-std=c99", *options, f"-DSTEPS={steps}L", f"-DSPEED={speed}f"),
+        *("faults.c", "windwrench.o", "-o", "faults", "-lm"),
         cwd=tmp_path,
     )
     status, height, along = run("./faults", cwd=tmp_path).split()
@@ -234,47 +240,22 @@ def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, steps, 
     assert abs(float(along)) == pytest.approx(1.0, abs=1e-4)
 
 
-def test_effects_in_c_are_those_in_python(tmp_path):
-    model = replace(VEHICLE, ceiling_z=3.0)
-    names = [n for n in exportable_effects() if get(n).kind != "body"]
-    assert {"rotor_drag", "body_drag", "inflow_thrust", "motor_lag", "ground_effect"} <= set(names)
-    model = declaring(model, *names)
-    folder = write(export_c(model, "ukf"), tmp_path)
-    # its functions are the file's own: here they are called from outside
-    text = (folder / "windwrench_filter.c").read_text()
-    (folder / "effects.c").write_text(text.replace("static void effect_", "void effect_"))
-    run("gcc", "-std=c99", "-O1", "-shared", "-fPIC", "effects.c", "-o", "e.so", "-lm", cwd=folder)
-    library = ctypes.CDLL(str(folder / "e.so"))
-    vehicle = compile_effects(model).constants
-    rng = default_rng(0)
-    for name in names:
-        effect = get(name)
-        for _ in range(5):
-            c = np.zeros(16)
-            c[: len(effect.coefficients)] = effect.vector(parse_setting(name, model).coefficients)
-            state = rng.uniform(0.2, 2.0, STATE_SIZE)
-            state[18:22] = rng.uniform(300.0, 500.0, 4)
-            rotors = rng.uniform(300.0, 500.0, ROTORS_SIZE)
-            memory = np.zeros(112)
-            rotors[4:] = (0.005, 10.0, 2.0)
-            memory[:5] = (1.0, 410.0, 420.0, 430.0, 440.0)
-            sample = rng.uniform(0.2, 2.0, SAMPLE_SIZE)
-            sample[7:11] /= norm(sample[7:11])
-            sample[12:16] = 1.0, 1.0, 1.0, rng.choice([-1.0, 1.0])
-            third, fourth = {
-                "wrench": (state, np.zeros(6)),
-                "rotor input": (rotors, memory),
-                "sensing": (sample, np.zeros(112)),
-            }[effect.kind]
-            given = [x.astype(np.float32) for x in (c, vehicle, third, fourth)]
-            double = [x.astype(np.float64) for x in given]
-            pointers = [x.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for x in double]
-            effect.model.ctypes(*pointers)
-            getattr(library, f"effect_{name}")(*(ctypes.c_void_p(x.ctypes.data) for x in given))
-            which = 3 if effect.kind == "wrench" else 2
-            assert (double[which] != 0.0).any(), name
-            scale = abs(double[which]).max()
-            assert_allclose(given[which], double[which], rtol=0, atol=1e-5 * scale)
+# a model has room for 16 of a kind; the constant gain does not converge under a slung payload
+@pytest.mark.parametrize(("estimator", "half"), [("ukf", 0), ("ukf", 1), ("constant-gain", 1)])
+def test_every_effect_works_as_in_python_to_the_bit(estimator, half, tmp_path):
+    model = declaring(replace(vehicle_of(TURNING), ceiling_z=3.0), *names()[half::2])
+    exported = export_c(model, estimator, precision="double")
+    c = CompiledFilter(exported, tmp_path)
+    worst = compare(c, exported.filter, flight(TURNING, 200, faults=False), 5)
+    assert worst["status"] == 0.0
+    assert all(worst[part] == 0.0 for part in PARTS), worst
+
+
+def test_an_effect_of_ones_own_is_refused(tmp_path):
+    start = "starting_points=lambda *_: [{'a': 0.1, 'w': 1.0}],"
+    (tmp_path / "hose.py").write_text(HOSE.replace("# more", start))
+    with joined(tmp_path), pytest.raises(InputError, match="hose is your own"):
+        export_c(declaring(VEHICLE, "hose"))
 
 
 def commands(c, seen):
@@ -313,7 +294,8 @@ def test_the_law_with_lead(tmp_path):
 
 def test_the_example_finds_the_force_that_it_is_given(tmp_path):
     folder = write(export_c(load_vehicle("crazyflie"), "ukf"), tmp_path / "source")
-    run("gcc", *STRICT, "-O1", "main.c", "windwrench_filter.c", "-o", "main", "-lm", cwd=folder)
+    run("g++", *STRICT, "-O1", "-c", "windwrench.cpp", cwd=folder)
+    run("gcc", *STRICT_C, "main.c", "windwrench.o", "-o", "main", "-lm", cwd=folder)
     said = run("./main", cwd=folder)
     assert said.startswith("force 0.")
     assert float(said.split()[1]) == pytest.approx(0.2, abs=0.02)
@@ -329,8 +311,8 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
     needs(*firmware.TOOLS)
     flown = flight(TURNING, 150, faults=False)
     for estimator, ram, instructions in (
-        ("constant-gain", 1_152, 8_400),
-        ("ukf", 16_384, 168_000),
+        ("constant-gain", 3_200, 8_400),
+        ("ukf", 6_144, 96_000),
     ):
         exported = export_c(vehicle_of(TURNING), estimator)
         board = firmware.fly(exported, flown, tmp_path / estimator)
@@ -359,7 +341,7 @@ def test_names_cannot_end_the_comment_that_holds_them(tmp_path):
     exported, again = (export_c(model, command="windwrench */\n#error") for _ in range(2))
     assert exported.files == again.files  # the same bytes
     folder = write(exported, tmp_path)
-    run("gcc", *STRICT, "-fsyntax-only", "windwrench_filter.c", cwd=folder)
+    run("g++", *STRICT, "-fsyntax-only", "windwrench.cpp", cwd=folder)
 
 
 BRIEFING = briefing_of(VEHICLE, UKFTuning.for_vehicle(VEHICLE, 0.005, 0.45), 0.005)
