@@ -1,6 +1,6 @@
 """The compiled core: what is computed at every step."""
 
-from typing import Annotated
+from typing import Annotated, Final, overload
 
 import numpy
 from numpy.typing import NDArray
@@ -69,6 +69,76 @@ class SingleBatch:
 
     def __getstate__(self) -> tuple[int, bytes]: ...
     def __setstate__(self, arg: tuple[int, bytes], /) -> None: ...
+
+CONSTANT_GAIN_SIZE: int
+
+def step_with_gain(address: int, parts: int, dt: float, voltage: float) -> int:
+    """Do what `step` does with a filter whose gain is constant in steady flight."""
+
+def step_with_gain_address() -> int:
+    """Return the address of `step_with_gain`: a C function with the same arguments."""
+
+def hold_still(
+    address: int,
+    z: Annotated[NDArray[numpy.float64], dict(shape=(11), order="C", device="cpu", writable=False)],
+    steps: int,
+    voltage: float,
+) -> None:
+    """Step a filter through periods with one sample (11,), rotor speeds and pose."""
+
+def hover_jacobian(
+    address: int,
+    voltage: float,
+    out: Annotated[NDArray[numpy.float64], dict(shape=(6, 18), order="C", device="cpu")],
+) -> None:
+    """Write the derivatives (6, 18) of angular (body) and linear acceleration by the error
+    state of a filter that hovers at its last rotor speeds; voltage in V.
+    """
+
+@overload
+def drive(
+    address: int,
+    speeds: Annotated[
+        NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)
+    ],
+    dt: float,
+    voltage: float,
+) -> None:
+    """Let the rotors of a filter's model deliver over dt s at logged speeds (4,), rad/s."""
+
+@overload
+def drive(
+    address: int,
+    rotor_speeds: Annotated[
+        NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)
+    ],
+    dt: float,
+    voltage: float,
+) -> None:
+    """Work out in the model at an address what its rotors deliver over dt s at the logged rotor
+    speeds (4,), rad/s; voltage in V, 0 where it is not known.
+    """
+
+def move(
+    address: int,
+    x: Annotated[NDArray[numpy.float64], dict(shape=(20), order="C", device="cpu", writable=False)],
+    dt: float,
+    out: Annotated[NDArray[numpy.float64], dict(shape=(20), order="C", device="cpu")],
+    jacobian: Annotated[NDArray[numpy.float64], dict(shape=(12, 18), order="C", device="cpu")]
+    | None = None,
+) -> None:
+    """Write the state (20,) that follows x (20,) after dt s by a filter's model, as driven, and
+    the first 12 rows (12, 18) of the Jacobian of its error state less the identity.
+    """
+
+def expected_imu(
+    address: int,
+    x: Annotated[NDArray[numpy.float64], dict(shape=(20), order="C", device="cpu", writable=False)],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu")],
+) -> None:
+    """Write what gyro, rad/s, and accelerometer, m/s2, would measure (6,) without bias in a
+    state x (20,), as driven.
+    """
 
 FLIGHT_SIZE: int
 
@@ -148,12 +218,345 @@ def weigh(
     tables; at the first decision, 0, the filter has settled on the jet where it is.
     """
 
+def acting_wrench(
+    model: int,
+    period: float,
+    speeds: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 4), order="C", device="cpu", writable=False)
+    ],
+    voltage: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    position: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    rotation: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3, 3), order="C", device="cpu", writable=False)
+    ],
+    velocity: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    rate: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    turning: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    mass: float,
+    inertia: Annotated[
+        NDArray[numpy.float64], dict(shape=(3, 3), order="C", device="cpu", writable=False)
+    ],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu")],
+) -> None:
+    """Write the force (N, world) and torque (Nm, body) of a model's accelerations along a flight,
+    for a body of this mass and inertia, at each sample (n, 6); turning: measured angular
+    acceleration (n, 3) rad/s2.
+    """
+
+def undo_sensing(
+    model: int,
+    t: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    seen: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    samples: Annotated[NDArray[numpy.float64], dict(shape=(None, 11), order="C", device="cpu")],
+) -> None:
+    """Bring samples (n, 11), rotor speeds and pose, back to the truth in place; rows `seen` have
+    a pose.
+    """
+
+def predict_flight(
+    model: int,
+    t: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    speeds: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 4), order="C", device="cpu", writable=False)
+    ],
+    voltage: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    states: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 13), order="C", device="cpu", writable=False)
+    ],
+    starts: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    period: float,
+    keeps_velocity: bool,
+    path: Annotated[NDArray[numpy.float64], dict(shape=(None, None, 13), order="C", device="cpu")],
+) -> None:
+    """Run a model along a flight of states (n, 13), and a copy of it from each start, a row;
+    write the copy's states (starts, ahead, 13), a period (s) apart. With keeps_velocity no
+    force acts.
+    """
+
+def choose_likeliest(
+    last: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    posed: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    numbers: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    innovations: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 12), order="C", device="cpu", writable=False)
+    ],
+    states: Annotated[NDArray[numpy.float64], dict(shape=(None, 13), order="C", device="cpu")],
+    best: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+) -> None:
+    """Write the state (n, 13) after the `last` of a filter's calls of each row, and the
+    log-likelihood (n,) of the poses so far, where this is larger than of the filters before.
+    Calls: `posed` with a pose, numbers (calls, 13 or more), innovations (calls, 12).
+    """
+
+def run_causal_filter(
+    model: int,
+    period: float,
+    speeds: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 4), order="C", device="cpu", writable=False)
+    ],
+    voltage: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    position: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    quaternion: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 4), order="C", device="cpu", writable=False)
+    ],
+    begun: Annotated[
+        NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu", writable=False)
+    ],
+    gain: Annotated[
+        NDArray[numpy.float64], dict(shape=(6, 3, 2), order="C", device="cpu", writable=False)
+    ],
+    keep: Annotated[
+        NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu", writable=False)
+    ],
+    known: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 6, 3), order="C", device="cpu", writable=False)
+    ],
+    at_position: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu")],
+    at_rotation: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3, 3), order="C", device="cpu")
+    ],
+    at_velocity: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu")],
+    at_rate: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu")],
+    acceleration: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu")],
+    rotors: Annotated[NDArray[numpy.float64], dict(shape=(None, 4), order="C", device="cpu")],
+    model_alone: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu")],
+    predicted: Annotated[NDArray[numpy.float64], dict(shape=(None, 7), order="C", device="cpu")],
+    heading: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order="C", device="cpu")],
+    innovations: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu")],
+    disturbance: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu")],
+) -> None:
+    """Run the causal filter of a model over poses; write the fields of its track."""
+
+def sensitivities(
+    period: float,
+    gain: Annotated[
+        NDArray[numpy.float64], dict(shape=(6, 3, 2), order="C", device="cpu", writable=False)
+    ],
+    keep: Annotated[
+        NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu", writable=False)
+    ],
+    heading: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 2), order="C", device="cpu", writable=False)
+    ],
+    pull: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3, 2), order="C", device="cpu", writable=False)
+    ],
+    rate: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    gyration: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3, 3), order="C", device="cpu", writable=False)
+    ],
+    acting: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu", writable=False)
+    ],
+    moved: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu", writable=False)
+    ],
+    jumps: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu", writable=False)
+    ],
+    jump_state: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    slopes: Annotated[
+        NDArray[numpy.float64], dict(shape=(6, 7, None), order="C", device="cpu", writable=False)
+    ],
+    innovations: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
+    ],
+    disturbance: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
+    ],
+    state: Annotated[NDArray[numpy.float64], dict(shape=(6, 3, None), order="C", device="cpu")],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu")],
+) -> None:
+    """Write the change of the innovations' predictions (n, 6, c) with a unit of each column."""
+
+def evidence(
+    normal: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    right: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    low: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    high: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    mode: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+    std: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+) -> float:
+    """Return the logarithm of the evidence of n columns of a quadratic log-likelihood; write the
+    mode of the posterior and its standard deviations (n,). NaN: no prior tells columns apart.
+    """
+
+def bounded_mode(
+    normal: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    right: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    low: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    high: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    mode: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+) -> bool:
+    """Write the maximum (n,) of `right @ x - x @ normal @ x / 2` within bounds; return whether
+    there is one.
+    """
+
+def low_pass(
+    x: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+    section: Annotated[
+        NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu", writable=False)
+    ],
+    start: Annotated[
+        NDArray[numpy.float64], dict(shape=(2), order="C", device="cpu", writable=False)
+    ],
+) -> None:
+    """Run a second-order section (6,) over columns (n, k) in place, forwards and backwards;
+    start (2,): the memory of a one.
+    """
+
+def level_attitude(
+    gyro: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    force: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    dt: float,
+    time: float,
+    start: Annotated[
+        NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)
+    ],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(None, 4), order="C", device="cpu")],
+) -> None:
+    """Write the attitude (n, 4) integrated from the gyro (n, 3) and levelled over `time` s by the
+    specific force (n, 3), both every dt s.
+    """
+
+def smooth_inertial_motion(
+    F: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 15, 15), order="C", device="cpu", writable=False)
+    ],
+    defect: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 15), order="C", device="cpu", writable=False)
+    ],
+    noise: Annotated[
+        NDArray[numpy.float64], dict(shape=(15), order="C", device="cpu", writable=False)
+    ],
+    knots: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    firsts: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    late: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    off: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
+    ],
+    variances: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    x: Annotated[NDArray[numpy.float64], dict(shape=(None, 15), order="C", device="cpu")],
+    std: Annotated[NDArray[numpy.float64], dict(shape=(None, 15), order="C", device="cpu")],
+) -> bool:
+    """Smooth an error state (m, 15) with steps F (m - 1, 15, 15) and defects between knots;
+    x and std hold the prior in their first rows. Return whether all covariances are regular.
+    """
+
+MODEL_SIZE: int
+
+def effect_addresses(name: str, kind: str) -> tuple[int, int]:
+    """Return the addresses of an effect's equation and of its `advance`, C functions of four
+    arrays of doubles; 0 where the library has none of this kind: wrench, rotor input,
+    sensing.
+    """
+
+def call_effect(
+    address: int,
+    c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+    vehicle: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+    third: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+    fourth: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu")],
+) -> None:
+    """Call the effect at an address with its four arrays, in place."""
+
+def set_jet_table(
+    axial: Annotated[
+        NDArray[numpy.float64], dict(shape=(137, 151), order="C", device="cpu", writable=False)
+    ],
+    radial: Annotated[
+        NDArray[numpy.float64], dict(shape=(137, 151), order="C", device="cpu", writable=False)
+    ],
+) -> None:
+    """Give the effect fan_jet the axial and radial speeds (137, 151) of a jet with u0 = 1."""
+
+def apply_effects(
+    address: int,
+    x: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    rotation: Annotated[
+        NDArray[numpy.float64], dict(shape=(3, 3), order="C", device="cpu", writable=False)
+    ],
+) -> None:
+    """Write in the model at an address the wrench of its effects at a state: x begins with
+    position m, quaternion, velocity m/s (world) and rate rad/s (body); rotation (3, 3) is from
+    body to world.
+    """
+
+def rewrite_sample(address: int, dt: float, parts: int, direction: int) -> None:
+    """Change rotor speeds and pose in the sample of the model at an address from truth to report
+    (direction 1) or back (-1); parts: 1 position, 2 attitude, 4 rotor speeds.
+    """
+
 FILTER_SIZE: int
 
-def step(address: int, parts: int, dt: float, voltage: float, white: int) -> int:
+def step(address: int, parts: int, dt: float, voltage: float) -> int:
     """Predict the filter at an address over dt s if that is positive, then correct with the
     parts (1 position, 2 attitude) of the sample in its memory that were measured; voltage in
-    V. The pose's whitened innovation (6,) is written at the address `white`.
+    V. The memory then also has the pose's whitened innovation.
 
     Return the parts that could be used, or -1, with the filter as it was, if the quaternion
     is no rotation.
@@ -223,6 +626,419 @@ def make_calls(
     pose, and the diagonal of the root of its covariance. Return the number of calls up to a
     quaternion that is no rotation.
     """
+
+class LoopBlocks:
+    def __init__(
+        self,
+        like: int,
+        count: int,
+        follows: bool,
+        moves: bool,
+        places: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+    ) -> None:
+        """Closed loops side by side, one to each lane of `count` blocks, all like the one at an
+        address. follows: whether the set point is a row of the reference; moves: whether
+        commands are velocities of the set point; places (n,) of commands in the set point, or
+        in the action. ValueError: an effect of a vehicle is written in Python.
+        """
+
+    def __len__(self) -> int: ...
+
+    lanes: Final[int] = ...
+    """(arg: object, /) -> int"""
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of a block."""
+
+    def put(self, block: int, first: int, last: int, address: int) -> None:
+        """Let lanes `first` to `last - 1` of a block stand where the loop at an address stands."""
+
+    def take(self, block: int, lane: int, other: LoopBlocks, source: int) -> None:
+        """Let a lane of a block stand where the same lane of another's block stands."""
+
+    def fly(
+        self,
+        begin: int,
+        end: int,
+        slots: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        scene: Scene,
+        kind: int,
+        done: int,
+        count: int,
+        noise: Annotated[
+            NDArray[numpy.float64],
+            dict(shape=(None, None, None), order="C", device="cpu", writable=False),
+        ],
+        winds: Annotated[
+            NDArray[numpy.int64],
+            dict(shape=(None, None, 2), order="C", device="cpu", writable=False),
+        ],
+        wind_counts: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+    ) -> None:
+        """Fly blocks `begin` to `end - 1` for the ticks of noise (n, ticks, size), unit normals,
+        those from `done` on of a run of `count`. slots (lanes,): the environment in each lane;
+        -1: no flight. kind: of the commands; winds (n, most, 2): calls of each environment's,
+        and their number (n,).
+        """
+
+    def look(
+        self,
+        which: Annotated[
+            NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        scene: Scene,
+    ) -> None:
+        """Let environments of which (n,) with numbers too large start over; write the rows of all."""
+
+    def view(self, name: str) -> NDArray[numpy.float64]:
+        """Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,
+        actuator_late or pose_late.
+        """
+
+    def fly_freely(self, dt: float, steps: int) -> None:
+        """Carry the free bodies on by steps of dt s at the wrench in xfrc."""
+
+    def state(self) -> bytes:
+        """Return all memory."""
+
+    def restore(self, state: bytes, like: int) -> None:
+        """Stand where the blocks of a state stood, of loops like the one at an address."""
+
+class SingleLoopBlocks:
+    def __init__(
+        self,
+        like: int,
+        count: int,
+        follows: bool,
+        moves: bool,
+        places: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+    ) -> None:
+        """Closed loops side by side, one to each lane of `count` blocks, all like the one at an
+        address. follows: whether the set point is a row of the reference; moves: whether
+        commands are velocities of the set point; places (n,) of commands in the set point, or
+        in the action. ValueError: an effect of a vehicle is written in Python.
+        """
+
+    def __len__(self) -> int: ...
+
+    lanes: Final[int] = ...
+    """(arg: object, /) -> int"""
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of a block."""
+
+    def put(self, block: int, first: int, last: int, address: int) -> None:
+        """Let lanes `first` to `last - 1` of a block stand where the loop at an address stands."""
+
+    def take(self, block: int, lane: int, other: SingleLoopBlocks, source: int) -> None:
+        """Let a lane of a block stand where the same lane of another's block stands."""
+
+    def fly(
+        self,
+        begin: int,
+        end: int,
+        slots: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        scene: Scene,
+        kind: int,
+        done: int,
+        count: int,
+        noise: Annotated[
+            NDArray[numpy.float64],
+            dict(shape=(None, None, None), order="C", device="cpu", writable=False),
+        ],
+        winds: Annotated[
+            NDArray[numpy.int64],
+            dict(shape=(None, None, 2), order="C", device="cpu", writable=False),
+        ],
+        wind_counts: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+    ) -> None:
+        """Fly blocks `begin` to `end - 1` for the ticks of noise (n, ticks, size), unit normals,
+        those from `done` on of a run of `count`. slots (lanes,): the environment in each lane;
+        -1: no flight. kind: of the commands; winds (n, most, 2): calls of each environment's,
+        and their number (n,).
+        """
+
+    def look(
+        self,
+        which: Annotated[
+            NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        scene: Scene,
+    ) -> None:
+        """Let environments of which (n,) with numbers too large start over; write the rows of all."""
+
+    def view(self, name: str) -> NDArray[numpy.float32]:
+        """Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,
+        actuator_late or pose_late.
+        """
+
+    def fly_freely(self, dt: float, steps: int) -> None:
+        """Carry the free bodies on by steps of dt s at the wrench in xfrc."""
+
+    def state(self) -> bytes:
+        """Return all memory."""
+
+    def restore(self, state: bytes, like: int) -> None:
+        """Stand where the blocks of a state stood, of loops like the one at an address."""
+
+def decode_blackbox(
+    data: Annotated[
+        NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    begin: int,
+    encodings: Annotated[
+        NDArray[numpy.int64], dict(shape=(6, None), order="C", device="cpu", writable=False)
+    ],
+    predictors: Annotated[
+        NDArray[numpy.int64], dict(shape=(6, None), order="C", device="cpu", writable=False)
+    ],
+    counts: Annotated[
+        NDArray[numpy.int64], dict(shape=(5), order="C", device="cpu", writable=False)
+    ],
+    intervals: Annotated[
+        NDArray[numpy.int64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    constants: Annotated[
+        NDArray[numpy.int64], dict(shape=(257), order="C", device="cpu", writable=False)
+    ],
+    places: Annotated[
+        NDArray[numpy.int64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    keep: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    rows: Annotated[NDArray[numpy.int64], dict(shape=(None, None), order="C", device="cpu")],
+) -> tuple[int, int]:
+    """Decode the main frames of a blackbox, its bytes up to the log's end, from `begin` on.
+
+    Of F fields: encodings and predictors (6, F) of I, P, S, G and H frames and of none, their counts of
+    fields (5,), intervals (3,) of I frames and of P frames as a fraction, in loops; the
+    constants (257,) of the predictors; the places (3,) of the fields loopIteration, time and
+    motor[0], -1 for none. The wanted fields, `keep` (K,), are written into rows (N, K).
+    Return how many frames, of N at most, were decoded, and how many were not.
+    """
+
+def walk_dataflash(
+    data: Annotated[
+        NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    places: Annotated[NDArray[numpy.int32], dict(shape=(None,), order="C", device="cpu")],
+    kinds: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu")],
+) -> tuple[int, int]:
+    """Write the places and types of all messages of a DataFlash log, at most one for each three
+    bytes. Return how many they are, and how many bytes they take.
+    """
+
+OBSERVER_SIZE: int
+
+def step_extended(address: int, parts: int, dt: float, voltage: float) -> int:
+    """Do what `step` does with an extended Kalman filter."""
+
+def step_extended_address() -> int:
+    """Return the address of `step_extended`: a C function with the same arguments."""
+
+def start_observer(filter: int, observer: int) -> None:
+    """Start an observer at the pose and twist of the state of a filter's memory."""
+
+def step_observer(filter: int, observer: int, parts: int, dt: float, voltage: float) -> int:
+    """Carry an observer dt s on, its period, with the parts (1 position, 2 attitude) of the
+    sample in the filter's memory that were measured; voltage in V. Return the parts that
+    could be used, or -1 if the quaternion is no rotation.
+    """
+
+ROW_SIZE: int
+
+INNOVATION_SIZE: int
+
+def smooth_block(
+    memory: int,
+    smoothed: int,
+    calls: Annotated[
+        NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    numbers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+    std: Annotated[NDArray[numpy.float64], dict(shape=(None, 18), order="C", device="cpu")],
+) -> None:
+    """Make calls, bytes of the record CALL (n,), of the filter at the address `memory`, and go
+    back from the smoothed estimate after them to the one before, both at the address
+    `smoothed`. Write numbers (n, 30 or 354) and standard deviations (n, 18) of each.
+    """
+
+def write_smoothed(
+    address: int,
+    row: int,
+    numbers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+    std: Annotated[NDArray[numpy.float64], dict(shape=(None, 18), order="C", device="cpu")],
+) -> None:
+    """Write the smoothed estimate at an address into a row of numbers and deviations."""
+
+def link_back(
+    P: Annotated[
+        NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu", writable=False)
+    ],
+    C: Annotated[
+        NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu", writable=False)
+    ],
+    after: Annotated[
+        NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu", writable=False)
+    ],
+    G: Annotated[NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu")],
+    K: Annotated[NDArray[numpy.float64], dict(shape=(18, 18), order="C", device="cpu")],
+) -> None:
+    """Write the smoother's gain, transposed, and the covariance of the estimate before, given
+    the one after, from P before a prediction, cross covariance C and P after; all (18, 18).
+    """
+
+def judge_rows(
+    address: int,
+    rows: Annotated[
+        NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    log_inlier: float,
+    log_outlier: float,
+    out: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order="C", device="cpu")],
+) -> None:
+    """Carry a filter along bytes of the record ROW (n,), and write those of INNOVATION (n,).
+    Logarithms of the chance of a pose that is no outlier, and of an outlier's density.
+    """
+
+def variances_along(
+    factors: Annotated[
+        NDArray[numpy.float64], dict(shape=(9), order="C", device="cpu", writable=False)
+    ],
+    loads: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 7, 3), order="C", device="cpu", writable=False)
+    ],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu")],
+) -> None:
+    """Write the variances (n, 6) of torque and force by the vehicle's uncertainty, at loads
+    (n, 7, 3).
+    """
+
+LOOP_SIZE: int
+
+PLANT_SIZE: int
+
+WORLD_SIZE: int
+
+def run_ticks(
+    address: int,
+    path: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    noise: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+) -> None:
+    """Run a tick of the loop at an address for each row of noise (n, size), unit normals; path
+    (m, 2): the fan's y and height in m, tick by tick. Winds and stages of a user's own do
+    not run.
+    """
+
+def run_stage(
+    address: int,
+    stage: int,
+    path: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    noise: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    k: int,
+) -> None:
+    """Run one stage of tick k: 0 wind, 1 sense, 2 estimate, 3 steer, 4 actuate, 5 the
+    accelerometer, 6 move.
+    """
+
+def is_healthy(address: int) -> bool:
+    """Return whether the loop's estimate is finite, and each velocity a vehicle's."""
+
+def no_time() -> int:
+    """Return the address of a clock for MuJoCo that stands still."""
+
+def limit(
+    seen: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    limits: Annotated[
+        NDArray[numpy.float32], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    scales: Annotated[
+        NDArray[numpy.float32], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    si: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order="C", device="cpu")],
+    out: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order="C", device="cpu")],
+) -> None:
+    """Write frames (n, k) within limits (k,) as they are into si, and over scales (k,) into out;
+    0 where a number is not finite.
+    """
+
+class Scene:
+    """The arrays of n episodes, a row each (envs/state.py)."""
+
+    def __init__(
+        self,
+        ticks: Annotated[NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu")],
+        decisions: Annotated[NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu")],
+        paths: Annotated[
+            NDArray[numpy.float64], dict(shape=(None, None, None), order="C", device="cpu")
+        ],
+        references: Annotated[
+            NDArray[numpy.float64], dict(shape=(None, None, None), order="C", device="cpu")
+        ],
+        commands: Annotated[
+            NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")
+        ],
+        actions: Annotated[
+            NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")
+        ],
+        last_actions: Annotated[
+            NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")
+        ],
+        broken: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu")],
+        rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+        flying: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu")],
+    ) -> None: ...
+    def take(
+        self,
+        wanted: Annotated[
+            NDArray[numpy.float64],
+            dict(shape=(None, None), order="C", device="cpu", writable=False),
+        ],
+        which: Annotated[
+            NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        scale: float,
+        hover: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        below: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        above: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+    ) -> bool:
+        """Write actions (n, size) over scale, within -1 to 1, and their commands into the episodes
+        which (n,). Return whether all numbers are finite; nothing is written otherwise.
+        """
+
+    def gather(self, n: int, address: int) -> None:
+        """Write row n from the loop at an address."""
 
 FAN_SIZE: int
 

@@ -1,6 +1,6 @@
 // Biases of gyro and accelerometer, and the last step's noise, beside the filter's error state e:
 // companions c = c_mean + T' e + r, cov(r) = E, r independent of e. Neither enters the dynamics.
-// estimator/bias_states.py says why in this form. Order of c: biases of gyro (3, rad/s) and
+// estimator/imu.py says why in this form. Order of c: biases of gyro (3, rad/s) and
 // accelerometer (3, m/s2), body; motor torque (3) and thrust (3) of the last step, in deviations.
 #pragma once
 #include "prediction.hpp"

@@ -1,7 +1,7 @@
 // The filter with the gain of steady flight: the same mean, (2)-(5), (11)-(14), and no covariance,
 // for less than a tenth of the work. After a gap, a restart or an unlikely pose a covariance of the
 // model linearised at hover takes over, in the frame of the vehicle's heading, until it has
-// converged again: estimator/constant_gain.py and hover_covariance.py have the reasons.
+// converged again: estimator/constant_gain.py has the reasons.
 #pragma once
 #include "linear_model.hpp"
 #include "ukf.hpp"

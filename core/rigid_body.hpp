@@ -37,35 +37,45 @@ template <class T, class S> T row_times(const S *row, T x, T y, T z) {
   return row[0] * x + row[1] * y + row[2] * z;
 }
 
-// accelerations out (6) of the geometric centre, m/s2 world, and of the attitude, rad/s2 body: (4),
+// angular acceleration out (3) rad/s2, body, at the rate w (3) and an external torque (3), world:
 // (12). rotors (4): thrust and torques; effects (6): declared effects' force, world, and torque,
 // body
 template <class T, class B, class R4, class E6>
-void accelerations(const Body<B> &b, const T R[3][3], const T *x, const R4 *rotors,
-                   const E6 *effects, T *out) {
-  T wx = x[RATE], wy = x[RATE + 1], wz = x[RATE + 2];
-  const T *t = x + TORQUE, *f = x + FORCE;
+void angular_acceleration(const Body<B> &b, const T R[3][3], const T *w, const T *torque,
+                          const R4 *rotors, const E6 *effects, T *out) {
+  T wx = w[0], wy = w[1], wz = w[2];
   T hx = row_times(b.inertia[0], wx, wy, wz), hy = row_times(b.inertia[1], wx, wy, wz),
     hz = row_times(b.inertia[2], wx, wy, wz);
   T turned[3];  // the external torque in the body frame, R' tau, beside the others
   for (int i = 0; i < 3; i++)
-    turned[i] = rotors[1 + i] + effects[3 + i] + R[0][i] * t[0] + R[1][i] * t[1] + R[2][i] * t[2];
+    turned[i] = rotors[1 + i] + effects[3 + i] + R[0][i] * torque[0] + R[1][i] * torque[1] +
+                R[2][i] * torque[2];
   T tx = turned[0] - (wy * hz - wz * hy), ty = turned[1] - (wz * hx - wx * hz),
     tz = turned[2] - (wx * hy - wy * hx);
-  T ax = row_times(b.inverse_inertia[0], tx, ty, tz),
-    ay = row_times(b.inverse_inertia[1], tx, ty, tz),
-    az = row_times(b.inverse_inertia[2], tx, ty, tz);
-  // the geometric centre about the centre of mass: alpha x c + omega x (omega x c)
+  for (int i = 0; i < 3; i++) out[i] = row_times(b.inverse_inertia[i], tx, ty, tz);
+}
+
+// acceleration out (3) of the geometric centre, m/s2, world, at an angular acceleration a (3) and
+// an external force (3): (4), and about the centre of mass alpha x c + omega x (omega x c)
+template <class T, class B, class R4, class E6>
+void centre_acceleration(const Body<B> &b, const T R[3][3], const T *w, const T *a, const T *force,
+                         const R4 *rotors, const E6 *effects, T *out) {
+  T wx = w[0], wy = w[1], wz = w[2];
   B cx = -b.com[0], cy = -b.com[1], cz = -b.com[2], inverse = Single<T>(1) / b.mass;
   T nx = wy * cz - wz * cy, ny = wz * cx - wx * cz, nz = wx * cy - wy * cx;
-  T px = ay * cz - az * cy + wy * nz - wz * ny, py = az * cx - ax * cz + wz * nx - wx * nz,
-    pz = ax * cy - ay * cx + wx * ny - wy * nx;
+  T px = a[1] * cz - a[2] * cy + wy * nz - wz * ny, py = a[2] * cx - a[0] * cz + wz * nx - wx * nz,
+    pz = a[0] * cy - a[1] * cx + wx * ny - wy * nx;
   for (int i = 0; i < 3; i++)
-    out[i] = (R[i][2] * rotors[0] + f[i] + effects[i]) * inverse + row_times(R[i], px, py, pz);
+    out[i] = (R[i][2] * rotors[0] + force[i] + effects[i]) * inverse + row_times(R[i], px, py, pz);
   out[2] -= b.gravity;
-  out[3] = ax;
-  out[4] = ay;
-  out[5] = az;
+}
+
+// both, out (6), at a state x
+template <class T, class B, class R4, class E6>
+void accelerations(const Body<B> &b, const T R[3][3], const T *x, const R4 *rotors,
+                   const E6 *effects, T *out) {
+  angular_acceleration(b, R, x + RATE, x + TORQUE, rotors, effects, out + 3);
+  centre_acceleration(b, R, x + RATE, out + 3, x + FORCE, rotors, effects, out);
 }
 
 // angular acceleration rad/s2, body, that (12) lacks of the exact turn of the angular momentum;

@@ -17,11 +17,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..runtime.errors import InputError
-from .error_state import error_from
 from .estimate import Array, WrenchEstimate
-from .filter_record import N
+from .reference import difference
 
 MEASURED = 6  # numbers in a pose
+_REFERENCE = np.r_[3:7, 10:13, 0:3, 7:10, 13:19]  # of a state, in ``reference``'s order
 
 
 def state_error(estimate: WrenchEstimate, truth: Array) -> Array:
@@ -31,9 +31,7 @@ def state_error(estimate: WrenchEstimate, truth: Array) -> Array:
     The world-frame MRP rho turns the estimated attitude into the true one. ``truth`` (20,) is a
     state laid out by the constants of ``estimator.estimate``.
     """
-    error = np.empty(N)
-    error_from(truth, estimate.state, error)
-    return error
+    return difference(truth[_REFERENCE], estimate.state[_REFERENCE])
 
 
 def nees(estimate: WrenchEstimate, truth: Array) -> float:

@@ -1,13 +1,11 @@
-"""The memory of one wrench filter, as a record that compiled code works on."""
+"""The memory of one wrench filter, as a record: ``Filter<double>`` of ``core/filter.hpp``, then the
+rest of ``ConstantGain<double>``.
+"""
 
 import numpy as np
 
-from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
-from ..dynamics.motion import LONG_TURN, Array, accelerations, gyroscopic_rest
-from ..dynamics.rotation import quaternion_to_matrix, turn_body
+from ..dynamics.model import MODEL_FIELDS, load_model
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import Record, compiled
-from ..runtime.vector_lanes import any_of, choose
 from .estimate import STATE_SIZE
 from .model_uncertainty import FACTORS, LOAD, factors_of
 from .recovery import MEMORY, N, Recovery, load_recovery
@@ -17,7 +15,7 @@ BIASES = 6  # of gyro and accelerometer
 AGREEING = 5  # accelerometer samples in a row that make a push
 # of the hover's rotor speed: no vehicle lifts 900 of its weights, and a log in rpm still shows
 FASTEST = 30.0
-COMPANIONS = 12  # the biases, and the noise of the last step: ``bias_states``
+COMPANIONS = 12  # the biases, and the noise of the last step: ``imu``
 
 IMU = np.dtype(
     [
@@ -94,39 +92,6 @@ FILTER = np.dtype(
         ("near", "f8"),  # s for which the covariance has been near that
         ("settle", "f8"),  # s for which it must have been
         ("hover", "f8", (6, N)),  # derivatives of the accelerations at hover by the error state
-        # the step in progress
-        ("acceleration", "f8", (6,)),
-        ("rotation", "f8", (3, 3)),  # of the sigma point in hand
-        ("S", "f8", (12, N)),  # columns of the root of P, one a row
-        ("M", "f8", (12, 12)),
-        ("Z", "f8", (12, N)),
-        ("H", "f8", (12, N)),  # pairs of sigma points after the step: their scaled half difference,
-        ("E", "f8", (12, N)),  # and their scaled half sum, from the central one
-        ("error", "f8", (2, N)),
-        ("B", "f8", (6, N)),  # scaled noise inputs, one a row
-        ("mean", "f8", (N,)),
-        ("increment", "f8", (6,)),  # of the innovation (rho, x) since the last pose was taken in
-        ("unsure", "f8", (6,)),  # variances of the pose (rho, x) that is expected
-        ("miss", "f8", (6,)),  # by which a pose misses where it was expected, (rho, x),
-        ("slack", "f8", (6,)),  # by how much it may,
-        ("disagreement", "f8", (6,)),  # and by how much it misses those refused before it
-        ("point", "f8", (STATE_SIZE,)),  # the sigma point in hand
-        ("next", "f8", (STATE_SIZE,)),  # where it is after the step
-        ("centre", "f8", (STATE_SIZE,)),  # the same of the central one
-        ("q", "f8", (4,)),
-        ("rho", "f8", (3,)),
-        ("L", "f8", (6, 6)),
-        ("scales", "f8", (6,)),  # inverse diagonal of a root
-        ("W", "f8", (6, N)),
-        # derivatives of the torque, body, by the error state: of the linearised model
-        ("torques", "f8", (3, N)),
-        # twelve sigma points side by side, one a column
-        ("points", "f8", (19, 12)),
-        ("accelerations", "f8", (6, 12)),
-        # in a step: square of half the angle, its cosine, rate to quaternion
-        ("turns", "f8", (3, 12)),
-        ("errors", "f8", (N, 12)),
-        ("rows", "f8", (12, N)),  # the errors, one point a row
     ]
 )
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to the estimate
@@ -174,43 +139,3 @@ def filter_record(
         np.square(tuning.accelerometer_noise),
     )
     return record
-
-
-@compiled
-def propagate(f: Record, x: Array, dt: float, out: Array) -> None:
-    """Write the state that follows ``x`` after ``dt`` s into ``out``: (2)-(5), (11)-(14)."""
-    quaternion_to_matrix(x[3:7], f.rotation)
-    apply_effects(f, x[0:3], f.rotation, x[7:10], x[10:13])
-    move(f, x, dt, out)
-
-
-@compiled
-def move(f: Record, x: Array, dt: float, out: Array) -> None:
-    """Do what ``propagate`` does once ``f.rotation`` and the effects' wrench at ``x`` are known."""
-    accelerations(
-        f.body,
-        f.rotation,
-        x[10:13],
-        f.rotor_wrench,
-        x[13:16],
-        x[16:19],
-        f.effect_wrench,
-        f.acceleration,
-    )
-    wx, wy, wz = x[10], x[11], x[12]
-    square = dt * dt * (wx * wx + wy * wy + wz * wz)
-    far = square > LONG_TURN * LONG_TURN
-    if any_of(far):
-        rest = gyroscopic_rest(f.body.inertia, f.body.inverse_inertia, wx, wy, wz, square, dt)
-        for i in range(3):
-            f.acceleration[3 + i] += choose(far, rest[i], 0.0)
-    for i in range(3):
-        out[i] = x[i] + dt * (x[7 + i] + 0.5 * dt * f.acceleration[i])
-        out[7 + i] = x[7 + i] + dt * f.acceleration[i]
-        out[10 + i] = x[10 + i] + dt * f.acceleration[3 + i]
-        out[13 + i] = x[13 + i]
-        out[16 + i] = x[16 + i]
-    turn_body(x[3:7], x[10], x[11], x[12], dt, out[3:7])
-
-
-__all__ = ["ESTIMATE", "FILTER", "N", "drive", "filter_record", "move", "propagate"]

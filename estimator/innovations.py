@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from .estimate import Array
+from .reference import multiply, rotation_matrix, to_mrp
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
 
@@ -109,9 +109,8 @@ def pieces_of(
         first, second, last = int(rows[0]), int(later[0]), int(rows[-1])
         here, steps = slice(first, last), slice(first + 1, last + 1)
         span = t[second] - t[first]
-        turn, rotation = np.empty(3), np.empty((3, 3))
-        attitude_error(pose[second, 3:], pose[first, 3:], turn)  # a quarter of it, world
-        quaternion_to_matrix(pose[first, 3:], rotation)
+        back = pose[first, 3:] * [1.0, -1.0, -1.0, -1.0]
+        turn = to_mrp(multiply(pose[second, 3:], back))  # a quarter of it, world
         row = np.zeros(last - first, dtype=ROW)
         row["t"], row["dt"] = t[steps], np.diff(t[first : last + 1])
         row["sample"][:, 4:] = pose[steps]
@@ -122,7 +121,7 @@ def pieces_of(
         row["measured"] = measured[steps]
         row["counted"] = measured[steps] & (t[steps] > t[first] + startup)
         velocity = (pose[second, :3] - pose[first, :3]) / span
-        rate = rotation.T @ turn * (4.0 / span)
+        rate = rotation_matrix(pose[first, 3:]).T @ turn * (4.0 / span)
         pieces.append(Piece(pose[first, :3], pose[first, 3:], velocity, rate, row))
     return pieces
 

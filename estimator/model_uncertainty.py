@@ -24,8 +24,6 @@ import numpy as np
 
 from .. import _core
 from ..dynamics.vehicle import Uncertainty, Vehicle
-from ..runtime.compiled import Record, compiled_for_vectors
-from ..runtime.vector_lanes import choose
 from .estimate import Array
 
 # Loads, one a row: thrust along body x and y (times its arm a torque) and along z (N). Then the
@@ -75,69 +73,8 @@ def factors_alone(vehicle: Vehicle) -> dict[str, Array]:
     }
 
 
-@compiled_for_vectors
-def variances(factors: Array, load: Array, out: Array) -> None:
-    """Write the variances (6,) of torque and force at followed loads (7, 3) into ``out``."""
-    mass, thrust, command, arm = factors[0], factors[1], factors[2], factors[3]
-    reaction, inertia, yy, xx, xy = factors[4], factors[5], factors[6], factors[7], factors[8]
-    for i in range(3):
-        ax, ay, t, w = load[0, i], load[1, i], load[2, i], load[3, i]
-        a, z, turning = load[4, i], load[5, i], load[6, i]
-        out[i] = (
-            arm * a * a
-            + reaction * z * z
-            + command * (a + z) * (a + z)
-            + inertia * turning * turning
-            + (yy * ax * ax + xx * ay * ay - 2.0 * xy * ax * ay)
-        )
-        out[3 + i] = mass * w * w + (thrust + command) * t * t
-
-
 def variances_along(factors: Array, loads: Array) -> Array:
     """Return the variances (n, 6) of torque and force at a series of loads (n, 7, 3)."""
     out = np.empty((len(loads), 6))
     _core.variances_along(factors, np.ascontiguousarray(loads), out)
     return out
-
-
-@compiled_for_vectors
-def follow_loads(f: Record, R: Array, dt: float) -> None:
-    """Follow the loads of a prediction over ``dt`` s at the attitude ``R`` (3, 3), and write the
-    model's variances into ``f.model``. Expects the rotors' and the effects' wrench, and ``f.P``
-    before the prediction.
-    """
-    load, w, e, x = f.load, f.rotor_wrench, f.effect_wrench, f.x
-    periods = dt / f.period
-    for i in range(3):
-        turn = _taken_in(f, i, periods * f.torque_walk[i])
-        push = _taken_in(f, 3 + i, periods * f.force_walk[i])
-        thrust = R[i, 2] * w[0]
-        across = R[i, 0] * w[1] + R[i, 1] * w[2]
-        around = R[i, 2] * w[3]
-        of_effects = R[i, 0] * e[3] + R[i, 1] * e[4] + R[i, 2] * e[5]
-        load[0, i] += turn * (R[i, 0] * w[0] - load[0, i])
-        load[1, i] += turn * (R[i, 1] * w[0] - load[1, i])
-        load[2, i] += push * (thrust - load[2, i])
-        load[3, i] += push * (thrust + x[16 + i] + e[i] - load[3, i])
-        load[4, i] += turn * (across - load[4, i])
-        load[5, i] += turn * (around - load[5, i])
-        load[6, i] += turn * (across + around + of_effects + x[13 + i] - load[6, i])
-    variances(f.uncertain, load, f.model)
-
-
-@compiled_for_vectors
-def _taken_in(f: Record, i: int, walk: float) -> float:
-    """Return which share of the variance of torque or force number ``i`` the corrections since the
-    last prediction took away.
-    """
-    before, now = f.predicted[i], wrench_variance(f, i)
-    f.predicted[i] = now + walk
-    share: float = choose(now < before, 1.0 - now / before, 0.0)
-    return share
-
-
-@compiled_for_vectors
-def wrench_variance(f: Record, i: int) -> float:
-    """Return the filter's variance of torque or force number ``i``."""
-    variance: float = f.P[12 + i, 12 + i]
-    return variance

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.ma import MaskedArray
 from numpy.typing import ArrayLike
 
-from ..dynamics.model import rewrite_sample
 from ..runtime.arguments import described, real_numbers
-from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .estimate import Array
 
@@ -104,46 +102,3 @@ def convert(
         where[...] = array
         parts += part
     return parts
-
-
-@compiled
-def check_sample(f: Record, z: Array, parts: int) -> int:
-    """Return the ``parts`` of ``z`` (11,) that can be used, or -1 if the quaternion is no rotation.
-
-    Rotor speeds that no vehicle has become the last ones that one may have; the quaternion is
-    brought to length 1.
-    """
-    usable = 0
-    if parts & 1 != 0 and math.isfinite(z[4] + z[5] + z[6]):
-        usable += 1
-    if parts & 2 != 0:
-        square = z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10]
-        if math.isfinite(square):
-            if square < 0.81 or square > 1.21:
-                return -1
-            scale = 1.0 / math.sqrt(square)
-            for i in range(7, 11):
-                z[i] *= scale
-            usable += 2
-    for i in range(4):
-        if not abs(z[i]) <= f.fastest:
-            z[i] = f.last_speeds[i]
-        f.last_speeds[i] = z[i]
-    return usable
-
-
-@compiled
-def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
-    """Return the checked ``parts`` of ``z`` (11,) as they were before the declared sensing effects.
-
-    Rotor speeds count where ``dt`` is positive. Where the attitude was not measured, the estimated
-    one stands in for it.
-    """
-    sample: Array = f.sample[0:11]
-    for i in range(11):
-        sample[i] = z[i]
-    if f.sensing_count > 0:
-        if parts & 2 == 0:
-            sample[7:11] = f.x[3:7]
-        rewrite_sample(f, dt, parts + 4 if dt > 0.0 else parts, -1.0)
-    return sample

@@ -13,8 +13,7 @@ McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quad
 * The measurement is linear in the error state: the correction by 49 redrawn points is the Kalman
   update.
 
-``WrenchUKF`` steps in the compiled core (``core/ukf.hpp``). The compiled functions here have the
-same bits, for loops that are not of the core yet: lanes of environments, smoother, constant gain.
+``core/ukf.hpp`` steps the filter.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import deepcopy
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,62 +30,25 @@ from .. import _core
 from ..dynamics.effects import compile_effects
 from ..dynamics.effects.own import raise_errors
 from ..dynamics.model import lay_addresses, reset_model, without_addresses
-from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import real_numbers
-from ..runtime.compiled import Record, compiled, compiled_inline
 from ..runtime.errors import InputError
-from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column, lanes_by
-from .bias_states import joint_covariance, load_imu
-from .covariance import (
-    add_noise,
-    add_pairs,
-    carry_linear_part,
-    root_of_six,
-    root_of_twelve,
-    subtract_squares,
-    whiten,
-)
-from .error_state import displace, error_from, fold, symmetrise
 from .estimate import (
     ESTIMATE_SIZE,
-    EXCESS,
-    MODEL,
     NIS,
     POSITION,
     QUATERNION,
     RATE,
-    RESTARTS,
     STATE_SIZE,
-    STATUS,
     VELOCITY,
     WITHOUT_COVARIANCE,
     Array,
     WrenchEstimate,
 )
-from .filter_record import (
-    BIASES,
-    ESTIMATE,
-    FILTER,
-    N,
-    drive,
-    fields_between,
-    filter_record,
-    move,
-    propagate,
-)
-from .model_uncertainty import follow_loads
-from .recovery import (
-    BELIEVING,
-    NOISE,
-    Recovery,
-    after_prediction,
-    believable,
-    doubted_variance,
-    pose_noise,
-)
-from .sample import Sample, check_sample, undo_sensing
-from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
+from .filter_record import BIASES, ESTIMATE, FILTER, N, fields_between, filter_record
+from .imu import joint_covariance, load_imu
+from .recovery import BELIEVING, Recovery
+from .sample import Sample
 from .tuning import UKFTuning
 
 # A call of a filter: rotor speeds and pose, which parts of the pose there are, s, V; or gyro and
@@ -94,254 +56,8 @@ from .tuning import UKFTuning
 CALL = np.dtype([("z", "f8", (11,)), ("parts", "i8"), ("dt", "f8"), ("voltage", "f8")])
 IMU_PARTS = 4, 8  # gyro and accelerometer, beside the parts of a pose
 _VARIANCES = slice(WITHOUT_COVARIANCE, None, N + 1)  # of an estimate's numbers
-
-
-@compiled
-def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s: (18)-(27)."""
-    drive(f, rotor_speeds, dt, voltage)
-    if f.wrench_count == 0:
-        quaternion_to_matrix(f.x[3:7], f.rotation)
-        carry(f, dt)
-    else:
-        root_of_twelve(f)
-        propagate(f, f.x, dt, f.centre)
-        _carry_linear(f, dt)
-        _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
-        add_pairs(f, 0)
-        add_pairs(f, PAIRS)
-        _gather(f, dt)
-    f.time += dt
-
-
-@compiled
-def carry(f: Record, dt: float) -> None:
-    """Carry a filter without wrench effects ahead, its rotors' wrench and the matrix of its
-    attitude being known.
-    """
-    root_of_six(f)
-    move(f, f.x, dt, f.centre)
-    _carry_linear(f, dt)
-    _pairs(f, dt)
-    add_pairs(f, 0)
-    _gather(f, dt)
-
-
-@compiled_inline
-def _pairs_in_turn(f: Record, dt: float, pairs: int, moved: Any) -> None:
-    """Write the scaled half differences and half sums of the first pairs of sigma points, and their
-    mean. ``moved`` carries one point after the other ahead.
-    """
-    spread, weight, scale = _spread_of(f)
-    x, H, E, mean, error = f.x, f.H, f.E, f.mean, f.error
-    for i in range(N):
-        mean[i] = 0.0
-    for j in range(pairs):
-        for sign in range(2):
-            displace(x, f.S[j], spread if sign == 0 else -spread, f.rho, f.q, f.point)
-            moved(f, f.point, dt, f.next)
-            error_from(f.next, f.centre, error[sign])
-        for i in range(N):
-            H[j, i] = scale * (error[0, i] - error[1, i])
-        for i in range(12):
-            total = error[0, i] + error[1, i]
-            E[j, i] = scale * total
-            mean[i] += weight * total  # (26)
-
-
-@compiled
-def _move_point(f: Record, x: Array, dt: float, out: Array) -> None:
-    quaternion_to_matrix(x[3:7], f.rotation)
-    move(f, x, dt, out)
-
-
-@compiled
-def _pairs_in_lanes(f: Record, dt: float) -> None:
-    """Do as ``_pairs_together`` where each number is a vector already: one point after the other
-    needs no more memory than one.
-    """
-    _pairs_in_turn(f, dt, PAIRS, _move_point)
-
-
-@compiled
-def _pairs_together(f: Record, dt: float) -> None:
-    """Write the same of six pairs, all of them side by side."""
-    spread, weight, scale = _spread_of(f)
-    spread_points(f, spread)
-    propagate_points(f, dt)
-    errors_of_points(f)
-    halve_pairs(f, scale, weight)
-
-
-_pairs = lanes_by(_pairs_together, _pairs_in_lanes)
-
-
-@compiled
-def _spread_of(f: Record) -> tuple[float, float, float]:
-    """Return how far out sigma points lie, and the factors of a pair's mean and of
-    its differences.
-    """
-    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
-    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the
-    # second half is only there where the model is nonlinear, in the first 12 rows
-    return math.sqrt(N + NOISE + f.kappa), weight, math.sqrt(0.5 * weight)
-
-
-@compiled
-def _carry_linear(f: Record, dt: float) -> None:
-    for i in range(3):
-        for j in range(3):
-            f.centre_rotation[i, j] = f.rotation[i, j]
-    follow_loads(f, f.centre_rotation, dt)
-    carry_linear_part(f, dt)
-    add_noise(f, f.centre_rotation, dt)
-
-
-@compiled
-def _gather(f: Record, dt: float) -> None:
-    """Take the mean's part off the covariance, and fold it into the estimate."""
-    P, mean = f.P, f.mean
-    for i in range(12):
-        a = mean[i]
-        for j in range(first_column(P, i), 12):
-            square = a * mean[j]
-            P[i, j] -= square
-            if j >= first_below(P, i):
-                P[j, i] -= square
-    fold(f, f.centre, mean)
-    symmetrise(P)
-    f.x[NIS] = math.nan
-    after_prediction(f, dt)
-
-
-@compiled
-def innovate(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> float:
-    """Leave the root of the innovation's covariance in ``f.L`` and the whitened innovation of what
-    was measured of a pose (7,), (rho, x), in ``f.innovation``; return the NIS.
-
-    Leaves the innovation itself in ``f.poses.residual``, its change since the last measurement
-    taken in, in ``f.increment``, and the variances of the expected pose in ``f.unsure``.
-    """
-    x, P, L, scales, y, residual = f.x, f.P, f.L, f.scales, f.innovation, f.poses.residual
-    attitude_error(pose[3:7], x[3:7], y[0:3])
-    for i in range(3):
-        y[3 + i] = pose[i] - x[i]
-    for i in range(6):
-        f.increment[i] = y[i] - residual[i]
-        residual[i] = choose(with_attitude if i < 3 else with_position, y[i], residual[i])
-    # y becomes the whitened innovation; whatever stands there of what was not measured, it becomes
-    # zero
-    nis = 0.0
-    for i in range(6):
-        measured = with_attitude if i < 3 else with_position
-        a = i if i < 3 else i + 3  # rows of (rho, x) in the error state are 0-2 and 6-8
-        for j in range(i):
-            total = P[a, j if j < 3 else j + 3]
-            for k in range(j):
-                total -= L[i, k] * L[j, k]
-            L[i, j] = choose(
-                measured & (with_attitude if j < 3 else with_position), total / L[j, j], 0.0
-            )
-            y[i] -= L[i, j] * y[j]
-        noise = pose_noise(f, i)
-        f.unsure[i] = P[a, a]
-        total = P[a, a] + noise
-        for k in range(i):
-            total -= L[i, k] * L[i, k]
-        # never below the measurement's own variance, whatever rounding does
-        L[i, i] = math.sqrt(max(total, noise))
-        scales[i] = choose(measured, 1.0 / L[i, i], 0.0)
-        y[i] = choose(measured, y[i] / L[i, i], 0.0)
-        nis += y[i] * y[i]
-    return nis
-
-
-@compiled
-def take_in(f: Record) -> None:
-    """Correct with the innovation that ``innovate`` left, whatever its size: (29)-(37)."""
-    whiten(f)
-    subtract_squares(f)
-    for i in range(NIS):
-        f.centre[i] = f.x[i]
-    fold(f, f.centre, f.mean)
-
-
-@compiled
-def correct(f: Record, pose: Array, with_position: bool, with_attitude: bool) -> None:
-    """Take in what was measured of a pose (7,), (rho, x), unless it is not to be believed."""
-    x, scales, y, residual = f.x, f.scales, f.innovation, f.poses.residual
-    nis = innovate(f, pose, with_position, with_attitude)
-    taken = believable(f, pose, with_position, with_attitude, nis)
-    if not all_of(taken):
-        if not any_of(taken):
-            return
-        for i in range(6):
-            scales[i], y[i] = choose(taken, scales[i], 0.0), choose(taken, y[i], 0.0)
-    take_in(f)
-    for i in range(6):
-        residual[i] -= choose(taken, f.mean[i if i < 3 else 3 + i], 0.0)
-    if not all_of(taken):  # a quaternion brought to length 1 once more may change in its last digit
-        for i in range(3, 7):
-            x[i] = choose(taken, x[i], f.centre[i])
-
-
-@compiled
-def correct_parts(f: Record, z: Array, parts: int) -> None:
-    """Correct with the checked ``parts`` of ``z`` (11,): 1 position, 2 attitude, 3 both."""
-    if parts != 0:
-        correct(f, z[4:11], parts & 1 != 0, parts & 2 != 0)
-
-
-@compiled
-def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
-    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,)
-    that were measured.
-
-    Returns the parts that could be used, or -1, with the filter as it was, if the quaternion is no
-    rotation.
-    """
-    usable: int = check_sample(f, z, parts)
-    if usable >= 0:
-        sample = undo_sensing(f, z, usable, dt)
-        if dt > 0.0:
-            predict(f, sample[0:4], dt, voltage)
-        correct_parts(f, sample, usable)
-    return usable
-
-
 _POSES = FILTER.fields["poses"][1]  # type: ignore[index]  # where their memory begins
 _STRAINED = 0.01  # of a variance: less is not told
-
-
-@compiled
-def _add_doubt(record: Record, variances: Array) -> None:
-    """Widen an estimate's variances (18,) by refused and unlikely poses."""
-    f = record[0]
-    doubted_variance(f, f.mean)
-    for i in range(N):
-        variances[i] += f.poses.strain * variances[i] + f.mean[i]
-
-
-@compiled
-def write_variances(f: Record, out: Array) -> None:
-    """Write the variances (18,) of the error state, widened by refused and unlikely poses, into
-    ``out``; of a single filter or of a block in hand.
-    """
-    m = f.poses
-    doubted = (m.phase > BELIEVING) | (m.strain > _STRAINED) | (m.astray > 0.0)
-    for i in range(N):
-        out[i] = f.P[i, i]
-    if any_of(doubted):
-        _add_doubt((f,), out)
-        for i in range(N):
-            out[i] = choose(doubted, out[i], f.P[i, i])
-
-
-@compiled
-def write_numbers(f: Record, out: Array) -> None:
-    """Write an estimate's numbers, without the covariance, into ``out``."""
-    out[:STATE_SIZE], out[MODEL], out[EXCESS] = f.x, f.model, f.excess
-    out[STATUS], out[RESTARTS] = f.status, f.restarts
 
 
 def make_calls(
@@ -527,7 +243,7 @@ class WrenchUKF:
 
     @property
     def step_address(self) -> int:
-        """Address of the step for ``call_step``, in compiled loops; it knows nothing of an IMU.
+        """Address of the step, for loops of the core; it knows nothing of an IMU.
 
         Raises:
             InputError: ``correct_imu`` was called.

@@ -28,12 +28,10 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from windwrench import __version__
-from windwrench.dynamics.rotation import quaternion_to_matrix, turn_body
 from windwrench.evidence.kept_results import DOCS
 from windwrench.evidence.runner import start
 from windwrench.identification.logs.tables import open_table
 from windwrench.identification.motion.smoothing import runs_of
-from windwrench.runtime.compiled import compiled
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit, made_by
@@ -179,80 +177,76 @@ def mean_clock(flights: Sequence[Flight]) -> float:
     return float(np.mean([flight.clock for flight in flights]))
 
 
-@compiled
-def _turn(q: Array, x: Array, w: Array, lead: float, dt: float, out: Array) -> None:
-    """Write ``q`` turned for ``dt`` at a state's rate, ``lead`` s of ``w`` on, into ``out``."""
-    turn_body(q, x[10] + lead * w[0], x[11] + lead * w[1], x[12] + lead * w[2], dt, out)
+def _matrices(q: Array) -> Array:
+    """Return the matrices (m, 3, 3) that take body to world axes, of quaternions (m, 4)."""
+    w, x, y, z = q.T
+    rows = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)]
+    rows += [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)]
+    rows += [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)]
+    return np.stack(rows, axis=1).reshape(-1, 3, 3)
 
 
-@compiled
-def _follow(c: Any, starts: Array, drive: Array, left: Array, reacts: bool, out: Array) -> None:
-    """Write the states (m, steps, 13) that follow into ``out``.
+def _turned(q: Array, turn: Array) -> Array:
+    """Return quaternions (m, 4) turned by rotation vectors (m, 3) in the body frame."""
+    half = 0.5 * np.linalg.norm(turn, axis=1, keepdims=True)
+    c, v = np.cos(half), 0.5 * np.sinc(half / math.pi) * turn
+    scalar = q[:, :1] * c - np.sum(q[:, 1:] * v, axis=1, keepdims=True)
+    return np.concatenate([scalar, q[:, :1] * v + c * q[:, 1:] + np.cross(q[:, 1:], v)], axis=1)
+
+
+def _follow(c: Any, starts: Array, drive: Array, left: Array, reacts: bool) -> Array:
+    """Return the states (m, steps, 13) that follow.
 
     ``drive`` (m, steps, 5): thrust over mass, the rotors' angular acceleration of the body, and the
     sum of rotor speeds.
     """
-    steps, dt = out.shape[1], STEP * STEPS / out.shape[1]
-    r, q, middle, vb = np.empty((3, 3)), np.empty(4), np.empty(4), np.empty(3)
-    force, accel, w, share = np.empty(3), np.empty(3), np.empty(3), np.ones(2)
-    for s in range(len(starts)):
-        x = starts[s].copy()
-        for h in range(steps):
-            d = drive[s, h]
-            q[:] = x[6:10]
-            quaternion_to_matrix(q, r)
-            for i in range(3):
-                vb[i] = r[0, i] * x[3] + r[1, i] * x[4] + r[2, i] * x[5]
-            flap, drag = c.flapping * d[4] / c.inertia, c.rotor_drag * d[4] / MASS
-            w[0], w[1], w[2] = d[1] + flap * vb[1], d[2] - flap * vb[0], d[3]
-            if reacts:
-                if h == 0:  # how strong measured moments are, against those that are not measured
-                    a = np.mean((drive[s, :, 1] + flap * vb[1]) ** 2)
-                    b = np.mean((drive[s, :, 2] - flap * vb[0]) ** 2)
-                    share[0] = a / (a + c.unmeasured_moment**2)
-                    share[1] = b / (b + c.unmeasured_moment**2)
-                w[0] = share[0] * (w[0] - c.stiffness * r[2, 1]) + c.never_answered * vb[1]
-                w[1] = share[1] * (w[1] + c.stiffness * r[2, 0]) - c.never_answered * vb[0]
-                for i in range(2):
-                    w[i] -= (c.damping + share[i] * c.damping_excited) * x[10 + i]
-                w[2] -= c.heading_stiffness * math.atan2(r[1, 0], r[0, 0]) + c.yaw_damping * x[12]
-            force[0], force[1] = -drag * vb[0], -drag * vb[1]
-            lift = c.lift * (vb[0] ** 2 + vb[1] ** 2) - c.inflow * d[4] * vb[2]
-            force[2] = d[0] + lift / MASS
-            of_force = c.force_share * math.exp(-(h + 0.5) * dt / c.force_memory)
-            of_moment = c.moment_share * math.exp(-(h + 0.5) * dt / c.moment_memory)
-            for i in range(3):
-                w[i] += of_moment * left[s, 3 + i]
-            _turn(q, x, w, 0.25 * dt, 0.5 * dt, middle)
-            quaternion_to_matrix(middle, r)
-            for i in range(3):
-                accel[i] = of_force * left[s, i]
-                for k in range(3):
-                    accel[i] += r[i, k] * force[k]
-            accel[2] -= GRAVITY
-            _turn(q, x, w, 0.5 * dt, dt, middle)
-            x[6:10] = middle
-            for i in range(3):
-                scale = c.velocity_scale if i < 2 else 1.0
-                x[i] += scale * dt * (x[3 + i] + 0.5 * dt * accel[i])
-                x[3 + i] += dt * accel[i]
-                x[10 + i] += dt * w[i]
-            out[s, h] = x
+    steps = drive.shape[1]
+    dt = STEP * STEPS / steps
+    out = np.empty((len(starts), steps, 13))
+    x, share = starts.copy(), np.ones((len(starts), 2))
+    scale = np.array([c.velocity_scale, c.velocity_scale, 1.0])
+    for h in range(steps):
+        d, q = drive[:, h], x[:, 6:10]
+        r = _matrices(q)
+        vb = np.einsum("nji,nj->ni", r, x[:, 3:6])
+        flap = c.flapping * d[:, 4:] / c.inertia * vb[:, 1::-1] * [1.0, -1.0]
+        w = d[:, 1:4] + np.column_stack([flap, np.zeros(len(d))])
+        if reacts:
+            if h == 0:  # how strong measured moments are, against those that are not measured
+                square = np.mean(np.square(drive[:, :, 1:3] + flap[:, None]), axis=1)
+                share = square / (square + c.unmeasured_moment**2)
+            tilt = r[:, 2, 1::-1] * [1.0, -1.0]
+            w[:, :2] = share * (w[:, :2] - c.stiffness * tilt)
+            w[:, :2] += c.never_answered * vb[:, 1::-1] * [1.0, -1.0]
+            w[:, :2] -= (c.damping + share * c.damping_excited) * x[:, 10:12]
+            w[:, 2] -= c.heading_stiffness * np.arctan2(r[:, 1, 0], r[:, 0, 0])
+            w[:, 2] -= c.yaw_damping * x[:, 12]
+        force = -c.rotor_drag * d[:, 4:] / MASS * vb
+        lift = c.lift * np.sum(np.square(vb[:, :2]), axis=1) - c.inflow * d[:, 4] * vb[:, 2]
+        force[:, 2] = d[:, 0] + lift / MASS
+        w += c.moment_share * math.exp(-(h + 0.5) * dt / c.moment_memory) * left[:, 3:]
+        middle = _turned(q, 0.5 * dt * (x[:, 10:] + 0.25 * dt * w))
+        accel = np.einsum("nij,nj->ni", _matrices(middle), force) - [0.0, 0.0, GRAVITY]
+        accel += c.force_share * math.exp(-(h + 0.5) * dt / c.force_memory) * left[:, :3]
+        x[:, 6:10] = _turned(q, dt * (x[:, 10:] + 0.5 * dt * w))
+        x[:, :3] += scale * dt * (x[:, 3:6] + 0.5 * dt * accel)
+        x[:, 3:6] += dt * accel
+        x[:, 10:] += dt * w
+        out[:, h] = x
+    return out
 
 
 def predicted(c: Any, starts: Starts, reacts: bool = True, each: int = 1) -> Array:
     """Return the states (m, STEPS / each, 13) that coefficients predict, with or without the closed
     loop's reaction, in steps of ``each`` samples.
     """
-    out = np.empty((len(starts.states), STEPS // each, 13))
     means = 0.5 * (starts.speeds[:, 1:] + starts.speeds[:, :-1])
-    means = means.reshape(*out.shape[:2], each, 4).mean(axis=2)
+    means = means.reshape(len(means), STEPS // each, each, 4).mean(axis=2)
     roll, pitch = ARM * _LEFT / c.inertia, -ARM * _FRONT * c.pitch_share / c.inertia
     mixing = np.column_stack([np.full(4, 1.0 / MASS), roll, pitch, -_SPIN * c.reaction_torque])
     thrust = c.thrust * np.square(means)
     drive = np.concatenate([thrust @ mixing, means.sum(axis=2, keepdims=True)], axis=2)
-    _follow(c, starts.states, drive, starts.left, reacts, out)
-    return out
+    return _follow(c, starts.states, drive, starts.left, reacts)
 
 
 def errors(path: Array, truth: Array) -> Array:

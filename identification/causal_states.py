@@ -10,11 +10,11 @@ A gyro measures the angular velocity, however wrong the model's torque. One filt
 tuning then starts predictions as well as four.
 """
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
+from .. import _core
 from ..dynamics.effects import get
 from ..dynamics.vehicle import Vehicle
 from ..estimator import Recovery, UKFTuning, WrenchUKF
@@ -22,7 +22,6 @@ from ..estimator.estimate import WITHOUT_COVARIANCE
 from ..estimator.model_uncertainty import LOAD
 from ..estimator.tuning import PERIOD
 from ..estimator.ukf import default_covariance, make_calls
-from ..runtime.compiled import compiled
 from .logs.flight_log import FlightLog
 from .logs.table import Array
 from .motion.sensing_effects import delay_of
@@ -34,11 +33,6 @@ STATE = 13  # numbers: position, quaternion, velocity, angular velocity
 # ``UKFTuning.for_vehicle``. On 17 simulated and measured flights a grid of 17 predicts the position
 # nearer by 0.2 % on average and by 6.5 % at most; the default alone is 31 % worse on average
 _ASSUMED = ((1.0, 1.0, 1.0), (0.1, 1.0, 0.03), (0.1, 1.0, 1.0), (0.1, 45.0, 45.0))
-# the scale of a filter's innovations is estimated as well, since noise is not as declared. The
-# declared scale counts as much as so many poses
-_DECLARED = 20.0
-# degrees of freedom of Student's t: a jump of a pose counts by the logarithm of its size
-_TAIL = 4.0
 
 
 def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
@@ -82,14 +76,8 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
             np.fill_diagonal(covariance[where, where], deviation**2)
         ukf.reset(log.position[first], log.quaternion[first], covariance)
         make_calls(ukf.record, calls, each, numbers, *others, innovations)
-        _choose(
-            begin[1:] - 1,
-            calls["parts"] == 3,
-            numbers,
-            innovations,
-            states[first + 1 :],
-            best[first + 1 :],
-        )
+        last, posed, later = begin[1:] - 1, calls["parts"] == 3, slice(first + 1, None)
+        _core.choose_likeliest(last, posed, numbers, innovations, states[later], best[later])
     return states
 
 
@@ -102,39 +90,3 @@ def scaled_tuning(usual: UKFTuning, white: float, force: float, torque: float) -
         force_walk=force * np.asarray(usual.force_walk),
         torque_walk=torque * np.asarray(usual.torque_walk),
     )
-
-
-@compiled
-def _choose(
-    last: np.ndarray,
-    posed: np.ndarray,
-    numbers: Array,
-    innovations: Array,
-    states: Array,
-    best: Array,
-) -> None:
-    """Write the state (n, STATE) after the ``last`` call of each row, and the log-likelihood (n,)
-    of the poses so far, where this is larger than of the filters before.
-
-    Translation and rotation have a scale of their own.
-    """
-    total, scales, squares = 0.0, np.ones(2), np.zeros(2)
-    seen = 0.0
-    for k in range(len(states)):
-        call = last[k]
-        if posed[call]:
-            white, root = innovations[call, :6], innovations[call, 6:]
-            seen += 3.0
-            for part in range(2):
-                nis, spread = 0.0, 1.5 * math.log(scales[part])
-                for i in range(3 * part, 3 * part + 3):
-                    nis += white[i] ** 2
-                    spread += math.log(root[i])
-                far = nis / (_TAIL * scales[part])
-                total -= spread + 0.5 * (_TAIL + 3.0) * math.log1p(far)
-                squares[part] += nis * (_TAIL + 3.0) / (_TAIL * (1.0 + far))
-                scales[part] = (3.0 * _DECLARED + squares[part]) / (3.0 * _DECLARED + seen)
-        if total > best[k]:
-            best[k] = total
-            for i in range(len(states[k])):
-                states[k, i] = numbers[call, i]

@@ -17,20 +17,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
-from ..dynamics.rotation import quaternion_to_matrix
+from .. import _core
 from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning
-from ..estimator.estimate import POSITION, QUATERNION, RATE, STATE_SIZE, VELOCITY
-from ..estimator.filter_record import propagate
+from ..estimator.estimate import POSITION, QUATERNION, RATE, VELOCITY
 from ..estimator.innovations import innovations, pieces_of
 from ..estimator.ukf import default_covariance
-from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .causal_states import STATE, causal_states, scaled_tuning
 from .logs.commanded_speeds import with_commanded_speeds
 from .logs.flight_log import NORM_TOLERANCE, FlightLog
 from .logs.table import Array, finite_rows
+from .motion.residual import loaded_model
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import Signals, known_pieces, log_signals, longest_step
 from .motion.smoothing import continuous, resampled, unbroken
@@ -39,9 +37,6 @@ Segments = Sequence[tuple[float, float]]
 
 
 # the flight of a model from a state
-_LONGEST_ROTOR_STEP = 0.005  # s, over which rotors are held
-# of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
-_MOTION_STEPS = 4
 _HEAVY = 1e9  # kg m2: torques turn nothing
 _STEP_TOLERANCE = 0.1  # of a period: a step so little too long is still one step
 # s after the start of unbroken pose: the filter of a prediction's start settles
@@ -53,8 +48,6 @@ _MOST_STARTS = 2000  # of an error's predictions in a piece, spread over it
 # the filter without a wrench
 _LONGEST_GAP = 2.0  # s without a pose, after which it starts anew (``estimate_log``)
 _FROZEN = 1e-6  # of its usual standard deviation: a fixed wrench state
-
-_MODEL = np.dtype([*MODEL_FIELDS, ("acceleration", "f8", (6,)), ("rotation", "f8", (3, 3))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,18 +153,16 @@ def _flown(
     known = finite_rows(states)
     first = int(np.argmax(known))
     last_known = np.maximum.accumulate(np.where(known, np.arange(len(log.t)), 0))[first:]
-    # the model along the flight, and its copy from a start on
-    models = np.zeros(2, dtype=_MODEL)
     if vehicle.status.torque == "refuted":
         vehicle = replace(vehicle, inertia=_HEAVY * np.eye(3))
-    load_model(models[0], vehicle)
+    models = loaded_model(vehicle)[0].copy()
     t = log.t[first:] - log.t[0]
     models[0]["time"] = t[0]
     voltage = np.zeros(len(log.t)) if log.voltage is None else log.voltage
     speeds, volts = (np.ascontiguousarray(x[first:]) for x in (log.rotor_speeds, voltage))
     keeps = vehicle.status.force == "refuted"
-    after = states[last_known], starts - first, log.period, keeps, path
-    _fly_along(models, t, speeds, volts, *after)
+    flown = t, speeds, volts, states[last_known], starts - first
+    _core.predict_flight(models.ctypes.data, *flown, log.period, keeps, path)
     return path
 
 
@@ -353,70 +344,6 @@ def _seen(piece: Signals, times: Array) -> Array:
     columns = piece.position, continuous(turned), piece.velocity, piece.angular_velocity
     states = resampled(times.ravel(), piece.t, np.column_stack(columns))
     return states.reshape(*times.shape, STATE)
-
-
-@compiled
-def _fly_along(
-    models: Record,
-    t: Array,
-    speeds: Array,
-    voltage: Array,
-    states: Array,
-    starts: np.ndarray,
-    period: float,
-    keeps_velocity: bool,
-    path: Array,
-) -> None:
-    """Run the first model along a flight of n rows, for the memory of rotors and effects; let a
-    copy of it go at each start, and write the copy's states (starts, ahead, STATE). With
-    ``keeps_velocity`` no force acts.
-    """
-    f, g = models[0], models[1]
-    after, x, between = np.zeros(STATE_SIZE), np.zeros(STATE_SIZE), np.empty(4)
-    steps = _rotor_steps(period)
-    dt, at, size = period / steps, 0, len(states[0])
-    for k in range(len(t)):
-        if k > 0:
-            last, length = states[k - 1], t[k] - t[k - 1]
-            along = _rotor_steps(length)
-            quaternion_to_matrix(last[3:7], f.rotation)
-            for _ in range(along):
-                drive(f, speeds[k], length / along, voltage[k])
-                apply_effects(f, last[0:3], f.rotation, last[7:10], last[10:13])
-                f.time += length / along
-        if at == len(starts):
-            return
-        if starts[at] == k:
-            models[1] = f
-            for i in range(size):
-                x[i] = states[k, i]
-            row = k
-            for i in range(path.shape[1]):
-                time = t[k] + (i + 1) * period
-                while row < len(t) - 2 and t[row + 1] < time:
-                    row += 1
-                share = min((time - t[row]) / (t[row + 1] - t[row]), 1.0)
-                for j in range(4):
-                    between[j] = (1.0 - share) * speeds[row, j] + share * speeds[row + 1, j]
-                volts = (1.0 - share) * voltage[row] + share * voltage[row + 1]
-                for _ in range(steps):
-                    drive(g, between, dt, volts)
-                    for _ in range(_MOTION_STEPS):
-                        propagate(g, x, dt / _MOTION_STEPS, after)
-                        if keeps_velocity:
-                            for j in range(3):
-                                after[7 + j] = x[7 + j]
-                                after[j] = x[j] + x[7 + j] * dt / _MOTION_STEPS
-                        x[:] = after
-                    g.time += dt
-                path[at, i] = x[:size]
-            at += 1
-
-
-@compiled
-def _rotor_steps(length: float) -> int:
-    """Return the number of rotor steps in ``length`` s."""
-    return max(1, math.ceil(length / _LONGEST_ROTOR_STEP - _STEP_TOLERANCE))
 
 
 def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:

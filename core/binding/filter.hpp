@@ -21,12 +21,20 @@ inline windwrench::Filter<double> &filter_at(std::uintptr_t address) {
   return *reinterpret_cast<windwrench::Filter<double> *>(address);
 }
 
+template <class... Arrays> void check_rows(std::size_t count, const Arrays &...arrays) {
+  if (((arrays.shape(0) != count) || ...))
+    throw nanobind::value_error("expected a row for each sample");
+}
+
 void bind_batch(nanobind::module_ &m);
+void bind_constant_gain(nanobind::module_ &m);
 void bind_control(nanobind::module_ &m);
+void bind_diagnosis(nanobind::module_ &m);
 void bind_effects(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
 void bind_lanes(nanobind::module_ &m);
+void bind_readers(nanobind::module_ &m);
+void bind_reproduction(nanobind::module_ &m);
+void bind_smoother(nanobind::module_ &m);
 void bind_tick(nanobind::module_ &m);
 void bind_winds(nanobind::module_ &m);
-void bind_constant_gain(nanobind::module_ &m);
-void bind_smoother(nanobind::module_ &m);

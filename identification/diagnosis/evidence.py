@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
-from ...runtime.compiled import compiled
+from ... import _core
 from ..logs.table import Array
 
 Index = NDArray[np.intp]
@@ -91,76 +91,25 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
     Raises:
         numpy.linalg.LinAlgError: no prior tells columns of the set apart.
     """
-    value, mode, std = _evidence(m.normal, m.right, np.array(index, dtype=np.intp), low, high)
+    at = np.array(index, dtype=np.intp)
+    mode, std = np.empty((2, len(at)))
+    asked = m.normal[np.ix_(at, at)], m.right[at], low[at], high[at]
+    value = _core.evidence(*asked, mode, std)
+    if math.isnan(value):
+        raise np.linalg.LinAlgError("no prior tells columns of the set apart")
     return SetEvidence(m.constant + value, mode, std)
 
 
-@compiled
-def _evidence(
-    every: Array, slopes: Array, at: np.ndarray, low: Array, high: Array
-) -> tuple[float, Array, Array]:
-    """Return the logarithm of the evidence of the columns ``at`` (n,), their mode and standard
-    deviations.
-    """
-    right, lo, hi, value = slopes[at], low[at], high[at], 0.0
-    if len(at) == 0:
-        return value, right, lo
-    normal = every[at][:, at] + np.eye(len(at))
-    factor = np.linalg.cholesky(normal)
-    mode = bounded_mode(normal, right, lo, hi)
-    slope = right - normal @ mode
-    for i in range(len(at)):
-        value += 0.5 * mode[i] * (right[i] + slope[i]) - math.log(factor[i, i])
-        if mode[i] <= lo[i] or mode[i] >= hi[i]:
-            # int_0^inf exp(-s t - h t^2 / 2) dt over the whole normal integral of curvature h
-            value += _log_tail(abs(slope[i]) / math.sqrt(normal[i, i]))
-        value -= math.log(max(_normal(hi[i]) - _normal(lo[i]), 1e-12))
-    return value, mode, np.sqrt(np.diag(np.linalg.inv(normal)))
-
-
-@compiled
-def _normal(x: float) -> float:
-    """Return the share of a standard normal density below ``x``."""
-    return 0.5 * math.erfc(-x / math.sqrt(2.0))
-
-
-@compiled
-def _log_tail(z: float) -> float:
-    """Return ``z**2 / 2`` plus the logarithm of the share of a standard normal density beyond
-    ``z``, at least zero.
-    """
-    if z < 10.0:
-        return 0.5 * z * z + math.log(_normal(-z))
-    w = 1.0 / (z * z)  # M. Abramowitz and I. Stegun, Handbook (1964), 26.2.12
-    return -math.log(z * math.sqrt(2.0 * math.pi)) + math.log1p(-w * (1.0 - w * (3.0 - 15.0 * w)))
-
-
-@compiled
 def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:
     """Return the maximum (n,) of ``right @ x - x @ normal @ x / 2`` within bounds. Coefficients
     outside are held at their bounds, the farthest first, and are free again if pulled back.
+
+    Raises:
+        numpy.linalg.LinAlgError: ``normal`` is singular.
     """
-    n = len(right)
-    mode = np.empty(n)
-    mode[:] = np.linalg.solve(normal, right)
-    size, held = np.sqrt(np.diag(normal)), np.zeros(n, dtype=np.bool_)
-    for _ in range(3 * n):
-        beyond = np.maximum(low - mode, mode - high)
-        pull = right - normal @ mode
-        inwards = np.where(mode >= high, -pull, pull)
-        outside, back = ~held & (beyond > 1e-12), held & (inwards > 1e-9)
-        if outside.any():
-            worst = np.argmax(np.where(outside, beyond * size, 0.0))
-            held[worst] = True
-            mode[worst] = min(max(mode[worst], low[worst]), high[worst])
-        elif back.any():
-            held[np.argmax(np.where(back, inwards, 0.0))] = False
-        else:
-            break
-        free = np.flatnonzero(~held)
-        left = right - normal @ np.where(held, mode, 0.0)
-        mode[free] = np.linalg.solve(normal[free][:, free], left[free])
-    mode[:] = np.minimum(np.maximum(mode, low), high)
+    mode = np.empty(len(right))
+    if not _core.bounded_mode(normal, right, low, high, mode):
+        raise np.linalg.LinAlgError("the matrix of a bounded mode is singular")
     return mode
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from ... import _core
 from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
@@ -26,7 +27,7 @@ from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import continuous, turn_between
-from .causal_filter import Poses, Track, level, run, sensitivities
+from .causal_filter import Poses, Track, level, run
 from .discrepancy import Columns, changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
@@ -516,12 +517,15 @@ class Likelihood:
         Args:
             track: the piece.
             steady: the filter.
-            acting: (n, 6, a) of ``sensitivities``.
-            moved: (n, 6, b) of ``sensitivities``.
+            acting: (n, 6, a) acceleration of the model by a unit of the first ``a`` columns.
+            moved: (n, 6, b) shift of the measured pose by a unit of the last ``b`` of these.
             at: the part.
-            jumps: (n, 6, e), of the states in turn; default: none.
+            jumps: (n, 6, e) jump of one state of each axis, of the states in turn, by a unit of
+                the next columns, before the pose of a sample is read; default: none.
             state: carried from one part to the next; default: none.
-            slopes: (6, 7, m) of ``sensitivities``; default: none.
+            slopes: (6, 7, m) change of the gains of each axis, in the order of
+                ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns; default:
+                none.
         """
         jumps = np.empty((len(acting), 6, 0)) if jumps is None else jumps
         slopes = np.empty((6, 7, 0)) if slopes is None else slopes
@@ -530,7 +534,7 @@ class Likelihood:
         if state is None:
             state = np.zeros((6, 3, acting.shape[2] + e + slopes.shape[2]))
         out = np.empty((len(acting), 6, state.shape[2]))
-        sensitivities(
+        _core.sensitivities(
             self.period,
             steady.gain,
             steady.keep,
@@ -538,8 +542,8 @@ class Likelihood:
             track.rotors[at, :1, None] * track.rotation[at, :, 1::-1] * [-1.0, 1.0],
             track.angular_velocity[at],
             gyration(self.vehicle, track.angular_velocity[at]),
-            np.ascontiguousarray(acting),
-            np.ascontiguousarray(moved),
+            acting,
+            moved,
             jumps,
             np.resize(STATES, e),
             slopes,

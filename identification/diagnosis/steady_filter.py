@@ -16,7 +16,6 @@ from ..logs.table import Array
 PAIRS = np.array([[0, 4], [1, 3], [2, 5]])  # a position, and the turn pulling it
 # (6, 3) whether an axis is of a pair
 OWN = np.equal(np.arange(6)[:, None, None], PAIRS).any(axis=2)
-PARTNER = np.array([4, 3, 5, 1, 0, 2])
 PULL = np.array([1.0, -1.0, 0.0])  # of a turn on its position's acceleration, over gravity
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...runtime.compiled import compiled
+from ... import _core
 from ..logs.table import Array
 from .smoothing import resampled, second_difference
 
@@ -77,156 +77,63 @@ class FusedMotion:
     std: Array  # (m, 15) of attitude (rad, body), velocity, position and the two biases
 
 
-@compiled
 def _cross_matrix(x: Array) -> Array:
-    out = np.zeros((3, 3))
-    out[0, 1], out[0, 2], out[1, 2] = -x[2], x[1], -x[0]
-    out[1, 0], out[2, 0], out[2, 1] = x[2], -x[1], x[0]
+    """Return the matrices (m, 3, 3) of the cross product with vectors (m, 3)."""
+    out = np.zeros((len(x), 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[:, j, i], out[:, i, j] = x[:, k], -x[:, k]
     return out
 
 
-@compiled
-def _exp(x: float, y: float, z: float) -> Array:
-    """Return the rotation matrix of a rotation vector (rad)."""
-    square = x * x + y * y + z * z
-    angle = math.sqrt(square)
-    if angle < 1e-6:
-        a, b = 1.0 - square / 6.0, 0.5 - square / 24.0
-    else:
-        a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
-    across = _cross_matrix(np.array([x, y, z]))
-    return np.eye(3) + a * across + b * (across @ across)
+def _exp(x: Array) -> Array:
+    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3) rad."""
+    return Rotation.from_rotvec(x.reshape(-1, 3)).as_matrix().reshape(*x.shape, 3)
 
 
-@compiled
 def _log(R: Array) -> Array:
-    """Return the rotation vector (3,) of a rotation matrix, of less than half a turn."""
-    out = np.empty(3)
-    out[0], out[1], out[2] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    sine = 0.5 * math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
-    angle = math.atan2(sine, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0))
-    out *= 0.5 if sine < 1e-9 else 0.5 * angle / sine
-    return out
+    """Return the rotation vectors (m, 3) of rotation matrices (m, 3, 3)."""
+    return np.asarray(Rotation.from_matrix(R).as_rotvec())
 
 
-@compiled
-def _integrate(
-    gyro: Array, force: Array, dt: float, stride: int, turns: Array, ways: Array, moves: Array
-) -> None:
-    """Write the IMU's motion in each interval between knots: turn (m, 3, 3), and the change of
-    velocity and position (m, 3) by the specific force, in the axes of its start.
+def _times(A: Array, x: Array) -> Array:
+    """Return matrices (m, 3, 3) times vectors (m, 3)."""
+    return np.asarray((A @ x[:, :, None])[:, :, 0])
+
+
+def _integrate(gyro: Array, force: Array, dt: float, stride: int) -> tuple[Array, Array, Array]:
+    """Return the IMU's motion in each of m intervals between knots: turn (m, 3, 3), and the change
+    of velocity and position (m, 3) by the specific force, in the axes of its start.
     """
-    for k in range(len(turns)):
-        turn, speed, way = np.eye(3), np.zeros(3), np.zeros(3)
-        for j in range(k * stride, (k + 1) * stride):
-            w = 0.5 * (gyro[j] + gyro[j + 1]) * dt
-            half = turn @ _exp(0.5 * w[0], 0.5 * w[1], 0.5 * w[2])
-            a = half @ (0.5 * (force[j] + force[j + 1]))
-            way += speed * dt + 0.5 * dt * dt * a
-            speed += a * dt
-            turn = turn @ _exp(w[0], w[1], w[2])
-        turns[k], ways[k], moves[k] = turn, speed, way
+    w, f = (0.5 * (x[:-1] + x[1:]).reshape(-1, stride, 3) for x in (gyro, force))
+    halves, wholes = _exp(0.5 * dt * w), _exp(dt * w)
+    turn, speed, way = np.eye(3), np.zeros((len(w), 3)), np.zeros((len(w), 3))
+    for j in range(stride):
+        a = _times(turn @ halves[:, j], f[:, j])
+        way += speed * dt + 0.5 * dt * dt * a
+        speed += a * dt
+        turn = turn @ wholes[:, j]
+    return turn, speed, way
 
 
-@compiled
-def _levelled(gyro: Array, force: Array, dt: float, time: float, R: Array, out: Array) -> None:
-    """Write the attitude (n, 3, 3) integrated from the gyro and slowly levelled by the specific
-    force (R. Mahony, T. Hamel, J.-M. Pflimlin, IEEE Transactions on Automatic Control 53 (2008)).
-    """
-    for k in range(len(gyro)):
-        out[k] = R
-        size = math.sqrt(np.sum(force[k] ** 2)) + 1e-9
-        up, seen = R[2], force[k] / size
-        w = gyro[k].copy()
-        w[0] += (seen[1] * up[2] - seen[2] * up[1]) / time
-        w[1] += (seen[2] * up[0] - seen[0] * up[2]) / time
-        w[2] += (seen[0] * up[1] - seen[1] * up[0]) / time
-        R = np.ascontiguousarray(R @ _exp(w[0] * dt, w[1] * dt, w[2] * dt))
-
-
-@compiled
-def _predict(k: int, nominal: Nominal, F: Array, defect: Array) -> None:
-    """Write the step from knot ``k`` to the next about the nominal motion: its matrix, and the next
-    knot's defect by the IMU.
+def _steps(nominal: Nominal) -> tuple[Array, Array]:
+    """Return the steps from each of m knots to the next about the nominal motion: their matrices
+    (m, 15, 15), and the next knots' defects (m, 15) by the IMU.
     """
     T, gravity, rotation, linear, turns, ways, moves = nominal
-    R, b, a = rotation[k], linear[k, 6:9], linear[k, 9:12]
-    turn = turns[k] @ _exp(-b[0] * T, -b[1] * T, -b[2] * T)
-    way, move = ways[k] - a * T, moves[k] - 0.5 * T * T * a
-    F[:] = 0.0
-    for i in range(3):
-        F[3 + i, 3 + i] = F[6 + i, 6 + i] = F[9 + i, 9 + i] = F[12 + i, 12 + i] = 1.0
-        F[i, 9 + i], F[6 + i, 3 + i] = -T, T
-    F[0:3, 0:3] = turn.T
-    F[3:6, 0:3] = -R @ _cross_matrix(way)
-    F[6:9, 0:3] = -R @ _cross_matrix(move)
-    F[3:6, 12:15], F[6:9, 12:15] = -T * R, -0.5 * T * T * R
-    defect[0:3] = _log(rotation[k + 1].T @ (R @ turn))
-    defect[3:6] = linear[k, 0:3] + R @ way - linear[k + 1, 0:3]
-    defect[6:9] = linear[k, 3:6] + T * linear[k, 0:3] + R @ move - linear[k + 1, 3:6]
-    defect[5] -= gravity * T
-    defect[8] -= 0.5 * gravity * T * T
-    defect[9:15] = linear[k, 6:12] - linear[k + 1, 6:12]
-
-
-@compiled
-def _update(x: Array, P: Array, first: int, late: float, z: Array, variance: float) -> None:
-    """Take in a measurement (3,) of three of the states from ``first`` on; positions are ``late`` s
-    behind the knot.
-    """
-    for i in range(3):
-        h = np.zeros(N)
-        h[first + i] = 1.0
-        if first == POSITION:
-            h[3 + i] = late
-        c = P @ h
-        gain = c / (h @ c + variance)
-        x += gain * (z[i] - h @ x)
-        P -= np.outer(gain, c)
-
-
-@compiled
-def _smooth(
-    nominal: Nominal,
-    noise: Array,
-    prior: Array,
-    prior_std: Array,
-    measured: Measurements,
-    change: Array,
-    std: Array,
-) -> None:
-    """Write the smoothed error state (m, 15) about a nominal motion and its standard deviations."""
-    knots, firsts, late, off, variances = measured
-    m = len(nominal[2])
-    means, covariances = np.empty((m, N)), np.empty((m, N, N))
-    before, spreads = np.empty((m, N)), np.empty((m, N, N))
-    F, defect = np.zeros((N, N)), np.zeros(N)
-    x, P = prior.copy(), np.diag(prior_std**2)
-    at = 0
-    for k in range(m):
-        if k > 0:
-            _predict(k - 1, nominal, F, defect)
-            x = F @ x + defect
-            P = F @ P @ F.T
-            for i in range(N):
-                P[i, i] += noise[i]
-        before[k], spreads[k] = x, P
-        P = P.copy()
-        while at < len(knots) and knots[at] == k:
-            _update(x, P, firsts[at], late[at], off[at], variances[at])
-            at += 1
-        P = 0.5 * (P + P.T)
-        means[k], covariances[k] = x, P
-    change[m - 1] = x
-    std[m - 1] = np.sqrt(np.maximum(np.diag(P), 0.0))
-    for k in range(m - 2, -1, -1):
-        _predict(k, nominal, F, defect)
-        gain = np.linalg.solve(spreads[k + 1], F @ covariances[k]).T.copy()
-        x = means[k] + gain @ (x - before[k + 1])
-        P = covariances[k] + gain @ (P - spreads[k + 1]) @ gain.T
-        P = 0.5 * (P + P.T)
-        change[k] = x
-        std[k] = np.sqrt(np.maximum(np.diag(P), 0.0))
+    R, (velocity, position, b, a) = rotation[:-1], np.split(linear[:-1], 4, axis=1)
+    turn = turns @ _exp(-T * b)
+    way, move = ways - a * T, moves - 0.5 * T * T * a
+    F, one = np.tile(np.eye(N), (len(R), 1, 1)), np.eye(3)
+    F[:, 0:3, 0:3] = turn.swapaxes(1, 2)
+    F[:, 0:3, 9:12], F[:, 6:9, 3:6] = -T * one, T * one
+    F[:, 3:6, 0:3] = -R @ _cross_matrix(way)
+    F[:, 6:9, 0:3] = -R @ _cross_matrix(move)
+    F[:, 3:6, 12:15], F[:, 6:9, 12:15] = -T * R, -0.5 * T * T * R
+    fall = np.array([0.0, 0.0, gravity])
+    after = [velocity + _times(R, way) - T * fall]
+    after += [position + T * velocity + _times(R, move) - 0.5 * T * T * fall, b, a]
+    tilt = _log(rotation[1:].swapaxes(1, 2) @ (R @ turn))
+    return F, np.concatenate([tilt, np.concatenate(after, axis=1) - linear[1:]], axis=1)
 
 
 def fuse(
@@ -254,8 +161,7 @@ def fuse(
     count = (len(t) - 1) // stride
     T = stride * dt
     gyro, force = (np.ascontiguousarray(x[: count * stride + 1]) for x in (gyro, force))
-    turns, ways, moves = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
-    _integrate(gyro, force, dt, stride, turns, ways, moves)
+    turns, ways, moves = _integrate(gyro, force, dt, stride)
     times = t[0] + T * np.arange(count + 1)
     rates, forces = (np.ascontiguousarray(x[::stride]) for x in (gyro, force))
     rotation, heading_std = _first_guess(times, rates, forces, gravity, noise, positions, attitudes)
@@ -280,9 +186,11 @@ def fuse(
     nominal = (T, gravity, rotation, linear, turns, ways, moves)
     change, std = np.zeros((2, count + 1, N))
     for _ in range(ITERATIONS):
-        prior = np.concatenate([_log(rotation[0].T @ started), begun - linear[0]])
+        change[0, :3] = _log(rotation[:1].swapaxes(1, 2) @ started)
+        change[0, 3:], std[0] = begun - linear[0], prior_std
         measured = _measured(times, rates, rotation, linear, readings)
-        _smooth(nominal, spread, prior, prior_std, measured, change, std)
+        if not _core.smooth_inertial_motion(*_steps(nominal), spread, *measured, change, std):
+            raise np.linalg.LinAlgError("the covariance of an inertial motion is singular")
         turn = Rotation.from_rotvec(change[:, :3])
         rotation[:] = (Rotation.from_matrix(rotation) * turn).as_matrix()
         linear += change[:, 3:]
@@ -308,15 +216,19 @@ def _first_guess(
     heading at the start.
     """
     dt = float(times[1] - times[0])
-    out = np.empty((len(times), 3, 3))
+    quaternions = np.empty((len(times), 4))
     # roll and pitch return to their start: their mean rate is the bias
     rates = gyro - np.append(gyro.mean(axis=0)[:2], 0.0)
     first = force[: max(1, round(LEVELLING / dt))].mean(axis=0)
-    up = first / np.linalg.norm(first)
-    forward = np.array([1.0, 0.0, 0.0]) - up[0] * up
-    forward /= max(float(np.linalg.norm(forward)), 1e-9)
+    size = float(np.linalg.norm(first))
+    up = first / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
+    ahead = np.eye(3)[0 if abs(up[0]) < 1.0 - 1e-9 else 1]
+    forward = ahead - (up @ ahead) * up
+    forward /= np.linalg.norm(forward)
     level = np.stack([forward, np.cross(up, forward), up])
-    _levelled(rates, force, dt, LEVELLING, np.ascontiguousarray(level), out)
+    start = Rotation.from_matrix(level).as_quat(scalar_first=True)
+    _core.level_attitude(rates, force, dt, LEVELLING, start, quaternions)
+    out = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
     if attitudes is not None and len(attitudes.t):
         nearest_knot = np.abs(np.subtract.outer(attitudes.t[:1], times)).argmin(axis=1)[0]
         heading = _turned_heading(out[nearest_knot], attitudes.values[0])
@@ -324,7 +236,7 @@ def _first_guess(
         heading = _heading(times, out, force, gravity, noise, gyro, positions)
     else:
         return out, 0.0
-    return np.ascontiguousarray(_exp(0.0, 0.0, heading) @ out), HEADING_STD
+    return _exp(np.array([0.0, 0.0, heading])) @ out, HEADING_STD
 
 
 def _heading(

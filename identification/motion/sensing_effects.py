@@ -8,31 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ... import _core
 from ...dynamics.effects import Role, get
-from ...dynamics.model import rewrite_sample
-from ...dynamics.vehicle import Array, EffectSetting, Vehicle
-from ...runtime.compiled import Record, compiled
+from ...dynamics.vehicle import EffectSetting, Vehicle
 from ..logs.flight_log import FlightLog
 from .residual import loaded_model
 from .signals import LONGEST_GAP
-
-
-@compiled
-def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
-    """Bring ``samples`` (n, 11), rotor speeds and pose, back to the truth in place; ``seen`` (n,)
-    marks rows with a pose.
-    """
-    f = models[0]
-    f.sample[7] = 1.0
-    for k in range(len(t)):
-        for i in range(4):
-            f.sample[i] = samples[k, i]
-        if seen[k]:
-            for i in range(4, 11):
-                f.sample[i] = samples[k, i]
-        rewrite_sample(f, t[k] - t[k - 1] if k > 0 else 0.0, 7 if seen[k] else 4, -1.0)
-        for i in range(11 if seen[k] else 4):
-            samples[k, i] = f.sample[i]
 
 
 def sensing_of(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
@@ -58,12 +39,9 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     if not sensing_of(vehicle):
         return log
     samples = np.column_stack([log.rotor_speeds, log.position, log.quaternion])
-    _undo(
-        loaded_model(vehicle)[0].copy(),
-        np.ascontiguousarray(log.t),
-        np.ascontiguousarray(log.valid),
-        samples,
-    )
+    models = loaded_model(vehicle)[0].copy()
+    t, seen = np.ascontiguousarray(log.t), np.ascontiguousarray(log.valid)
+    _core.undo_sensing(models.ctypes.data, t, seen, samples)
     delay = delay_of(vehicle)
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan

@@ -48,7 +48,7 @@ class Signals:
 
     def columns(self) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Return rotor speeds, voltage (0 where unknown), position, rotation, velocity and angular
-        velocity, contiguous: compiled code would be compiled anew for another memory layout.
+        velocity, contiguous, as the core takes them.
         """
         voltage = np.zeros(len(self.t)) if self.voltage is None else self.voltage
         moving = (self.position, self.rotation, self.velocity, self.angular_velocity)

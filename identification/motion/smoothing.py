@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, savgol_filter, sosfilt_zi, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from ...runtime.compiled import compiled
+from ... import _core
 
 Array = NDArray[np.float64]
 
@@ -59,9 +59,7 @@ def low_pass(x: Array, cutoff_hz: float, period: float) -> Array:
     before = 2.0 * columns[0] - columns[edge:0:-1]
     after = 2.0 * columns[-1] - columns[-2 : -edge - 2 : -1]
     out = np.concatenate([before, columns, after])
-    section, start = _section(2.0 * cutoff_hz * period)
-    for way in (out, out[::-1]):
-        _run(way, section, start)
+    _core.low_pass(out, *_section(2.0 * cutoff_hz * period))
     return out[edge : edge + len(x)].reshape(x.shape)
 
 
@@ -70,19 +68,6 @@ def _section(share_of_nyquist: float) -> tuple[Array, Array]:
     """Return the coefficients (6,) of a second-order low-pass, and its memory (2,) of a one."""
     sections = butter(2, share_of_nyquist, output="sos")
     return sections[0], sosfilt_zi(sections)[0]
-
-
-@compiled
-def _run(x: Array, section: Array, start: Array) -> None:
-    """Run a second-order filter over columns (n, k), in place, as if the first row had lasted."""
-    b, a = section[:3], section[4:]
-    first, second = start[0] * x[0], start[1] * x[0]
-    for row in x:
-        for j in range(len(row)):
-            given, made = row[j], b[0] * row[j] + first[j]
-            first[j] = b[1] * given - a[0] * made + second[j]
-            second[j] = b[2] * given - a[1] * made
-            row[j] = made
 
 
 def high_pass(x: Array, share_of_rate: float) -> Array:

@@ -13,7 +13,6 @@ from tests.support.vehicles import POSE, VEHICLE
 from windwrench import _core
 from windwrench.estimator import WrenchUKF, WrenchUKFBatch
 from windwrench.estimator.filter_record import FILTER
-from windwrench.estimator.ukf import step
 
 STEPS = 400
 COMPILER = shutil.which("g++") or shutil.which("clang++")
@@ -49,23 +48,7 @@ def begun(gate=0.999):
 
 def test_the_record_of_python_begins_with_the_memory_of_the_core():
     assert FILTER.fields["innovation"][1] == _core.FILTER_SIZE
-    assert FILTER.fields["acceleration"][1] == _core.CONSTANT_GAIN_SIZE
-
-
-@pytest.mark.parametrize("gate", [None, 0.999])
-def test_the_core_is_the_compiled_python_to_the_bit(gate):
-    # through gaps, outliers, restarts and overflows
-    kept = FILTER.fields["gated"][1]
-    for seed in range(3):
-        core = begun(gate)
-        old = begun(gate)
-        seen = set()
-        for sample in zip(*flight_with_faults(seed), strict=True):
-            seen.add(core.step(*sample).status)
-            parts = old._sample.read(*sample)
-            step(old.record[0], old.record[0]["z"], parts, PERIOD, VEHICLE.voltage_ref)
-            assert core.record.tobytes()[:kept] == old.record.tobytes()[:kept]
-        assert {"tracking", "coasting", "restarted"} <= seen
+    assert FILTER.itemsize == _core.CONSTANT_GAIN_SIZE
 
 
 def test_single_precision_follows_double():

@@ -10,8 +10,10 @@ from scipy.spatial.transform import Rotation
 from tests.support.flights import PERIOD, fly, yawing_flight
 from tests.support.sizes import rms
 from tests.support.vehicles import HOVER, POSE, VEHICLE
+from windwrench import _core
 from windwrench.dynamics import EffectSetting
 from windwrench.reproduction import NonlinearObserver
+from windwrench.reproduction.observer import OBSERVER
 
 FORCE = np.array([0.3, -0.2, -0.1])  # of yawing_flight
 TORQUE = np.array([0.0, 0.0, 0.02])
@@ -42,6 +44,10 @@ def errors_along(flight, missing=()):
     true |= {"velocity": flight["velocity"][1:], "angular_velocity": flight["omega"][1:]}
     found = fly(NonlinearObserver(VEHICLE), flight, missing)
     return np.hstack([np.array([getattr(e, n) for e in found]) - x for n, x in true.items()])
+
+
+def test_the_record_of_python_is_the_memory_of_the_core():
+    assert OBSERVER.itemsize == _core.OBSERVER_SIZE
 
 
 def test_steady_state_is_exact_after_a_rise_of_a_second():

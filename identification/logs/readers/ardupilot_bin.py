@@ -14,8 +14,8 @@ Betaflight's, DJI's, and clockwise from front-right. X is assumed where the log 
 128, FMT, states of a type its number, its length, its name, and the letters and names of its
 columns. pymavlink reads such logs, too: as Python objects, one by one, in 14 times the time, with a
 printed line for each damaged byte, and with 100 MB of disk. pymavlink opens 20 million empty
-messages in 161 s and 1.1 GB. Here compiled code notes the messages' places, and wanted columns are
-read at once: any file costs a bounded time. Ground stations turn such a log into text (``.log``): a
+messages in 161 s and 1.1 GB. Here the core notes the messages' places, and wanted columns are read
+at once: any file costs a bounded time. Ground stations turn such a log into text (``.log``): a
 message a line, its type's name first, FMT among them, and numbers in whole units.
 """
 
@@ -30,8 +30,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from .... import _core
 from ....dynamics.vehicle import Vehicle
-from ....runtime.compiled import compiled
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
@@ -68,7 +68,7 @@ BEGINS = b"\xa3\x95|(?s:.*)" + _AS_TEXT
 WHAT = "an ArduPilot log (DataFlash .BIN)"
 _TEXTS = ("Name", "Message")  # columns, of PARM and MSG
 _HEAD = 3  # bytes of a message before its columns
-_FMT, _FMT_LENGTH = 128, 89
+_FMT = 128
 _FORMAT = np.dtype("u1, u1, S4, S16, S64")  # number, length, name, letters and columns of a type
 _MOST_FORMATS = 100_000  # at most
 # types of columns by their letters, as of ``struct`` and further ones; and units of columns other
@@ -284,7 +284,7 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
     data = np.frombuffer(content, np.uint8)
     most = len(data) // _HEAD
     places, kinds = np.empty(most, np.int32), np.empty(most, np.uint8)
-    count, used = _walk(data, places, kinds)
+    count, used = _core.walk_dataflash(data, places, kinds)
     places, kinds = places[:count], kinds[:count]  # take memory as they were filled
     by_type = {}
     formats = places[kinds == _FMT][:_MOST_FORMATS]
@@ -366,28 +366,3 @@ def _layouts(
         if layout.itemsize + _HEAD == length:
             layouts[number] = name, layout, dict(zip(columns, units, strict=True))
     return layouts
-
-
-@compiled
-def _walk(data: Bytes, places: NDArray[np.int32], kinds: Bytes) -> tuple[int, int]:
-    """Go through all messages; note their places and types. Return how many they are, and how many
-    bytes they take. Other bytes are passed one by one.
-    """
-    lengths = np.zeros(256, np.int64)
-    lengths[_FMT] = _FMT_LENGTH
-    place, used, count = 0, 0, 0
-    while place + _HEAD <= len(data):
-        kind = data[place + 2]
-        length = lengths[kind]
-        is_begin = data[place] == 0xA3 and data[place + 1] == 0x95
-        if not is_begin or length < _HEAD or place + length > len(data):
-            place += 1
-            continue
-        if kind == _FMT:
-            lengths[data[place + 3]] = data[place + 4]
-            lengths[_FMT] = _FMT_LENGTH
-        places[count], kinds[count] = place, kind
-        count += 1
-        place += length
-        used += length
-    return count, used

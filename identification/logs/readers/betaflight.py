@@ -15,7 +15,7 @@ A table has the log's numbers without the headers: these are inferred from the n
 A unit in a column's name is taken.
 
 A file may hold several logs, one for each arming: the longest is read, and a note says so.
-``blackbox_frames`` decodes its frames. orangebox 0.5.0, the library for these logs, cannot:
+The core decodes its frames. orangebox 0.5.0, the library for these logs, cannot:
 encoding 10 of Betaflight's logs is not written, and a cut log ends in a TypeError. In damaged logs
 orangebox keeps wrong frames (398 of 400 where 369 are right). The tests use orangebox as a second
 opinion on whole logs without encoding 10.
@@ -25,9 +25,12 @@ import re
 from collections.abc import Collection, Mapping
 from itertools import zip_longest
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .... import _core
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
@@ -38,7 +41,8 @@ from ..log_map import shipped_map
 from ..mapped_log import recording_of
 from ..streams import MOST_VOLTS
 from ..table import Array, NamedArrays, Table
-from .blackbox_frames import ENCODINGS, FRAMES, PREDICTORS, Layout, decode
+
+Ints = NDArray[np.int64]
 
 BEGINS = b"H Product:Blackbox"
 Headers = Mapping[str, str]
@@ -56,6 +60,21 @@ _MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of other vehicles th
 _HUNDREDS = "(/100)"  # behind the name eRPM of some versions, which are all in hundreds
 WHAT = "a blackbox of Betaflight or INAV"
 _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
+# how fields are coded, the numbers to which they are added, and the letters of frames with fields
+_ENCODINGS = (0, 1, 3, 6, 7, 8, 9, 10)
+_PREDICTORS = (*range(12), 256)
+_FRAMES = "IPSGH"
+
+
+class _Layout(NamedTuple):
+    """A header's statements on the frames; I and P frames have the same fields."""
+
+    encodings: Ints  # (6, F) of I, P, S, G and H frames; the last row is of none
+    predictors: Ints  # (6, F)
+    counts: Ints  # (5,) fields of each
+    intervals: Ints  # (3,) of I frames, and numerator and denominator of P frames, in loops
+    constants: Ints  # (257,) what each predictor adds
+    places: Ints  # (3,) fields loopIteration, time and motor[0]; -1: none
 
 
 def read(
@@ -99,7 +118,7 @@ def read(
     frames = np.frombuffer(data[: ends[chosen]], np.uint8)
     most = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
     rows = np.empty((most + 1, len(keep)), np.int64)  # memory is taken as filled
-    count, lost = decode(frames, begin, layout, where, rows)
+    count, lost = _core.decode_blackbox(frames, begin, *layout, where, rows)
     check_count(path, count, most, "frames")
     if count < 2:
         raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
@@ -271,16 +290,16 @@ def _whole_number(text: str, least: int, most: int) -> int | None:
     return int(text) if least <= int(text) <= most else None
 
 
-def _layout(path: Path, headers: Headers, names: list[str]) -> Layout:
+def _layout(path: Path, headers: Headers, names: list[str]) -> _Layout:
     """Return the frames' layout from the headers.
 
     Raises:
         InputError: the headers contradict themselves, or name something unknown.
     """
     check_count(path, len(names), LIMITS.log_fields, "fields")
-    predictors = _frame_lists(path, headers, "predictor", PREDICTORS)
-    encodings = _frame_lists(path, headers, "encoding", ENCODINGS)
-    for letter, one, other in zip(FRAMES, predictors, encodings, strict=True):
+    predictors = _frame_lists(path, headers, "predictor", _PREDICTORS)
+    encodings = _frame_lists(path, headers, "encoding", _ENCODINGS)
+    for letter, one, other in zip(_FRAMES, predictors, encodings, strict=True):
         sizes = {len(one), len(other)}
         if len(sizes) > 1 or (letter in "IP" and sizes != {len(names)}):
             raise InputError(
@@ -302,7 +321,7 @@ def _layout(path: Path, headers: Headers, names: list[str]) -> Layout:
     every = headers.get("I interval", "32")
     intervals = [max(1, number(text, 1)) for text in (every, top or "1", bottom)]
     least = headers.get("motorOutput", "").split(",")[0]
-    constants = np.zeros(max(PREDICTORS) + 1, np.int64)
+    constants = np.zeros(max(_PREDICTORS) + 1, np.int64)
     constants[4] = number(headers.get("minthrottle", ""), 1150)
     constants[8], constants[9] = 1500, number(headers.get("vbatref", ""), 4095)
     constants[11] = number(least, 0)
@@ -311,7 +330,7 @@ def _layout(path: Path, headers: Headers, names: list[str]) -> Layout:
         for lists in (encodings, predictors)
     )
     counts = [len(one) for one in encodings]
-    return Layout(*rows, *(np.array(x, np.int64) for x in (counts, intervals, constants, places)))
+    return _Layout(*rows, *(np.array(x, np.int64) for x in (counts, intervals, constants, places)))
 
 
 def _frame_lists(
@@ -323,7 +342,7 @@ def _frame_lists(
         InputError: a predictor or encoding is unknown.
     """
     lists = []
-    for letter in FRAMES:
+    for letter in _FRAMES:
         key = f"Field {letter} {what}"
         texts = headers.get(key, "").split(",") if headers.get(key) else []
         if bad := [text for text in texts if text.strip() not in map(str, known)]:

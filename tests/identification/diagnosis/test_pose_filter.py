@@ -13,18 +13,18 @@ from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded
-from windwrench.identification.diagnosis.causal_filter import sensitivities
+from windwrench._core import sensitivities
 from windwrench.identification.diagnosis.likelihood import OWN, Likelihood, gyration
 from windwrench.identification.diagnosis.noise_search import NoiseSearch, _free
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.steady_filter import (
     PAIRS,
-    PARTNER,
     PULL,
     PoseNoise,
     steady_filter,
 )
 
+PARTNER = np.array([4, 3, 5, 1, 0, 2])  # the axis that an axis is filtered with
 PERIOD = 0.01
 GRAVITY = 9.81
 TRUE = PoseNoise(

@@ -1,0 +1,168 @@
+// A model along a logged flight of n rows: its wrench, its predictions, and poses without its
+// sensing effects. What Python says of each stands in identification/.
+#pragma once
+#include <algorithm>
+#include <cstdint>
+
+#include "../effects.hpp"
+
+namespace windwrench {
+
+// The rotors at each row of a log
+struct LoggedRotors {
+  int64_t n;
+  const double (*speeds)[4];  // rad/s
+  const double *voltage;      // V; 0: not known
+};
+
+// The motion at each row; its angular acceleration is measured
+struct LoggedMotion {
+  const double (*position)[3], (*rotation)[3][3], (*velocity)[3], (*rate)[3], (*turning)[3];
+};
+
+// Force N, world, and torque Nm, body, out (n, 6), of a model's accelerations, for a body of this
+// mass and inertia. The measured angular acceleration moves the pose's point about a centre of mass
+// off this point
+inline void acting_wrench(Model<double> &m, double period, const LoggedRotors &rotors,
+                          const LoggedMotion &flown, double mass, const double J[3][3],
+                          double (*out)[6]) {
+  const double none[3] = {};
+  for (int64_t k = 0; k < rotors.n; k++) {
+    double x[STATE] = {}, a[3], alpha[3];
+    for (int i = 0; i < 3; i++) {
+      x[i] = flown.position[k][i];
+      x[VELOCITY + i] = flown.velocity[k][i];
+      x[RATE + i] = flown.rate[k][i];
+    }
+    const double (*R)[3] = flown.rotation[k];
+    drive(m, rotors.speeds[k], period, rotors.voltage[k]);
+    apply_effects(m, x, R);
+    m.time += period;
+    const double *w = x + RATE;
+    centre_acceleration(m.body, R, w, flown.turning[k], none, m.rotor_wrench, m.effect_wrench, a);
+    angular_acceleration(m.body, R, w, none, m.rotor_wrench, m.effect_wrench, alpha);
+    a[2] += m.body.gravity;
+    for (int i = 0; i < 3; i++) {
+      out[k][i] = mass * a[i];
+      out[k][3 + i] = row_times(J[i], alpha[0], alpha[1], alpha[2]);
+    }
+  }
+}
+
+// Bring samples (n, 11), rotor speeds and pose, back to the truth in place; `seen` marks rows with
+// a pose
+inline void undo_log_sensing(Model<double> &m, int64_t n, const double *t, const bool *seen,
+                             double (*samples)[11]) {
+  if (m.sensing_count == 0) return;
+  double *sample = numbers_of<double>(m.sample);
+  m.sample.quaternion[0] = 1;
+  for (int64_t k = 0; k < n; k++) {
+    int given = seen[k] ? 11 : 4;
+    std::copy_n(samples[k], given, sample);
+    undo_sensing(m, seen[k] ? 7 : 4, k > 0 ? t[k] - t[k - 1] : 0.0);
+    std::copy_n(sample, given, samples[k]);
+  }
+}
+
+constexpr double LONGEST_ROTOR_STEP = 0.005;  // s, over which rotors are held
+constexpr double STEP_TOLERANCE = 0.1;  // of a period: a step so little too long is still one step
+// of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
+constexpr int MOTION_STEPS = 4;
+constexpr int FLOWN = 13;  // numbers of a state: position, quaternion, velocity, rate
+
+inline int rotor_steps(double length) {
+  return std::max(1, int(std::ceil(length / LONGEST_ROTOR_STEP - STEP_TOLERANCE)));
+}
+
+// Move a state on by dt s; where `keeps_velocity`, no force acts
+inline void fly(Model<double> &m, double *x, double dt, bool keeps_velocity) {
+  double R[3][3], after[STATE];
+  matrix_of(x + QUATERNION, R);
+  apply_effects(m, x, R);
+  move(m.body, x, R, m.rotor_wrench, m.effect_wrench, dt, after);
+  for (int i = 0; keeps_velocity && i < 3; i++) {
+    after[VELOCITY + i] = x[VELOCITY + i];
+    after[i] = x[i] + x[VELOCITY + i] * dt;
+  }
+  std::copy_n(after, NIS, x);
+}
+
+// Run a model along a flight, for the memory of rotors and effects; let a copy of it go at each
+// start, a row, and write the copy's states path (starts, ahead, 13), a period apart
+inline void predict_flight(Model<double> &along, const LoggedRotors &rotors, const double *t,
+                           const double (*states)[FLOWN], const int64_t *starts, int64_t count,
+                           double period, bool keeps_velocity, int64_t ahead,
+                           double (*path)[FLOWN]) {
+  const int steps = rotor_steps(period);
+  const double dt = period / steps;
+  int64_t at = 0;
+  for (int64_t k = 0; k < rotors.n && at < count; k++) {
+    if (k > 0) {
+      double R[3][3], length = t[k] - t[k - 1];
+      int parts = rotor_steps(length);
+      matrix_of(states[k - 1] + QUATERNION, R);
+      for (int i = 0; i < parts; i++) {
+        drive(along, rotors.speeds[k], length / parts, rotors.voltage[k]);
+        apply_effects(along, states[k - 1], R);
+        along.time += length / parts;
+      }
+    }
+    if (starts[at] != k) continue;
+    Model<double> m = along;
+    double x[STATE] = {}, between[4];
+    std::copy_n(states[k], FLOWN, x);
+    int64_t row = k;
+    for (int64_t i = 0; i < ahead; i++) {
+      double time = t[k] + double(i + 1) * period;
+      while (row < rotors.n - 2 && t[row + 1] < time) row++;
+      double share = std::min((time - t[row]) / (t[row + 1] - t[row]), 1.0);
+      for (int j = 0; j < 4; j++)
+        between[j] = (1 - share) * rotors.speeds[row][j] + share * rotors.speeds[row + 1][j];
+      double volts = (1 - share) * rotors.voltage[row] + share * rotors.voltage[row + 1];
+      for (int j = 0; j < steps; j++) {
+        drive(m, between, dt, volts);
+        for (int part = 0; part < MOTION_STEPS; part++)
+          fly(m, x, dt / MOTION_STEPS, keeps_velocity);
+        m.time += dt;
+      }
+      std::copy_n(x, FLOWN, path[at * ahead + i]);
+    }
+    at++;
+  }
+}
+
+// The scale of a filter's innovations, of translation and of rotation, is estimated as well, since
+// noise is not as declared: the declared one counts as much as so many poses
+constexpr double DECLARED = 20;
+constexpr double TAIL = 4;  // degrees of freedom of Student's t, which a jump of a pose follows
+
+// Write the state after the `last` call of each row, and the log-likelihood of the poses so far,
+// where this is larger than of the filters before. `posed` marks calls with a pose
+inline void choose_likeliest(int64_t n, const int64_t *last, const bool *posed,
+                             const double *numbers, int64_t width, const double (*innovations)[12],
+                             double (*states)[FLOWN], double *best) {
+  double total = 0, seen = 0, scales[2] = {1, 1}, squares[2] = {};
+  for (int64_t k = 0; k < n; k++) {
+    const double *white = innovations[last[k]], *root_of_variance = white + 6;
+    if (posed[last[k]]) {
+      seen += 3;
+      for (int part = 0; part < 2; part++) {
+        double nis = 0, spread = 1.5 * std::log(scales[part]);
+        for (int i = 3 * part; i < 3 * part + 3; i++) {
+          nis += white[i] * white[i];
+          spread += std::log(root_of_variance[i]);
+        }
+        double far = nis / (TAIL * scales[part]);
+        total -= spread + 0.5 * (TAIL + 3) * std::log1p(far);
+        squares[part] += nis * (TAIL + 3) / (TAIL * (1 + far));
+        scales[part] = (3 * DECLARED + squares[part]) / (3 * DECLARED + seen);
+      }
+    }
+    if (total > best[k]) {
+      best[k] = total;
+      std::copy_n(numbers + last[k] * width, FLOWN, states[k]);
+    }
+  }
+}
+
+}  // namespace windwrench
