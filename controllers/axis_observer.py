@@ -1,5 +1,6 @@
-"""A Kalman filter of one axis of the flight loop and its vehicle (``axis_models``), with the
-external wrench, the wrench filter's estimate of it, and an accelerometer's bias as further states.
+"""A Kalman filter of one axis of the flight loop and its vehicle (``axis_models``).
+
+Further states are the external wrench, the wrench filter's estimate, and an accelerometer's bias.
 """
 
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..dynamics.effects import compile_effects
-from ..dynamics.effects.base import POSITION, RATE, ROTATION, STATE_SIZE, VELOCITY
+from ..dynamics.effects.base import STATE
 from ..dynamics.mean_jet import (
     AIR_DENSITY,
     FIRST_X,
@@ -53,18 +53,19 @@ def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> JetMap:
     )
     bundle = compile_effects(alone)
     (model,), (coefficients,) = bundle.wrench_models, bundle.wrench_coefficients
-    state, wrench = np.zeros(STATE_SIZE), np.zeros(6)
-    state[POSITION] = jet.distance
-    state[[ROTATION, ROTATION + 4, ROTATION + 8]] = -1.0, -1.0, 1.0  # it faces the fan
+    numbers, wrench = np.zeros(STATE.itemsize // 8), np.zeros(6)
+    state = numbers.view(STATE)[0]
+    state["position"][0] = jet.distance
+    state["rotation"] = np.diag([-1.0, -1.0, 1.0])  # it faces the fan
     offsets = FIRST + STEP * np.arange(COUNT, dtype=np.float64)
 
     def felt(velocity: float, rate: float) -> Array:
         table = np.empty((AXES, COUNT))
-        state[VELOCITY + 1], state[RATE + 2] = velocity, rate
+        state["velocity"][1], state["rate"][2] = velocity, rate
         for i, offset in enumerate(offsets):
-            state[POSITION + 1] = offset
+            state["position"][1] = offset
             wrench[:] = 0.0
-            _core.call_effect(model, coefficients, bundle.constants, state, wrench)
+            _core.call_effect(model, coefficients, bundle.constants, numbers, wrench)
             table[:, i] = wrench[5], wrench[0], wrench[1]
         return table
 

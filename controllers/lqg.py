@@ -99,7 +99,7 @@ class LQG:
 
     def _law(self, axis: AxisModel) -> tuple[AxisObserver, Wide, float]:
         """Return the observer of an axis, the regulator's gain (n,) on its states, and the gain on
-        the reference's last turn, which is expected to go on.
+        the reference's last turn. The turn is expected to go on.
         """
         k = axis.D.shape[1]
         weight, standard, noise = self.vehicle.weight, standard_vehicle(), dict(self.noise)

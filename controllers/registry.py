@@ -25,7 +25,7 @@ from .tracker import InformedTracker, Limit, Tracker, TrackerLQG
 from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, PIDWithWrench
 
 STANDARD_TASK = "FanTracking"
-STANDARD_SCENARIO = "base"  # of the gains of a law that is called no more than tuned
+STANDARD_SCENARIO = "base"  # whose gains a law called no more than tuned has
 
 
 class Controller(Protocol):

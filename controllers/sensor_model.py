@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 _TYPICAL = 0.15  # m off the axis, where the noise is taken whose colour stands for all
 SETTLED = 19  # decisions of 80 ms that the filter has settled before the first observation
-# of a particle: the jet's mean that it felt last, the filter's error, residuals, newest first
+# a particle's: the jet's mean of its last decision, the filter's error, residuals, newest first
 MEMORY = 4 * AXES + ORDER * AXES
 
 

@@ -30,12 +30,12 @@ from .wrench_lag import lags
 Array = NDArray[np.float64]
 
 _ALONG_Y, _LOOK = 1, 24  # the axis that is commanded; decisions that ``Limit`` looks ahead
-# of the wrench along y, N and Nm: standard deviations and correlation times (s)
+# the wrench along y, N and Nm: standard deviations and correlation times (s)
 _SIZES, _TIMES = (0.1, 0.01), (1.0, 0.5)
 _MODEL = (0.05, 0.5)  # m/s2 and rad/s2 that the model lacks, per root of a second
 # standard deviations of place (m), speed (m/s) and estimated wrench (N, Nm)
 _NOISE = (0.002, 0.02, 0.02, 0.002)
-_SEED = 2016  # of the own generator, the same in every episode
+_SEED = 2016  # the own generator's, the same in every episode
 FEW = 0.5  # share of effective particles below which they are drawn anew
 # what a fan that changes its velocity at once does: a third of them stop, half turn round, the rest
 # take any other velocity
@@ -58,7 +58,7 @@ class _Belief(ABC):
     level: float = 0.0  # logarithmic spread of the noise's size; 0: as the briefing says
     particles: int = 1000
 
-    # what a particle has, (n, ...) each
+    # a particle's numbers, (n, ...) each
     _arrays: ClassVar[tuple[str, ...]] = ("_level", "_memory", "_place", "_velocity")
 
     def __post_init__(self) -> None:
@@ -205,7 +205,7 @@ class InformedTracker(_Belief):
         # speed, travel and offset at the start of each, within their bounds
         self._bounds = low, high = np.transpose([known.speed, known.travel, known.offset])
         self._motion = rng.uniform(low, high, (n, 3))
-        self._free = np.zeros(n, dtype=bool)  # of those that left the family
+        self._free = np.zeros(n, dtype=bool)  # whether a particle left the family
         self._go(0.0)
 
     def _move(self) -> None:
@@ -323,7 +323,7 @@ class TrackerLQG(_Regulated, Tracker):
     """
 
     def _ahead(self, seconds: float) -> Array:
-        rate = self.jumps * (1.0 + TURN)  # what stops or is anyhow loses its velocity, a turn two
+        rate = self.jumps * (1.0 + TURN)  # a stop costs a velocity, a turn two
         kept = -float(np.expm1(-rate * seconds)) / rate  # s of its velocity
         return np.asarray(self._place + self._velocity * kept)
 

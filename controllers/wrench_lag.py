@@ -19,7 +19,7 @@ from .briefing import Air, FilterNoise
 
 Array = NDArray[np.float64]
 
-ORDER = 3  # of the autoregression
+ORDER = 3  # the autoregression's
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,12 @@
 //
 // A cascade on the estimated state: position, velocity and integral to a thrust vector; its
 // direction to body rates and torques; torques and thrust through the inverse of the rotor mixing.
+//
+// Of a declared model, each kind of effect enters in its own way. Wrench effects: their force and
+// torque at the reference's velocity are taken off the rotors' share (`foresee`). Rotor-input
+// effects: commands are found for the wanted delivered rotor speeds (`through_the_rotors`). Sensing
+// effects: the filter has taken them out of its estimate already. Effects on the rigid body are
+// mass, inertia and centre of mass of the flight loop. No effect is known here by its name.
 #pragma once
 #include "effects.hpp"
 
@@ -42,7 +48,6 @@ template <class T> struct Flight {
   T command[4];       // rotor speeds, rad/s
   T foreseen[6];      // wrench of the model's effects: force world, torque body
   T wanted[4];        // rotor speeds to deliver, rad/s
-  S scratch[53 + 16 * 112];
 };
 
 // Move the set point with its own velocity for dt s; on an axis where it runs too far ahead of the

@@ -7,7 +7,7 @@
 
 namespace windwrench {
 
-using WindFormula = void (*)(const void *parameters, int64_t count, const double *time,
+using WindFormula = void (*)(const void *parameters, int64_t count, double time,
                              const double *points, double *velocities);
 
 // A wind that blows: its formula, and the formula's parameters
@@ -19,14 +19,14 @@ struct WindCall {
 inline void add_winds(const WindCall *winds, int64_t number, int64_t count, double time,
                       const double *points, double *velocities) {
   for (int64_t k = 0; k < number; k++)
-    winds[k].formula(winds[k].parameters, count, &time, points, velocities);
+    winds[k].formula(winds[k].parameters, count, time, points, velocities);
 }
 
 // A formula of its own parameters as a `WindFormula`
 template <class P, void formula(const P &, int64_t, double, const double *, double *)>
-void blow(const void *parameters, int64_t count, const double *time, const double *points,
+void blow(const void *parameters, int64_t count, double time, const double *points,
           double *velocities) {
-  formula(*static_cast<const P *>(parameters), count, *time, points, velocities);
+  formula(*static_cast<const P *>(parameters), count, time, points, velocities);
 }
 
 // A uniform wind, one that grows with height, or a single travelling gust

@@ -1,4 +1,4 @@
-"""A vehicle with its effects, as fields of a record for compiled code.
+"""A vehicle with its effects, as fields of a record for the core.
 
 Filter and plant each hold one: the filter's with the declared effects, the plant's also with
 undeclared ones.
@@ -7,32 +7,23 @@ undeclared ones.
 import numpy as np
 
 from .. import _core
-from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .effects import Bundle, compile_effects
 from .effects.base import (
     HIDDEN,
     MEMORY,
     PARAMETERS,
-    ROTOR_ACCELERATION,
-    ROTOR_TIME,
     ROTORS_SIZE,
     ROW_SIZE,
     SAMPLE_SIZE,
     STATE_SIZE,
-    STEP,
     VEHICLE_SIZE,
-    Array,
 )
-from .effects.call import add_wrenches, advance, deliver, report
-from .motion import BODY, body_record, fill_state, rotor_wrench
+from .motion import BODY, body_record
 from .vehicle import Vehicle
 
 MAX_EFFECTS = 16  # a kind
 MAX_SENSING = 4
-_SENSING_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
-# the model's: whether there are delivered rotor speeds, and their values
-_OWN_ROW = MAX_EFFECTS + MAX_SENSING
 
 # fields with addresses of compiled effects
 _ADDRESSES = ("wrench_models", "wrench_hooks", "rotor_models", "sensing_models")
@@ -53,7 +44,8 @@ MODEL_FIELDS: list[tuple[object, ...]] = [
     ("sensing_coefficients", "f8", (MAX_SENSING, PARAMETERS)),
     ("sensing_count", "i8"),
     ("sample", "f8", (SAMPLE_SIZE,)),  # on its way through the sensing effects
-    ("memory", "f8", (_OWN_ROW + 1, MEMORY)),
+    # of rotor-input and sensing effects; last: whether rotor speeds were delivered, and which
+    ("memory", "f8", (MAX_EFFECTS + MAX_SENSING + 1, MEMORY)),
     ("time", "f8"),
     ("voltage", "f8"),
     ("wind", "f8", (3,)),
@@ -114,97 +106,3 @@ def reset_model(record: np.void) -> None:
     """Clear the effects' memory, and set the time to zero."""
     record["memory"], record["time"], record["waiting"] = 0.0, 0.0, 0
     record["wrench_coefficients"][:, HIDDEN:] = 0.0
-
-
-@compiled
-def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Work out what the rotors deliver over a step of ``dt`` s at the logged rotor
-    speeds (4,) rad/s.
-    """
-    f.voltage = voltage
-    for i in range(4):
-        f.rotors[i] = rotor_speeds[i]
-    f.rotors[STEP], f.rotors[ROTOR_TIME] = dt, f.time
-    if f.rotor_count > 0:
-        deliver(
-            f.rotor_models[: f.rotor_count],
-            f.rotor_coefficients,
-            f.constants,
-            f.memory,
-            dt,
-            voltage,
-            f.rotors,
-        )
-    if f.wrench_count > 0:
-        last = f.memory[_OWN_ROW]
-        share = last[0] / dt if dt > 0.0 else 0.0
-        last[0] = 1.0
-        for i in range(4):
-            f.effect_state[ROTOR_ACCELERATION + i] = share * (f.rotors[i] - last[1 + i])
-            last[1 + i] = f.rotors[i]
-        f.waiting = f.hooked
-    rotor_wrench(f.body, f.rotors, f.rotor_wrench)
-
-
-@compiled
-def apply_effects(
-    f: Record, position: Array, rotation: Array, velocity: Array, omega: Array
-) -> None:
-    """Write what the wrench effects say at a state into ``f.effect_wrench``.
-
-    The first call after ``drive`` also carries the effects' own states over the step: made at the
-    state itself, not at a sigma point.
-    """
-    if f.wrench_count > 0:
-        count = f.wrench_count
-        fill_state(
-            f.body,
-            position,
-            rotation,
-            velocity,
-            omega,
-            f.rotors,
-            f.wind,
-            f.voltage,
-            f.time,
-            f.effect_state,
-        )
-        if f.waiting > 0:
-            f.waiting = 0
-            advance(
-                f.wrench_hooks[:count],
-                f.wrench_coefficients,
-                f.constants,
-                f.effect_state,
-                f.rotors,
-            )
-        for i in range(6):
-            f.effect_wrench[i] = 0.0
-        add_wrenches(
-            f.wrench_models[:count],
-            f.wrench_coefficients,
-            f.constants,
-            f.effect_state,
-            f.effect_wrench,
-        )
-
-
-@compiled
-def rewrite_sample(f: Record, dt: float, parts: int, direction: float) -> None:
-    """Change rotor speeds and pose, the first 11 of ``f.sample``, from truth to report
-    (``direction`` +1) or back (-1).
-
-    ``parts``: 1 position, 2 attitude, 4 rotor speeds. Where the attitude is no part of it, it must
-    still be readable.
-    """
-    if f.sensing_count > 0:
-        report(
-            f.sensing_models[: f.sensing_count],
-            f.sensing_coefficients,
-            f.constants,
-            f.memory[_SENSING_ROW:],
-            dt,
-            parts,
-            direction,
-            f.sample,
-        )

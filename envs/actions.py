@@ -32,7 +32,7 @@ class Action:
     """
 
     name: str
-    kind: int  # of ``controllers.flight.steer``
+    kind: int  # one of ``controllers.flight``
     moves: bool  # whether commands are velocities of the set point
     places: np.ndarray  # (size,) indices of the commands in the set point, or in the loop's action
     hover: Array  # (size,) commands of the action 0

@@ -19,6 +19,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import mujoco
@@ -42,8 +43,10 @@ from .fan import FAN, STATIONS, Fan, fan_record
 from .plant import (
     NOISE,
     PLANT,
+    SUBSTEPS,
     TICK,
     PlantSettings,
+    is_same_body,
     load_world,
     plant_record,
     reset_plant,
@@ -60,7 +63,7 @@ LOOP = np.dtype(
         ("plant", PLANT),
         ("flight", FLIGHT),
         ("fan", FAN),
-        ("action", "f8", (4,)),  # the command, of a kind that ``controllers.flight.steer`` knows
+        ("action", "f8", (4,)),  # the command, of a kind of ``controllers.flight``
         ("accelerometer_sigma", "f8"),  # m/s2, a tick
         ("accelerometer_bias", "f8", (3,)),  # m/s2, body axes
         # m/s2, world, mean over the last run: specific force of the accelerometer, and of the
@@ -83,12 +86,27 @@ LOOP = np.dtype(
 assert LOOP.itemsize == _core.LOOP_SIZE, "the core was built for another layout"
 _ADDRESSES = (LOOP.names or ())[-14:]
 # stages of the core
-WIND, SENSE, ESTIMATE, STEER, ACTUATE, FEEL, MOVE = range(7)
+WIND, SENSE, ESTIMATE, STEER, ACTUATE, FEEL = range(6)
+# callbacks of a user's own in a step: Python's errors would end the process in MuJoCo's function
+_CALLBACKS = [
+    getattr(mujoco, f"get_mjcb_{name}")
+    for name in ("control", "passive", "act_dyn", "act_gain", "act_bias", "sensor")
+]
 # MuJoCo's own function
 _MUJOCO_STEP = ctypes.cast(ctypes.CDLL(_functions.__file__).mj_step, ctypes.c_void_p).value
 
 # estimators of the wrench in flight
 ESTIMATORS: dict[str, type[WrenchUKF]] = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
+
+
+_NO_JET: Array = np.zeros((2, COUNT_X, COUNT_R))
+
+
+@lru_cache(maxsize=8)
+def _jet(radius: float, hub_radius: float) -> Array:
+    """Return the tables (2, COUNT_X, COUNT_R) of axial and radial speed, one for all loops."""
+    tables: Array = np.stack(jet_table(radius, hub_radius))
+    return tables
 
 
 class World(NamedTuple):
@@ -171,13 +189,14 @@ class ClosedLoop:
         model_in_loop: whether the flight loop counters the effects of ``declared``.
         kind: of the commands in ``action``, once the filter has settled.
         stages: a user's own, in the pipeline of a tick.
+        like: a loop whose MuJoCo model is this one's, too, if the rigid bodies are the same.
 
     Attributes:
         state: (20,) estimated state, laid out as in ``estimator.estimate``.
         covariance: (18, 18) of the estimate.
         setpoint: (11,) position, velocity, acceleration, yaw and yaw rate to fly to.
         action: (4,) the command, of the kind ``kind``: in m/s2, world, beside the flight loop's own
-            acceleration, or as of ``controllers.flight.steer``.
+            acceleration, or as ``controllers.flight`` says.
         command: (4,) rad/s, of the rotors.
         sample: (11,) rotor speeds, position and quaternion of the last measurement.
         unrounded: (4,) rad/s, these rotor speeds before rounding.
@@ -208,12 +227,13 @@ class ClosedLoop:
         model_in_loop: bool = False,
         kind: int = BESIDE,
         stages: Sequence[Stage] = (),
+        like: ClosedLoop | None = None,
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
         self.true = declared if true is None else true
         plant, self._body = plant_record(self.true, settings or PlantSettings())
-        self.model, self.data = self._make_world(drawn)
+        self.model, self.data = self._make_world(drawn, like)
         self.own_stages = tuple(stages)
         self.record = np.zeros(1, dtype=LOOP)
         loop = self.record[0]
@@ -221,11 +241,11 @@ class ClosedLoop:
         # the flight loop's model has no effects but those of the body: mass, inertia and its centre
         loop["flight"] = flight_record(compile_effects(declared).vehicle, gains)[0]
         loop["model_in_loop"], self.kind = model_in_loop, kind
-        self.jet_table: Array = np.zeros((2, COUNT_X, COUNT_R))  # axial and radial
+        self.jet_table = _NO_JET
         if fan is not None:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
             loop["fan"]["blown"] = 1  # drag, in still air too
-            self.jet_table = np.stack(jet_table(fan.radius, fan.hub_radius))
+            self.jet_table = _jet(fan.radius, fan.hub_radius)
         self.accelerometer = accelerometer
         self.noise_size = NOISE
         if accelerometer is not None:
@@ -239,7 +259,11 @@ class ClosedLoop:
         self._carried = tuple(self.__dict__)  # to a copy, where ``_bind`` adds the rest
         self._bind()
 
-    def _make_world(self, drawn: bool) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    def _make_world(
+        self, drawn: bool, like: ClosedLoop | None
+    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        if like is not None and is_same_body(like._body, self._body):
+            return like.model, mujoco.MjData(like.model)
         return load_world(self._body, drawn)
 
     def _bind(self) -> None:
@@ -398,12 +422,13 @@ class ClosedLoop:
                 f"ClosedLoop: expected noise (n, {self.noise_size}) and fan_path (m,) or (m, 2); "
                 f"got shapes {noise.shape} and {path.shape}"
             )
-        self.noise, self.fan_path = noise, path
         with Untimed():
-            if not self.own_stages and not self.winds.own:  # which are called from Python
+            in_python = self.own_stages or self.winds.own or any(ask() for ask in _CALLBACKS)
+            if not in_python:
                 _core.run_ticks(self.address, path, noise)
                 raise_errors()
                 return
+            self.noise, self.fan_path = noise, path
             for k in range(count):
                 self.row = k
                 for stage in self.stages.values():
@@ -423,7 +448,8 @@ class ClosedLoop:
 
     def move(self) -> None:
         """Let MuJoCo integrate the rigid body over the tick."""
-        self.run_stage(MOVE)
+        mujoco.mj_step(self.model, self.data, SUBSTEPS)
+        self._ticks += 1
 
     @property
     def was_reset(self) -> bool:

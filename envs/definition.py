@@ -57,6 +57,7 @@ class TaskDefinition:
     label: ClassVar[str] = "trajectory"  # entry of ``info`` with the name of the episode's draw
     draws: ClassVar[int] = 20  # at most, until an episode begins with the vehicle not lost
     mixes: ClassVar[bool] = False  # whether episodes differ in what lanes share
+    _made: ClosedLoop | None = None  # last of all loops, whose MuJoCo model the next one may take
     limits: Any = None  # (k,) largest sizes of the observation's numbers
     scales: Any = None  # (k,) their divisors, with ``normalize``
     fan: Fan
@@ -285,7 +286,7 @@ class TaskDefinition:
             "gains": self.gains,
             "model_in_loop": bool(self.model_in_loop),
         }
-        return ClosedLoop(
+        self._made = ClosedLoop(
             declared,
             replace(vehicle, mocap=declared.mocap, effects=(*vehicle.effects, *self.effects)),
             self.tuning,
@@ -295,8 +296,13 @@ class TaskDefinition:
             estimator=self.estimator,
             kind=self.flown.kind,
             stages=self.stages,
+            like=self._made,
             **{**own, **given},
         )
+        return self._made
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_made": None}
 
     def draw_loop(self, rng: np.random.Generator, kept: dict[Any, ClosedLoop]) -> ClosedLoop:
         """Return the closed loop of a world's episode, drawn where the scenario varies; elsewhere

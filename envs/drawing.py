@@ -52,7 +52,7 @@ class Viewer:
         self._renderer: Any = None
         self._window: Any = None
         self._model: Any = None
-        self.scales = SCALES  # of the arrows drawn last
+        self.scales = SCALES  # the last arrows'
         self._path: list[Array] = []
         self._last = math.inf  # s, of the loop's clock
         self._begun = 0.0  # s, of the wall's clock, at its start

@@ -19,7 +19,7 @@ from .task import Task
 
 DISTANCE = 2.3  # m, from the fan
 TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
-CHANGE_COST = 0.05  # of a change of an action from 0 to 1
+CHANGE_COST = 0.05  # a change of an action from 0 to 1
 AWAY = 1.0  # m, off its height or its distance, at which a vehicle is lost
 # largest size of a frame's numbers: N, Nm, m/s and m/s
 LIMITS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, MAX_COMMAND)

@@ -73,8 +73,8 @@ class FanTrackingEnv(FanTask):
     | `"pose"`              | 8    | no wrench: the pose, as the filter estimates it                    |
     | `"history"`           | 200  | the table above at the last 25 decisions (2 s), oldest first       |
 
-    The pose is the position since the start x, y, z (m), the velocity along y (m/s), and the x and y of the body's z
-    axis (its tilt). Then come yaw less 180 degrees (rad) and the last command. Before the start the history is as at the
+    The pose is the position since the start x, y, z (m) and the velocity along y (m/s). Next are the x and y of the
+    body's z axis (its tilt). Then come yaw less 180 degrees (rad) and the last command. Before the start the history is as at the
     start.
 
     With ``normalize=True`` each number is divided by a fixed scale, and is about 1 in flight:

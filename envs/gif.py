@@ -40,5 +40,5 @@ def write_gif(pictures: Sequence[NDArray[np.uint8]], fps: float, path: Path) -> 
             append_images=others,
             duration=round(1000 / fps),
             loop=0,
-            optimize=True,  # where nothing changed a picture is transparent: 3 to 6 times smaller
+            optimize=True,  # parts that stay are transparent: 3 to 6 times smaller
         )

@@ -178,6 +178,14 @@ def is_a_body(inertia: Array) -> bool:
     return bool(moments[0] + moments[1] >= moments[2])
 
 
+def is_same_body(one: Vehicle, other: Vehicle) -> bool:
+    """Return whether two vehicles are the same to MuJoCo."""
+    bodies = [
+        np.hstack([v.mass, v.gravity, v.arm_l, v.com, v.inertia.ravel()]) for v in (one, other)
+    ]
+    return np.array_equal(*bodies)
+
+
 def load_world(
     vehicle: Vehicle, drawn: bool = True, add: Callable[[Any], None] | None = None
 ) -> tuple["mujoco.MjModel", "mujoco.MjData"]:

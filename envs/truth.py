@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..dynamics.motion import Array
-from ..dynamics.rotation import quaternion_to_matrix
+from ..dynamics.rotation import matrix_of
 from ..dynamics.vehicle import Vehicle
 
 
@@ -21,8 +21,7 @@ def true_motion(
         speeds: (4,) rad/s, of the rotors.
         integral: (3,) of the flight loop.
     """
-    R = np.empty((3, 3))
-    quaternion_to_matrix(pose[3:7], R)
+    R = matrix_of(pose[3:7])
     thrust, *torques = (vehicle.mixing @ speeds**2).tolist()
     return {
         "velocity": velocity[:3].copy(),

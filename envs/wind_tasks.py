@@ -12,13 +12,13 @@ from ..controllers.wind_observation import (
     OBSERVATION_LIMITS,
     OBSERVATION_SCALES,
 )
-from ..dynamics.rotation import quaternion_to_matrix
+from ..dynamics.rotation import matrix_of
 from .plant import TICK
 from .state import Start, State
 from .task import Task
 from .wind_scenarios import START, draw_reference
 
-CHANGE_COST = 0.032  # of a change of an action from 0 to 1
+CHANGE_COST = 0.032  # a change of an action from 0 to 1
 
 
 class WindHoverEnv(Task):
@@ -63,7 +63,7 @@ class WindHoverEnv(Task):
     | 21-23 | specific force of the rotors by the declared model, likewise | 40 | 10    | m/s2 |
     | 24-26 | last action                                              | 4     | 4     | m/s2 |
 
-    The accelerometer sits in the centre of mass and has a noise of 0.15 m/s2 a tick (5 ms) and a bias of
+    The accelerometer sits in the centre of mass. Its noise is 0.15 m/s2 a tick (5 ms), and its bias
     0.05 m/s2, drawn each episode. The estimated attitude turns its axes into the world. The filter does
     not use the accelerometer. Wind and true force are not observed: ``info`` has them.
 
@@ -135,9 +135,8 @@ class WindHoverEnv(Task):
         """Return ``Task._truth``, the actuators' disturbance (6,) N and Nm, world, and the winds'
         wrench (foresight, 6) over each decision to come, at the vehicle's present place.
         """
-        loop, R = self.loop, np.empty((3, 3))
+        loop, R = self.loop, matrix_of(self.loop.quaternion)
         fan = loop.record["fan"].copy()
-        quaternion_to_matrix(loop.quaternion, R)
         com, ahead = loop.record[0]["plant"]["body"]["com"], np.empty((self.foresight, 6))
         jet, now = loop.jet_table, (loop.position, R, loop.world.qvel, com)
         period = TICK * self.decision_ticks

@@ -74,7 +74,10 @@ SETTINGS = (
     "validation.every=25000",
     "validation.episodes=8",
 )
-_ROOMS = ("runtime", "dynamics", "estimator", "controllers", "envs", "evaluation", "training")
+_ROOMS = (
+    *("core", "runtime", "dynamics", "estimator", "controllers", "envs"),
+    *("evaluation", "training"),
+)
 
 
 def flown(

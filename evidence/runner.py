@@ -20,7 +20,7 @@ from windwrench.runtime.workers import Lost, each
 Task = tuple[Any, ...]  # arguments that JSON can hold
 Jobs = Annotated[int, typer.Option(min=1, help="Number of processes.")]
 _MOST_SECONDS = 4 * 3600.0  # of a task
-_ROOMS = ("runtime", "dynamics", "estimator", "controllers", "identification", "envs")
+_ROOMS = ("core", "runtime", "dynamics", "estimator", "controllers", "identification", "envs")
 
 
 def code_stamp(*modules: str) -> str:

@@ -140,7 +140,9 @@ class LoadedLoop(ClosedLoop):
         self.load = load
         super().__init__(*shared, **named)
 
-    def _make_world(self, drawn: bool) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    def _make_world(
+        self, drawn: bool, like: ClosedLoop | None
+    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         add = None if self.load is None else partial(add_load, load=self.load)
         return load_world(self._body, drawn, add)
 

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parent.parent
-_SOURCES = (".py", ".yaml", ".xml")
+_SOURCES = (".py", ".yaml", ".xml", ".hpp", ".cpp")
 
 
 @cache

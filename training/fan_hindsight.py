@@ -126,7 +126,7 @@ def _felt(infos: dict[str, Any]) -> Array:
 
 def _moved(set_point: Array | None, own: Array, commands: Array) -> Array:
     """Return the set points (n,) m after a decision at ``commands`` (n,) m/s; it waits where it
-    would run too far ahead (``controllers.flight.move_setpoint``).
+    would run too far ahead (``core/flight_loop.hpp``).
     """
     if set_point is None:
         return own.copy()

@@ -32,6 +32,7 @@ void bind_control(nanobind::module_ &m);
 void bind_diagnosis(nanobind::module_ &m);
 void bind_effects(nanobind::module_ &m);
 void bind_filter(nanobind::module_ &m);
+void bind_rotation(nanobind::module_ &m);
 void bind_lanes(nanobind::module_ &m);
 void bind_readers(nanobind::module_ &m);
 void bind_reproduction(nanobind::module_ &m);

@@ -16,6 +16,7 @@ NB_MODULE(WINDWRENCH_MODULE, m) {
   bind_diagnosis(m);
   bind_effects(m);
   bind_filter(m);
+  bind_rotation(m);
   bind_lanes(m);
   bind_readers(m);
   bind_reproduction(m);

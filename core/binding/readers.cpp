@@ -42,7 +42,7 @@ void bind_readers(nb::module_ &m) {
   m.def("decode_blackbox", &decode_blackbox, "data"_a, "begin"_a, "encodings"_a, "predictors"_a,
         "counts"_a, "intervals"_a, "constants"_a, "places"_a, "keep"_a, "rows"_a,
         "Decode the main frames of a blackbox, its bytes up to the log's end, from `begin` on.\n\n"
-        "Of F fields: encodings and predictors (6, F) of I, P, S, G and H frames and of none, "
+        "Of F fields: encodings and predictors (6, F) of I, P, S, G, H and no frames, "
         "their counts of\n"
         "fields (5,), intervals (3,) of I frames and of P frames as a fraction, in loops; the\n"
         "constants (257,) of the predictors; the places (3,) of the fields loopIteration, time "

@@ -4,48 +4,27 @@
 
 namespace windwrench {
 
-// An equation as a function of four arrays
-template <class T, class Equation, Equation F> struct Called;
+// a wrench
+template <class T, class State>
+void call(void (*f)(const T *, const VehicleNumbers<T> &, State &, Wrench<T> &), T *c,
+          VehicleNumbers<T> &v, T *state, T *wrench) {
+  f(c, v, *reinterpret_cast<State *>(state), *reinterpret_cast<Wrench<T> *>(wrench));
+}
+// rotor speeds, or a sample, with the effect's memory
+template <class T, class Values>
+void call(void (*f)(const T *, const VehicleNumbers<T> &, Values &, T *), T *c,
+          VehicleNumbers<T> &v, T *values, T *memory) {
+  f(c, v, *reinterpret_cast<Values *>(values), memory);
+}
+// a wrench with a state of its own behind the coefficients, or what carries the state on
+template <class T, class Own, class Last>
+void call(void (*f)(const T *, Own *, const VehicleNumbers<T> &, const FlightState<T> &, Last &),
+          T *c, VehicleNumbers<T> &v, T *state, T *last) {
+  f(c, c + HIDDEN, v, *reinterpret_cast<FlightState<T> *>(state), *reinterpret_cast<Last *>(last));
+}
 
-template <class T, class State,
-          void (*F)(const T *, const VehicleNumbers<T> &, State &, Wrench<T> &)>
-struct Called<T, void (*)(const T *, const VehicleNumbers<T> &, State &, Wrench<T> &), F> {
-  static void call(T *c, T *vehicle, T *state, T *wrench) {
-    F(c, *reinterpret_cast<VehicleNumbers<T> *>(vehicle), *reinterpret_cast<State *>(state),
-      *reinterpret_cast<Wrench<T> *>(wrench));
-  }
-};
-template <class T, class Values, void (*F)(const T *, const VehicleNumbers<T> &, Values &, T *)>
-struct Called<T, void (*)(const T *, const VehicleNumbers<T> &, Values &, T *), F> {
-  static void call(T *c, T *vehicle, T *values, T *memory) {
-    F(c, *reinterpret_cast<VehicleNumbers<T> *>(vehicle), *reinterpret_cast<Values *>(values),
-      memory);
-  }
-};
-// with a state of its own behind the coefficients
-template <class T, void (*F)(const T *, const T *, const VehicleNumbers<T> &,
-                             const FlightState<T> &, Wrench<T> &)>
-struct Called<T,
-              void (*)(const T *, const T *, const VehicleNumbers<T> &, const FlightState<T> &,
-                       Wrench<T> &),
-              F> {
-  static void call(T *c, T *vehicle, T *state, T *wrench) {
-    F(c, c + HIDDEN, *reinterpret_cast<VehicleNumbers<T> *>(vehicle),
-      *reinterpret_cast<FlightState<T> *>(state), *reinterpret_cast<Wrench<T> *>(wrench));
-  }
-};
-template <class T, void (*F)(const T *, T *, const VehicleNumbers<T> &, const FlightState<T> &,
-                             const Rotors<T> &)>
-struct Called<T,
-              void (*)(const T *, T *, const VehicleNumbers<T> &, const FlightState<T> &,
-                       const Rotors<T> &),
-              F> {
-  static void call(T *c, T *vehicle, T *state, T *rotors) {
-    F(c, c + HIDDEN, *reinterpret_cast<VehicleNumbers<T> *>(vehicle),
-      *reinterpret_cast<FlightState<T> *>(state), *reinterpret_cast<Rotors<T> *>(rotors));
-  }
-};
-
-template <class T, auto F> constexpr EffectModel<T> called = &Called<T, decltype(F), F>::call;
+template <class T, auto EQUATION> void called(T *c, T *vehicle, T *third, T *fourth) {
+  call(EQUATION, c, *reinterpret_cast<VehicleNumbers<T> *>(vehicle), third, fourth);
+}
 
 }  // namespace windwrench

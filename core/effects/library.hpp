@@ -36,14 +36,12 @@ template <class T> struct LibraryEffect {
   const char *name, *kind;
   EffectModel<T> model, advance;  // advance: null without a state of its own
 };
-constexpr int LIBRARY_EFFECTS = 28;
 
 // All effects with an equation
-template <class T> const LibraryEffect<T> *library() {
+template <class T> struct Library {
 #define CALLED(name) called<T, name<T, T>>
-#define EFFECT(kind, name) \
-  { #name, kind, CALLED(name), nullptr }
-  static constexpr LibraryEffect<T> all[LIBRARY_EFFECTS] = {
+#define EFFECT(kind, name) {#name, kind, CALLED(name), nullptr}
+  static constexpr LibraryEffect<T> all[] = {
       EFFECT("sensing", attitude_gain),
       EFFECT("rotor input", battery_sag),
       EFFECT("wrench", body_drag),
@@ -75,8 +73,9 @@ template <class T> const LibraryEffect<T> *library() {
   };
 #undef EFFECT
 #undef CALLED
-  return all;
-}
+};
+constexpr int LIBRARY_EFFECTS = sizeof(Library<double>::all) / sizeof(LibraryEffect<double>);
+template <class T> const LibraryEffect<T> *library() { return Library<T>::all; }
 
 // The effect of a name, or null: none of the library, or one without an equation
 template <class T> const LibraryEffect<T> *find_effect(const char *name) {

@@ -49,7 +49,7 @@ def __dir__() -> list[str]:
 
 
 _FOLDERS = "WINDWRENCH_EFFECTS"
-_NOT_EFFECTS = {"__init__", "__main__", "base", "call", "declaration", "own", "vanishing"}
+_NOT_EFFECTS = {"__init__", "__main__", "base", "declaration", "own", "vanishing"}
 
 
 def add_folder(folder: str | Path) -> tuple[str, ...]:

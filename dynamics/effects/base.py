@@ -99,12 +99,6 @@ HIDDEN = 8  # first place of a wrench effect's own state in ``c``
 ROW_SIZE = 16  # size of ``c`` of a wrench effect
 MEMORY = 112  # numbers of a rotor-input or sensing effect
 
-# places of the numbers, for compiled loops
-POSITION, ROTATION, VELOCITY, RATE, ROTOR_SPEED, ROTOR_THRUST, WIND = 0, 3, 12, 15, 18, 22, 26
-VOLTAGE, TIME, ROTOR_ACCELERATION = 29, 30, 31
-STEP, ROTOR_VOLTAGE, ROTOR_TIME = 4, 5, 6
-SAMPLE_STEP, HAS_SPEED, HAS_POSITION, HAS_QUATERNION, DIRECTION = 11, 12, 13, 14, 15
-
 
 @dataclass(frozen=True)
 class Coefficient:

@@ -9,20 +9,7 @@ to them, and they would never be proposed. Such a law must say where a fit start
 import numpy as np
 
 from ... import _core
-from .base import (
-    DIRECTION,
-    HAS_POSITION,
-    HAS_QUATERNION,
-    HAS_SPEED,
-    MEMORY,
-    ROTORS_SIZE,
-    ROW_SIZE,
-    SAMPLE_SIZE,
-    STATE_SIZE,
-    VEHICLE_SIZE,
-    Array,
-    Effect,
-)
+from .base import MEMORY, ROTORS, ROW_SIZE, SAMPLE, STATE, VEHICLE, Array, Effect
 from .own import addresses, raise_errors
 
 _SAMPLES = 60
@@ -64,7 +51,7 @@ def _flown(effect: Effect, coefficients: Array) -> Array:
     c[: len(coefficients)] = coefficients
     memory = np.zeros(MEMORY)
     vehicle, state, rotor, sample = (
-        rng.uniform(*_SIZES, size) for size in (VEHICLE_SIZE, STATE_SIZE, ROTORS_SIZE, SAMPLE_SIZE)
+        rng.uniform(*_SIZES, layout.itemsize // 8) for layout in (VEHICLE, STATE, ROTORS, SAMPLE)
     )
     read, written, other = {
         "wrench": (state, wrench, wrench),
@@ -75,7 +62,7 @@ def _flown(effect: Effect, coefficients: Array) -> Array:
     for k in range(_SAMPLES):
         for numbers in (vehicle, state, rotor, sample):
             numbers[:] = rng.uniform(*_SIZES, len(numbers))
-        sample[[DIRECTION, HAS_SPEED, HAS_POSITION, HAS_QUATERNION]] = 1.0
+        sample.view(SAMPLE)[["has_speed", "has_position", "has_quaternion", "direction"]] = 1.0
         wrench[:] = 0.0
         if advance:
             _core.call_effect(advance, c, vehicle, state, rotor)

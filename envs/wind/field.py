@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ... import _core
-from ...runtime.addresses import call_at
-from ...runtime.compiled import compiled
 from ...runtime.errors import InputError
 
 Array = NDArray[np.float64]
@@ -26,23 +24,6 @@ class Wind(Protocol):
         in s.
         """
         ...
-
-
-@compiled
-def add_winds(calls: Calls, time: Array, points: Array, velocities: Array) -> None:
-    """Add compiled winds at points (3, n) m and a time (1,) s to velocities (3, n) m/s.
-
-    ``calls`` (winds, 2) are the addresses of each wind's function and of its parameters.
-    """
-    for k in range(len(calls)):
-        call_at(
-            calls[k, 0],
-            calls[k, 1],
-            points.shape[1],
-            time.ctypes.data,
-            points.ctypes.data,
-            velocities.ctypes.data,
-        )
 
 
 class CompiledWind:

@@ -4,7 +4,7 @@ mean wind.
 A field is a sum of plane waves with random directions, each normal to its own direction: the air
 keeps its volume. The waves' energies follow the three-dimensional spectrum E(k) of the
 one-dimensional ones in MIL-F-8785C. With the same length and strength on all axes, the spectrum
-along any line is the stated one, for the component along the line and for those across. Gusts at
+along any line is the stated one. So are the components along the line and across. Gusts at
 two points of a vehicle are then as alike as in theory. Near the ground MIL-F-8785C states other
 lengths and strengths on each axis, impossible for an isotropic field. There each component comes
 from a field of its own with the stated spectrum along the mean wind. The field is frozen (Taylor's

@@ -87,7 +87,8 @@ def _cross_matrix(x: Array) -> Array:
 
 def _exp(x: Array) -> Array:
     """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3) rad."""
-    return Rotation.from_rotvec(x.reshape(-1, 3)).as_matrix().reshape(*x.shape, 3)
+    matrices = Rotation.from_rotvec(x.reshape(-1, 3)).as_matrix()
+    return np.asarray(matrices).reshape(*x.shape, 3)
 
 
 def _log(R: Array) -> Array:
@@ -189,7 +190,8 @@ def fuse(
         change[0, :3] = _log(rotation[:1].swapaxes(1, 2) @ started)
         change[0, 3:], std[0] = begun - linear[0], prior_std
         measured = _measured(times, rates, rotation, linear, readings)
-        if not _core.smooth_inertial_motion(*_steps(nominal), spread, *measured, change, std):
+        F, defect = _steps(nominal)
+        if not _core.smooth_inertial_motion(F, defect, spread, *measured, change, std):
             raise np.linalg.LinAlgError("the covariance of an inertial motion is singular")
         turn = Rotation.from_rotvec(change[:, :3])
         rotation[:] = (Rotation.from_matrix(rotation) * turn).as_matrix()

@@ -12,7 +12,7 @@ from tests.support.vehicles import VEHICLE
 from windwrench import _core
 from windwrench.controllers.flight import flight_record
 from windwrench.dynamics.effects import get, names, parse_setting
-from windwrench.dynamics.model import MODEL_FIELDS, drive, load_model
+from windwrench.dynamics.model import MODEL_FIELDS, load_model
 from windwrench.dynamics.rotation import quaternion_of_yaw
 from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 
@@ -27,7 +27,7 @@ def made(*texts):
     model = np.zeros(1, dtype=MODEL_FIELDS)
     amended = load_model(model[0], declared)
     for _ in range(40):
-        drive(model[0], _SPEEDS, 0.005, 0.95 * VEHICLE.voltage_ref)
+        _core.drive(model.ctypes.data, _SPEEDS, 0.005, 0.95 * VEHICLE.voltage_ref)
     return flight_record(amended), model
 
 
@@ -35,7 +35,7 @@ def commanded(wanted, *texts):
     flight, model = made(*texts)
     flight["command"] = wanted
     _core.through_the_rotors(flight.ctypes.data, model.ctypes.data)
-    return flight["command"][0], model[0]
+    return flight["command"][0], model
 
 
 STATIC = [n for n in names() if get(n).kind == "rotor input" and n not in _LATE]
@@ -46,8 +46,8 @@ def test_commands_deliver_the_wanted_rotor_speeds(name):
     wanted = _SPEEDS * np.array([1.05, 0.97, 1.02, 0.9])
     command, model = commanded(wanted, name)
     assert model["rotor_count"] == 1
-    drive(model, command, HORIZON, float(model["voltage"]))
-    assert_allclose(model["rotors"][:4], wanted, rtol=1e-6)
+    _core.drive(model.ctypes.data, command.copy(), HORIZON, float(model["voltage"][0]))
+    assert_allclose(model["rotors"][0, :4], wanted, rtol=1e-6)
 
 
 def test_a_lag_is_led_by_what_remains_after_the_horizon():
@@ -55,7 +55,7 @@ def test_a_lag_is_led_by_what_remains_after_the_horizon():
     share = 1.0 - math.exp(-HORIZON / 0.035)
     assert_allclose(command, _SPEEDS + 10.0 / share, rtol=1e-9)
     # and looking ahead has not moved the model's own rotors
-    assert_allclose(model["rotors"][:4], _SPEEDS, rtol=1e-3)
+    assert_allclose(model["rotors"][0, :4], _SPEEDS, rtol=1e-3)
 
 
 def test_drag_is_foreseen_at_the_reference_and_not_at_the_vehicle():

@@ -15,7 +15,7 @@ from windwrench.controllers.jet_map import COUNT, FIRST, STEP, jet_map
 from windwrench.controllers.observation import MAX_COMMAND
 from windwrench.controllers.preview import Oracle, WindOracle, preview, regulator
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.rotation import quaternion_to_matrix
+from windwrench.dynamics.rotation import matrix_of
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.scenarios import SCENARIOS
 from windwrench.evaluation.episodes import fly_episode
@@ -195,7 +195,6 @@ def test_who_foresees_nothing_is_told_what_everybody_is(task):
 @pytest.mark.parametrize("task", TASKS)
 def test_what_the_oracle_is_told_is_true(task):
     env = TASKS[task].environment("base")
-    R = np.empty((3, 3))
     env.foresight = 4
     infos = [env.reset(seed=900_200)[1]]
     jets = []
@@ -203,7 +202,7 @@ def test_what_the_oracle_is_told_is_true(task):
         *_, info = env.step(np.full(env.action_size, 0.3 * (-1) ** (k // 3), dtype=np.float32))
         infos.append(info)
         jets.append(env.loop.jet[:3].copy())
-        quaternion_to_matrix(env.loop.quaternion, R)
+        R = matrix_of(env.loop.quaternion)
         moving = env.loop.motion[1]
         assert_array_equal(info["velocity"], moving[:3])
         assert_array_equal(info["rate"], R @ moving[3:6])

@@ -17,7 +17,7 @@ from tests.support.vehicles import VEHICLE
 from windwrench import _core
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import compile_effects
-from windwrench.dynamics.effects.base import ROTOR_ACCELERATION
+from windwrench.dynamics.effects.base import STATE
 from windwrench.dynamics.mean_jet import jet_table
 from windwrench.dynamics.model import MODEL_FIELDS, load_model
 from windwrench.envs.fan import Fan, fan_record
@@ -50,8 +50,9 @@ def wrench(
 ):
     """Force (world) and torque (body) of a vehicle's effects in the state above."""
     model = Model(vehicle)
-    model.memory["effect_state"] = nan
-    model.memory["effect_state"][ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = acceleration
+    state = model.memory["effect_state"]
+    state[:] = nan
+    state.view(STATE)["rotor_acceleration"] = acceleration
     model.memory["wind"], model.memory["voltage"] = wind, 11.0
     model.memory["rotors"][:4] = speeds
     x = np.concatenate([position, np.full(4, nan), V, omega])

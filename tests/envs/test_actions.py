@@ -17,7 +17,7 @@ from tests.support.outcomes import refused
 from tests.support.sizes import rms
 from tests.support.vector_flights import TASKS
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.rotation import quaternion_to_matrix
+from windwrench.dynamics.rotation import matrix_of
 from windwrench.envs import ACTIONS, OBSERVATIONS
 from windwrench.envs.plant import PlantSettings
 
@@ -36,9 +36,7 @@ def flying(action, seconds, given=(), **named):
 
 
 def turned(loop):
-    R = np.empty((3, 3))
-    quaternion_to_matrix(loop.quaternion, R)
-    return R
+    return matrix_of(loop.quaternion)
 
 
 @pytest.mark.parametrize("action", ACTIONS)

@@ -8,19 +8,21 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
-from numba import njit
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.outcomes import refused
+from tests.support.own_effects import HOSE, joined
 from tests.support.vector_flights import TASKS, fly, make, make_single
+from windwrench import _core
 from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.effects import get, names
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.lanes.flight import LOOPS, LoopBlocks, fly_freely
 from windwrench.envs.plant import SUBSTEPS, TICK, PlantSettings, load_world
 from windwrench.envs.scenarios import SCENARIOS
-from windwrench.runtime.vector_lanes import WIDTH
+
+WIDTH = _core.LoopBlocks.lanes
 
 
 @pytest.mark.parametrize(
@@ -29,6 +31,7 @@ from windwrench.runtime.vector_lanes import WIDTH
         ({"estimator": "ukf"}, 5),
         ({"estimator": "constant-gain"}, 2),
         ({"plant": "lanes"}, 3),
+        ({"plant": "lanes", "precision": "single"}, 2),
     ],
 )
 def test_the_bits_depend_on_neither_number_nor_threads(given, threads):
@@ -52,7 +55,7 @@ def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(plant, tmp_pa
     if plant == "mujoco":
         envs.loops[1].data.qvel[0] = nan
     else:
-        envs._flying.loops["qvel"][0, 0, 1] = nan
+        envs._flying.view("qvel")[0, 0, 1] = nan
     frames, rewards, lost, _, infos = envs.step(actions)
     assert lost.tolist() == infos["lost"].tolist() == [False, True, False]
     assert frames in envs.observation_space
@@ -159,27 +162,18 @@ def test_lanes_fly_what_mujoco_does(count, decisions, given, apart):
     assert abs(ours - theirs).max() < apart
 
 
-@njit
-def fly_on(address, steps, dt):
-    loop = LOOPS_AT(address)
-    for _ in range(steps):
-        fly_freely(loop, dt)
-
-
-LOOPS_AT = LOOPS.at
-
-
 def test_a_body_that_tumbles_moves_as_in_mujoco():
     """Centre of mass off the centre, inertia with products, another turn in each lane."""
     inertia = np.array([[2.2, 0.3, -0.2], [0.3, 3.0, 0.1], [-0.2, 0.1, 4.0]]) * 1e-3
     vehicle = replace(load_vehicle("ardrone2"), inertia=inertia, com=np.array([0.02, -0.03, 0.01]))
-    blocks = LoopBlocks(1, ClosedLoop(vehicle))
+    loop = ClosedLoop(vehicle)
+    blocks = _core.LoopBlocks(loop.address, 1, False, False, np.zeros(0, np.int64))
     rng = default_rng(0)
     start = rng.normal(0, 5, (6, WIDTH))
     wrench = rng.normal(0, 0.02, (6, WIDTH))
-    blocks.loops["qpos"][0], blocks.loops["qpos"][0, 3] = 0.0, 1.0
-    blocks.loops["qvel"][0], blocks.loops["xfrc"][0] = start, wrench
-    fly_on(blocks.loops.ctypes.data, round(SUBSTEPS / TICK), TICK / SUBSTEPS)
+    pose, velocity = blocks.view("qpos")[0], blocks.view("qvel")[0]
+    pose[:], pose[3], velocity[:], blocks.view("xfrc")[0] = 0.0, 1.0, start, wrench
+    blocks.fly_freely(TICK / SUBSTEPS, round(SUBSTEPS / TICK))
     model, data = load_world(vehicle, drawn=False)
     for lane in range(WIDTH):
         mujoco.mj_resetData(model, data)
@@ -188,5 +182,79 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
         data.xfrc_applied[model.body("vehicle").id] = wrench[:, lane]
         for _ in range(round(SUBSTEPS / TICK)):
             mujoco.mj_step(model, data)
-        assert_allclose(blocks.loops["qpos"][0, :, lane], data.qpos, atol=1e-9)
-        assert_allclose(blocks.loops["qvel"][0, :, lane], data.qvel, atol=1e-8)
+        assert_allclose(pose[:, lane], data.qpos, atol=1e-9)
+        assert_allclose(velocity[:, lane], data.qvel, atol=1e-8)
+
+
+# m, m/s, rad/s; N, Nm: a log's rounded rotor speeds may fall on the other side
+CLOSE = {"position": 5e-4, "velocity": 3e-3, "angular_velocity": 3e-2, "force": 5e-3}
+
+
+@pytest.mark.parametrize(
+    "given", [{"task": "FanTracking"}, {"task": "WindTrajectory", "scenario": "varied"}]
+)
+def test_lanes_of_32_bits_fly_close_to_those_of_64(given):
+    """Two seconds: the noise of the estimate is ten times as large."""
+    states = []
+    for precision in ("double", "single"):
+        envs = make(WIDTH + 1, "lanes", precision=precision, **given)
+        fly(envs, 25)
+        states.append(envs.state)
+    for name, apart in CLOSE.items():
+        assert_allclose(*(getattr(state, name) for state in states), atol=apart)
+
+
+def small(name):
+    """An effect of a third of its typical size."""
+    known = {c.name: (0.3 * c.typical[0], c.minimum, c.maximum) for c in get(name).coefficients}
+    return EffectSetting(name, {n: float(np.clip(*range_)) for n, range_ in known.items()})
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_effect_flies_in_lanes_as_in_mujoco(name):
+    """Declared, so that filter and flight loop have it, too; with poses late and lost."""
+    vehicle = replace(load_vehicle("ardrone2"), effects=(small(name),))
+    settings = PlantSettings(dropout=0.2, dropout_burst=0.02, pose_delay=0.01)
+    given = {"task": "WindHover", "vehicle": vehicle, "settings": settings}
+    states = [make(2, plant, **given) for plant in ("lanes", "mujoco")]
+    for envs in states:
+        fly(envs, 4)
+    ours, theirs = (envs.state.rows for envs in states)
+    assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
+
+
+def test_lanes_refuse_effects_in_python_and_other_precisions(tmp_path):
+    pull = HOSE.replace("c[0] * math.sin(c[1] * state.time)", "c[0] + c[1]")
+    (tmp_path / "hose.py").write_text(pull, encoding="utf-8")
+    with joined(tmp_path), refused("plant='lanes' flies no effects in Python"):
+        make(2, "lanes", effects=[EffectSetting("hose", {"a": 0.1, "w": 3.0})])
+    with refused("unknown precision 'half'"):
+        make(2, "lanes", precision="half")
+    with refused("precision is of plant='lanes'"):
+        make(2, precision="single")
+
+
+def test_a_callback_of_mujoco_is_called_in_a_flight_and_its_error_raised():
+    envs = make(2, threads=2)
+    calls = []
+    envs.reset(seed=0)
+    mujoco.set_mjcb_control(lambda model, data: calls.append(data.time))
+    try:
+        envs.step(np.zeros((2, 1)))
+        assert len(calls) == 2 * 16 * SUBSTEPS
+        mujoco.set_mjcb_control(lambda model, data: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            envs.step(np.zeros((2, 1)))
+    finally:
+        mujoco.set_mjcb_control(None)
+
+
+def test_undeclared_effects_fly_in_lanes_of_32_bits():
+    effects = [small(name) for name in ("rotor_drag", "motor_lag", "slung_payload", "clock_offset")]
+    states = []
+    for precision in ("double", "single"):
+        envs = make(2, "lanes", precision=precision, effects=effects)
+        fly(envs, 12)
+        states.append(envs.state)
+    for name, apart in CLOSE.items():
+        assert_allclose(*(getattr(state, name) for state in states), atol=apart)

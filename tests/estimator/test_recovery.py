@@ -15,8 +15,8 @@ from numpy.testing import assert_allclose
 from tests.support.exported_c.hostile import KINDS, befall
 from tests.support.parameters import mostly_slow
 from tests.support.sizes import rms
+from windwrench import _core
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.rotation import quaternion_multiply
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 
 VEHICLES = {name: load_vehicle(name) for name in ("ardrone2", "crazyflie", "hummingbird")}
@@ -82,7 +82,7 @@ class Flight:
         moved, turned = self.noise * self.rng.standard_normal((2, 3))
         turn = np.array([1.0, *(0.5 * mocap.sigma_att_rad * turned)])
         seen = np.empty(4)
-        quaternion_multiply(turn, np.array(quaternion), seen)
+        _core.multiply(turn, np.array(quaternion), seen)
         return position + mocap.sigma_pos_m * moved, seen / norm(seen)
 
     def check(self, estimate):
