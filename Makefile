@@ -6,7 +6,6 @@ BIN := $(VENV)/bin
 .PHONY: demo test test-all test-fast test-light test-lowest coverage coverage-all lint format types docs check clean
 
 demo: $(VENV)/.installed
-	$(BIN)/windwrench warm
 	$(BIN)/windwrench demo --out results/demo
 
 # processes that share the tests; 0: none beside the first
