@@ -690,7 +690,7 @@ class LoopBlocks:
     """(arg: object, /) -> int"""
 
     @property
-    def bytes(self) -> int:
+    def nbytes(self) -> int:
         """Bytes of a block."""
 
     def put(self, block: int, first: int, last: int, address: int) -> None:
@@ -735,7 +735,7 @@ class LoopBlocks:
         ],
         scene: Scene,
     ) -> None:
-        """Let environments of which (n,) with numbers too large start over; write the rows of all."""
+        """Let environments of which (n,) with too large numbers start over; write all rows."""
 
     def view(self, name: str) -> NDArray[numpy.float64]:
         """Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,
@@ -774,7 +774,7 @@ class SingleLoopBlocks:
     """(arg: object, /) -> int"""
 
     @property
-    def bytes(self) -> int:
+    def nbytes(self) -> int:
         """Bytes of a block."""
 
     def put(self, block: int, first: int, last: int, address: int) -> None:
@@ -819,7 +819,7 @@ class SingleLoopBlocks:
         ],
         scene: Scene,
     ) -> None:
-        """Let environments of which (n,) with numbers too large start over; write the rows of all."""
+        """Let environments of which (n,) with too large numbers start over; write all rows."""
 
     def view(self, name: str) -> NDArray[numpy.float32]:
         """Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,

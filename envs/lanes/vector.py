@@ -16,7 +16,7 @@ from ..truth import true_motion
 from ..vector import SETTLE_TICKS, TaskVectorEnv
 from ..wind.field import Sum
 
-PRECISIONS: dict[str, type] = {"double": _core.LoopBlocks, "single": _core.SingleLoopBlocks}
+PRECISIONS: dict[str, Any] = {"double": _core.LoopBlocks, "single": _core.SingleLoopBlocks}
 _DRAWN = 20  # ticks whose normals are drawn at once
 
 
@@ -94,8 +94,9 @@ class TaskLanes(TaskVectorEnv):
 
     def late(self) -> Array:
         """Return the delay (n,) s of the flight loop's answer: actuators and pose."""
-        ticks: Array = sum(self._rows(self._flying.view(f"{n}_late")) for n in ("actuator", "pose"))
-        return TICK * ticks[:, 0]
+        actuator, pose = (self._rows(self._flying.view(f"{n}_late")) for n in ("actuator", "pose"))
+        late: Array = TICK * (actuator + pose)[:, 0]
+        return late
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
