@@ -34,8 +34,8 @@ from numpy.typing import ArrayLike
 from .. import _core
 from ..runtime.errors import InputError
 from .estimate import ESTIMATE_SIZE, NIS, WITHOUT_COVARIANCE, WrenchEstimate
-from .filter_record import N
 from .model_uncertainty import LOAD
+from .recovery import N
 from .ukf import CALL, WrenchUKF, make_calls
 
 _BLOCK = 1024  # steps in memory at a time: 6 MB

@@ -45,9 +45,9 @@ from .estimate import (
     Array,
     WrenchEstimate,
 )
-from .filter_record import BIASES, ESTIMATE, FILTER, N, fields_between, filter_record
+from .filter_record import BIASES, ESTIMATE, FILTER, fields_between, filter_record
 from .imu import joint_covariance, load_imu
-from .recovery import BELIEVING, Recovery
+from .recovery import BELIEVING, N, Recovery
 from .sample import Sample
 from .tuning import UKFTuning
 

@@ -20,8 +20,7 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
 from ..runtime.errors import InputError, unknown_name
 from .estimate import WITHOUT_COVARIANCE, Array, WrenchEstimate
-from .filter_record import N
-from .recovery import Recovery
+from .recovery import N, Recovery
 from .sample import convert
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
