@@ -19,10 +19,10 @@ def export_c(
     out: Path = Path("results/export_c"),
     overwrite: bool = False,
 ) -> dict[str, Any]:
-    """Write the filter for a flight controller, in C++ with a C interface.
+    """Write the filter as C++ for a flight controller.
 
-    The core's C++17 headers and one header of numbers, in single precision unless said otherwise,
-    and without a heap; with an example and a CMake file.
+    The core's C++17 headers, one header of numbers and a C interface, in single precision unless
+    said otherwise, and without a heap; with an example and a CMake file.
 
     Example: windwrench export-c --vehicle ardrone2 --estimator ukf --out filter
     """

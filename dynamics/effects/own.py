@@ -42,7 +42,7 @@ def _view(address: int, layout: Layout) -> Any:
     """Return a view of the memory at an address: numbers (n,), or the fields of a record."""
     numbers = isinstance(layout, int)
     dtype = np.dtype(("f8", (layout,))) if isinstance(layout, int) else layout
-    memory = (ctypes.c_char * dtype.itemsize).from_address(address)
+    memory: Any = (ctypes.c_char * dtype.itemsize).from_address(address)
     return np.frombuffer(memory) if numbers else Fields(np.ndarray((), dtype, memory))
 
 
