@@ -825,7 +825,7 @@ def decode_blackbox(
 ) -> tuple[int, int]:
     """Decode the main frames of a blackbox, its bytes up to the log's end, from `begin` on.
 
-    Of F fields: encodings and predictors (6, F) of I, P, S, G and H frames and of none, their counts of
+    Of F fields: encodings and predictors (6, F) of I, P, S, G, H and no frames, their counts of
     fields (5,), intervals (3,) of I frames and of P frames as a fraction, in loops; the
     constants (257,) of the predictors; the places (3,) of the fields loopIteration, time and
     motor[0], -1 for none. The wanted fields, `keep` (K,), are written into rows (N, K).
