@@ -6,7 +6,6 @@ BIN := $(VENV)/bin
 .PHONY: demo test test-all test-fast test-light test-lowest coverage coverage-all lint format types docs check clean
 
 demo: $(VENV)/.installed
-	$(BIN)/windwrench warm
 	$(BIN)/windwrench demo --out results/demo
 
 # processes that share the tests; 0: none beside the first
@@ -18,7 +17,7 @@ COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=88
 FAST = tests/core tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \
 	tests/runtime tests/evaluation/test_statistics.py tests/project/test_structure.py
 
-CORE = $(shell find core -name '*.[ch]pp')
+CORE = $(shell find core live/export_c/source -name '*.[ch]pp')
 
 # all but the marked slow: some 15 minutes on two cores, and nearly all lines
 test: $(VENV)/.tested

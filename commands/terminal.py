@@ -28,7 +28,6 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from ..runtime.compile_notice import notice
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
 
@@ -149,7 +148,7 @@ class _What(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         """Return the text beside a bar."""
-        return Text(notice.words or task.description)
+        return Text(task.description)
 
 
 @contextmanager
@@ -203,7 +202,7 @@ def _line(task: Task) -> str:
         if task.total > 1.0:
             done = f", {task.completed:.0f} of {task.total:.0f}"
     left = f", {task.time_remaining:.0f} s left" if task.time_remaining else ""
-    return f"{notice.words or task.description}{done}, {task.elapsed or 0.0:.0f} s so far{left}"
+    return f"{task.description}{done}, {task.elapsed or 0.0:.0f} s so far{left}"
 
 
 @contextmanager

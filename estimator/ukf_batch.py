@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
+from ..dynamics.effects.own import raise_errors
 from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
 from ..runtime.errors import InputError, unknown_name
@@ -73,6 +74,7 @@ class _Records:
     ) -> None:
         memory = self._records
         _core.step_many(memory.ctypes.data, memory.itemsize, z, parts, dt, voltage, out, variances)
+        raise_errors()
 
     @property
     def covariance(self) -> Array:
