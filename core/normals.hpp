@@ -125,11 +125,12 @@ inline bool is_inside(const Ziggurat &z, std::uint64_t bits, double &x) {
   return steps < z.inside[bits & 0xff];
 }
 
-// The unit normal of bits that are not enough; next: a function that returns further 64
-template <class Next>
-__attribute__((noinline)) double go_on_drawing(const Ziggurat &z, std::uint64_t bits, Next next) {
+// The unit normal of bits that are not enough. next, share: functions that return further 64, and a
+// number from 0 to 1
+template <class Next, class Share>
+__attribute__((noinline)) double go_on_drawing(const Ziggurat &z, std::uint64_t bits, Next next,
+                                               Share share) {
   const double end = LAYER_ENDS[LAYERS - 1], inverse_end = 0.27366123732975827;
-  auto share = [&] { return double(next() >> 11) * (1.0 / 9007199254740992.0); };
   for (double x; !is_inside(z, bits, x); bits = next()) {
     int layer = int(bits & 0xff);
     if (layer > 0) {
@@ -157,7 +158,11 @@ void draw_normals(const Ziggurat &z, const Stream &from, std::int64_t count, S *
     std::uint64_t bits = from.pcg ? own.next() : g.next(g.state);
     if (!is_inside(z, bits, x)) {
       Pcg64 lent = own;  // a copy: the state itself stays in registers
-      x = go_on_drawing(z, bits, [&] { return from.pcg ? lent.next() : g.next(g.state); });
+      auto next = [&] { return from.pcg ? lent.next() : g.next(g.state); };
+      auto share = [&] {
+        return from.pcg ? double(lent.next() >> 11) / 9007199254740992.0 : g.next_share(g.state);
+      };
+      x = go_on_drawing(z, bits, next, share);
       own = lent;
     }
     to[stride * i] = S(x);

@@ -62,9 +62,6 @@ class TaskLanes(TaskVectorEnv):
         self._settling = self._blocks(0)
         self._blowing: list[Sum] = [Sum()] * self.num_envs  # keeps the winds at ``_calls``
         self._lay_calls()
-        self._streams = _core.Streams(self.num_envs)
-        for i, generator in enumerate(self.generators):
-            self._streams.put(i, generator)
 
     def _blocks(self, count: int) -> Any:
         """Return so many blocks of closed loops, all like one."""
@@ -103,7 +100,7 @@ class TaskLanes(TaskVectorEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
-        for name in ("_like", "_kept", "_settling", "_calls", "_streams"):
+        for name in ("_like", "_kept", "_settling", "_calls"):
             del state[name]
         return state | {"_flying": self._flying.state()}
 
@@ -151,7 +148,6 @@ class TaskLanes(TaskVectorEnv):
         block, lane = self._places[i]
         self._settling.put(block, lane, lane + 1, loop.address)
         self._blowing[i], self.episodes.ticks[i] = loop.winds, -SETTLE_TICKS
-        self._streams.put(i, self.generators[i])
 
     def _settle(self, which: list[int]) -> None:
         slots = np.full(len(self._settling) * self._lanes, -1)
