@@ -18,7 +18,7 @@ COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=88
 FAST = tests/core tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \
 	tests/runtime tests/evaluation/test_statistics.py tests/project/test_structure.py
 
-CORE = $(shell find core -name '*.[ch]pp')
+CORE = $(shell find core live/export_c/source -name '*.[ch]pp')
 
 # all but the marked slow: some 15 minutes on two cores, and nearly all lines
 test: $(VENV)/.tested

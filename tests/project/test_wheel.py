@@ -79,6 +79,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
         "dynamics/vehicles/ardrone2.yaml",
         "dynamics/effects/rotor_drag.py",
         "dynamics/effects/page.md.j2",
+        "live/export_c/source/windwrench.cpp",
         "identification/logs/readers/px4_ulog.py",
         "identification/logs/maps/nanobench.yaml",
         "training/policies/tasks/WindHover-gru-0.npz",
