@@ -31,7 +31,6 @@ SUBSTEPS = 2
 # unit normals that one tick uses: pose, disturbance, gusts, dropout
 _POSE, _DISTURBANCE, _GUSTS, _DROPOUT = 0, 6, 12, 12 + 3 * STATIONS
 NOISE = _DROPOUT + 1
-_MEMORY = 1 << 14  # bytes of a step's scratch in MuJoCo: 40 times a free body's
 MAX_DELAY = 0.1  # s, of what is kept for later
 _KEPT = round(MAX_DELAY / TICK) + 1
 
@@ -223,8 +222,6 @@ def load_world(
     if not drawn:
         for part in (*spec.cameras, *spec.lights, spec.body("fan")):
             spec.delete(part)
-    if not drawn and add is None:
-        spec.memory = _MEMORY
     model = spec.compile()
     if add is None:  # no other constraint or spring
         flags = mujoco.mjtDisableBit
