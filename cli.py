@@ -25,7 +25,6 @@ from .commands.paper import reproduce
 from .commands.profiling import profile
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
-from .commands.warming import warm
 from .runtime.errors import InputError, unknown_name
 from .runtime.interrupts import INTERRUPTED, TERMINATED, forget, noted
 from .runtime.printable import printable
@@ -39,7 +38,7 @@ class _Commands(TyperGroup):
         name = args[0] if args else ""
         if name and not name.startswith("-") and name not in self.commands:
             if not is_path(name):
-                raise unknown_name("command", name, set(self.commands) - {"look", "warm"})
+                raise unknown_name("command", name, set(self.commands) - {"look"})
             args = ["look", *args]
         return super().resolve_command(ctx, args)
 
@@ -103,8 +102,7 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
 _EARLIER: dict[str, dict[str, str]] = {
     "live": {"view": "browser"},
 }
-for command in (look, warm):
-    app.command(command_name(command), hidden=True)(as_command(command))
+app.command(command_name(look), hidden=True)(as_command(look))
 for command in _COMMANDS:
     name = command_name(command)
     earlier = _EARLIER.get(name, {})

@@ -627,6 +627,46 @@ def make_calls(
     quaternion that is no rotation.
     """
 
+def matrix_of(
+    q: Annotated[NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order="C", device="cpu")],
+) -> None:
+    """Write the matrix (3, 3) from body to world of a quaternion (4,)."""
+
+def multiply(
+    a: Annotated[NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)],
+    b: Annotated[NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu")],
+) -> None:
+    """Write Hamilton's product a * b (4,) of two quaternions; out is neither of them."""
+
+def quaternion_of(
+    rho: Annotated[
+        NDArray[numpy.float64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu")],
+) -> None:
+    """Write the quaternion (4,) of modified Rodrigues parameters (3,)."""
+
+def attitude_error(
+    q: Annotated[NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)],
+    reference: Annotated[
+        NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)
+    ],
+    out: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C", device="cpu")],
+) -> None:
+    """Write the modified Rodrigues parameters (3,), world, that take a quaternion to q."""
+
+def turn_body(
+    q: Annotated[NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu", writable=False)],
+    rate: Annotated[
+        NDArray[numpy.float64], dict(shape=(3), order="C", device="cpu", writable=False)
+    ],
+    dt: float,
+    out: Annotated[NDArray[numpy.float64], dict(shape=(4), order="C", device="cpu")],
+) -> None:
+    """Write q turned at a body rate (3,), rad/s, for dt s."""
+
 class LoopBlocks:
     def __init__(
         self,
@@ -825,7 +865,7 @@ def decode_blackbox(
 ) -> tuple[int, int]:
     """Decode the main frames of a blackbox, its bytes up to the log's end, from `begin` on.
 
-    Of F fields: encodings and predictors (6, F) of I, P, S, G and H frames and of none, their counts of
+    Of F fields: encodings and predictors (6, F) of I, P, S, G, H and no frames, their counts of
     fields (5,), intervals (3,) of I frames and of P frames as a fraction, in loops; the
     constants (257,) of the predictors; the places (3,) of the fields loopIteration, time and
     motor[0], -1 for none. The wanted fields, `keep` (K,), are written into rows (N, K).
@@ -860,7 +900,7 @@ def step_observer(filter: int, observer: int, parts: int, dt: float, voltage: fl
     could be used, or -1 if the quaternion is no rotation.
     """
 
-ROW_SIZE: int
+FLIGHT_ROW_SIZE: int
 
 INNOVATION_SIZE: int
 

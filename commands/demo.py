@@ -33,8 +33,7 @@ def demo(
     parse_setting(effect)  # refused before anything is made
     folder = results_folder(out)
     console.print(
-        "A vehicle flies in a fan's jet, is diagnosed, and flies better. The first start also "
-        "compiles.",
+        "A vehicle flies in a fan's jet, is diagnosed, and flies better.",
     )
     with working("loading"):
         from ..demo.steps import Step, write_page

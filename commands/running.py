@@ -14,7 +14,6 @@ from typing import Any, TypeVar
 import typer
 
 from .. import __version__
-from ..runtime.compile_notice import notice
 from ..runtime.page_files import write_text
 from ..runtime.plain_values import plain
 from ..runtime.provenance import package_versions
@@ -44,7 +43,6 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     def command(*, as_json: bool, quiet: bool, dry_run: bool = False, **options: Any) -> None:
         run.begin(dry_run)
         console.quiet, errors.quiet = as_json or quiet, quiet
-        notice.quiet = quiet
         try:
             check_values(name, options)
             with one_thread():

@@ -17,7 +17,6 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
-    ProgressColumn,
     SpinnerColumn,
     Task,
     TextColumn,
@@ -26,9 +25,7 @@ from rich.progress import (
 )
 from rich.segment import Segment
 from rich.table import Table
-from rich.text import Text
 
-from ..runtime.compile_notice import notice
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
 
@@ -144,14 +141,6 @@ def results_folder(out: Path, **plan: object) -> Path:
     return out
 
 
-class _What(ProgressColumn):
-    """The work at hand; during compilation, the number of functions."""
-
-    def render(self, task: Task) -> Text:
-        """Return the text beside a bar."""
-        return Text(notice.words or task.description)
-
-
 @contextmanager
 def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
     """Show the work at hand and the time of its rest. Give a function of the finished amount,
@@ -165,7 +154,7 @@ def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
     """
     columns = (
         SpinnerColumn(),
-        _What(),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         *([MofNCompleteColumn()] if total > 1.0 else []),
         TimeElapsedColumn(),
@@ -203,7 +192,7 @@ def _line(task: Task) -> str:
         if task.total > 1.0:
             done = f", {task.completed:.0f} of {task.total:.0f}"
     left = f", {task.time_remaining:.0f} s left" if task.time_remaining else ""
-    return f"{notice.words or task.description}{done}, {task.elapsed or 0.0:.0f} s so far{left}"
+    return f"{task.description}{done}, {task.elapsed or 0.0:.0f} s so far{left}"
 
 
 @contextmanager

@@ -119,7 +119,7 @@ def _flown(
         return ((chunk, _fly_chunk(chunk)) for chunk in chunks)
     if cluster is None:
         request, _, scenario, _ = chunks[0]
-        # compiles, once for all processes
+        # a wrong request is refused before processes start
         task_of(request.task).make(scenario).reset(seed=0)
     return every(_fly_chunk, chunks, None if cluster else jobs, cluster)
 

@@ -1,3 +1,1 @@
-"""Machinery under all rooms: errors, files written whole, compiled calls, vector lanes, worker
-processes.
-"""
+"""Machinery under all rooms: errors, files written whole, worker processes."""

@@ -17,7 +17,6 @@ _PACKAGES = (
     "torch",
     "numpy",
     "scipy",
-    "numba",
     "mujoco",
     "gymnasium",
 )

@@ -15,7 +15,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from tests.fuzz.forms import Form, forms, lay_out
-from tests.support.compiling import compile_estimates
 from windwrench.cli import main
 from windwrench.dynamics import InputError
 from windwrench.identification.logs.reading import read_log
@@ -89,12 +88,6 @@ def assert_command_refuses(form, path, monkeypatch, capsys):
     (line,) = said.err.strip().splitlines()
     assert line.startswith("error: ")
     assert set(path.parent.iterdir()) == before
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled():
-    """The first use of compiled code is its slowest, and no fault of an input's."""
-    compile_estimates()
 
 
 @pytest.mark.parametrize("name", FORMS)

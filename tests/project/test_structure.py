@@ -9,7 +9,6 @@ from graphlib import CycleError, TopologicalSorter
 import pytest
 
 from tests.support.paths import ROOT
-from windwrench.runtime.machine_code import ROOMS
 
 PACKAGE = "windwrench"
 
@@ -170,35 +169,6 @@ def test_identification_is_built_from_logs_upwards(modules):
         if module.split(".")[1] != other.split(".")[1] and storey(other) >= storey(module)
     ]
     assert not found, "\n".join(found)
-
-
-def reached(modules, first):
-    """All modules that some import, with those themselves, however many imports lie between."""
-    found = set()
-    todo = list(first)
-    known = edges(modules)
-    while todo:
-        module = todo.pop()
-        if module not in found:
-            found.add(module)
-            todo += [other for importer, _, other in known if importer == module]
-    return found
-
-
-def test_the_digest_of_machine_code_is_of_all_that_is_in_it(modules):
-    package = {
-        name: path
-        for name, path in modules.items()
-        if room(name) not in ("_core", "evidence", "reproduction")
-    }
-    marks = ("@compiled", "@intrinsic", "@overload", "address_of(")
-    compiled = {
-        module
-        for module, path in package.items()
-        if any(mark in path.read_text(encoding="utf-8") for mark in marks)
-    }
-    assert len(compiled) > 60
-    assert {room(module) for module in reached(package, compiled)} <= set(ROOMS)
 
 
 def test_who_knows_torch_and_mujoco(modules):

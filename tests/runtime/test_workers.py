@@ -1,9 +1,8 @@
-"""Workers that stay warm, interrupts that are not lost, and a first call that tells its wait."""
+"""Workers that stay warm, and interrupts that are not lost."""
 
 import multiprocessing
 import os
 import signal
-import sys
 import time
 import weakref
 from contextlib import suppress
@@ -12,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.outcomes import refused
-from tests.support.programs import said, until
-from windwrench.runtime.compile_notice import LINE, CompileNotice
+from tests.support.programs import until
 from windwrench.runtime.interrupts import noted
 from windwrench.runtime.workers import Lost, each, every
 
@@ -159,43 +157,3 @@ def test_one_that_is_lost_comes_again_until_it_has_an_answer(loses):
             time.sleep(0.1)
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-@pytest.fixture
-def told():
-    """A notice whose time never comes by itself."""
-    notice = CompileNotice(patience=1e6)
-    yield notice
-    if notice._timer is not None:
-        notice._timer.cancel()
-
-
-def test_a_long_wait_is_told_once(told, capsys):
-    told.begin()
-    told.begin()
-    told._tell()
-    told.begin()
-    told._tell()
-    assert capsys.readouterr().err == f"{LINE}\n"
-
-
-def test_a_short_wait_and_a_quiet_one_are_not_told(told, capsys):
-    told.begin()
-    told.end()
-    told._tell()
-    told.quiet = True
-    told.begin()
-    told._tell()
-    assert capsys.readouterr().err == ""
-
-
-def test_numba_tells_what_it_compiles_and_not_what_it_loads(tmp_path):
-    (tmp_path / "loops.py").write_text(
-        "from windwrench.runtime.compiled import compiled, notice\n"
-        "@compiled\ndef double(x):\n    return 2 * x\n"
-        "begun = []\nnotice.begin = lambda: begun.append('double')\n"
-        "print(double(3), begun)\n"
-    )
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    runs = [said(sys.executable, "loops.py", cwd=tmp_path, env=environment) for _ in range(2)]
-    assert runs == ["6 ['double']\n", "6 []\n"]
