@@ -35,7 +35,8 @@ _TOO_SLOW = (
     "the tuning says. It is late, and its deviations are too small. Leave out --no-tune and "
     "--tuning.",
     "Innovations agree with each other within a second even so: the wrench changes otherwise than "
-    "a random walk. windwrench diagnose names an effect that the vehicle lacks.",
+    "a random walk. --fit-disturbance fits gusts; windwrench diagnose names an effect that the "
+    "vehicle lacks.",
 )
 
 
@@ -45,6 +46,7 @@ def estimate(
     smooth: bool | None = None,
     gate: float | None = None,
     tune: bool | None = None,
+    fit_disturbance: bool = False,
     tuning: Path | None = None,
     out: Path = Path("results/estimate"),
 ) -> dict[str, Any]:
@@ -68,6 +70,8 @@ def estimate(
     from .tuning_file import load_tuning, save_tuning
 
     level = gate_of(gate)
+    if fit_disturbance and tune is False:
+        raise InputError("--fit-disturbance: fits the tuning; leave out --no-tune")
     (flight,), model = read_flights([log], reading)
     track = result_file(out, "wrench.csv", _TRACKS)
     if needed := _TRACKS[track.suffix]:
@@ -79,7 +83,8 @@ def estimate(
         smooth = (flight.gyro is None) == (flight.accelerometer is None)
     smooth = smooth or reads_imu(flight)
     given = None if tuning is None else load_tuning(tuning, flight.period)
-    fit, consistency, said = _tuned(flight, model, given, tuning is None if tune is None else tune)
+    wanted = fit_disturbance or (tuning is None if tune is None else tune)
+    fit, consistency, said = _tuned(flight, model, given, wanted, fit_disturbance)
     with working("estimating") as progress:
         series = estimate_log(flight, model, fit.tuning if fit else given, progress, smooth, level)
     if track.suffix == ".csv":
@@ -133,10 +138,14 @@ def estimate(
 
 
 def _tuned(
-    flight: "FlightLog", model: "Vehicle", given: "UKFTuning | None", wanted: bool
+    flight: "FlightLog",
+    model: "Vehicle",
+    given: "UKFTuning | None",
+    wanted: bool,
+    gusts: bool,
 ) -> "tuple[NoiseFit | None, Consistency | None, str]":
-    """Return the fitted tuning, if wanted and possible; the innovations' judgement of the tuning in
-    use, if there are enough; and a sentence on both.
+    """Return the fitted tuning, if wanted and possible, with correlation times if ``gusts``; the
+    innovations' judgement of the tuning in use, if there are enough; and a sentence on both.
     """
     from ..identification.wrench_series import consistency_with_log, tune_to_log
 
@@ -145,7 +154,7 @@ def _tuned(
             consistency = consistency_with_log(flight, model, given)
             return None, consistency, f"The tuning was not fitted: {consistency}."
         with working("fitting the tuning"):
-            fit = tune_to_log(flight, model, given)
+            fit = tune_to_log(flight, model, given, gusts)
     except InputError as error:
         return None, None, f"The {'given' if given else 'default'} tuning was used: {error}"
     return fit, fit.after, str(fit)

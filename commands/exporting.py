@@ -19,9 +19,10 @@ def export_c(
     out: Path = Path("results/export_c"),
     overwrite: bool = False,
 ) -> dict[str, Any]:
-    """Write the filter for a flight controller: the core's C++17 headers, one header of numbers and
-    a C interface, in single precision unless said otherwise, and without a heap; with an example
-    and a CMake file.
+    """Write the filter as C++ for a flight controller.
+
+    The core's C++17 headers, one header of numbers and a C interface, in single precision unless
+    said otherwise, and without a heap; with an example and a CMake file.
 
     Example: windwrench export-c --vehicle ardrone2 --estimator ukf --out filter
     """

@@ -163,6 +163,25 @@ void believed_rows(Filter<S> &f, const ImuInnovation<S> &n, int &first, int &las
   last = end;
 }
 
+// Write the rate's covariances after a correction once more, from W (6, N) and V (6, COMPANIONS),
+// whitened by `lower` and overwritten. The gyro measures the sum of rate and bias: of the sum noise
+// S^-1 W is left, without the difference of two large numbers that single precision would lose
+template <class S>
+void keep_measured_rate(Filter<S> &f, const S lower[6][6], S W[6][N], S V[6][COMPANIONS],
+                        S cross[N][COMPANIONS], const S joint[COMPANIONS][COMPANIONS]) {
+  auto &P = f.belief.P;
+  const S *noise = f.settings.imu_noise;
+  divide_transposed<6, N>(lower, W);
+  divide_transposed<6, COMPANIONS>(lower, V);
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < COMPANIONS; j++) cross[3 + i][j] = noise[i] * V[i][j] - joint[i][j];
+    for (int j = 0; j < N; j++)
+      if (j < 3 || j > 5) P[3 + i][j] = P[j][3 + i] = noise[i] * W[i][j] - cross[j][i];
+  }
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) P[3 + i][3 + j] = noise[i] * W[i][3 + j] - cross[3 + j][i];
+}
+
 // Update error state and companions with rows `first` to `last` of the innovation: (34)-(37)
 template <class S>
 void correct_with_imu(Filter<S> &f, const ImuInnovation<S> &n, int first, int last) {
@@ -192,12 +211,13 @@ void correct_with_imu(Filter<S> &f, const ImuInnovation<S> &n, int first, int la
       for (int j = 0; j < COMPANIONS; j++) cross[i][j] -= W[k][i] * V[k][j];
       for (int j = 0; j < N; j++) b.P[i][j] -= W[k][i] * W[k][j];
     }
+  for (int j = 0; j < COMPANIONS; j++)
+    for (int k = first; k < last; k++) u.mean[j] += V[k][j] * y[k][0];
+  if (sizeof(S) < sizeof(double) && first == 0) keep_measured_rate(f, lower, W, V, cross, joint);
   symmetrise<N>(b.P);
   for (int i = 0; i < 3; i++) bound_variance<N>(b.P, i, S(LARGEST_MRP_VARIANCE));
   for (int i = 0; i < NIS; i++) before[i] = b.x[i];
   fold(before, mean, b.x);
-  for (int j = 0; j < COMPANIONS; j++)
-    for (int k = first; k < last; k++) u.mean[j] += V[k][j] * y[k][0];
   bound_biases(u);
   split(f, cross, joint);
 }

@@ -43,6 +43,7 @@ from .fan import FAN, STATIONS, Fan, fan_record
 from .plant import (
     NOISE,
     PLANT,
+    SUBSTEPS,
     TICK,
     PlantSettings,
     is_same_body,
@@ -85,7 +86,12 @@ LOOP = np.dtype(
 assert LOOP.itemsize == _core.LOOP_SIZE, "the core was built for another layout"
 _ADDRESSES = (LOOP.names or ())[-14:]
 # stages of the core
-WIND, SENSE, ESTIMATE, STEER, ACTUATE, FEEL, MOVE = range(7)
+WIND, SENSE, ESTIMATE, STEER, ACTUATE, FEEL = range(6)
+# callbacks of a user's own in a step: Python's errors would end the process in MuJoCo's function
+_CALLBACKS = [
+    getattr(mujoco, f"get_mjcb_{name}")
+    for name in ("control", "passive", "act_dyn", "act_gain", "act_bias", "sensor")
+]
 # MuJoCo's own function
 _MUJOCO_STEP = ctypes.cast(ctypes.CDLL(_functions.__file__).mj_step, ctypes.c_void_p).value
 
@@ -417,7 +423,8 @@ class ClosedLoop:
                 f"got shapes {noise.shape} and {path.shape}"
             )
         with Untimed():
-            if not self.own_stages and not self.winds.own:  # which are called from Python
+            in_python = self.own_stages or self.winds.own or any(ask() for ask in _CALLBACKS)
+            if not in_python:
                 _core.run_ticks(self.address, path, noise)
                 raise_errors()
                 return
@@ -441,7 +448,8 @@ class ClosedLoop:
 
     def move(self) -> None:
         """Let MuJoCo integrate the rigid body over the tick."""
-        self.run_stage(MOVE)
+        mujoco.mj_step(self.model, self.data, SUBSTEPS)
+        self._ticks += 1
 
     @property
     def was_reset(self) -> bool:

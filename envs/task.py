@@ -90,6 +90,8 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
                 )
         if plant not in PLANTS:
             raise unknown_name("plant", str(plant), PLANTS, f"{cls.name}: plant")
+        if "precision" in given and plant == "mujoco":
+            raise InputError(f"{cls.name}: precision is of plant='lanes'; MuJoCo's is double")
         return PLANTS[plant](num_envs, task=cls, **given)
 
     @property

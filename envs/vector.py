@@ -47,8 +47,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         num_envs: number of environments.
         max_episode_steps: decisions until an episode is truncated; default: those of
             ``episode_s``.
-        threads: number of threads, without a change of the results. MuJoCo gains little by
-            threads: its step is called through Python.
+        threads: number of threads, without a change of the results.
         autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, of ``gymnasium.vector.AutoresetMode`` or its
             value as text.
         task: class of the task, or a task that is made.

@@ -21,7 +21,8 @@ import numpy as np
 from .. import _core
 from ..runtime.errors import InputError
 from .estimate import Array
-from .filter_record import FILTER, N
+from .filter_record import FILTER
+from .recovery import N
 from .ukf import WrenchUKF
 
 _MEASURED = (0, 1, 2, 6, 7, 8)  # rows of (rho, x) in the error state

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..dynamics.effects.own import raise_errors
 from ..dynamics.vehicle import Vehicle
 from .estimate import Array
 from .reference import multiply, rotation_matrix, to_mrp
@@ -161,6 +162,7 @@ def innovations(
         inlier = math.log1p(-outlier_chance)
         memory = piece.rows.view(np.uint8), out.view(np.uint8)
         _core.judge_rows(ukf.record.ctypes.data, memory[0], inlier, outlier, memory[1])
+        raise_errors()
         found.append(out[piece.rows["counted"]])
     return np.concatenate(found).view(np.recarray)
 

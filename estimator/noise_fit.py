@@ -10,13 +10,19 @@ prediction error methods*, Automatica 16, 1980. The fitted numbers, as logarithm
 Pose noise and walks are well determined: they shape the innovations at short and at long times.
 White noise often is not: below some size white noise changes nothing, and then stays or comes to
 rest on its bound.
+
+With ``NoiseFitSettings.gusts`` the correlation times of force and torque are fitted, too, each
+horizontally and vertically, from the likeliest walk on. They have to be likelier than the walk by
+a likelihood ratio that chance exceeds in one of a thousand flights of a walk (four numbers more,
+Wilks 1938).
 """
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -42,6 +48,14 @@ _PARAMETERS: tuple[tuple[str, tuple[int, ...]], ...] = (
     ("position_noise", (0, 1, 2)),
     ("attitude_noise", (0, 1, 2)),
 )
+_TIMES: tuple[tuple[str, tuple[int, ...]], ...] = (
+    ("force_time", (0, 1)),
+    ("force_time", (2,)),
+    ("torque_time", (0, 1)),
+    ("torque_time", (2,)),
+)
+_GUSTS = (0.1, 0.3, 1.0, 5.0)  # s, of starts
+_BY_CHANCE = 9.2  # gain of log-likelihood by four numbers more, of one in a thousand walks
 
 
 @dataclass(frozen=True)
@@ -66,6 +80,8 @@ class NoiseFitSettings:
         position: m: the best motion capture, a poor radio.
         attitude: rad.
         rise_times: s, of further starting tunings, with a tenth of the white noise.
+        gusts: whether correlation times of force and torque are fitted.
+        correlation: s: from a few poses to the length of an excerpt; a longer one is a walk.
     """
 
     startup: float = 1.0
@@ -80,6 +96,8 @@ class NoiseFitSettings:
     position: tuple[float, float] = (2e-5, 0.3)
     attitude: tuple[float, float] = (1e-4, 0.5)
     rise_times: tuple[float, ...] = (1.0, 0.3, 0.1)
+    gusts: bool = False
+    correlation: tuple[float, float] = (0.02, 10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +117,9 @@ class NoiseFit:
         outliers: poses, to the fitted tuning.
         rise_before: (3,) s of the force, (3,) s of the torque, 10-90 %.
         rise_after: likewise (s), of the fitted tuning.
-        deviation: standard deviation of the logarithm of each fitted number (8,); NaN on a bound.
-            Their order: force walk (horizontal, vertical), torque walk (the same), thrust, motor
-            torque, position and attitude noise.
+        deviation: standard deviation of the logarithm of each fitted number (8,), of gusts (12,);
+            NaN on a bound. Their order: force walk (horizontal, vertical), torque walk (the same),
+            thrust, motor torque, position and attitude noise; the correlation times as the walks.
     """
 
     tuning: UKFTuning
@@ -117,7 +135,7 @@ class NoiseFit:
 
     def as_dict(self) -> dict[str, object]:
         """Return the fitted numbers, NIS and rise times as plain data."""
-        names = dict.fromkeys(name for name, _ in _PARAMETERS)
+        names = dict.fromkeys(name for name, _ in _parameters(len(self.deviation)))
         return {name: np.asarray(getattr(self.tuning, name)).tolist() for name in names} | {
             "nis_before": self.before.nis,
             "nis_after": self.after.nis,
@@ -138,6 +156,14 @@ class NoiseFit:
             f"{self.before.nis:.2f}, over a second {self.before.nis_over_second:.3g}; the force "
             f"rises in {_times(force)} s instead of {_times(force_before)} s, the torque in "
             f"{_times(torque)} s instead of {_times(torque_before)} s."
+            + "".join(
+                f" Unseen, the {name} falls to 1/e in {_times(np.asarray(time))} s."
+                for name, time in (
+                    ("force", self.tuning.force_time),
+                    ("torque", self.tuning.torque_time),
+                )
+                if np.isfinite(time).any()
+            )
         )
 
 
@@ -199,15 +225,21 @@ def fit_noise(
         pieces = flight.whole
 
     def evaluate(x: Array) -> Innovations:
-        return flight.evaluate(_tuning(x, given), pieces)
+        return flight.evaluate(_tuning(x, given, use), pieces)
 
     bounds = np.log(_bounds(vehicle, period, use))
     starts = [np.clip(_numbers(made), *bounds.T) for made in _starts(flight)]
     try:
         with ThreadPoolExecutor(min(len(bounds), os.cpu_count() or 1)) as threads:
-            likelihoods = [each.log_likelihood.sum() for each in threads.map(evaluate, starts)]
-            found, deviation = climb(evaluate, starts[int(np.argmax(likelihoods))], bounds, threads)
-        fitted = _tuning(found, given)
+            found, deviation = _likeliest(evaluate, starts, bounds, threads)
+            if use.gusts:
+                starts = [np.append(found, np.log(4 * [time])) for time in _GUSTS]
+                wider = np.vstack([bounds, *4 * [np.log([use.correlation])]])
+                gusts = _likeliest(evaluate, starts, wider, threads)
+                totals = [evaluate(x).log_likelihood.sum() for x in (found, gusts[0])]
+                if totals[1] > totals[0] + _BY_CHANCE:
+                    found, deviation = gusts
+        fitted = _tuning(found, given, use)
         rise, rise_after = (rise_times(vehicle, made, period) for made in (given, fitted))
     except np.linalg.LinAlgError as error:
         raise InputError(f"fit_noise: no tuning suits these poses: {error}") from error
@@ -219,11 +251,27 @@ def fit_noise(
     )
 
 
-def _tuning(x: Array, given: UKFTuning) -> UKFTuning:
-    """Return the tuning with logarithms ``x`` (8,) of the fitted numbers."""
-    values: dict[str, Any] = {name: np.empty(3) for name, _ in _PARAMETERS}
-    for (name, axes), value in zip(_PARAMETERS, np.exp(x), strict=True):
+def _parameters(count: int) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    """Return the fitted numbers: eight, of gusts twelve."""
+    return (*_PARAMETERS, *_TIMES)[:count]
+
+
+def _likeliest(
+    evaluate: Callable[[Array], Innovations], starts: list[Array], bounds: Array, threads: Executor
+) -> tuple[Array, Array]:
+    """Return the result of ``climb`` from the likeliest start."""
+    likelihoods = [each.log_likelihood.sum() for each in threads.map(evaluate, starts)]
+    return climb(evaluate, starts[int(np.argmax(likelihoods))], bounds, threads)
+
+
+def _tuning(x: Array, given: UKFTuning, use: NoiseFitSettings) -> UKFTuning:
+    """Return the tuning with logarithms ``x`` (8 or 12,) of the fitted numbers."""
+    parameters = _parameters(len(x))
+    values: dict[str, Any] = {name: np.empty(3) for name, _ in parameters}
+    for (name, axes), value in zip(parameters, np.exp(x), strict=True):
         values[name][list(axes)] = value
+    for name in values.keys() & {"force_time", "torque_time"}:  # on the upper bound: a walk
+        values[name][values[name] > 0.99 * use.correlation[1]] = math.inf
     return replace(given, **values)
 
 

@@ -32,10 +32,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
+from ..dynamics.effects.own import raise_errors
 from ..runtime.errors import InputError
 from .estimate import ESTIMATE_SIZE, NIS, WITHOUT_COVARIANCE, WrenchEstimate
-from .filter_record import N
 from .model_uncertainty import LOAD
+from .recovery import N
 from .ukf import CALL, WrenchUKF, make_calls
 
 _BLOCK = 1024  # steps in memory at a time: 6 MB
@@ -112,6 +113,7 @@ class RecordingUKF(WrenchUKF):
                 address = memory.ctypes.data
                 _core.smooth_block(address, smoothed, calls, numbers[here], std[here])
             _core.write_smoothed(smoothed, begin, numbers, std)
+            raise_errors()
         finite = np.isfinite(numbers[:, :NIS]).all(axis=1) & np.isfinite(std).all(axis=1)
         if not finite.all():
             raise InputError(

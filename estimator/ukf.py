@@ -45,9 +45,9 @@ from .estimate import (
     Array,
     WrenchEstimate,
 )
-from .filter_record import BIASES, ESTIMATE, FILTER, N, fields_between, filter_record
+from .filter_record import BIASES, ESTIMATE, FILTER, fields_between, filter_record
 from .imu import joint_covariance, load_imu
-from .recovery import BELIEVING, Recovery
+from .recovery import BELIEVING, N, Recovery
 from .sample import Sample
 from .tuning import UKFTuning
 
@@ -232,6 +232,7 @@ class WrenchUKF:
         f["x"], f["P"] = x, P
         reset_model(f)
         _core.start(self._address)
+        raise_errors()
         for name in (*fields_between("status", "model"), "poses", "load"):
             f[name] = 0.0
         f["predicted"] = np.diag(f["P"])[12:]
@@ -377,6 +378,7 @@ class WrenchUKF:
             if value is not None:
                 z[where] = _finite(f"correct_imu: {name}", value, 3)
         _core.take_in_imu(self._address, z, gyro is not None, accelerometer is not None)
+        raise_errors()
         return self.estimate
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
+from ..dynamics.effects.own import raise_errors
 from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
 from ..runtime.errors import InputError, unknown_name
 from .estimate import WITHOUT_COVARIANCE, Array, WrenchEstimate
-from .filter_record import N
-from .recovery import Recovery
+from .recovery import N, Recovery
 from .sample import convert
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
@@ -74,6 +74,7 @@ class _Records:
     ) -> None:
         memory = self._records
         _core.step_many(memory.ctypes.data, memory.itemsize, z, parts, dt, voltage, out, variances)
+        raise_errors()
 
     @property
     def covariance(self) -> Array:

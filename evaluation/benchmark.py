@@ -117,10 +117,6 @@ def _flown(
     jobs = min(jobs or os.cpu_count() or 1, len(chunks))
     if jobs == 1 and cluster is None:
         return ((chunk, _fly_chunk(chunk)) for chunk in chunks)
-    if cluster is None:
-        request, _, scenario, _ = chunks[0]
-        # a wrong request is refused before processes start
-        task_of(request.task).make(scenario).reset(seed=0)
     return every(_fly_chunk, chunks, None if cluster else jobs, cluster)
 
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from .. import _core
+from ..dynamics.effects.own import raise_errors
 from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning
 from ..estimator.estimate import POSITION, QUATERNION, RATE, VELOCITY
@@ -163,6 +164,7 @@ def _flown(
     keeps = vehicle.status.force == "refuted"
     flown = t, speeds, volts, states[last_known], starts - first
     _core.predict_flight(models.ctypes.data, *flown, log.period, keeps, path)
+    raise_errors()
     return path
 
 

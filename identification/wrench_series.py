@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,7 +12,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.vehicle import Vehicle
-from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchEstimate, WrenchUKF, fit_noise
+from ..estimator import (
+    NoiseFit,
+    NoiseFitSettings,
+    RecordingUKF,
+    UKFTuning,
+    WrenchEstimate,
+    WrenchUKF,
+    fit_noise,
+)
 from ..estimator.consistency import Consistency
 from ..estimator.estimate import (
     COASTING,
@@ -260,17 +269,21 @@ def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:
         yield ("the log has one of gyro and accelerometer only: the poses were smoothed without it")
 
 
-def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> NoiseFit:
+def tune_to_log(
+    log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None, gusts: bool = False
+) -> NoiseFit:
     """Return the fitted tuning of a log, beside the given one, by default
-    ``UKFTuning.for_vehicle(vehicle, log.period)``; see ``estimator.noise_fit``.
+    ``UKFTuning.for_vehicle(vehicle, log.period)``; ``gusts``: with correlation times of force and
+    torque. See ``estimator.noise_fit``.
 
     Raises:
         InputError: the log does not suit a wrench estimate (``screen_log``), has too few poses for
             a tuning, or has a filtered pose that hides both its noise and a walk.
     """
-    fit = _of_poses(fit_noise, log, vehicle, tuning)
+    judge = partial(fit_noise, settings=NoiseFitSettings(gusts=gusts))
+    fit = _of_poses(judge, log, vehicle, tuning)
     on_bound = np.isnan(fit.deviation)
-    if on_bound[:4].any() and on_bound[6:].any():
+    if on_bound[:4].any() and on_bound[6:8].any():
         raise InputError(
             f"{log.source or log.name}: neither the noise of its pose nor the walk of its wrench "
             "can be fitted: the pose was filtered before it was written"

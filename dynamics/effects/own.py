@@ -31,10 +31,11 @@ class Fields:
     def __init__(self, record: np.ndarray) -> None:
         self.__dict__.update({name: record[name] for name in record.dtype.fields or ()})
 
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"no field {name}; expected one of {', '.join(self.__dict__)}")
+
     def __setattr__(self, name: str, value: object) -> None:
-        if name not in self.__dict__:
-            raise AttributeError(f"no field {name}; expected one of {', '.join(self.__dict__)}")
-        self.__dict__[name][...] = value
+        getattr(self, name)[...] = value
 
 
 @lru_cache(_KEPT_VIEWS)
@@ -42,7 +43,7 @@ def _view(address: int, layout: Layout) -> Any:
     """Return a view of the memory at an address: numbers (n,), or the fields of a record."""
     numbers = isinstance(layout, int)
     dtype = np.dtype(("f8", (layout,))) if isinstance(layout, int) else layout
-    memory = (ctypes.c_char * dtype.itemsize).from_address(address)
+    memory: Any = (ctypes.c_char * dtype.itemsize).from_address(address)
     return np.frombuffer(memory) if numbers else Fields(np.ndarray((), dtype, memory))
 
 

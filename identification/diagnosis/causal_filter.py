@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ... import _core
+from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array
 from ..motion.residual import loaded_model
@@ -92,5 +93,6 @@ def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> T
         *map(np.ascontiguousarray, (*measured, begun, steady.gain, steady.keep, known)),
         *(getattr(out, field.name) for field in fields(out)[1:]),
     )
+    raise_errors()
     np.divide(out.rotors, [vehicle.mass, *np.diagonal(vehicle.inertia)], out=out.rotors)
     return out

@@ -16,7 +16,6 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.effects import get, names, playing
-from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.threads import one_thread
@@ -127,7 +126,6 @@ def diagnose(
     predicted = {model: _predicted(flights, model, segments) for model in {vehicle, amended}}
     hidden = flights.needs_pose | said.hidden
     unseen = (flights.not_identifiable | said.unseen) - flights.needs_pose
-    raise_errors()
     return Diagnosis(
         verdict=verdict,
         remainder=said.remainder,

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from ... import _core
 from ...dynamics.effects import Role, get, playing
+from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
@@ -552,6 +553,7 @@ class Likelihood:
             state,
             out,
         )
+        raise_errors()
         return out
 
 

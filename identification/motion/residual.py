@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from ... import _core
+from ...dynamics.effects.own import raise_errors
 from ...dynamics.model import MODEL_FIELDS, load_model
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array
@@ -33,6 +34,7 @@ def acting_wrench(
     inertia = np.ascontiguousarray(body.inertia)
     flown = (*signals.columns(), turning)
     _core.acting_wrench(models.ctypes.data, signals.period, *flown, body.mass, inertia, out)
+    raise_errors()
     return out, body
 
 

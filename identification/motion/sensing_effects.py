@@ -10,6 +10,7 @@ import numpy as np
 
 from ... import _core
 from ...dynamics.effects import Role, get
+from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ..logs.flight_log import FlightLog
 from .residual import loaded_model
@@ -42,6 +43,7 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     models = loaded_model(vehicle)[0].copy()
     t, seen = np.ascontiguousarray(log.t), np.ascontiguousarray(log.valid)
     _core.undo_sensing(models.ctypes.data, t, seen, samples)
+    raise_errors()
     delay = delay_of(vehicle)
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan

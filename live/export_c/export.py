@@ -99,6 +99,8 @@ def export_c(
     headers = [f"core/{header}.hpp", *(f"core/effects/{name}.hpp" for name in names)]
     if names:
         headers.append("core/effects/called.hpp")
+    if flown is not None and flown["kind"] == "tracker":
+        headers.append("core/tracker.hpp")
     room = _room(effects)
     context: dict[str, Any] = {
         "version": __version__,

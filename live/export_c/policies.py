@@ -11,7 +11,6 @@ import numpy as np
 from ...controllers.briefing import Briefing, FilterNoise
 from ...controllers.fan_laws import Lead
 from ...controllers.features import QUANTITIES
-from ...controllers.jet_map import FIRST, STEP
 from ...controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ...controllers.registry import shipped_policies
 from ...controllers.sensor_model import SETTLED, sensor_model
@@ -128,9 +127,7 @@ def policy_numbers(
         "title": "Fan tracking by a particle filter on the fan's place and velocity.",
         "particles": PARTICLES,
         "integers": [
-            ("ORDER", ORDER, "decisions that a residual is regressed on"),
             ("SETTLED", SETTLED, "decisions that the filter has settled before the first"),
-            ("OFFSET_COUNT", len(model.tables), "offsets from the fan's axis in the jet's map"),
         ],
         "numbers": [
             ("REACH", law.reach, "m, of the fan at first"),
@@ -143,8 +140,6 @@ def policy_numbers(
             ("FEED", law.feed, "of the fan's velocity"),
             ("GAIN", law.gain, "1/s, of the offset"),
             ("DAMPING", law.damping, "of the velocity's error"),
-            ("FIRST", FIRST, "m, first offset of the jet's map"),
-            ("PER_STEP", 1.0 / STEP, "1/m, offsets"),
             ("JET", model.tables, "mean, slopes with velocity and yaw rate, deviation: Nm, N, N"),
             ("KEEP", model.keep, "of the filter's error, in a decision"),
             ("ENTER", model.enter, "of a change, into that error"),

@@ -158,6 +158,9 @@ def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
     wrench = np.genfromtxt(tmp_path / "out" / "wrench.csv", delimiter=",", names=True)
     track = tmp_path / "track.mcap"
     assert call("estimate", log, "--no-smooth", "--no-tune", "--out", track)[0] == 0
+    code, _, error = call("estimate", log, "--no-tune", "--fit-disturbance", "--out", track)
+    assert code == 2
+    assert "leave out --no-tune" in error
     beside = {"track.png", "track.tuning.yaml", "track.run.json", track.name}
     assert beside == {p.name for p in tmp_path.glob("track.*")}
     names = "t fx fy fz tx ty tz std_fx std_fy std_fz std_tx std_ty std_tz nis status"
@@ -217,7 +220,7 @@ def test_a_benchmark_writes_its_leaderboard_and_how_it_came_about(call, tmp_path
     noted = json.loads(first)["benchmark"]
     assert noted["command"] == "windwrench " + " ".join(arguments)
     assert (noted["seed"], noted["options"]["jobs"]) == (7, 1)
-    assert {"numpy", "mujoco"} <= set(noted["packages"])
+    assert {"numpy", "mujoco", "scipy"} <= set(noted["packages"])
     assert call("fly", "--scenario", "static", "--out", "out")[0] == 0
     both = json.loads(path.read_bytes())
     assert set(both) == {"benchmark", "fly"}  # results of two commands may share a folder

@@ -4,6 +4,7 @@ beside their declarations.
 
 import math
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,11 @@ from windwrench.dynamics.effects.base import (
     Effect,
 )
 from windwrench.dynamics.effects.own import addresses, raise_errors
+from windwrench.envs.recording import record_flight
 from windwrench.estimator import WrenchUKF
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.prediction import predict
+from windwrench.identification.wrench_series import estimate_log
 
 HEADERS = Path(effects.__file__).parents[2] / "core/effects"
 
@@ -121,23 +126,42 @@ def test_an_effect_in_python_is_the_one_of_the_core(name):
 
 
 STARTS = "starting_points=lambda flights: [{'a': 0.2, 'w': 3.0}]"
-LATER = "    if state.time > 9.0: wrench.force = state.velosity\n    wrench.force[0] +="
+HOVER = np.full(4, VEHICLE.hover_rate)
+STILL = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
+SWAYING = EffectSetting("hose", {"a": 0.2, "w": 3.0})
 
 
-def test_an_error_in_an_effect_is_one_line_after_the_step_and_the_filter_goes_on(tmp_path):
-    text = HOSE.replace("# more", STARTS).replace("    wrench.force[0] +=", LATER)
+@pytest.fixture
+def hose(tmp_path):
+    """A vehicle whose own effect has an error that no state at loading shows."""
+    early = "    if 0.1 < state.time < 0.4:\n        wrench.force = state.velosity\n    wrench."
+    text = HOSE.replace("# more", STARTS).replace("    wrench.", early)
     (tmp_path / "hose.py").write_text(text)
     with joined(tmp_path):
-        ukf = WrenchUKF(VEHICLE.with_effects(EffectSetting("hose", {"a": 0.2, "w": 3.0})))
-        ukf.reset(np.zeros(3), [1.0, 0.0, 0.0, 0.0])
-        hover = np.full(4, VEHICLE.hover_rate)
-        ukf.step(hover, np.zeros(3), [1.0, 0.0, 0.0, 0.0])
-        ukf.record["time"] = 10.0
-        where = r"hose\.py, line \d+: effect hose: AttributeError: .*velosity"
-        with refused(where):
-            ukf.step(hover, np.zeros(3), [1.0, 0.0, 0.0, 0.0])
-        ukf.record["time"] = 0.0
-        assert np.isfinite(ukf.step(hover, np.zeros(3), [1.0, 0.0, 0.0, 0.0]).force).all()
+        yield VEHICLE.with_effects(SWAYING)
+
+
+SLIP = r"hose\.py, line 10: effect hose: AttributeError: no field velosity"
+
+
+def test_an_error_in_an_effect_is_one_line_after_the_step_and_the_filter_goes_on(hose):
+    ukf = WrenchUKF(hose)
+    ukf.reset(*STILL)
+    for _ in range(20):
+        ukf.step(HOVER, *STILL)
+    with refused(SLIP):
+        ukf.step(HOVER, *STILL)
+    ukf.record["time"] = 0.0
+    assert np.isfinite(ukf.step(HOVER, *STILL).force).all()
+
+
+def test_an_error_in_an_effect_ends_a_flight_and_what_is_made_of_a_log(hose):
+    with refused(SLIP):
+        record_flight(VEHICLE, (SWAYING,), "hover", 1.0, 1)
+    log = FlightLog(**record_flight(VEHICLE, (), "hover", 4.0, 1))
+    for use in (estimate_log, partial(estimate_log, smooth=True), predict):
+        with refused(SLIP):
+            use(log, hose)
 
 
 def test_an_error_at_any_state_shows_when_the_effect_is_loaded(tmp_path):

@@ -12,6 +12,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.outcomes import refused
+from tests.support.own_effects import HOSE, joined
 from tests.support.vector_flights import TASKS, fly, make, make_single
 from windwrench import _core
 from windwrench.dynamics import load_vehicle
@@ -220,6 +221,32 @@ def test_every_effect_flies_in_lanes_as_in_mujoco(name):
         fly(envs, 4)
     ours, theirs = (envs.state.rows for envs in states)
     assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
+
+
+def test_lanes_refuse_effects_in_python_and_other_precisions(tmp_path):
+    pull = HOSE.replace("c[0] * math.sin(c[1] * state.time)", "c[0] + c[1]")
+    (tmp_path / "hose.py").write_text(pull, encoding="utf-8")
+    with joined(tmp_path), refused("plant='lanes' flies no effects in Python"):
+        make(2, "lanes", effects=[EffectSetting("hose", {"a": 0.1, "w": 3.0})])
+    with refused("unknown precision 'half'"):
+        make(2, "lanes", precision="half")
+    with refused("precision is of plant='lanes'"):
+        make(2, precision="single")
+
+
+def test_a_callback_of_mujoco_is_called_in_a_flight_and_its_error_raised():
+    envs = make(2, threads=2)
+    calls = []
+    envs.reset(seed=0)
+    mujoco.set_mjcb_control(lambda model, data: calls.append(data.time))
+    try:
+        envs.step(np.zeros((2, 1)))
+        assert len(calls) == 2 * 16 * SUBSTEPS
+        mujoco.set_mjcb_control(lambda model, data: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            envs.step(np.zeros((2, 1)))
+    finally:
+        mujoco.set_mjcb_control(None)
 
 
 def test_undeclared_effects_fly_in_lanes_of_32_bits():

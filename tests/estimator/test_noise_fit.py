@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.linalg import norm, slogdet
 from numpy.random import default_rng
+from numpy.testing import assert_array_equal
 
 from tests.support.model_flights import WITH_EFFECTS, simulate_model
 from tests.support.outcomes import refused
@@ -64,6 +65,23 @@ def test_known_noise_is_found_back_within_its_uncertainty(fits):
     for fit in fits:
         assert (fit.deviation[6:] < 0.02).all()
         assert (fit.deviation[:4] < 0.4).all()
+
+
+def test_gusts_are_found_back_and_a_walk_stays_one(fits):
+    """A wrong thrust, steady, is no gust: along z the force walks."""
+    true = replace(TRUE, force_time=(0.2, 0.2, inf), torque_time=0.3)
+    fit = fit_noise(VEHICLE, *flight(true), settings=NoiseFitSettings(gusts=True))
+    times = np.array([*np.asarray(fit.tuning.force_time)[[0, 2]], fit.tuning.torque_time[0]])
+    assert abs(np.log(times[0] / 0.2)) < 3.5 * fit.deviation[8]
+    assert times[1] > 1.0
+    assert abs(np.log(times[2] / 0.3)) < 3.5 * fit.deviation[10]
+    assert "Unseen, the force falls to 1/e in" in str(fit)
+    assert fit.as_dict()["force_time"][0] == times[0]
+    # the walk that fits best is half the true one, and twice as late
+    assert fit_noise(VEHICLE, *flight(true)).tuning.force_walk[0] < 0.6 * 0.02
+    walk = fit_noise(VEHICLE, *flight(), settings=NoiseFitSettings(gusts=True))
+    assert np.isinf(walk.tuning.force_time)
+    assert_array_equal(walk.tuning.force_walk, fits[0].tuning.force_walk)
 
 
 def test_nis_is_in_its_band_after_the_fit_and_not_before(fits):

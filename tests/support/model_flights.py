@@ -13,7 +13,8 @@ from windwrench import _core
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.estimator import UKFTuning
 from windwrench.estimator.estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array
-from windwrench.estimator.filter_record import BIASES, N, filter_record
+from windwrench.estimator.filter_record import BIASES, filter_record
+from windwrench.estimator.recovery import N
 from windwrench.estimator.reference import displaced, multiply, rotation_matrix, to_quaternion
 from windwrench.estimator.tuning import decay_of
 from windwrench.estimator.ukf import default_covariance

@@ -1,19 +1,21 @@
-// Fan tracking by a particle filter on the fan's place and velocity: controllers/tracker.py,
-// tracker_filter.py and sensor_model.py.
+// Fan tracking by a particle filter on the fan's place and velocity: controllers/tracker.py.
 #pragma once
 #include "windwrench.h"
 #include "windwrench_numbers.hpp"
 
 namespace windwrench {
 
+constexpr SensorModel<ww_number> MODEL = {JET, KEEP, ENTER, REGRESSION, REST};
+
 // Random numbers of 32 bits: Marsaglia's xorshift, a stream for each use
 enum Stream { DRIFT, WHETHER, KIND, FRESH, SHIFT, STREAMS };
 constexpr uint32_t SEEDS[STREAMS] = {2463534242u, 1013904223u, 362436069u, 521288629u, 88675123u};
 
-// One path that the fan may have taken, and what the filter would show of it
+// One path that the fan may have taken
 struct Particle {
   ww_number place, velocity;  // m and m/s, along y, from where the vehicle was at first
-  ww_number felt[3], error[3][3], past[3][ORDER], log_weight, weight, drawn;
+  ParticleMemory<ww_number> memory;
+  ww_number log_weight, weight, drawn;
 };
 
 struct Policy {
@@ -35,9 +37,10 @@ struct Policy {
     int order = count;
     ww_number most = -INFINITY, sum = 0, squares = 0, place = 0, velocity = 0;
     look(e);
+    const OwnMotion<ww_number> motion = {own, own_velocity, yaw[2]};
     for (Particle &p : particles) {
       if (order > 0) move_fan(p);
-      p.log_weight += weigh(p, seen, order);
+      p.log_weight += weigh(MODEL, p.place, ww_number(1), motion, seen, order, p.memory);
       most = larger(most, p.log_weight);
     }
     for (Particle &p : particles) {
@@ -106,33 +109,6 @@ struct Policy {
       p.velocity = kind >= STOP && kind < TURN ? -before : fresh;
     }
     p.place += ww_number(0.5) * WW_POLICY_PERIOD * (before + p.velocity);
-  }
-
-  // log-likelihood of an estimate, were the fan at a particle's place
-  ww_number weigh(Particle &p, const ww_number *seen, int order) const {
-    ww_number column = (own - p.place - FIRST) * PER_STEP;
-    column = smaller(larger(column, ww_number(0)), ww_number(OFFSET_COUNT) - ww_number(1.001));
-    int j = int(column);
-    ww_number b = column - ww_number(j), total = 0, deviations = 1;
-    for (int a = 0; a < 3; a++) {
-      ww_number at[4];
-      for (int k = 0; k < 4; k++) at[k] = (ww_number(1) - b) * JET[j][k][a] + b * JET[j + 1][k][a];
-      ww_number mean = at[0] + own_velocity * at[1], turning = yaw[2] * at[2];
-      ww_number *error = p.error[a], *past = p.past[a], change = mean - p.felt[a];
-      const ww_number old[3] = {error[0], error[1], error[2]};
-      for (int k = 0; k < 3; k++)
-        error[k] = order == 0 ? ww_number(0)
-                              : KEEP[a][k][0] * old[0] + KEEP[a][k][1] * old[1] +
-                                    KEEP[a][k][2] * old[2] + ENTER[a][k] * change;
-      p.felt[a] = mean;
-      ww_number residual = (seen[a] - turning - mean + error[2]) / at[3], innovation = residual;
-      for (int k = 0; k < ORDER; k++) innovation -= REGRESSION[order][a][k] * past[k];
-      for (int k = ORDER - 1; k > 0; k--) past[k] = past[k - 1];
-      past[0] = residual;
-      total -= ww_number(0.5) * innovation * innovation / REST[order][a];
-      deviations *= at[3];
-    }
-    return total - std::log(deviations);
   }
 
   // Draw the particles anew, systematically and in place: those drawn move to the front, and
