@@ -1,6 +1,7 @@
 """Inertial measurements in the wrench filter."""
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -176,13 +177,16 @@ def test_pose_and_imu_of_one_moment_may_come_in_either_order():
         assert np.max(np.abs(difference) / deviation) < 0.02
 
 
-def consistency(vehicle, rate, pose_hz, fine, runs, seconds):
+def consistency(vehicle, rate, pose_hz, fine, runs, seconds, memory):
     """Return mean IMU-NIS (6), force-NEES (3), NEES (18) and NEES with biases (24), and the bands
-    of one step's mean over the runs. ``fine`` steps make a period of the filter.
+    of one step's mean over the runs. ``fine`` steps make a period of the filter; ``memory``, s, is
+    that of gusts.
     """
     dt = 1.0 / rate
-    tuning = UKFTuning.for_vehicle(vehicle, dt * fine)
-    drawn_with = UKFTuning.for_vehicle(vehicle, dt)
+    tuning, drawn_with = (
+        replace(UKFTuning.for_vehicle(vehicle, period), force_time=memory, torque_time=0.5 * memory)
+        for period in (dt * fine, dt)
+    )
     steps = round(seconds * rate)
     every = rate // pose_hz
     found = np.empty((4, runs, steps))
@@ -206,17 +210,18 @@ RATES = [(200, 50, 1), (500, 50, 1), (1000, 50, 1), (1000, 100, 10)]
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "rate", "pose_hz", "fine", "runs", "seconds"),
+    ("vehicle", "rate", "pose_hz", "fine", "runs", "seconds", "memory"),
     [
-        (OFFSET, 500, 50, 1, 25, 0.6),
-        *(pytest.param(VEHICLE, *rates, 100, 2.0, marks=pytest.mark.slow) for rates in RATES),
+        (OFFSET, 500, 50, 1, 25, 0.6, inf),
+        (VEHICLE, 500, 50, 5, 25, 0.6, 0.1),
+        *(pytest.param(VEHICLE, *rates, 100, 2.0, inf, marks=pytest.mark.slow) for rates in RATES),
     ],
 )
-def test_the_filter_with_an_imu_is_consistent(vehicle, rate, pose_hz, fine, runs, seconds):
+def test_the_filter_with_an_imu_is_consistent(vehicle, rate, pose_hz, fine, runs, seconds, memory):
     """Off the centre of mass the torque's noise is in the specific force; the last rates predict in
     tenths of the period for which the tuning is stated.
     """
-    mean, bands = consistency(vehicle, rate, pose_hz, fine, runs, seconds)
+    mean, bands = consistency(vehicle, rate, pose_hz, fine, runs, seconds, memory)
     for value, (low, high) in zip(mean, bands, strict=True):
         assert low <= value <= high
     # innovations are independent from step to step, so all of them have a narrow band
