@@ -6,6 +6,7 @@
 #include "batch.hpp"
 #include "effects/library.hpp"
 #include "episodes.hpp"
+#include "normals.hpp"
 
 namespace windwrench {
 
@@ -155,17 +156,19 @@ void tick(Block<T> &b, Model<T> *declared, const Common<Single<T>> &c, const T *
   for (int i = 0; i < SUBSTEPS; i++) fly_freely(b, S(TICK / SUBSTEPS));
 }
 
-// Ticks `begin` to `end` of a run of `count`; the run's means are finished behind its last
-struct Ticks {
-  std::int64_t begin, end, count;
+// The air of n episodes: winds (n, columns) and how many each has (n); streams (n) of its noise
+struct Weather {
+  const WindCall *winds;
+  std::int64_t columns;
+  const std::int64_t *counts;
+  const Stream *streams;
+  const Ziggurat *ziggurat;
 };
 
-// Fly ticks of a block. members (lanes): the episode in each lane; -1: no flight. noise (n, end -
-// begin, size): unit normals; winds (n, wind_columns): those of each episode, wind_counts (n)
+// Fly a block for so many ticks. members (lanes): the episode in each lane; -1: no flight, no draws
 template <class T>
 void fly_block(Block<T> &b, Model<T> *declared, const Common<Single<T>> &c,
-               const std::int64_t *members, Episodes &e, const Ticks &ticks, const double *noise,
-               const WindCall *winds, std::int64_t wind_columns, const std::int64_t *wind_counts) {
+               const std::int64_t *members, Episodes &e, std::int64_t ticks, const Weather &air) {
   using S = Single<T>;
   Loop<T> &loop = b.loop;
   T normals[PLANT_NOISE + ACCELEROMETER_NOISE] = {};
@@ -174,8 +177,8 @@ void fly_block(Block<T> &b, Model<T> *declared, const Common<Single<T>> &c,
       T *commanded = c.moves ? loop.flight.setpoint : loop.action;
       commanded[c.places[i]][lane] = S(e.commands[e.actions * n + i]);
     }
-  for (int j = 0; ticks.begin == 0 && j < 3; j++) loop.specific[j] = loop.thrust[j] = T{};
-  for (std::int64_t k = 0; k < ticks.end - ticks.begin; k++) {
+  for (int j = 0; j < 3; j++) loop.specific[j] = loop.thrust[j] = T{};
+  for (std::int64_t k = 0; k < ticks; k++) {
     for (int lane = 0; lane < lanes_of<T>; lane++) {
       std::int64_t n = members[lane];
       if (n < 0) continue;
@@ -185,25 +188,22 @@ void fly_block(Block<T> &b, Model<T> *declared, const Common<Single<T>> &c,
       row = e.reference_rows * n + row_at(now, e.reference_rows);
       for (int i = 0; c.follows && i < REFERENCE; i++)
         loop.flight.setpoint[i][lane] = S(e.references[REFERENCE * row + i]);
-      if (wind_counts[n] > 0 && now % WIND_EVERY == 0) {
-        double pose[7], points[3][STATIONS], air[3][STATIONS];
+      if (air.counts[n] > 0 && now % WIND_EVERY == 0) {
+        double pose[7], points[3][STATIONS], flow[3][STATIONS];
         for (int i = 0; i < 7; i++) pose[i] = double(b.qpos[i][lane]);
-        winds_at(winds + wind_columns * n, wind_counts[n], double(now > 0 ? now : 0) * TICK, pose,
-                 loop.fan.stations, points, air);
+        winds_at(air.winds + air.columns * n, air.counts[n], double(now > 0 ? now : 0) * TICK, pose,
+                 loop.fan.stations, points, flow);
         for (int i = 0; i < STATIONS; i++)
-          for (int a = 0; a < 3; a++) loop.fan.air[i][a][lane] = S(air[a][i]);
+          for (int a = 0; a < 3; a++) loop.fan.air[i][a][lane] = S(flow[a][i]);
       }
-      const double *own = noise + c.size * ((ticks.end - ticks.begin) * n + k);
-      for (std::int64_t i = 0; i < c.size; i++) normals[i][lane] = S(own[i]);
+      draw_normals(*air.ziggurat, air.streams[n], c.size, numbers_of<S>(normals) + lane,
+                   lanes_of<T>);
     }
     tick(b, declared, c, normals);
   }
   for (int lane = 0; lane < lanes_of<T>; lane++)
-    if (members[lane] >= 0) e.ticks[members[lane]] += ticks.end - ticks.begin;
-  for (int j = 0; ticks.end == ticks.count && j < 3; j++) {
-    loop.specific[j] /= S(ticks.count);
-    loop.thrust[j] /= S(ticks.count);
-  }
+    if (members[lane] >= 0) e.ticks[members[lane]] += ticks;
+  for (int j = 0; j < 3; j++) loop.specific[j] /= S(ticks), loop.thrust[j] /= S(ticks);
 }
 
 constexpr double LARGEST = 1e10;  // beyond it MuJoCo starts over

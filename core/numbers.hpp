@@ -11,6 +11,10 @@
 #include <type_traits>
 #include <utility>
 
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
+
 namespace windwrench {
 
 constexpr double PI = 3.14159265358979323846;  // M_PI is not in every C library
@@ -40,6 +44,18 @@ template <class C> inline bool any(C c) {
   if constexpr (is_single<C>) {
     return c != 0;
   } else {
+#ifdef __AVX512F__
+    if constexpr (sizeof(C) == 64) {
+      __m512i bits = reinterpret_cast<__m512i>(c);
+      return _mm512_test_epi64_mask(bits, bits) != 0;
+    }
+#endif
+#ifdef __AVX__
+    if constexpr (sizeof(C) == 32) {
+      __m256i bits = reinterpret_cast<__m256i>(c);
+      return !_mm256_testz_si256(bits, bits);
+    }
+#endif
     bool found = false;
     for (int i = 0; i < lanes_of<C>; i++) found |= c[i] != 0;
     return found;

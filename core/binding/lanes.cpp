@@ -23,6 +23,39 @@ using Whole = Array<const std::int64_t, nb::shape<-1>>;
 
 const Flying &flying_at(std::uintptr_t address) { return *reinterpret_cast<Flying *>(address); }
 
+// NumPy's generators of n environments
+class Streams {
+ public:
+  explicit Streams(std::size_t count) : streams_(count), owners_(count) {}
+
+  void put(std::size_t n, nb::object generator) {
+    nb::object bits = generator.attr("bit_generator"), capsule = bits.attr("capsule");
+    auto *known = static_cast<BitGenerator *>(PyCapsule_GetPointer(capsule.ptr(), "BitGenerator"));
+    if (!known) throw nb::python_error();
+    streams_.at(n) = {known, pcg_of(bits, *known)};
+    owners_[n] = bits;
+  }
+
+  const Stream *data() const { return streams_.data(); }
+
+ private:
+  // The state of NumPy's default generator, or null: another one, or another layout of its memory
+  static Pcg64 *pcg_of(const nb::object &bits, const BitGenerator &known) {
+    if (nb::cast<std::string>(bits.type().attr("__name__")) != "PCG64") return nullptr;
+    nb::object stated = bits.attr("state")["state"], low = nb::int_(~std::uint64_t(0));
+    Pcg64 &pcg = **static_cast<Pcg64 **>(known.state);
+    auto same = [&](const char *name, unsigned __int128 value) {
+      nb::object whole = stated[name];
+      return nb::cast<std::uint64_t>(whole & low) == std::uint64_t(value) &&
+             nb::cast<std::uint64_t>(whole >> nb::int_(64)) == std::uint64_t(value >> 64);
+    };
+    return same("state", pcg.state) && same("inc", pcg.increment) ? &pcg : nullptr;
+  }
+
+  std::vector<Stream> streams_;
+  std::vector<nb::object> owners_;
+};
+
 template <class S> class LoopBlocks {
  public:
   static constexpr int LANES = REGISTER / sizeof(S);
@@ -69,24 +102,25 @@ template <class S> class LoopBlocks {
   }
 
   void fly(std::size_t begin, std::size_t end, Whole slots, Scene &scene, int kind,
-           std::int64_t done, std::int64_t count, Array<const double, nb::shape<-1, -1, -1>> noise,
+           std::int64_t ticks, std::int64_t size, const Streams &streams,
            Array<const std::int64_t, nb::shape<-1, -1, 2>> winds, Whole wind_counts) {
     if (slots.shape(0) != LANES * blocks_.size() || end > blocks_.size())
       throw nb::value_error("fly: expected a slot for each lane");
+    static const Ziggurat ziggurat;
     nb::gil_scoped_release others_run;
     Common<S> common = common_;
     common.kind = CommandKind(kind);
-    common.size = std::int64_t(noise.shape(2));
-    const Ticks ticks = {done, done + std::int64_t(noise.shape(1)), count};
+    common.size = size;
+    const Weather air = {reinterpret_cast<const WindCall *>(winds.data()),
+                         std::int64_t(winds.shape(1)), wind_counts.data(), streams.data(),
+                         &ziggurat};
     for (std::size_t i = begin; i < end; i++) {
       const std::int64_t *members = slots.data() + LANES * i;
       bool some = false;
       for (int lane = 0; lane < LANES; lane++) some = some || members[lane] >= 0;
       if (some)
         fly_block(blocks_[i], declared_.empty() ? nullptr : &declared_[i], common, members,
-                  scene.episodes, ticks, noise.data(),
-                  reinterpret_cast<const WindCall *>(winds.data()), std::int64_t(winds.shape(1)),
-                  wind_counts.data());
+                  scene.episodes, ticks, air);
     }
   }
 
@@ -189,14 +223,12 @@ template <class S> void bind(nb::module_ &m, const char *name) {
            "Let lanes `first` to `last - 1` of a block stand where the loop at an address stands.")
       .def("take", &Blocks::take, "block"_a, "lane"_a, "other"_a, "source"_a,
            "Let a lane of a block stand where the same lane of another's block stands.")
-      .def(
-          "fly", &Blocks::fly, "begin"_a, "end"_a, "slots"_a, "scene"_a, "kind"_a, "done"_a,
-          "count"_a, "noise"_a, "winds"_a, "wind_counts"_a,
-          "Fly blocks `begin` to `end - 1` for the ticks of noise (n, ticks, size), unit normals,\n"
-          "those from `done` on of a run of `count`. slots (lanes,): the environment in each "
-          "lane;\n"
-          "-1: no flight. kind: of the commands; winds (n, most, 2): calls of each environment's,\n"
-          "and their number (n,).")
+      .def("fly", &Blocks::fly, "begin"_a, "end"_a, "slots"_a, "scene"_a, "kind"_a, "ticks"_a,
+           "size"_a, "streams"_a, "winds"_a, "wind_counts"_a,
+           "Fly blocks `begin` to `end - 1` for some ticks of `size` unit normals each, from the\n"
+           "environments' streams. slots (lanes,): the environment in each lane; -1: no flight.\n"
+           "kind: of the commands; winds (n, most, 2): calls of each environment's, and their\n"
+           "number (n,).")
       .def("look", &Blocks::look, "which"_a, "scene"_a,
            "Let environments of which (n,) with numbers too large start over; write the rows of "
            "all.")
@@ -213,6 +245,10 @@ template <class S> void bind(nb::module_ &m, const char *name) {
 }  // namespace
 
 void bind_lanes(nb::module_ &m) {
+  nb::class_<Streams>(m, "Streams", "Generators of n environments, for lanes.")
+      .def(nb::init<std::size_t>(), "count"_a)
+      .def("put", &Streams::put, "n"_a, "generator"_a,
+           "Let environment n draw from a numpy.random.Generator.");
   bind<double>(m, "LoopBlocks");
   bind<float>(m, "SingleLoopBlocks");
 }

@@ -17,7 +17,6 @@ from ..vector import SETTLE_TICKS, TaskVectorEnv
 from ..wind.field import Sum
 
 PRECISIONS: dict[str, type] = {"double": _core.LoopBlocks, "single": _core.SingleLoopBlocks}
-_DRAWN = 20  # ticks whose normals are drawn at once
 
 
 class TaskLanes(TaskVectorEnv):
@@ -62,6 +61,9 @@ class TaskLanes(TaskVectorEnv):
         self._settling = self._blocks(0)
         self._blowing: list[Sum] = [Sum()] * self.num_envs  # keeps the winds at ``_calls``
         self._lay_calls()
+        self._streams = _core.Streams(self.num_envs)
+        for i, generator in enumerate(self.generators):
+            self._streams.put(i, generator)
 
     def _blocks(self, count: int) -> Any:
         """Return so many blocks of closed loops, all like one."""
@@ -99,7 +101,7 @@ class TaskLanes(TaskVectorEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
-        for name in ("_like", "_kept", "_settling", "_calls"):
+        for name in ("_like", "_kept", "_settling", "_calls", "_streams"):
             del state[name]
         return state | {"_flying": self._flying.state()}
 
@@ -115,21 +117,13 @@ class TaskLanes(TaskVectorEnv):
         vehicle's normals are drawn from its own generator.
         """
         parts = 1 if self.threads == 1 else len(blocks)
-        step = ticks if ticks <= _DRAWN else _DRAWN
-        noise = np.zeros((self.num_envs, step, self._like.noise_size))
-        given = slots, self._scene, kind
+        given = slots, self._scene, kind, ticks, self._like.noise_size, self._streams
 
         def fly(part: int) -> None:
             first, last = part * len(blocks) // parts, (part + 1) * len(blocks) // parts
-            members = slots[first * self._lanes : last * self._lanes]
-            members = members[members >= 0].tolist()
-            for n in members:
-                self.generators[n].standard_normal(out=noise[n])
-            blocks.fly(first, last, *given, done, ticks, noise, self._calls, self._winds)
+            blocks.fly(first, last, *given, self._calls, self._winds)
 
-        for done in range(0, ticks, step):
-            noise = noise[:, : ticks - done]
-            self._spread(fly, range(parts))
+        self._spread(fly, range(parts))
 
     def _fly(self, which: Flags) -> None:
         slots = np.full(len(self._flying) * self._lanes, -1)
@@ -151,6 +145,7 @@ class TaskLanes(TaskVectorEnv):
         block, lane = self._places[i]
         self._settling.put(block, lane, lane + 1, loop.address)
         self._blowing[i], self.episodes.ticks[i] = loop.winds, -SETTLE_TICKS
+        self._streams.put(i, self.generators[i])
 
     def _settle(self, which: list[int]) -> None:
         slots = np.full(len(self._settling) * self._lanes, -1)
