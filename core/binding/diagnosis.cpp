@@ -55,6 +55,9 @@ void write_prediction(std::uintptr_t model, In<-1> t, In<-1, 4> speeds, In<-1> v
                       Out<-1, -1, FLOWN> path) {
   check_rows(t.size(), speeds, states);
   check_rows(starts.size(), path);
+  for (std::size_t k = 0; k < starts.size(); k++)
+    if (starts.data()[k] < 0 || std::size_t(starts.data()[k]) + 1 >= t.size())
+      throw nb::value_error("predict_flight: expected a row behind each start");
   predict_flight(model_at(model), rotors_of(speeds, voltage), t.data(), rows(states), starts.data(),
                  std::int64_t(starts.size()), period, keeps_velocity, std::int64_t(path.shape(1)),
                  reinterpret_cast<double (*)[FLOWN]>(path.data()));

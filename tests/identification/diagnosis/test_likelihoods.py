@@ -12,6 +12,7 @@ from numpy.linalg import norm, slogdet, solve
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
+from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import load_vehicle
@@ -53,6 +54,32 @@ def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
     )
     assert found.log_evidence == pytest.approx(by_numbers(2.0, right, low, inf), abs=1e-6)
     assert found.mode[0] == pytest.approx(max(right / 3.0, low))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_mode_of_many_coefficients_is_the_best_within_bounds(seed):
+    rng = default_rng(seed)
+    x = rng.standard_normal((30, 9)) @ np.diag(np.geomspace(0.1, 30.0, 9))
+    y = x @ rng.standard_normal(9) + rng.standard_normal(30)
+    low = -np.abs(rng.standard_normal(9))
+    high = np.where(rng.random(9) < 0.5, inf, 0.5 * np.abs(rng.standard_normal(9)))
+    index = [8, 0, 3, 5, 1, 6]
+    found = set_evidence(Marginal(x.T @ x, x.T @ y, 0.0, 0.0), index, low, high)
+    # least squares, with the prior as further rows
+    A = np.vstack([x[:, index], np.eye(6)])
+    best = lsq_linear(A, np.append(y, np.zeros(6)), (low[index], high[index]), tol=1e-14)
+    assert_allclose(found.mode, best.x, rtol=1e-7, atol=1e-8)
+    assert_allclose(found.std, np.sqrt(np.diag(np.linalg.inv(A.T @ A))), rtol=1e-9)
+    free = set_evidence(Marginal(x.T @ x, x.T @ y, 0.0, 0.0), index, 0 * low - inf, 0 * low + inf)
+    assert_allclose(free.mode, solve(A.T @ A, x[:, index].T @ y), rtol=1e-9)
+    gained = 0.5 * free.mode @ (x[:, index].T @ y) - 0.5 * slogdet(A.T @ A)[1]
+    assert free.log_evidence == pytest.approx(gained)
+
+
+def test_columns_that_no_prior_tells_apart_have_no_evidence():
+    both = Marginal(np.full((2, 2), -2.0), np.ones(2), 0.0, 0.0)
+    with pytest.raises(np.linalg.LinAlgError, match="tells columns of the set apart"):
+        set_evidence(both, [0, 1], np.full(2, -inf), np.full(2, inf))
 
 
 def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():

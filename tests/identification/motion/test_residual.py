@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from tests.support.flown import VEHICLE, recorded, resting
 from tests.support.outcomes import refused
 from tests.support.sizes import rms
+from windwrench import _core
 from windwrench.dynamics import EffectSetting, load_vehicle, preset_names
 from windwrench.dynamics.effects import compile_effects
 from windwrench.evidence.trials.logged_poses import FILTERS
@@ -292,3 +293,29 @@ def test_ten_positions_a_second_show_heading_velocity_and_biases(motion):
     assert 0.3 < rms(z) < 2.0
     assert abs(fused.gyro_bias[len(at) // 2] - GYRO_BIAS).max() < 0.002
     assert abs(fused.accelerometer_bias[len(at) // 2] - FORCE_BIAS).max() < 0.03
+
+
+def test_the_smoother_of_an_imu_is_least_squares_over_all_knots():
+    rng, knots, size = default_rng(3), 6, 15
+    F = np.eye(size) + 0.2 * rng.standard_normal((knots - 1, size, size))
+    defect = rng.standard_normal((knots - 1, size))
+    noise, prior, prior_std = rng.uniform(0.5, 2.0, (3, size))
+    at, first = np.array([0, 2, 2, 5]), np.array([3, 6, 0, 6])
+    late, off, variances = rng.uniform(-0.1, 0.1, 4), rng.standard_normal((4, 3)), np.full(4, 0.3)
+    x, std = np.zeros((2, knots, size))
+    x[0], std[0] = prior, prior_std
+    readings = at, first, late, off, variances
+    assert _core.smooth_inertial_motion(F, defect, noise, *readings, x, std)
+    # one row for each statement on all states (knots * size), in its standard deviations
+    every = np.eye(knots * size).reshape(knots, size, -1)
+    rows, values = [every[0] / prior_std[:, None]], [prior / prior_std]
+    for k in range(knots - 1):
+        rows.append((every[k + 1] - F[k] @ every[k]) / np.sqrt(noise)[:, None])
+        values.append(defect[k] / np.sqrt(noise))
+    for k, i, behind, z in zip(at, first, late, off, strict=True):
+        moved = behind * every[k, 3:6] if i == 6 else 0.0
+        rows.append((every[k, i : i + 3] + moved) / np.sqrt(0.3))
+        values.append(z / np.sqrt(0.3))
+    A = np.vstack(rows)
+    assert_allclose(x.ravel(), np.linalg.lstsq(A, np.concatenate(values))[0], atol=1e-10)
+    assert_allclose(std.ravel(), np.sqrt(np.diag(np.linalg.inv(A.T @ A))), atol=1e-10)
