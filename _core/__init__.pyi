@@ -667,6 +667,13 @@ def turn_body(
 ) -> None:
     """Write q turned at a body rate (3,), rad/s, for dt s."""
 
+class Streams:
+    """Generators of n environments, for lanes."""
+
+    def __init__(self, count: int) -> None: ...
+    def put(self, n: int, generator: object) -> None:
+        """Let environment n draw from a numpy.random.Generator."""
+
 class LoopBlocks:
     def __init__(
         self,
@@ -708,12 +715,9 @@ class LoopBlocks:
         ],
         scene: Scene,
         kind: int,
-        done: int,
-        count: int,
-        noise: Annotated[
-            NDArray[numpy.float64],
-            dict(shape=(None, None, None), order="C", device="cpu", writable=False),
-        ],
+        ticks: int,
+        size: int,
+        streams: Streams,
         winds: Annotated[
             NDArray[numpy.int64],
             dict(shape=(None, None, 2), order="C", device="cpu", writable=False),
@@ -722,10 +726,10 @@ class LoopBlocks:
             NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
         ],
     ) -> None:
-        """Fly blocks `begin` to `end - 1` for the ticks of noise (n, ticks, size), unit normals,
-        those from `done` on of a run of `count`. slots (lanes,): the environment in each lane;
-        -1: no flight. kind: of the commands; winds (n, most, 2): calls of each environment's,
-        and their number (n,).
+        """Fly blocks `begin` to `end - 1` for some ticks of `size` unit normals each, from the
+        environments' streams. slots (lanes,): the environment in each lane; -1: no flight.
+        kind: of the commands; winds (n, most, 2): calls of each environment's, and their
+        number (n,).
         """
 
     def look(
@@ -792,12 +796,9 @@ class SingleLoopBlocks:
         ],
         scene: Scene,
         kind: int,
-        done: int,
-        count: int,
-        noise: Annotated[
-            NDArray[numpy.float64],
-            dict(shape=(None, None, None), order="C", device="cpu", writable=False),
-        ],
+        ticks: int,
+        size: int,
+        streams: Streams,
         winds: Annotated[
             NDArray[numpy.int64],
             dict(shape=(None, None, 2), order="C", device="cpu", writable=False),
@@ -806,10 +807,10 @@ class SingleLoopBlocks:
             NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
         ],
     ) -> None:
-        """Fly blocks `begin` to `end - 1` for the ticks of noise (n, ticks, size), unit normals,
-        those from `done` on of a run of `count`. slots (lanes,): the environment in each lane;
-        -1: no flight. kind: of the commands; winds (n, most, 2): calls of each environment's,
-        and their number (n,).
+        """Fly blocks `begin` to `end - 1` for some ticks of `size` unit normals each, from the
+        environments' streams. slots (lanes,): the environment in each lane; -1: no flight.
+        kind: of the commands; winds (n, most, 2): calls of each environment's, and their
+        number (n,).
         """
 
     def look(
