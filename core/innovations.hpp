@@ -38,7 +38,7 @@ inline void judge_row(Filter<double> &f, const FlightRow &row, double log_inlier
   innovate(f.settings, f.belief, z + 4, true, true, n);
   found.t = row.t;
   found.nis = n.nis;
-  double log_normal = log_inlier - 3.0 * std::log(2.0 * 3.14159265358979323846) - 0.5 * n.nis;
+  double log_normal = log_inlier - 3.0 * std::log(2.0 * PI) - 0.5 * n.nis;
   for (int i = 0; i < 6; i++) {
     found.white[i] = n.y[i];
     log_normal -= std::log(n.L[i][i]);

@@ -17,11 +17,15 @@ template <class T> struct Block {
   T qpos[7], qvel[6], xfrc[6];
 };
 
-// `count` single numbers into lanes `first` to `last` of as many
+// `count` single numbers into lanes `first` to `last` of as many. What is so already is not
+// written: a page of zeros, such as the memory of effects that a vehicle has not, takes no memory
 template <class T>
 void put_numbers(T *to, const double *from, std::size_t count, int first, int last) {
   for (std::size_t i = 0; i < count; i++)
-    for (int lane = first; lane < last; lane++) to[i][lane] = Single<T>(from[i]);
+    for (int lane = first; lane < last; lane++) {
+      Single<T> now = to[i][lane], value = Single<T>(from[i]);
+      if (std::memcmp(&now, &value, sizeof(now)) != 0) to[i][lane] = value;
+    }
 }
 template <class T, class Many, class One>
 void put_struct(Many &to, const One &from, int first, int last) {

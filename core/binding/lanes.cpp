@@ -5,6 +5,8 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 
+#include <cstdlib>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -56,6 +58,35 @@ class Streams {
   std::vector<nb::object> owners_;
 };
 
+// `count` structs of zeros in pages that take no memory before they are written
+template <class Many> class Zeros {
+ public:
+  Zeros() = default;
+  explicit Zeros(std::size_t count)
+      : count_(count), room_(std::calloc(count * sizeof(Many) + alignof(Many), 1)) {
+    std::size_t size = count * sizeof(Many) + alignof(Many);
+    void *first = room_.get();
+    if (!std::align(alignof(Many), count * sizeof(Many), first, size)) throw std::bad_alloc();
+    first_ = static_cast<Many *>(first);
+  }
+  Many &at(std::size_t i) const {
+    if (i >= count_) throw nb::index_error("no such block");
+    return first_[i];
+  }
+  Many *begin() const { return first_; }
+  Many *end() const { return first_ + count_; }
+  std::size_t size() const { return count_; }
+  std::size_t bytes() const { return count_ * sizeof(Many); }
+
+ private:
+  struct Free {
+    void operator()(void *room) const { std::free(room); }
+  };
+  std::size_t count_ = 0;
+  std::unique_ptr<void, Free> room_;
+  Many *first_ = nullptr;
+};
+
 template <class S> class LoopBlocks {
  public:
   static constexpr int LANES = REGISTER / sizeof(S);
@@ -76,7 +107,7 @@ template <class S> class LoopBlocks {
     common_.places = places_.data();
     common_.model_in_loop = f.model_in_loop > 0;
     if (declared.wrench_count + declared.rotor_count + declared.sensing_count > 0)
-      declared_.resize(count);
+      declared_ = Zeros<Model<T>>(count);
     for (std::size_t i = 0; i < count; i++) put(i, 0, LANES, like);
   }
 
@@ -90,15 +121,15 @@ template <class S> class LoopBlocks {
     put_numbers<T>(b.qpos, f.qpos, 7, first, last);
     put_numbers<T>(b.qvel, f.qvel, 6, first, last);
     windwrench::put(b.belief, one.belief, first, last);
-    if (declared_.empty()) return;
-    lay_effects(declared_[block], f.filter->vehicle);
-    put_model(declared_[block], f.filter->vehicle, first, last);
+    if (declared_.size() == 0) return;
+    lay_effects(declared_.at(block), f.filter->vehicle);
+    put_model(declared_.at(block), f.filter->vehicle, first, last);
   }
 
   // Let a lane stand where the same lane of another's block stands
   void take(std::size_t block, int lane, const LoopBlocks &other, std::size_t source) {
     take_part(blocks_.at(block), other.blocks_.at(source), lane);
-    if (!declared_.empty()) take_part(declared_.at(block), other.declared_.at(source), lane);
+    if (declared_.size() != 0) take_part(declared_.at(block), other.declared_.at(source), lane);
   }
 
   void fly(std::size_t begin, std::size_t end, Whole slots, Scene &scene, int kind,
@@ -119,8 +150,8 @@ template <class S> class LoopBlocks {
       bool some = false;
       for (int lane = 0; lane < LANES; lane++) some = some || members[lane] >= 0;
       if (some)
-        fly_block(blocks_[i], declared_.empty() ? nullptr : &declared_[i], common, members,
-                  scene.episodes, ticks, air);
+        fly_block(blocks_.at(i), declared_.size() == 0 ? nullptr : &declared_.at(i), common,
+                  members, scene.episodes, ticks, air);
     }
   }
 
@@ -137,8 +168,8 @@ template <class S> class LoopBlocks {
   // A field (blocks, size, lanes) of the memory
   nb::ndarray<nb::numpy, S> view(const std::string &name) {
     static_assert(sizeof(Block<T>) % sizeof(S) == 0, "a whole number of numbers");
-    if (blocks_.empty()) throw nb::value_error("view: no blocks");
-    Block<T> &b = blocks_[0];
+    if (blocks_.size() == 0) throw nb::value_error("view: no blocks");
+    Block<T> &b = blocks_.at(0);
     Plant<T> &plant = b.loop.plant;
     const struct {
       const char *name;
@@ -166,21 +197,22 @@ template <class S> class LoopBlocks {
   }
 
   nb::bytes state() const {
-    std::size_t size = blocks_.size() * sizeof(Block<T>);
-    std::vector<char> all(size + declared_.size() * sizeof(Model<T>));
-    std::memcpy(all.data(), blocks_.data(), size);
-    std::memcpy(all.data() + size, declared_.data(), all.size() - size);
+    std::vector<char> all(blocks_.bytes() + declared_.bytes());
+    std::memcpy(all.data(), blocks_.begin(), blocks_.bytes());
+    if (declared_.size())
+      std::memcpy(all.data() + blocks_.bytes(), declared_.begin(), declared_.bytes());
     return nb::bytes(all.data(), all.size());
   }
 
   // Stand where the blocks of a state stood; the effects are those of this process
   void restore(const nb::bytes &given, std::uintptr_t like) {
-    std::size_t size = blocks_.size() * sizeof(Block<T>),
-                rest = declared_.size() * sizeof(Model<T>);
-    if (given.size() != size + rest) throw nb::value_error("a state of another core");
-    std::memcpy(static_cast<void *>(blocks_.data()), given.data(), size);
-    std::memcpy(static_cast<void *>(declared_.data()),
-                static_cast<const char *>(given.data()) + size, rest);
+    if (given.size() != blocks_.bytes() + declared_.bytes())
+      throw nb::value_error("a state of another core");
+    const char *from = static_cast<const char *>(given.data());
+    std::memcpy(static_cast<void *>(blocks_.begin()), from, blocks_.bytes());
+    if (declared_.size())
+      std::memcpy(static_cast<void *>(declared_.begin()), from + blocks_.bytes(),
+                  declared_.bytes());
     for (Block<T> &b : blocks_)
       lay_effects(b.loop.plant.vehicle, flying_at(like).loop.plant.vehicle);
     for (Model<T> &m : declared_) lay_effects(m, flying_at(like).filter->vehicle);
@@ -188,7 +220,7 @@ template <class S> class LoopBlocks {
 
   std::size_t size() const { return blocks_.size(); }
   std::size_t bytes() const {
-    return sizeof(Block<T>) + (declared_.empty() ? 0 : sizeof(Model<T>));
+    return sizeof(Block<T>) + (declared_.size() == 0 ? 0 : sizeof(Model<T>));
   }
 
  private:
@@ -196,11 +228,12 @@ template <class S> class LoopBlocks {
   template <class Many> static void take_part(Many &to, const Many &from, int lane) {
     T *mine = reinterpret_cast<T *>(&to);
     const T *its = reinterpret_cast<const T *>(&from);
-    for (std::size_t i = 0; i < sizeof(Many) / sizeof(T); i++) mine[i][lane] = its[i][lane];
+    for (std::size_t i = 0; i < sizeof(Many) / sizeof(T); i++)
+      if (std::memcmp(&mine[i], &its[i], sizeof(T)) != 0) mine[i][lane] = its[i][lane];
   }
 
-  std::vector<Block<T>> blocks_;
-  std::vector<Model<T>> declared_;  // of the filters, where these have effects
+  Zeros<Block<T>> blocks_;
+  Zeros<Model<T>> declared_;  // of the filters, where these have effects
   std::vector<S> jet_;
   Whole places_;
   Common<S> common_ = {};

@@ -16,6 +16,7 @@ from ..truth import true_motion
 from ..vector import SETTLE_TICKS, TaskVectorEnv
 from ..wind.field import Sum
 
+_AT_ONCE = 4  # blocks of vehicles that settle, a thread
 PRECISIONS: dict[str, type] = {"double": _core.LoopBlocks, "single": _core.SingleLoopBlocks}
 
 
@@ -132,14 +133,18 @@ class TaskLanes(TaskVectorEnv):
         self._flying.look(which, self._scene)
 
     def _hover(self, which: list[int]) -> None:
-        """Let drawn vehicles hover at the start, each in its own lane of a block of others."""
-        taken, self._places = [0] * self._lanes, {}
-        for i in which:
-            self._places[i] = taken[i % self._lanes], i % self._lanes
-            taken[i % self._lanes] += 1
-        if max(taken) > len(self._settling):
-            self._settling = self._blocks(max(taken))
-        super()._hover(which)
+        """Let drawn vehicles hover at the start, some blocks of them at a time, each in its own
+        lane of a block of others.
+        """
+        some = _AT_ONCE * self.threads * self._lanes
+        for first in range(0, len(which), some):
+            taken, self._places = [0] * self._lanes, {}
+            for i in which[first : first + some]:
+                self._places[i] = taken[i % self._lanes], i % self._lanes
+                taken[i % self._lanes] += 1
+            if max(taken) > len(self._settling):
+                self._settling = self._blocks(max(taken))
+            super()._hover(which[first : first + some])
 
     def _place(self, i: int, loop: ClosedLoop) -> None:
         block, lane = self._places[i]

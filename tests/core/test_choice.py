@@ -1,9 +1,12 @@
 """The build of the core that an import takes."""
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
 
 import pytest
 
@@ -38,6 +41,16 @@ def test_the_processor_s_flags_choose(tmp_path, flags, chosen):
 @pytest.mark.parametrize("name", _core._found(_core._flags()))
 def test_each_build_can_be_forced(name):
     assert said(sys.executable, "-c", SAY, **with_core(name)).strip() == name
+
+
+@pytest.mark.skipif(shutil.which("objdump") is None, reason="no disassembler")
+@pytest.mark.parametrize("name", _core._found(_core._flags()))
+def test_no_build_fuses_a_product_and_a_sum(name):
+    """All builds have the same bits. GCC fused a turn of vectors (vfmaddsub), told not to."""
+    built = Path(_core.__file__).with_name(name + EXTENSION_SUFFIXES[0])
+    listing = said("objdump", "-d", "--no-show-raw-insn", str(built))
+    assert len(listing) > 1e6
+    assert not re.findall(r"\tvfn?m(?:add|sub)\w+", listing)
 
 
 def test_a_build_that_cannot_run_is_refused_in_one_line():
