@@ -95,7 +95,7 @@ def export_c(
     made = kind(vehicle, tuning, period, gate, Recovery())
     flown = None if policy is None else policy_numbers(policy, vehicle, tuning, period)
     f = made.record[0]
-    names = sorted({effect.model for kind in effects.values() for effect in kind})
+    names = sorted({str(effect.model) for kind in effects.values() for effect in kind})
     headers = [f"core/{header}.hpp", *(f"core/effects/{name}.hpp" for name in names)]
     if names:
         headers.append("core/effects/called.hpp")
