@@ -1035,8 +1035,9 @@ class Scene:
         self,
         ticks: Annotated[NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu")],
         decisions: Annotated[NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu")],
-        paths: Annotated[
-            NDArray[numpy.float64], dict(shape=(None, None, None), order="C", device="cpu")
+        paths: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+        heights: Annotated[
+            NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")
         ],
         references: Annotated[
             NDArray[numpy.float64], dict(shape=(None, None, None), order="C", device="cpu")

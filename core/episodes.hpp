@@ -12,8 +12,8 @@ constexpr double UPRIGHT = 0.34;   // cosine of 70 degrees
 struct Episodes {
   std::int64_t count, actions;
   std::int64_t *ticks, *decisions;  // (n): since the start; ticks are below zero while it settles
-  const double *paths;              // (n, path_rows, 2) m, y and height of the fan's axis
-  std::int64_t path_rows;
+  const double *paths, *heights;    // (n, path_rows), (n, height_rows) m, of the fan's axis
+  std::int64_t path_rows, height_rows;
   const double *references;  // (n, reference_rows, REFERENCE)
   std::int64_t reference_rows;
   double *commands, *taken, *last_taken;  // (n, actions)
@@ -95,11 +95,12 @@ inline bool write_row(const Motion &m, const Episodes &e, std::int64_t n, double
   row[ROW_TURN] = turned * (c * w[1] + s * w[2]);
   row[ROW_TURN + 1] = turned * (c * w[2] - s * w[1]);
   row[ROW_TURN + 2] = turned * (c * w[3] - s * w[0]);
-  const double *path = e.paths + 2 * e.path_rows * n;
-  std::int64_t k = row_at(e.ticks[n], e.path_rows), before = k > 0 ? k - 1 : 0;
+  const double *paths[2] = {e.paths + e.path_rows * n, e.heights + e.height_rows * n};
+  const std::int64_t rows[2] = {e.path_rows, e.height_rows};
   for (int i = 0; i < 2; i++) {
-    row[ROW_FAN + i] = path[2 * before + i];
-    row[ROW_FAN + 2 + i] = (path[2 * k + i] - path[2 * before + i]) / TICK;
+    std::int64_t k = row_at(e.ticks[n], rows[i]), before = k > 0 ? k - 1 : 0;
+    row[ROW_FAN + i] = paths[i][before];
+    row[ROW_FAN + 2 + i] = (paths[i][k] - paths[i][before]) / TICK;
   }
   double square = 0.0, change = 0.0;
   for (int i = 0; i < 3; i++) square += (m.pose[i] - reference[i]) * (m.pose[i] - reference[i]);

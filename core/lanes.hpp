@@ -186,9 +186,9 @@ void fly_block(Block<T> &b, Model<T> *declared, const Common<Single<T>> &c,
     for (int lane = 0; lane < lanes_of<T>; lane++) {
       std::int64_t n = members[lane];
       if (n < 0) continue;
-      std::int64_t now = e.ticks[n] + k, row = row_at(now, e.path_rows);
-      loop.fan.y[lane] = S(e.paths[2 * (e.path_rows * n + row)]);
-      loop.fan.height[lane] = S(e.paths[2 * (e.path_rows * n + row) + 1]);
+      std::int64_t now = e.ticks[n] + k, row;
+      loop.fan.y[lane] = S(e.paths[e.path_rows * n + row_at(now, e.path_rows)]);
+      loop.fan.height[lane] = S(e.heights[e.height_rows * n + row_at(now, e.height_rows)]);
       row = e.reference_rows * n + row_at(now, e.reference_rows);
       for (int i = 0; c.follows && i < REFERENCE; i++)
         loop.flight.setpoint[i][lane] = S(e.references[REFERENCE * row + i]);

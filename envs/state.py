@@ -39,7 +39,8 @@ class Episodes(NamedTuple):
 
     ticks: NDArray[np.int64]  # (n,) since the start; below zero while the filter settles
     decisions: NDArray[np.int64]  # (n,) likewise
-    paths: Array  # (n, m, 2) m, y and height of the fan's axis, a row a tick
+    paths: Array  # (n, m) m, y of the fan's axis, a column a tick
+    heights: Array  # (n, m) m, its height; (n, 1) if no fan moves up or down
     references: Array  # (n, k, 10), a row a tick
     commands: Array  # (n, actions) as the flight loop takes them
     actions: Array  # (n, actions) as the agent gave them, -1 to 1
@@ -51,9 +52,9 @@ class Episodes(NamedTuple):
         """Return ``count`` episodes before they begin."""
         ticks, decisions = np.zeros((2, count), dtype=np.int64)
         commands, now, last = np.zeros((3, count, actions))
-        paths, references = np.zeros((count, 1, 2)), np.zeros((count, 1, REFERENCE_SIZE))
-        broken = np.zeros(count, dtype=np.bool_)
-        return cls(ticks, decisions, paths, references, commands, now, last, broken)
+        paths, heights = np.zeros((2, count, 1))
+        references, broken = np.zeros((count, 1, REFERENCE_SIZE)), np.zeros(count, dtype=np.bool_)
+        return cls(ticks, decisions, paths, heights, references, commands, now, last, broken)
 
 
 # columns of a world's row, in the core's order

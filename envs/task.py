@@ -109,8 +109,8 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
     @property
     def path(self) -> Array:
         """Path (m, 2) m of the fan's y and height, a row a tick."""
-        path: Array = self.many.episodes.paths[0]
-        return path
+        y, height = self.many.episodes[2:4]
+        return np.stack(np.broadcast_arrays(y[0], height[0]), axis=1)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -302,10 +302,12 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def _keep(self, i: int, start: Start) -> None:
         """Write down an environment's new episode; after its last row all stays."""
-        for name, rows in (("paths", start.paths), ("references", start.references)):
+        y, height = start.paths.T
+        height = height if np.ptp(height) > 0.0 else height[:1]
+        for name, rows in (("paths", y), ("heights", height), ("references", start.references)):
             kept = getattr(self.episodes, name)
             if len(rows) > kept.shape[1]:
-                more = ((0, 0), (0, len(rows) - kept.shape[1]), (0, 0))
+                more = ((0, 0), (0, len(rows) - kept.shape[1]), (0, 0))[: kept.ndim]
                 kept = np.pad(kept, more, mode="edge")
                 self.episodes = self.episodes._replace(**{name: kept})
                 self._look()
@@ -325,7 +327,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         """Let the filters of some environments settle."""
 
         def settle(i: int) -> None:
-            self.loops[i].settle(self.generators[i], SETTLE_TICKS, self.episodes.paths[i, :1])
+            self.loops[i].settle(self.generators[i], SETTLE_TICKS, self._path(i, 1))
 
         self._spread(settle, which)
         self._see(which)
@@ -339,11 +341,19 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def _fly_one(self, i: int) -> None:
         """Fly a decision with the normals of ``standard_normal``."""
-        task, loop, path = self.task, self.loops[i], self.episodes.paths[i]
+        task, loop = self.task, self.loops[i]
         normals = self.generators[i].standard_normal((task.decision_ticks, loop.noise_size))
         commanded = loop.setpoint if task.flown.moves else loop.action
         commanded[task.flown.places] = self.episodes.commands[i]
-        loop.run(normals, path[min(loop.ticks, len(path) - 1) :])
+        loop.run(normals, self._path(i, task.decision_ticks))
+
+    def _path(self, i: int, ticks: int) -> Array:
+        """Return the fan's path (m, 2) m in an environment's next ticks."""
+        now = max(self.loops[i].ticks, 0)
+        steps, path = np.arange(now, now + ticks), np.empty((ticks, 2))
+        for j, rows in enumerate(self.episodes[2:4]):
+            path[:, j] = rows[i].take(steps, mode="clip")
+        return path
 
     def _see(self, which: list[int]) -> None:
         """Gather the state of some environments."""

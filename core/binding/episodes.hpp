@@ -20,9 +20,10 @@ struct Scene {
   using Flags = Array<bool, nb::shape<-1>>;
   using Fixed = Array<const double, nb::shape<-1>>;
 
-  Scene(Whole ticks, Whole decisions, Cube paths, Cube references, Table commands, Table actions,
-        Table last_actions, Flags broken, Table rows, Flags flying)
-      : held_{ticks, decisions, paths, references, commands, actions, last_actions, broken},
+  Scene(Whole ticks, Whole decisions, Table paths, Table heights, Cube references, Table commands,
+        Table actions, Table last_actions, Flags broken, Table rows, Flags flying)
+      : held_{ticks,    decisions, paths,        heights, references,
+              commands, actions,   last_actions, broken},
         rows(rows),
         flying(flying) {
     if (rows.shape(1) != ROW_SIZE) throw nb::value_error("Scene: rows of another layout");
@@ -31,7 +32,9 @@ struct Scene {
                 ticks.data(),
                 decisions.data(),
                 paths.data(),
+                heights.data(),
                 std::int64_t(paths.shape(1)),
+                std::int64_t(heights.shape(1)),
                 references.data(),
                 std::int64_t(references.shape(1)),
                 commands.data(),
@@ -49,7 +52,8 @@ struct Scene {
  private:
   struct {
     Whole ticks, decisions;
-    Cube paths, references;
+    Table paths, heights;
+    Cube references;
     Table commands, actions, last_actions;
     Flags broken;
   } held_;

@@ -68,10 +68,11 @@ void bind_tick(nb::module_ &m) {
       "Write frames (n, k) within limits (k,) as they are into si, and over scales (k,) into out;\n"
       "0 where a number is not finite.");
   nb::class_<Scene>(m, "Scene", "The arrays of n episodes, a row each (envs/state.py).")
-      .def(nb::init<Scene::Whole, Scene::Whole, Scene::Cube, Scene::Cube, Scene::Table,
-                    Scene::Table, Scene::Table, Scene::Flags, Scene::Table, Scene::Flags>(),
-           "ticks"_a, "decisions"_a, "paths"_a, "references"_a, "commands"_a, "actions"_a,
-           "last_actions"_a, "broken"_a, "rows"_a, "flying"_a)
+      .def(nb::init<Scene::Whole, Scene::Whole, Scene::Table, Scene::Table, Scene::Cube,
+                    Scene::Table, Scene::Table, Scene::Table, Scene::Flags, Scene::Table,
+                    Scene::Flags>(),
+           "ticks"_a, "decisions"_a, "paths"_a, "heights"_a, "references"_a, "commands"_a,
+           "actions"_a, "last_actions"_a, "broken"_a, "rows"_a, "flying"_a)
       .def(
           "take",
           [](Scene &self, Array<const double, nb::shape<-1, -1>> wanted,
