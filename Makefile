@@ -37,8 +37,7 @@ test-light: $(VENV)/.light
 test-lowest: $(VENV)-lowest/.lowest
 	$(subst $(BIN),$(VENV)-lowest/bin,$(PYTEST)) -m "not slow" $(FAST)
 
-# programs that tests start write beside the others, wherever they run;
-# compiled code is run, but not seen; `@compiled` functions are left out of the count
+# programs that tests start write beside the others, wherever they run
 coverage: $(VENV)/.tested
 	COVERAGE_FILE=$(CURDIR)/.coverage $(PYTEST) -m "not slow" $(COVERAGE)
 
@@ -104,4 +103,3 @@ foreign: $(VENV)/.tested
 
 clean:
 	rm -rf $(VENV) $(VENV)-* build dist results site *.egg-info _core/*.so _core/built.*
-	find . -name '*.nb[ic]' -delete

@@ -129,12 +129,6 @@ def count() -> dict[str, float]:
         for node in trees[name].body
         if isinstance(node, DEFINITIONS) and not node.name.startswith("_")
     ]
-    compiled = [
-        node
-        for node in inside
-        if isinstance(node, ast.FunctionDef)
-        and any("compiled" in ast.unparse(mark) for mark in node.decorator_list)
-    ]
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     rooms = sorted(room for room in nodes if room not in NOT_KIT)
     return {
@@ -144,7 +138,6 @@ def count() -> dict[str, float]:
         **language(kit),
         "class names used twice": sum(number > 1 for number in classes.values()),
         "public names": len(public),
-        "compiled functions": len(compiled),
         "modules that reading a log passes": int(run(READING)),
         "pages": len(pages),
         "words on pages": sum(len(page.read_text(encoding="utf-8").split()) for page in pages),

@@ -12,7 +12,7 @@ from rich.live import Live
 from ..runtime.errors import InputError
 from ..runtime.interrupts import INTERRUPTED, TERMINATED, taken, terminable
 from .flight_logs import LogOptions
-from .terminal import console, errors, gate_of, note, run, working
+from .terminal import console, errors, gate_of, note, run
 
 if TYPE_CHECKING:
     from ..live.session import Session
@@ -45,7 +45,7 @@ def live(
     """
     from ..dynamics.vehicle_file import load_vehicle, name_in_log, preset_names
     from ..identification.logs.log_map import load_map
-    from ..live.filtering import LiveSettings, Output, warm_up
+    from ..live.filtering import LiveSettings, Output
     from ..live.messages import Row
     from ..live.outlets import Outlet
     from ..live.outputs import Lines
@@ -72,8 +72,6 @@ def live(
     if record is not None:
         recorder = Recorder(record, name_in_log(model, flown), tallies, horizon)
         recording = Outlet[Row](recorder, tallies)
-    with working("preparing the filter"):
-        warm_up(model)
     if not console.is_terminal and not console.quiet:
         telling = Outlet[Output](
             Lines(sys.stdout),

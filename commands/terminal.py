@@ -17,7 +17,6 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
-    ProgressColumn,
     SpinnerColumn,
     Task,
     TextColumn,
@@ -26,7 +25,6 @@ from rich.progress import (
 )
 from rich.segment import Segment
 from rich.table import Table
-from rich.text import Text
 
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
@@ -143,14 +141,6 @@ def results_folder(out: Path, **plan: object) -> Path:
     return out
 
 
-class _What(ProgressColumn):
-    """The work at hand; during compilation, the number of functions."""
-
-    def render(self, task: Task) -> Text:
-        """Return the text beside a bar."""
-        return Text(task.description)
-
-
 @contextmanager
 def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
     """Show the work at hand and the time of its rest. Give a function of the finished amount,
@@ -164,7 +154,7 @@ def working(text: str, total: float = 1.0) -> Iterator[Callable[..., None]]:
     """
     columns = (
         SpinnerColumn(),
-        _What(),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         *([MofNCompleteColumn()] if total > 1.0 else []),
         TimeElapsedColumn(),

@@ -1,5 +1,5 @@
 """A tracker's knowledge of its own sensing: the jet's map, the wrench filter's lag, the coloured
-noise, and its own yaw, in arrays for compiled code.
+noise, and its own yaw, in arrays for the core.
 """
 
 from functools import lru_cache

@@ -267,7 +267,7 @@ class ClosedLoop:
         return load_world(self._body, drawn)
 
     def _bind(self) -> None:
-        """Lay Python's arrays over the record and MuJoCo's data, and find compiled code."""
+        """Lay Python's arrays over the record and MuJoCo's data, and find the core's functions."""
         loop, ukf = self.record[0], self.ukf.record[0]
         self.address: int = self.record.ctypes.data
         loop["filter"], loop["step"] = self.ukf.record.ctypes.data, self.ukf.step_address

@@ -18,7 +18,7 @@ POSITION, ATTITUDE = 1, 2  # the parts of a pose; their sum is both
 
 
 class Sample:
-    """A buffer (11,) of rotor speeds, position and quaternion that compiled code reads.
+    """A buffer (11,) of rotor speeds, position and quaternion for the core.
 
     Args:
         z: the buffer, contiguous.

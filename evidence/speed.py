@@ -77,7 +77,7 @@ def stepping(made: Any, sample: Any, pose: Any, count: int) -> Callable[[], floa
     """Return a run of 2000 steps of one of ``count`` filters that step together."""
     steps = 2000 // count
     made.reset(*pose)
-    made.step(*sample)  # compiles
+    made.step(*sample)
     return lambda: (
         1e6 / (steps * count) * seconds(lambda: [made.step(*sample) for _ in range(steps)])
     )
@@ -109,7 +109,7 @@ def flight(name: str, includes: str, env: Any, period: float, count: int, steps:
         env.reset(seed=0)
         return count * steps * period / seconds(lambda: [env.step(action) for _ in range(steps)])
 
-    run()  # compiles
+    run()
     return Contender(name, REAL_TIME, includes, run)
 
 
@@ -139,7 +139,7 @@ def starts() -> list[Contender]:
     """Return a fresh process to the package, and to an environment's first step."""
     return [
         program("import windwrench", "a fresh process", "-c", "import windwrench"),
-        program("first make, reset and step", "compiled code on disk", "-c", FIRST_STEP),
+        program("first make, reset and step", "a fresh process", "-c", FIRST_STEP),
     ]
 
 

@@ -181,23 +181,3 @@ class LiveFilter:
         if row.has_pose and estimate.status == "rejected":
             self._tallies.counts["refused"] += 1
         return Output(row, self._timed.time, estimate, std)
-
-
-def warm_up(vehicle: Vehicle) -> None:
-    """Compile all functions for a stream of this vehicle."""
-    live = LiveFilter(vehicle, Tallies())
-    hover = Row(
-        0.0,
-        0,
-        rotor_speeds=np.full(4, vehicle.hover_rate),
-        position=np.array([0.0, 0.0, 1.0]),
-        quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
-        voltage=vehicle.voltage_ref or None,
-    )
-    up = np.array([0.0, 0.0, vehicle.gravity])
-    for i in range(40):
-        live.take(replace(hover, t=0.005 * i))
-    live.take(replace(hover, t=0.0501))  # late
-    for i in range(40, 45):
-        row = replace(hover, t=0.005 * i, voltage=None)
-        live.take(replace(row, gyro=np.zeros(3), accelerometer=up))

@@ -23,7 +23,7 @@ from .threads import one_thread
 T = TypeVar("T")
 R = TypeVar("R")
 
-# for new processes: forked workers would share the locks of compiled code and of linear algebra
+# for new processes: forked workers would share the locks of linear algebra
 SPAWNED = multiprocessing.get_context("spawn")
 _FIRST_TO_GO = 500  # of 1000: where memory runs out, the system ends a worker before its parent
 _LOOK = 0.2  # s between two checks of the time and calls of ``idle``

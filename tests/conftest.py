@@ -4,7 +4,7 @@ import signal
 
 
 def pytest_configure(config):
-    """Prepare the whole suite."""
+    """Hear interrupts in every process of the suite."""
     hear_interrupts()
 
 

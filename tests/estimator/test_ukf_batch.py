@@ -1,5 +1,5 @@
 """A batch of filters is as many single ones; inputs that no vehicle makes, numbers at the ends of
-what is stated, and what passes between Python and compiled code.
+what is stated, and what passes between Python and the core.
 """
 
 import copy

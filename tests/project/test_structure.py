@@ -171,19 +171,6 @@ def test_identification_is_built_from_logs_upwards(modules):
     assert not found, "\n".join(found)
 
 
-def reached(modules, first):
-    """All modules that some import, with those themselves, however many imports lie between."""
-    found = set()
-    todo = list(first)
-    known = edges(modules)
-    while todo:
-        module = todo.pop()
-        if module not in found:
-            found.add(module)
-            todo += [other for importer, _, other in known if importer == module]
-    return found
-
-
 def test_who_knows_torch_and_mujoco(modules):
     """Torch is imported by training, and by evidence; MuJoCo by the simulation and what uses it."""
     found = [
