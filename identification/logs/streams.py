@@ -313,6 +313,7 @@ _LEAST_ROWS = 2.0  # median spacing in rows; below, each row is a sample
 _EARLY = 0.05  # quantile of spacings compared with the median
 # share of the RMS distance from the line between both neighbours: on the line
 _ON_LINE = 1e-3
+_ROUNDED = 1.001  # rounding steps by which three rounded values leave a line, at most
 _MOST_CORNERS = 2 / 3  # of the rows; with more no two corners can be told apart
 _LEAST_CHANGES = 8  # for a spacing
 
@@ -348,18 +349,21 @@ def between_samples(t: Array, values: Array, rate: float) -> Array:
 
 
 def _corners(t: Array, values: Array) -> Rows:
-    """Return where values (N, K) leave the straight line between their neighbours: the first of
-    consecutive rows, since a sample between rows bends the line in both.
+    """Return where values (N, K) leave the straight line between their neighbours by more than
+    their rounding: the first of consecutive rows, since a sample between rows bends the line in
+    both.
     """
     if len(t) < 3:
         return np.empty(0, dtype=np.intp)
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    steps = np.abs(np.diff(values, axis=0))
+    rounding = np.min(steps, axis=0, where=steps > 0.0, initial=np.inf)
     off = values[2:] - values[:-2]  # in place: a copy of an hour takes 23 MB a column
     off *= share
     off += values[:-2]
     np.abs(np.subtract(values[1:-1], off, out=off), out=off)
     rms = np.sqrt(np.mean(np.square(off), axis=0))
-    is_corner = (off > _ON_LINE * rms).any(axis=1)
+    is_corner = (off > np.maximum(_ON_LINE * rms, _ROUNDED * rounding)).any(axis=1)
     if np.mean(is_corner) > _MOST_CORNERS:
         return np.empty(0, dtype=np.intp)
     return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))

@@ -30,6 +30,11 @@ def test_rounded_times_are_even():
     assert log.period == pytest.approx(0.005, rel=1e-3)
 
 
+def test_rounded_rotor_speeds_of_a_smooth_flight_come_with_each_row():
+    log = read_log(data_file("hard_logs/perfect_model_smooth_rounded.csv.gz"))
+    assert log.motor_rate == pytest.approx(1.0 / log.period)
+
+
 @pytest.mark.parametrize(
     ("name", "line"),
     [
