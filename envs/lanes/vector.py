@@ -17,7 +17,7 @@ from ..vector import SETTLE_TICKS, TaskVectorEnv
 from ..wind.field import Sum
 
 _AT_ONCE = 4  # blocks of vehicles that settle, a thread
-PRECISIONS: dict[str, type] = {"double": _core.LoopBlocks, "single": _core.SingleLoopBlocks}
+PRECISIONS: dict[str, Any] = {"double": _core.LoopBlocks, "single": _core.SingleLoopBlocks}
 
 
 class TaskLanes(TaskVectorEnv):
@@ -94,8 +94,9 @@ class TaskLanes(TaskVectorEnv):
 
     def late(self) -> Array:
         """Return the delay (n,) s of the flight loop's answer: actuators and pose."""
-        ticks: Array = sum(self._rows(self._flying.view(f"{n}_late")) for n in ("actuator", "pose"))
-        return TICK * ticks[:, 0]
+        ticks = self._flying.view("actuator_late") + self._flying.view("pose_late")
+        late: Array = TICK * self._rows(ticks)[:, 0]
+        return late
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
