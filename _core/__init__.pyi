@@ -689,10 +689,6 @@ class LoopBlocks:
     lanes: Final[int] = ...
     """(arg: object, /) -> int"""
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of a block."""
-
     def put(self, block: int, first: int, last: int, address: int) -> None:
         """Let lanes `first` to `last - 1` of a block stand where the loop at an address stands."""
 
@@ -732,7 +728,7 @@ class LoopBlocks:
         ],
         scene: Scene,
     ) -> None:
-        """Let environments of which (n,) with too large numbers start over; write all rows."""
+        """Let environments of which (n,) with numbers too large start over; write the rows of all."""
 
     def view(self, name: str) -> NDArray[numpy.float64]:
         """Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,
@@ -769,10 +765,6 @@ class SingleLoopBlocks:
 
     lanes: Final[int] = ...
     """(arg: object, /) -> int"""
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of a block."""
 
     def put(self, block: int, first: int, last: int, address: int) -> None:
         """Let lanes `first` to `last - 1` of a block stand where the loop at an address stands."""
@@ -813,7 +805,7 @@ class SingleLoopBlocks:
         ],
         scene: Scene,
     ) -> None:
-        """Let environments of which (n,) with too large numbers start over; write all rows."""
+        """Let environments of which (n,) with numbers too large start over; write the rows of all."""
 
     def view(self, name: str) -> NDArray[numpy.float32]:
         """Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,

@@ -106,7 +106,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all but threads, windows and the core's parts, for a copy."""
-        left = {"_pool": None, "_scene": None, "_streams": None, "viewers": {}}
+        left: dict[str, Any] = {"_pool": None, "_scene": None, "_streams": None, "viewers": {}}
         return self.__dict__ | left
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -186,9 +186,6 @@ template <class S> class LoopBlocks {
   }
 
   std::size_t size() const { return blocks_.size(); }
-  std::size_t bytes() const {
-    return sizeof(Block<T>) + (declared_.size() == 0 ? 0 : sizeof(Model<T>));
-  }
 
  private:
   // Numbers of lanes lie at whole registers, and between them is what all blocks have in common
@@ -218,7 +215,6 @@ template <class S> void bind(nb::module_ &m, const char *name) {
           "in the action. ValueError: an effect of a vehicle is written in Python.")
       .def("__len__", &Blocks::size)
       .def_prop_ro_static("lanes", [](nb::handle) { return int(Blocks::LANES); })
-      .def_prop_ro("nbytes", &Blocks::bytes, "Bytes of a block.")
       .def("put", &Blocks::put, "block"_a, "first"_a, "last"_a, "address"_a,
            "Let lanes `first` to `last - 1` of a block stand where the loop at an address stands.")
       .def("take", &Blocks::take, "block"_a, "lane"_a, "other"_a, "source"_a,
@@ -230,7 +226,8 @@ template <class S> void bind(nb::module_ &m, const char *name) {
            "kind: of the commands; winds (n, most, 2): calls of each environment's, and their\n"
            "number (n,).")
       .def("look", &Blocks::look, "which"_a, "scene"_a,
-           "Let environments of which (n,) with too large numbers start over; write all rows.")
+           "Let environments of which (n,) with numbers too large start over; write the rows of "
+           "all.")
       .def("view", &Blocks::view, "name"_a,
            "Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,\n"
            "actuator_late or pose_late.")

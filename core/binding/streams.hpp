@@ -30,7 +30,10 @@ class Streams {
   }
 
   const Stream *data() const { return streams_.data(); }
-  const Stream &at(std::size_t n) const { return streams_.at(n); }
+  const Stream &at(std::size_t n) const {
+    if (!streams_.at(n).generator) throw nb::value_error("draw: an environment without generator");
+    return streams_[n];
+  }
 
  private:
   // The state of NumPy's default generator, or null: another one, or another layout of its memory

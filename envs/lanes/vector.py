@@ -94,8 +94,8 @@ class TaskLanes(TaskVectorEnv):
 
     def late(self) -> Array:
         """Return the delay (n,) s of the flight loop's answer: actuators and pose."""
-        actuator, pose = (self._rows(self._flying.view(f"{n}_late")) for n in ("actuator", "pose"))
-        late: Array = TICK * (actuator + pose)[:, 0]
+        ticks = self._flying.view("actuator_late") + self._flying.view("pose_late")
+        late: Array = TICK * self._rows(ticks)[:, 0]
         return late
 
     def __getstate__(self) -> dict[str, Any]:
