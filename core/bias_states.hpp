@@ -45,11 +45,11 @@ template <class S> void restore_bias_prior(Imu<S> &u, int first) {
 
 // cov(e, c) of the first COLUMNS companions: P T
 template <int COLUMNS, class S> void cross_covariance(const Filter<S> &f, S out[N][COLUMNS]) {
-  for (int i = 0; i < N; i++)
-    for (int j = 0; j < COLUMNS; j++) {
-      out[i][j] = S(0);
-      for (int k = 0; k < N; k++) out[i][j] += f.belief.P[i][k] * f.imu.regression[k][j];
-    }
+  for (int i = 0; i < N; i++) {
+    for (int j = 0; j < COLUMNS; j++) out[i][j] = S(0);
+    for (int k = 0; k < N; k++)
+      for (int j = 0; j < COLUMNS; j++) out[i][j] += f.belief.P[i][k] * f.imu.regression[k][j];
+  }
 }
 
 // Regression T and rest E of the companions, from their covariance with the error state, `cross`
@@ -69,11 +69,10 @@ void split(Filter<S> &f, S cross[N][COMPANIONS], const S joint[COMPANIONS][COMPA
   root_of<N>(P, lower);
   divide<N, COMPANIONS>(lower, cross);
   for (int i = 0; i < COMPANIONS; i++)
-    for (int j = 0; j < COMPANIONS; j++) {
-      S explained = S(0);
-      for (int k = 0; k < N; k++) explained += cross[k][i] * cross[k][j];
-      u.rest[i][j] = joint[i][j] - explained;
-    }
+    for (int j = 0; j < COMPANIONS; j++) rest[i][j] = S(0);
+  add_products<N, COMPANIONS, COMPANIONS>(cross, cross, rest);  // what the state explains
+  for (int i = 0; i < COMPANIONS; i++)
+    for (int j = 0; j < COMPANIONS; j++) u.rest[i][j] = joint[i][j] - rest[i][j];
   root_of<COMPANIONS>(u.rest, rest);
   bool fits = true;
   for (int i = 0; i < COMPANIONS; i++)
@@ -140,19 +139,19 @@ void carry_with_points(const Filter<S> &f, S dt, const Prediction<S> &w, S cross
                        S out[N][BIASES]) {
   int pairs = f.vehicle.wrench_count == 0 ? 6 : 12;
   S rows[12][BIASES];
-  for (int j = 0; j < pairs; j++)
-    for (int m = 0; m < BIASES; m++) {
-      rows[j][m] = cross[j][m] / w.S[j][j];
-      for (int i = j; i < N; i++) cross[i][m] -= w.S[j][i] * rows[j][m];
-    }
+  for (int j = 0; j < pairs; j++) {
+    for (int m = 0; m < BIASES; m++) rows[j][m] = cross[j][m] / w.S[j][j];
+    for (int i = j; i < N; i++)
+      for (int m = 0; m < BIASES; m++) cross[i][m] -= w.S[j][i] * rows[j][m];
+  }
   for (int i = 6; i < pairs; i++)
     for (int m = 0; m < BIASES; m++) cross[i][m] = S(0);
   carry_linear<BIASES, S>(
       f.vehicle.body, w.R, dt, w.walk, [&](int i, int j) { return cross[6 + i][j]; },
       [&](int i, int j) -> S & { return out[i][j]; });
-  for (int i = 0; i < N; i++)
-    for (int m = 0; m < BIASES; m++)
-      for (int j = 0; j < pairs; j++) out[i][m] += w.H[j][i] * rows[j][m];
+  for (int j = 0; j < pairs; j++)
+    for (int i = 0; i < N; i++)
+      for (int m = 0; m < BIASES; m++) out[i][m] += w.H[j][i] * rows[j][m];
 }
 
 // Move the companions with a pose's correction of the error state; before (20): the state before it
@@ -160,15 +159,13 @@ template <class S> void correct_companions(Filter<S> &f, const S *before) {
   Imu<S> &u = f.imu;
   S error[N], cross[N][BIASES];
   difference(f.belief.x, before, error);
-  for (int j = 0; j < COMPANIONS; j++)
-    for (int i = 0; i < N; i++) u.mean[j] += u.regression[i][j] * error[i];
+  for (int i = 0; i < N; i++)
+    for (int j = 0; j < COMPANIONS; j++) u.mean[j] += u.regression[i][j] * error[i];
   bound_biases(u);
   cross_covariance<BIASES>(f, cross);
   for (int i = 0; i < BIASES; i++)
-    for (int j = 0; j < BIASES; j++) {
-      u.bias_covariance[i][j] = u.rest[i][j];
-      for (int k = 0; k < N; k++) u.bias_covariance[i][j] += u.regression[k][i] * cross[k][j];
-    }
+    for (int j = 0; j < BIASES; j++) u.bias_covariance[i][j] = u.rest[i][j];
+  add_products<N, BIASES, BIASES>(u.regression, cross, u.bias_covariance);
 }
 
 }  // namespace windwrench

@@ -48,8 +48,8 @@ template <class S> void innovate_imu(Filter<S> &f, const S *z, ImuInnovation<S> 
     expected_imu(f, point, plus);
     displace(f.belief.x, back, point);
     expected_imu(f, point, minus);
-    for (int c = 0; c < COMPANIONS; c++)  // the companions along this column of the root
-      for (int i = 0; i < N; i++) turned[c] += u.regression[i][c] * lower[i][j];
+    for (int i = j; i < N; i++)  // the companions along this column of the root
+      for (int c = 0; c < COMPANIONS; c++) turned[c] += u.regression[i][c] * lower[i][j];
     for (int i = 0; i < 6; i++) {
       half[j][i] = S(0.5) * (plus[i] - minus[i]) / spread;
       for (int c = 0; c < COMPANIONS; c++) half[j][i] += C[i][c] * turned[c];
@@ -75,16 +75,15 @@ template <class S> void innovate_imu(Filter<S> &f, const S *z, ImuInnovation<S> 
         sum += half[k][i] * half[k][j], bent += second[k][i] * second[k][j];
       n.covariance[i][j] = sum + S(0.5) * weight * bent - mean[i] * mean[j];
     }
-    for (int k = 0; k < N; k++) {
-      n.cross[k][i] = S(0);
-      for (int j = 0; j < N; j++) n.cross[k][i] += lower[k][j] * half[j][i];
-    }
+  }
+  for (int k = 0; k < N; k++) {
+    for (int i = 0; i < 6; i++) n.cross[k][i] = S(0);
+    for (int j = 0; j <= k; j++)
+      for (int i = 0; i < 6; i++) n.cross[k][i] += lower[k][j] * half[j][i];
   }
   for (int c = 0; c < COMPANIONS; c++)
-    for (int i = 0; i < 6; i++) {
-      n.companions[c][i] = rest[c][i];
-      for (int k = 0; k < N; k++) n.companions[c][i] += u.regression[k][c] * n.cross[k][i];
-    }
+    for (int i = 0; i < 6; i++) n.companions[c][i] = rest[c][i];
+  add_products<N, COMPANIONS, 6>(u.regression, n.cross, n.companions);
 }
 
 // Root of the covariance of rows `first` to `last` of what is measured; one elsewhere
@@ -200,11 +199,11 @@ void correct_with_imu(Filter<S> &f, const ImuInnovation<S> &n, int first, int la
   S cross[N][COMPANIONS], joint[COMPANIONS][COMPANIONS], mean[N] = {}, before[STATE];
   cross_covariance<COMPANIONS>(f, cross);
   for (int i = 0; i < COMPANIONS; i++)
-    for (int j = 0; j < COMPANIONS; j++) {
-      joint[i][j] = u.rest[i][j];
-      for (int k = 0; k < N; k++) joint[i][j] += u.regression[k][i] * cross[k][j];
-      for (int k = first; k < last; k++) joint[i][j] -= V[k][i] * V[k][j];
-    }
+    for (int j = 0; j < COMPANIONS; j++) joint[i][j] = u.rest[i][j];
+  add_products<N, COMPANIONS, COMPANIONS>(u.regression, cross, joint);
+  for (int k = first; k < last; k++)
+    for (int i = 0; i < COMPANIONS; i++)
+      for (int j = 0; j < COMPANIONS; j++) joint[i][j] -= V[k][i] * V[k][j];
   for (int i = 0; i < N; i++)
     for (int k = first; k < last; k++) {
       mean[i] += W[k][i] * y[k][0];

@@ -68,17 +68,27 @@ template <int WIDTH, class T> void symmetrise(T P[WIDTH][WIDTH]) {
 
 // Lower root of P; a pivot eaten by rounding does no harm
 template <int SIZE, class S> void root_of(const S P[SIZE][SIZE], S out[SIZE][SIZE]) {
+  S column[SIZE];
   for (int j = 0; j < SIZE; j++) {
-    S pivot = P[j][j];
-    for (int k = 0; k < j; k++) pivot -= out[j][k] * out[j][k];
-    out[j][j] = root(larger(pivot, least_pivot(P[j][j])));
-    for (int i = 0; i < j; i++) out[i][j] = S(0);
-    for (int i = j + 1; i < SIZE; i++) {
-      S total = P[i][j];
-      for (int k = 0; k < j; k++) total -= out[i][k] * out[j][k];
-      out[i][j] = total / out[j][j];
-    }
+    for (int i = j; i < SIZE; i++) column[i] = P[i][j];
+    for (int k = 0; k < j; k++)  // the columns so far, one a row
+      for (int i = j; i < SIZE; i++) column[i] -= out[k][i] * out[k][j];
+    out[j][j] = root(larger(column[j], least_pivot(P[j][j])));
+    for (int i = j + 1; i < SIZE; i++) out[j][i] = column[i] / out[j][j];
   }
+  for (int i = 0; i < SIZE; i++)
+    for (int j = 0; j < i; j++) {
+      out[i][j] = out[j][i];
+      out[j][i] = S(0);
+    }
+}
+
+// out += a' b, of the first LEFT columns of a, row after row: a column of `out` in a register
+template <int ROWS, int LEFT, int RIGHT, class A, class B, class C>
+void add_products(const A &a, const B &b, C &out) {
+  for (int k = 0; k < ROWS; k++)
+    for (int i = 0; i < LEFT; i++)
+      for (int j = 0; j < RIGHT; j++) out[i][j] += a[k][i] * b[k][j];
 }
 
 // rows = lower^-1 rows

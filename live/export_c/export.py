@@ -171,12 +171,11 @@ def _room(effects: Mapping[str, list[Effect]]) -> tuple[int, int, int, int]:
     memory of each: all, unless no equation delays what it changes.
     """
     wrench, rotor, sensing = (max(1, len(kind)) for kind in effects.values())
-    remembered = [
-        _source(f"core/effects/{effect.model}.hpp")
+    long = any(
+        "T *memory" in _source(f"core/effects/{effect.model}.hpp")
         for effect in effects["rotor"] + effects["sensing"]
         if effect.model not in _SHORT_MEMORY
-    ]
-    long = any("T *memory" in source for source in remembered)
+    )
     return wrench, rotor, sensing, MEMORY if long else 5
 
 
