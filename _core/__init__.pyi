@@ -667,13 +667,6 @@ def turn_body(
 ) -> None:
     """Write q turned at a body rate (3,), rad/s, for dt s."""
 
-class Streams:
-    """Generators of n environments, for lanes."""
-
-    def __init__(self, count: int) -> None: ...
-    def put(self, n: int, generator: object) -> None:
-        """Let environment n draw from a numpy.random.Generator."""
-
 class LoopBlocks:
     def __init__(
         self,
@@ -695,10 +688,6 @@ class LoopBlocks:
 
     lanes: Final[int] = ...
     """(arg: object, /) -> int"""
-
-    @property
-    def bytes(self) -> int:
-        """Bytes of a block."""
 
     def put(self, block: int, first: int, last: int, address: int) -> None:
         """Let lanes `first` to `last - 1` of a block stand where the loop at an address stands."""
@@ -776,10 +765,6 @@ class SingleLoopBlocks:
 
     lanes: Final[int] = ...
     """(arg: object, /) -> int"""
-
-    @property
-    def bytes(self) -> int:
-        """Bytes of a block."""
 
     def put(self, block: int, first: int, last: int, address: int) -> None:
         """Let lanes `first` to `last - 1` of a block stand where the loop at an address stands."""
@@ -1027,6 +1012,20 @@ def limit(
     """Write frames (n, k) within limits (k,) as they are into si, and over scales (k,) into out;
     0 where a number is not finite.
     """
+
+class Streams:
+    """NumPy's generators of n environments."""
+
+    def __init__(self, count: int) -> None: ...
+    def put(self, n: int, generator: object) -> None:
+        """Let environment n draw from a numpy.random.Generator."""
+
+    def draw(
+        self,
+        n: int,
+        out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+    ) -> None:
+        """Draw unit normals out (m, k), as `standard_normal(out=out)` does."""
 
 class Scene:
     """The arrays of n episodes, a row each (envs/state.py)."""

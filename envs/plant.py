@@ -180,10 +180,10 @@ def is_a_body(inertia: Array) -> bool:
 
 def is_same_body(one: Vehicle, other: Vehicle) -> bool:
     """Return whether two vehicles are the same to MuJoCo."""
-    bodies = [
+    mine, its = (
         np.hstack([v.mass, v.gravity, v.arm_l, v.com, v.inertia.ravel()]) for v in (one, other)
-    ]
-    return np.array_equal(*bodies)
+    )
+    return np.array_equal(mine, its)
 
 
 def load_world(

@@ -86,6 +86,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self.episodes = Episodes.zeros(num_envs, task.action_size)
         # each environment's own generator; before its first reset a placeholder
         self.generators: list[np.random.Generator] = [np.random.default_rng(0)] * num_envs
+        self._streams = _core.Streams(num_envs)
         self.state = State(self.episodes, self.generators)
         self._look()
         self._seeded, self._begun, self._over = np.zeros((3, num_envs), dtype=np.bool_)
@@ -104,17 +105,26 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._make_memory()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all but threads, windows and the core's part, for a copy."""
-        return self.__dict__ | {"_pool": None, "_scene": None, "viewers": {}}
+        """Return all but threads, windows and the core's parts, for a copy."""
+        left: dict[str, Any] = {"_pool": None, "_scene": None, "_streams": None, "viewers": {}}
+        return self.__dict__ | left
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self.state.bind(self.episodes)
+        self._streams = _core.Streams(self.num_envs)
+        for i in np.flatnonzero(self._seeded).tolist():
+            self._streams.put(i, self.generators[i])
         self._look()
 
     def _look(self) -> None:
         """Show the core the arrays of the episodes and their rows."""
         self._scene = _core.Scene(*self.episodes, self.state.rows, self.state.flying)
+
+    def _draw_from(self, i: int, rng: np.random.Generator) -> None:
+        """Let an environment draw from a generator."""
+        self.generators[i], self._seeded[i] = rng, True
+        self._streams.put(i, rng)
 
     def reset(
         self,
@@ -176,7 +186,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def begin(self, rng: np.random.Generator) -> JudgedStep:
         """Start an episode of the one environment, which draws from ``rng``."""
-        self.generators[0], self._seeded[0] = rng, True
+        self._draw_from(0, rng)
         self._start(self._all)
         return self._judge()
 
@@ -186,7 +196,9 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         Raises:
             InputError: as ``step``.
         """
-        self.generators[0], task = rng, self.task
+        if rng is not self.generators[0]:
+            self._draw_from(0, rng)
+        task = self.task
         if not self._taken([action], self._all):
             count = f"{_COUNTS[task.action_size]} finite number{'s' * (task.action_size > 1)}"
             raise InputError(
@@ -264,7 +276,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         for i in started:
             seed = None if seeds is None else seeds[i]
             if not self._seeded[i] or seed is not None:
-                self.generators[i], self._seeded[i] = np_random(seed)[0], True
+                self._draw_from(i, np_random(seed)[0])
         for i in started:
             for numbers in self.episodes[-4:-1]:  # commands and actions
                 numbers[i] = 0.0
@@ -340,9 +352,10 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._see(flying)
 
     def _fly_one(self, i: int) -> None:
-        """Fly a decision with the normals of ``standard_normal``."""
+        """Fly a decision with the normals of the environment's generator."""
         task, loop = self.task, self.loops[i]
-        normals = self.generators[i].standard_normal((task.decision_ticks, loop.noise_size))
+        normals = np.empty((task.decision_ticks, loop.noise_size))
+        self._streams.draw(i, normals)
         commanded = loop.setpoint if task.flown.moves else loop.action
         commanded[task.flown.places] = self.episodes.commands[i]
         loop.run(normals, self._path(i, task.decision_ticks))

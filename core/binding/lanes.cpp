@@ -12,6 +12,7 @@
 
 #include "episodes.hpp"
 #include "filter.hpp"
+#include "streams.hpp"
 
 namespace {
 
@@ -24,39 +25,6 @@ constexpr int REGISTER = 32;
 using Whole = Array<const std::int64_t, nb::shape<-1>>;
 
 const Flying &flying_at(std::uintptr_t address) { return *reinterpret_cast<Flying *>(address); }
-
-// NumPy's generators of n environments
-class Streams {
- public:
-  explicit Streams(std::size_t count) : streams_(count), owners_(count) {}
-
-  void put(std::size_t n, nb::object generator) {
-    nb::object bits = generator.attr("bit_generator"), capsule = bits.attr("capsule");
-    auto *known = static_cast<BitGenerator *>(PyCapsule_GetPointer(capsule.ptr(), "BitGenerator"));
-    if (!known) throw nb::python_error();
-    streams_.at(n) = {known, pcg_of(bits, *known)};
-    owners_[n] = bits;
-  }
-
-  const Stream *data() const { return streams_.data(); }
-
- private:
-  // The state of NumPy's default generator, or null: another one, or another layout of its memory
-  static Pcg64 *pcg_of(const nb::object &bits, const BitGenerator &known) {
-    if (nb::cast<std::string>(bits.type().attr("__name__")) != "PCG64") return nullptr;
-    nb::object stated = bits.attr("state")["state"], low = nb::int_(~std::uint64_t(0));
-    Pcg64 &pcg = **static_cast<Pcg64 **>(known.state);
-    auto same = [&](const char *name, unsigned __int128 value) {
-      nb::object whole = stated[name];
-      return nb::cast<std::uint64_t>(whole & low) == std::uint64_t(value) &&
-             nb::cast<std::uint64_t>(whole >> nb::int_(64)) == std::uint64_t(value >> 64);
-    };
-    return same("state", pcg.state) && same("inc", pcg.increment) ? &pcg : nullptr;
-  }
-
-  std::vector<Stream> streams_;
-  std::vector<nb::object> owners_;
-};
 
 // `count` structs of zeros in pages that take no memory before they are written
 template <class Many> class Zeros {
@@ -137,14 +105,13 @@ template <class S> class LoopBlocks {
            Array<const std::int64_t, nb::shape<-1, -1, 2>> winds, Whole wind_counts) {
     if (slots.shape(0) != LANES * blocks_.size() || end > blocks_.size())
       throw nb::value_error("fly: expected a slot for each lane");
-    static const Ziggurat ziggurat;
     nb::gil_scoped_release others_run;
     Common<S> common = common_;
     common.kind = CommandKind(kind);
     common.size = size;
     const Weather air = {reinterpret_cast<const WindCall *>(winds.data()),
                          std::int64_t(winds.shape(1)), wind_counts.data(), streams.data(),
-                         &ziggurat};
+                         &ziggurat()};
     for (std::size_t i = begin; i < end; i++) {
       const std::int64_t *members = slots.data() + LANES * i;
       bool some = false;
@@ -219,9 +186,6 @@ template <class S> class LoopBlocks {
   }
 
   std::size_t size() const { return blocks_.size(); }
-  std::size_t bytes() const {
-    return sizeof(Block<T>) + (declared_.size() == 0 ? 0 : sizeof(Model<T>));
-  }
 
  private:
   // Numbers of lanes lie at whole registers, and between them is what all blocks have in common
@@ -251,7 +215,6 @@ template <class S> void bind(nb::module_ &m, const char *name) {
           "in the action. ValueError: an effect of a vehicle is written in Python.")
       .def("__len__", &Blocks::size)
       .def_prop_ro_static("lanes", [](nb::handle) { return int(Blocks::LANES); })
-      .def_prop_ro("bytes", &Blocks::bytes, "Bytes of a block.")
       .def("put", &Blocks::put, "block"_a, "first"_a, "last"_a, "address"_a,
            "Let lanes `first` to `last - 1` of a block stand where the loop at an address stands.")
       .def("take", &Blocks::take, "block"_a, "lane"_a, "other"_a, "source"_a,
@@ -278,10 +241,6 @@ template <class S> void bind(nb::module_ &m, const char *name) {
 }  // namespace
 
 void bind_lanes(nb::module_ &m) {
-  nb::class_<Streams>(m, "Streams", "Generators of n environments, for lanes.")
-      .def(nb::init<std::size_t>(), "count"_a)
-      .def("put", &Streams::put, "n"_a, "generator"_a,
-           "Let environment n draw from a numpy.random.Generator.");
   bind<double>(m, "LoopBlocks");
   bind<float>(m, "SingleLoopBlocks");
 }

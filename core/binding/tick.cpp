@@ -6,6 +6,7 @@
 #include "../episodes.hpp"
 #include "episodes.hpp"
 #include "filter.hpp"
+#include "streams.hpp"
 
 namespace {
 
@@ -67,6 +68,16 @@ void bind_tick(nb::module_ &m) {
       "seen"_a, "limits"_a, "scales"_a, "si"_a, "out"_a,
       "Write frames (n, k) within limits (k,) as they are into si, and over scales (k,) into out;\n"
       "0 where a number is not finite.");
+  nb::class_<Streams>(m, "Streams", "NumPy's generators of n environments.")
+      .def(nb::init<std::size_t>(), "count"_a)
+      .def("put", &Streams::put, "n"_a, "generator"_a,
+           "Let environment n draw from a numpy.random.Generator.")
+      .def(
+          "draw",
+          [](const Streams &self, std::size_t n, Array<double, nb::shape<-1, -1>> out) {
+            draw_normals(ziggurat(), self.at(n), std::int64_t(out.size()), out.data(), 1);
+          },
+          "n"_a, "out"_a, "Draw unit normals out (m, k), as `standard_normal(out=out)` does.");
   nb::class_<Scene>(m, "Scene", "The arrays of n episodes, a row each (envs/state.py).")
       .def(nb::init<Scene::Whole, Scene::Whole, Scene::Table, Scene::Table, Scene::Cube,
                     Scene::Table, Scene::Table, Scene::Table, Scene::Flags, Scene::Table,

@@ -17,7 +17,7 @@ from ..vector import SETTLE_TICKS, TaskVectorEnv
 from ..wind.field import Sum
 
 _AT_ONCE = 4  # blocks of vehicles that settle, a thread
-PRECISIONS: dict[str, type] = {"double": _core.LoopBlocks, "single": _core.SingleLoopBlocks}
+PRECISIONS: dict[str, Any] = {"double": _core.LoopBlocks, "single": _core.SingleLoopBlocks}
 
 
 class TaskLanes(TaskVectorEnv):
@@ -62,9 +62,6 @@ class TaskLanes(TaskVectorEnv):
         self._settling = self._blocks(0)
         self._blowing: list[Sum] = [Sum()] * self.num_envs  # keeps the winds at ``_calls``
         self._lay_calls()
-        self._streams = _core.Streams(self.num_envs)
-        for i, generator in enumerate(self.generators):
-            self._streams.put(i, generator)
 
     def _blocks(self, count: int) -> Any:
         """Return so many blocks of closed loops, all like one."""
@@ -97,12 +94,13 @@ class TaskLanes(TaskVectorEnv):
 
     def late(self) -> Array:
         """Return the delay (n,) s of the flight loop's answer: actuators and pose."""
-        ticks: Array = sum(self._rows(self._flying.view(f"{n}_late")) for n in ("actuator", "pose"))
-        return TICK * ticks[:, 0]
+        ticks = self._flying.view("actuator_late") + self._flying.view("pose_late")
+        late: Array = TICK * self._rows(ticks)[:, 0]
+        return late
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
-        for name in ("_like", "_kept", "_settling", "_calls", "_streams"):
+        for name in ("_like", "_kept", "_settling", "_calls"):
             del state[name]
         return state | {"_flying": self._flying.state()}
 
@@ -150,7 +148,6 @@ class TaskLanes(TaskVectorEnv):
         block, lane = self._places[i]
         self._settling.put(block, lane, lane + 1, loop.address)
         self._blowing[i], self.episodes.ticks[i] = loop.winds, -SETTLE_TICKS
-        self._streams.put(i, self.generators[i])
 
     def _settle(self, which: list[int]) -> None:
         slots = np.full(len(self._settling) * self._lanes, -1)

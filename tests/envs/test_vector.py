@@ -97,6 +97,18 @@ def test_bad_actions_are_named_and_nothing_flies(actions):
     assert (envs.step(np.zeros((3, 1)))[4]["time"] == 0.08).all()
 
 
+@pytest.mark.parametrize("bits", [np.random.PCG64, np.random.SFC64, np.random.MT19937])
+def test_the_core_draws_the_normals_of_numpy(bits):
+    """2,000,000, of which 500 are in the tail; NumPy's own draws go on behind them."""
+    ours, theirs = (np.random.Generator(bits(5)) for _ in range(2))
+    streams, drawn = _core.Streams(1), np.empty((2000, 1000))
+    streams.put(0, ours)
+    streams.draw(0, drawn)
+    assert_array_equal(drawn, theirs.standard_normal(drawn.shape))
+    assert abs(drawn).max() > 3.66
+    assert ours.integers(1 << 60) == theirs.integers(1 << 60)
+
+
 def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():
     envs = make(1)
     calls = []
