@@ -728,7 +728,7 @@ class LoopBlocks:
         ],
         scene: Scene,
     ) -> None:
-        """Let environments of which (n,) with numbers too large start over; write the rows of all."""
+        """Let environments of which (n,) with numbers too large start over; write all rows."""
 
     def view(self, name: str) -> NDArray[numpy.float64]:
         """Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,
@@ -805,7 +805,7 @@ class SingleLoopBlocks:
         ],
         scene: Scene,
     ) -> None:
-        """Let environments of which (n,) with numbers too large start over; write the rows of all."""
+        """Let environments of which (n,) with numbers too large start over; write all rows."""
 
     def view(self, name: str) -> NDArray[numpy.float32]:
         """Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,

@@ -226,8 +226,7 @@ template <class S> void bind(nb::module_ &m, const char *name) {
            "kind: of the commands; winds (n, most, 2): calls of each environment's, and their\n"
            "number (n,).")
       .def("look", &Blocks::look, "which"_a, "scene"_a,
-           "Let environments of which (n,) with numbers too large start over; write the rows of "
-           "all.")
+           "Let environments of which (n,) with numbers too large start over; write all rows.")
       .def("view", &Blocks::view, "name"_a,
            "Return a field (blocks, size, lanes) of the memory: qpos, qvel, xfrc, speeds, sum,\n"
            "actuator_late or pose_late.")
