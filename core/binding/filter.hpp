@@ -17,10 +17,13 @@ struct Call {
 };
 constexpr int NUMBERS = 30;  // of an estimate, without its covariance
 
-#ifdef __AVX512F__
+// of a register
+#if defined(__AVX512F__)
 constexpr int REGISTER = 64;  // bytes
-#else
+#elif defined(__AVX2__)
 constexpr int REGISTER = 32;
+#else
+constexpr int REGISTER = 16;
 #endif
 
 inline windwrench::Filter<double> &filter_at(std::uintptr_t address) {
