@@ -143,7 +143,7 @@ class Objects:
         return target
 
     def key(self, source: Path, listed: Path, flags: list[str]) -> str:
-        """Return the digest of compiler, flags, a source, and the files that the compiler listed."""
+        """Return the digest of compiler, flags, a source, and the files in it."""
         sha = hashlib.sha256(f"{self.tools} {flags}".encode())
         text = listed.read_text() if listed.is_file() else ""
         listed_files = re.split(r"\s+", text.replace("\\\n", " ").partition(": ")[2].strip())
