@@ -1,7 +1,8 @@
 """The core as three extensions, one for each instruction set; setuptools calls it.
 
-Each file of ``core/binding`` is compiled once for each set. An object is compiled again when its
-source, one of the headers that it includes, the flags or the compiler have changed.
+Each file of ``core/binding/units`` includes the binding's files that share templates and is
+compiled once for each set. An object is compiled again when its source, one of the files that it
+includes, the flags or the compiler have changed.
 """
 
 import hashlib
@@ -37,7 +38,7 @@ FAST = ["-O3", "-fno-math-errno", "-fno-trapping-math"]
 FLAGS = [*COMMON, *FAST, *EXACT, "-Wall", "-Wextra", "-Wno-psabi"]
 # of nanobind itself, whose speed is that of a call
 NANOBIND_FLAGS = [*COMMON, "-O2", "-fno-strict-aliasing"]
-BINDING = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("core/binding/*.cpp"))
+UNITS = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("core/binding/units/*.cpp"))
 
 
 def sets() -> list[str]:
@@ -55,7 +56,7 @@ def sets() -> list[str]:
 
 def extensions() -> list[Extension]:
     """Return setuptools' names for the extensions."""
-    return [Extension(f"windwrench._core.{name}", BINDING, language="c++") for name in sets()]
+    return [Extension(f"windwrench._core.{name}", UNITS, language="c++") for name in sets()]
 
 
 class BuildCore(build_ext):
@@ -142,14 +143,12 @@ class Objects:
         return target
 
     def key(self, source: Path, listed: Path, flags: list[str]) -> str:
-        """Return the digest of compiler, flags, a source, and the headers that the compiler
-        listed.
-        """
+        """Return the digest of compiler, flags, a source, and the files in it."""
         sha = hashlib.sha256(f"{self.tools} {flags}".encode())
         text = listed.read_text() if listed.is_file() else ""
-        headers = re.split(r"\s+", text.replace("\\\n", " ").partition(": ")[2].strip())
-        inside = [Path(name) for name in headers if name.endswith(".hpp")]
-        for path in [ROOT / source, *(ROOT / name for name in sorted(inside))]:
+        listed_files = re.split(r"\s+", text.replace("\\\n", " ").partition(": ")[2].strip())
+        inside = sorted(name for name in listed_files if name.endswith((".hpp", ".cpp")))
+        for path in [ROOT / source, *(ROOT / name for name in inside)]:
             sha.update(path.read_bytes() if path.is_file() else b"gone")
         return sha.hexdigest()
 

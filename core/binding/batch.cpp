@@ -11,12 +11,6 @@ using namespace windwrench;
 
 namespace {
 
-#ifdef __AVX512F__
-constexpr int REGISTER = 64;  // bytes
-#else
-constexpr int REGISTER = 32;
-#endif
-
 template <class S> class Batch {
  public:
   static constexpr int LANES = REGISTER / sizeof(S);
@@ -75,7 +69,7 @@ template <class S> class Batch {
 
 using State = nb::typed<nb::tuple, long, nb::bytes>;  // how many, and all memory
 
-template <class S> void bind(nb::module_ &m, const char *name) {
+template <class S> void bind_filters(nb::module_ &m, const char *name) {
   nb::class_<Batch<S>>(m, name)
       .def(nb::init<std::uintptr_t, long>(), "address"_a, "count"_a,
            "Filters side by side, `count` like the one at an address, without effects.")
@@ -98,6 +92,6 @@ template <class S> void bind(nb::module_ &m, const char *name) {
 }  // namespace
 
 void bind_batch(nb::module_ &m) {
-  bind<double>(m, "Batch");
-  bind<float>(m, "SingleBatch");
+  bind_filters<double>(m, "Batch");
+  bind_filters<float>(m, "SingleBatch");
 }

@@ -19,10 +19,6 @@ Flight<double> &flight_at(std::uintptr_t address) {
   return *reinterpret_cast<Flight<double> *>(address);
 }
 
-Model<double> &model_at(std::uintptr_t address) {
-  return *reinterpret_cast<Model<double> *>(address);
-}
-
 void move_setpoint_at(std::uintptr_t flight, Numbers<3> position, double dt) {
   move_setpoint(flight_at(flight), position.data(), dt);
 }

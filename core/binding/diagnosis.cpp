@@ -26,10 +26,6 @@ auto rows(const Array<T, nb::shape<-1, V, W>> &array) {
   return reinterpret_cast<T(*)[V][W]>(array.data());
 }
 
-Model<double> &model_at(std::uintptr_t address) {
-  return *reinterpret_cast<Model<double> *>(address);
-}
-
 LoggedRotors rotors_of(const In<-1, 4> &speeds, const In<-1> &voltage) {
   check_rows(speeds.shape(0), voltage);
   return {std::int64_t(speeds.shape(0)), rows(speeds), voltage.data()};

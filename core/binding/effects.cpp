@@ -46,10 +46,6 @@ void call_effect(std::uintptr_t address, Numbers c, Numbers vehicle, Numbers thi
                                                  fourth.data());
 }
 
-Model<double> &model_at(std::uintptr_t address) {
-  return *reinterpret_cast<Model<double> *>(address);
-}
-
 }  // namespace
 
 namespace windwrench {

@@ -3,14 +3,14 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
-#include "filter.hpp"
-
 #include "../episodes.hpp"
 #include "filter.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace windwrench;
+
+inline Flying &flying_at(std::uintptr_t address) { return *reinterpret_cast<Flying *>(address); }
 
 // Arrays of n episodes, with a row each; they live as long as this
 struct Scene {

@@ -17,8 +17,21 @@ struct Call {
 };
 constexpr int NUMBERS = 30;  // of an estimate, without its covariance
 
+// of a register
+#if defined(__AVX512F__)
+constexpr int REGISTER = 64;  // bytes
+#elif defined(__AVX2__)
+constexpr int REGISTER = 32;
+#else
+constexpr int REGISTER = 16;
+#endif
+
 inline windwrench::Filter<double> &filter_at(std::uintptr_t address) {
   return *reinterpret_cast<windwrench::Filter<double> *>(address);
+}
+
+inline windwrench::Model<double> &model_at(std::uintptr_t address) {
+  return *reinterpret_cast<windwrench::Model<double> *>(address);
 }
 
 template <class... Arrays> void check_rows(std::size_t count, const Arrays &...arrays) {

@@ -16,15 +16,7 @@
 
 namespace {
 
-#ifdef __AVX512F__
-constexpr int REGISTER = 64;  // bytes
-#else
-constexpr int REGISTER = 32;
-#endif
-
 using Whole = Array<const std::int64_t, nb::shape<-1>>;
-
-const Flying &flying_at(std::uintptr_t address) { return *reinterpret_cast<Flying *>(address); }
 
 // `count` structs of zeros in pages that take no memory before they are written
 template <class Many> class Zeros {
@@ -203,7 +195,7 @@ template <class S> class LoopBlocks {
   Common<S> common_ = {};
 };
 
-template <class S> void bind(nb::module_ &m, const char *name) {
+template <class S> void bind_loops(nb::module_ &m, const char *name) {
   using Blocks = LoopBlocks<S>;
   nb::class_<Blocks>(m, name)
       .def(
@@ -240,6 +232,6 @@ template <class S> void bind(nb::module_ &m, const char *name) {
 }  // namespace
 
 void bind_lanes(nb::module_ &m) {
-  bind<double>(m, "LoopBlocks");
-  bind<float>(m, "SingleLoopBlocks");
+  bind_loops<double>(m, "LoopBlocks");
+  bind_loops<float>(m, "SingleLoopBlocks");
 }

@@ -10,8 +10,6 @@
 
 namespace {
 
-Flying &flying_at(std::uintptr_t address) { return *reinterpret_cast<Flying *>(address); }
-
 using Rows = Array<const double, nb::shape<-1, -1>>;
 
 Run run_of(const Rows &path, const Rows &noise) {

@@ -1,8 +1,4 @@
-// Attitude gain: the reported tilt is the true one times 1 + g, as that of an onboard estimate may
-// be.
-//
-// With the attitude split into a turn about the vertical and a tilt by an angle about a horizontal
-// axis, the angle is reported as (1 + g) times what it is, axis and turn as they are.
+// Attitude gain: dynamics/effects/attitude_gain.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

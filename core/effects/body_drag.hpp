@@ -1,8 +1,4 @@
-// Body drag: the air's force on hull and frame, linear and quadratic in the airspeed, at the
-// geometric centre.
-//
-// With u = R'(v - wind) the airspeed in body axes, F = -diag(dx, dy, dz) u - |u| diag(cx, cy, cz) u
-// in body axes. The quadratic part is the parasitic drag of RotorPy, c_Dx, c_Dy, c_Dz.
+// Body drag: dynamics/effects/body_drag.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

@@ -1,8 +1,4 @@
-// Clock offset: pose and rotor speeds of one row of the log are not of the same instant.
-//
-// With dt > 0 the pose is that of dt earlier than the rotor speeds; with dt < 0 the rotor speeds
-// are those of -dt earlier than the pose. Between samples by a cubic. An estimator that knows of it
-// delays the other of the two, and so estimates the flight of dt ago.
+// Clock offset: dynamics/effects/clock_offset.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

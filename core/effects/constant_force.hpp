@@ -1,4 +1,4 @@
-// Constant force: a steady force, fixed in the world frame, at the centre of mass.
+// Constant force: dynamics/effects/constant_force.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

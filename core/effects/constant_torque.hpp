@@ -1,5 +1,4 @@
-// Constant torque: a steady torque, fixed in the body frame (a bent arm, an unequal set of
-// propellers).
+// Constant torque: dynamics/effects/constant_torque.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

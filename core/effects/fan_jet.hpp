@@ -1,11 +1,4 @@
-// Fan jet: the jet of a drum fan, and the drag of a vehicle in it.
-//
-// The mean wind is that of dynamics.mean_jet: u^2 = u0^2 (annular disc) * Gaussian, with the inflow
-// that continuity asks for. The fan stands at (x, y, z) m and blows horizontally, along world x
-// turned by heading about the vertical. Drag acts at stations, each in its own wind, which is why a
-// symmetric vehicle feels a torque: F = kd u in its plane at each rotor, and F = 0.6 kg/m3 * area /
-// 8 |u| u at each of eight points of a ring on the hull, u being the wind relative to the station.
-// It is the jet of the fan-tracking environment without its gusts.
+// Fan jet: dynamics/effects/fan_jet.py has the equation in words.
 #pragma once
 #include "../mean_jet.hpp"
 #include "parts.hpp"

@@ -1,8 +1,4 @@
-// Flapping moment: the blades of a moving rotor flap, and their hub turns the vehicle away from the
-// motion.
-//
-// At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: the torque -kflap W_i (u_i x e_z)
-// in body axes. It is the k_flap of RotorPy. The force that goes with flapping is rotor_drag.
+// Flapping moment: dynamics/effects/flapping_moment.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

@@ -1,8 +1,4 @@
-// Inflow drag: the part of a rotor's drag in its plane that grows with the air through its disc.
-//
-// At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kl u_iz (u_ix, u_iy, 0),
-// applied at the rotor. A rotor that climbs into its inflow drags more, one that sinks less. The
-// part in proportion to the rotor speed is rotor_drag.
+// Inflow drag: dynamics/effects/inflow_drag.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

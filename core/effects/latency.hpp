@@ -1,7 +1,4 @@
-// Latency: what the rotors do is what was logged a while ago, a pure delay.
-//
-// The delivered rotor speeds at t are the logged ones at t - d, between samples by a cubic. In
-// front of the first sample the first one holds.
+// Latency: dynamics/effects/latency.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

@@ -1,8 +1,4 @@
-// Marker offset: the reported position is not that of the geometric centre but of a point beside
-// it.
-//
-// p' = p + R m with m = (mx, my, mz) in body axes. To undo it takes the attitude, measured or,
-// where none was, estimated.
+// Marker offset: dynamics/effects/marker_offset.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

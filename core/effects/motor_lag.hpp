@@ -1,7 +1,4 @@
-// Motor lag: the rotors follow the logged (commanded) rotor speeds as a first-order system.
-//
-// dW/dt = (W_logged - W) / tau, integrated exactly over a step at constant W_logged; the rotors
-// start at the first W_logged.
+// Motor lag: dynamics/effects/motor_lag.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

@@ -1,4 +1,4 @@
-// Rate damping: a torque against the body rate, tau = -diag(dx, dy, dz) omega in body axes.
+// Rate damping: dynamics/effects/rate_damping.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

@@ -1,8 +1,4 @@
-// Rotor drag: a force in the rotor plane against the motion of each rotor through the air, times
-// its rotor speed.
-//
-// At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -W_i diag(kdx, kdy, 0) u_i,
-// applied at the rotor.
+// Rotor drag: dynamics/effects/rotor_drag.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

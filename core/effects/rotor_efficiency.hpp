@@ -1,7 +1,4 @@
-// Rotor efficiency: single rotors deliver more or less than declared at the same rotor speed.
-//
-// Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered rotor speed is W_i sqrt(1 +
-// e_i).
+// Rotor efficiency: dynamics/effects/rotor_efficiency.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

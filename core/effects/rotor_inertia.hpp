@@ -1,7 +1,4 @@
-// Rotor inertia: the torque that it takes to spin rotors up and to turn them with the body.
-//
-// With the angular momentum h = jr sum spin_i W_i along body z: tau = -dh/dt e_z - omega x h e_z in
-// body axes, W being delivered rotor speeds and dW/dt their mean over the step.
+// Rotor inertia: dynamics/effects/rotor_inertia.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

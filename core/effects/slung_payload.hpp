@@ -1,17 +1,4 @@
-// Slung payload: a load that hangs from the geometric centre by a cable and swings.
-//
-// The load is a point mass m on a massless cable of length l that stays taut. With n the unit
-// vector from vehicle to load, f = (sum of thrusts) R e_z / M the specific force of the rotors and
-// a = damping (v + l n' - wind) the load's drag in the air by its mass, the cable's tension is T =
-// (l |n'|^2 - n (f + a)) / (1/m + 1/M), no less than zero. It pulls the vehicle with T n, and the
-// load swings by l n'' = -f - a - T n (1/m + 1/M). n and n' are the effect's own state, carried on
-// once a step; they start at rest, straight down. In hover it pulls with the load's weight.
-//
-// It holds while the cable is taut. Forces on the vehicle other than thrust and weight (its drag,
-// say) are left out of the swing. No measurement corrects the swing: how it was at the start is
-// forgotten, and an error of its phase dies out, at half the damping. With a damping well below 1/s
-// a real load drifts out of phase with the equation, which then may explain less than mass with the
-// same mass.
+// Slung payload: dynamics/effects/slung_payload.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

@@ -1,9 +1,4 @@
-// Thrust fade: thrust at a given rotor speed falls steadily with flight time, as motors and battery
-// warm up.
-//
-// Thrust and reaction torque scale by 1 - rate * t, no less than a tenth: the delivered rotor speed
-// is W times the root of that. The time t runs from the start of the flight; in an estimator from
-// its reset.
+// Thrust fade: dynamics/effects/thrust_fade.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

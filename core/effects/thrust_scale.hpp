@@ -1,6 +1,4 @@
-// Thrust scale: all rotors deliver more or less than declared at the same rotor speed.
-//
-// Thrust and reaction torque scale by 1 + s: the delivered rotor speed is W sqrt(1 + s).
+// Thrust scale: dynamics/effects/thrust_scale.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

@@ -1,7 +1,4 @@
-// Translational lift: a rotor that moves through the air edgewise delivers more thrust.
-//
-// At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = kh (u_ix^2 + u_iy^2) along
-// body z, applied at the rotor. It is the k_h of RotorPy.
+// Translational lift: dynamics/effects/translational_lift.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 

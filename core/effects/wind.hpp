@@ -1,10 +1,4 @@
-// Wind: a steady wind, fixed in the world frame.
-//
-// Every declared effect that asks for the wind (rotor_drag, body_drag, inflow_thrust ...) feels it.
-// cd is a drag of its own, for a vehicle that declares none: with w the wind and u = w - v, F = cd
-// |u| u + cd |v| v at the centre of mass, that is the change against the same drag in still air. So
-// nothing happens without wind, and what differs from a constant force is how the force changes
-// with the velocity.
+// Wind: dynamics/effects/wind.py has the equation in words.
 #pragma once
 #include "form.hpp"
 

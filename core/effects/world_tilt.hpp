@@ -1,7 +1,4 @@
-// World tilt: the vertical of the motion capture's frame is not the true one.
-//
-// Position and attitude are reported in a frame in which they appear turned about the world's axes
-// by the rotation vector (ax, ay, 0) rad: p' = Q p, R' = Q R.
+// World tilt: dynamics/effects/world_tilt.py has the equation in words.
 #pragma once
 #include "parts.hpp"
 
