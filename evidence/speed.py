@@ -120,11 +120,16 @@ def flights() -> list[Contender]:
         for gain in ("ukf", "constant-gain"):
             env = gym.make(f"windwrench/{name}-v0", scenario=scenario, estimator=gain)
             found.append(flight(f"{name}, {scenario}", gain, env.unwrapped, period, 1, 128))
-    for plant, steps in (("mujoco", 2), ("lanes", 16)):
+    sides: tuple[tuple[str, int, dict[str, str]], ...] = (
+        ("mujoco", 2, {"plant": "mujoco"}),
+        ("lanes", 16, {"plant": "lanes"}),
+        ("lanes of 32 bits", 16, {"plant": "lanes", "precision": "single"}),
+    )
+    for name, steps, how in sides:
         envs = gym.make_vec(
-            "windwrench/FanTracking-v0", 256, "vector_entry_point", scenario="static", plant=plant
+            "windwrench/FanTracking-v0", 256, "vector_entry_point", scenario="static", **how
         )
-        found.append(flight(f"256 FanTracking, {plant}", "ukf", envs, 0.08, 256, steps))
+        found.append(flight(f"256 FanTracking, {name}", "ukf", envs, 0.08, 256, steps))
     return [*found, flight("Ant-v5", "MuJoCo at 100 Hz", gym.make("Ant-v5"), 0.05, 1, 60)]
 
 
