@@ -120,7 +120,7 @@ def flights() -> list[Contender]:
         for gain in ("ukf", "constant-gain"):
             env = gym.make(f"windwrench/{name}-v0", scenario=scenario, estimator=gain)
             found.append(flight(f"{name}, {scenario}", gain, env.unwrapped, period, 1, 128))
-    sides: tuple[tuple[str, int, dict[str, str]], ...] = (
+    sides: tuple[tuple[str, int, dict[str, Any]], ...] = (
         ("mujoco", 2, {"plant": "mujoco"}),
         ("lanes", 16, {"plant": "lanes"}),
         ("lanes of 32 bits", 16, {"plant": "lanes", "precision": "single"}),
