@@ -358,11 +358,6 @@ class Evidence:
         score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
         return Fit(reading, horizontal, tuple(others), score)
 
-    def delay(self) -> float:
-        """Return the likeliest delay in s of the motion behind the rotors' columns, as declared."""
-        left = self._left(self._mixing, DECLARED, _DELAYS)[0].tolist()
-        return max(zip(left, _DELAYS, strict=True), key=lambda each: likelihood(each[0]))[1]
-
     def _left(
         self, mixing: Array, reading: ColumnReading, delays: tuple[float, ...]
     ) -> tuple[Array, float, float]:

@@ -6,10 +6,6 @@ second difference of the position, plus gravity: ``(p(t + T) - 2 p(t) + p(t - T)
 Both hold whatever the vehicle's model lacks, on logs of any length. A contradicting sensor is left
 out, with a note: the pose and the rotors are enough for everything. Without a pose, gravity alone
 is left to show the accelerometer.
-
-The turns show one more fact: the clock of the inertial sensors against the clock of the pose. The
-offset of the likeliest windows is searched over +-0.3 s. The rotors tell which of the two clocks is
-wrong: torques turn the body at once.
 """
 
 from collections.abc import Sequence
@@ -19,34 +15,21 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
-from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
-from .evidence import GOOD, Evidence, likelihood
-from .excerpt import excerpt
+from .evidence import GOOD, likelihood
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
-from .table import Array, Data, Mask, NamedArrays, Names, Pair, Rows, finite_rows
+from .table import Array, Data, Names, finite_rows
 
 # How inertial sensors are compared.
-_WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
+WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
 _STEP = 0.05  # s between two comparisons
 _GAP = 0.1  # s without a sample; no comparison across
 _FEWEST = 10  # comparisons for a decision
 LEAST_SAMPLES = 20  # of pose and of sensor, at least
-_STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
+STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
 _MOVING = 0.5  # m/s2 of horizontal acceleration, far above pose noise
-# How clocks are compared.
-_FARTHEST = 0.3  # s, of the search
-_COARSE, _FINE = 0.01, 0.001  # s, of its steps
-# s: smaller offsets are delays of the sensors' own filters, and of stamps at a sample's end
-_LEAST = 0.01
-# s: between rotor speeds and motion lie a motor's lag and the search's step. Smaller offsets do not
-# show whose clock is wrong
-_MOTOR_LAG, _TELLING = 0.02, 0.06
-_PARTS = 4  # of the flight; the scatter of their offsets is the uncertainty
-_SURE = 4.0  # standard deviations
-_FEWEST_WINDOWS = 40
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
@@ -136,28 +119,29 @@ def gyro_shares(
     """
     read = np.isfinite(t) & finite_rows(gyro)
     t, gyro = t[read], gyro[read]
-    begins = _windows(pose_times, t, before=0.0)
+    begins = windows(pose_times, t, before=0.0)
     if len(begins) < _FEWEST:
         return None
-    motion = _unbiased(_turned(begins, pose_times, attitude))
+    motion = unbiased(turn_rates(begins, pose_times, attitude))
     sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
-    seen = _unbiased(_mean_rate(begins, t, sum_of))
-    size = _middle(motion) + _STILL**2
-    return [_middle(motion - seen @ turn.T) / size for turn in turns]
+    seen = unbiased(mean_rate(begins, t, sum_of))
+    size = median_square(motion) + STILL**2
+    return [median_square(motion - seen @ turn.T) / size for turn in turns]
 
 
-def _turned(begins: Array, pose_times: Array, attitude: Rotation) -> Array:
+def turn_rates(begins: Array, pose_times: Array, attitude: Rotation) -> Array:
     """Return an attitude's mean angular velocity (n, 3) in windows, rad/s."""
     at = Slerp(pose_times, attitude)
-    return np.asarray((at(begins).inv() * at(begins + _WINDOW)).as_rotvec() / _WINDOW)
+    return np.asarray((at(begins).inv() * at(begins + WINDOW)).as_rotvec() / WINDOW)
 
 
-def _mean_rate(begins: Array, t: Array, sum_of: Array) -> Array:
+def mean_rate(begins: Array, t: Array, sum_of: Array) -> Array:
     """Return the mean (n, 3) in windows of a gyro, by its integral over time (N, 3)."""
-    return (resampled(begins + _WINDOW, t, sum_of) - resampled(begins, t, sum_of)) / _WINDOW
+    return (resampled(begins + WINDOW, t, sum_of) - resampled(begins, t, sum_of)) / WINDOW
 
 
-def _unbiased(rates: Array) -> Array:
+def unbiased(rates: Array) -> Array:
+    """Return angular velocities or forces (n, 3) less their medians."""
     return rates - np.median(rates, axis=0)
 
 
@@ -176,7 +160,7 @@ def _force_shares(
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
     """
-    middles = _windows(pose_times, t, before=_WINDOW)
+    middles = windows(pose_times, t, before=WINDOW)
     if len(middles) < _FEWEST:
         return None, None
     inside = (t >= pose_times[0]) & (t <= pose_times[-1])
@@ -187,14 +171,14 @@ def _force_shares(
         sums, times = force[inside], t[inside]
         for _ in range(2):
             sums = cumulative_trapezoid(sums, times, axis=0, initial=0.0)
-        return second_difference(middles, _WINDOW, times, sums) / _WINDOW**2
+        return second_difference(middles, WINDOW, times, sums) / WINDOW**2
 
     up, turned = np.zeros(3), None
-    needed = second_difference(middles, _WINDOW, pose_times, position) / _WINDOW**2
+    needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2
     moves = np.linalg.norm(needed[:, :2], axis=1) > _MOVING
     if np.count_nonzero(moves) >= _FEWEST:
         in_body, in_world = (
-            _middle((needed - mean(x))[moves, :2]) / _middle(needed[moves, :2])
+            median_square((needed - mean(x))[moves, :2]) / median_square(needed[moves, :2])
             for x in (body.apply(measured), measured)
         )
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
@@ -204,8 +188,8 @@ def _force_shares(
     up[2] = gravity
     needed += up
     return [
-        _middle(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
-        / _middle(needed)
+        median_square(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
+        / median_square(needed)
         for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
     ], turned
 
@@ -233,119 +217,25 @@ def _gravity_shares(force: Array, gravity: float) -> list[float]:
     return [float(np.sum(np.square(up - r.turn @ median))) / gravity**2 for r in readings]
 
 
-def _middle(vectors: Array) -> float:
+def median_square(vectors: Array) -> float:
     """Return the median squared length of vectors (n, 3): robust to single leaps of a pose."""
     return float(np.median(np.sum(np.square(vectors), axis=1)))
 
 
-def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
+def windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     """Return times (n,) in s without a gap of pose or sensor, from ``before`` earlier to a window
     later.
     """
     if min(len(pose_times), len(sensor_times)) < LEAST_SAMPLES:
         return np.empty(0)
     first = max(pose_times[0], sensor_times[0]) + before
-    last = min(pose_times[-1], sensor_times[-1]) - _WINDOW
+    last = min(pose_times[-1], sensor_times[-1]) - WINDOW
     if last <= first:
         return np.empty(0)
     count = min(int((last - first) / _STEP), 100_000)
     times = np.linspace(first, last, count + 1)
     for clock in (pose_times, sensor_times):
         gaps = np.flatnonzero(np.diff(clock) > _GAP)
-        begun = np.searchsorted(clock[gaps], times + _WINDOW)
+        begun = np.searchsorted(clock[gaps], times + WINDOW)
         times = times[begun == np.searchsorted(clock[gaps + 1], times - before, "right")]
     return times
-
-
-def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Names]:
-    """Return a log with IMU and pose on one clock, and a note on an offset beyond 10 ms.
-
-    Samples are moved by whole rows. Beyond 0.3 s the inertial sensors are left out.
-
-    Args:
-        log: the flight, as read.
-        vehicle: as declared, for the rotors' torques; None: rotors on one side turn the body to the
-            other.
-    """
-    late, std = _imu_delay(log)
-    if not abs(late) > max(_LEAST, _SURE * std):
-        return log, ()
-    if abs(late) > _FARTHEST - _COARSE:
-        return replace(log, gyro=None, accelerometer=None), (
-            f"the IMU's clock is off by more than {_FARTHEST:g} s against the pose's: gyro and "
-            "accelerometer were left out",
-        )
-    whose, other = "IMU", "pose"
-    rotors = ", by less than the rotor speeds tell whose clock is wrong"
-    is_pose = False
-    if log.has_rotor_speeds and abs(late) > _TELLING:
-        lag = _rotor_delay(log, vehicle) - _MOTOR_LAG
-        rotors, is_pose = " and the rotor speeds", abs(lag) > abs(lag + late)
-    if is_pose:  # rotors and IMU share a clock
-        whose, other, late = "pose", "IMU", -late
-        pose = {"position": log.position, "quaternion": log.quaternion}
-        moved = _moved(log.t, log.valid, late, pose)
-        log = replace(log, **moved, valid=np.isfinite(moved["position"][:, 0]))
-    else:
-        for name, x in {"gyro": log.gyro, "accelerometer": log.accelerometer}.items():
-            if x is not None:
-                log = replace(log, **_moved(log.t, np.isfinite(x[:, 0]), late, {name: x}))
-    return log, (
-        f"the {whose} is {abs(late):.3f} s {'late' if late > 0.0 else 'early'} against the {other}"
-        f"{rotors} (standard deviation {std:.3f} s); the {whose} was moved",
-    )
-
-
-def _imu_delay(log: FlightLog) -> Pair:
-    """Return the delay in s of the IMU against the pose, and its standard deviation; 0: unknown."""
-    if log.gyro is None:
-        return 0.0, 0.0
-    read, seen = np.isfinite(log.gyro[:, 0]), np.flatnonzero(log.valid)
-    t, pose_times = log.t[read], log.t[seen]
-    begins = _windows(pose_times, t, before=0.0)
-    inside = (begins > t[:1] + _FARTHEST) & (begins < t[-1:] - _FARTHEST - _WINDOW)
-    begins = begins[inside]
-    if len(begins) < _FEWEST_WINDOWS:
-        return 0.0, 0.0
-    attitude = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
-    turned = _turned(begins, pose_times, attitude)
-    sum_of = cumulative_trapezoid(log.gyro[read], t, axis=0, initial=0.0)
-
-    def left(late: float, part: slice | Rows) -> float:
-        """Return the middle squared difference of turns and gyro in some windows."""
-        return _middle(_unbiased(turned[part] - _mean_rate(begins[part] + late, t, sum_of)))
-
-    def likeliest(part: slice | Rows) -> float:
-        found = 0.0
-        for reach, step in ((_FARTHEST, _COARSE), (_COARSE, _FINE)):
-            tried = found + np.arange(-round(reach / step), round(reach / step) + 1) * step
-            found = float(tried[np.argmin([left(x, part) for x in tried])])
-        return found
-
-    late = likeliest(slice(None))
-    if left(late, slice(None)) > GOOD * (_middle(_unbiased(turned)) + _STILL**2):
-        return 0.0, 0.0
-    parts = np.array_split(np.arange(len(begins)), _PARTS)
-    return late, float(np.std([likeliest(part) for part in parts])) / np.sqrt(_PARTS)
-
-
-def _rotor_delay(log: FlightLog, vehicle: Vehicle | None) -> float:
-    """Return the delay in s of the pose's motion behind the rotor speeds; 0: unknown."""
-    evidence = Evidence.of_log(excerpt([log])[0], vehicle)
-    return evidence.delay() if evidence.enough else 0.0
-
-
-def _moved(t: Array, there: Mask, late: float, columns: NamedArrays) -> Data:
-    """Return columns (N, k) with the samples ``there`` (N,) moved ``late`` s back in time, to the
-    nearest rows; NaN elsewhere.
-    """
-    source = np.flatnonzero(there)
-    when = t[source] - late
-    inside = (when >= t[0]) & (when <= t[-1])
-    source, when = source[inside], when[inside]
-    after = np.clip(np.searchsorted(t, when), 1, len(t) - 1)
-    target = after - (when - t[after - 1] < t[after] - when)
-    out = {name: np.full_like(x, np.nan) for name, x in columns.items()}
-    for name, x in columns.items():
-        out[name][target] = x[source]
-    return out

@@ -12,9 +12,10 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from . import readers
+from .clocks import on_one_clock
 from .commanded_speeds import flown_vehicle
 from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
-from .inertial import check_inertial, on_one_clock
+from .inertial import check_inertial
 from .log_map import OWN_MAP, load_map
 from .magnitudes import unit_doubts
 from .mapped_log import map_table

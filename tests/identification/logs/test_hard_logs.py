@@ -8,8 +8,9 @@ import pytest
 from tests.support.data_paths import data_file
 from tests.support.outcomes import refused
 from windwrench.dynamics import load_vehicle
+from windwrench.identification import diagnose
+from windwrench.identification.logs.clocks import on_one_clock
 from windwrench.identification.logs.flight_log import with_rows
-from windwrench.identification.logs.inertial import on_one_clock
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
@@ -79,3 +80,14 @@ def test_a_late_clock_is_found_and_mended(whose, rows):
     for name in names:
         off = getattr(mended, name)[inside] - getattr(log, name)[inside]
         assert np.median(np.abs(off)) < 0.02 * np.ptp(getattr(log, name)[inside])
+
+
+@pytest.mark.parametrize(("name", "late"), [("pose_late_40", 0.04), ("pose_late_80", 0.08)])
+def test_a_late_pose_is_a_clock_and_no_lag(name, late):
+    vehicle = load_vehicle("ardrone2")
+    log = read_log(data_file(f"hard_logs/{name}.csv.gz"), vehicle=vehicle)
+    (note,) = (note for note in log.notes if "the pose is" in note)
+    assert float(note.split(" s late")[0].split()[-1]) == pytest.approx(late, abs=0.003)
+    found = diagnose([log], vehicle)
+    assert found.effects == ()
+    assert found.remainder == "none"
