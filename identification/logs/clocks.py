@@ -36,13 +36,14 @@ from .inertial import (
     unbiased,
     windows,
 )
-from .pose_delay import FARTHEST, LEAST, SURE, answered_ahead, pose_delay
+from .pose_delay import FARTHEST, LEAST, SURE, answer_to_noise, pose_delay
 from .table import Array, Data, Mask, NamedArrays, Names, Pair, Rows
 
 _COARSE, _FINE = 0.01, 0.001  # s, of the search's steps
 # s: between rotor speeds and motion lie a motor's lag and the search's step. Smaller offsets do not
 # show whose clock is wrong
 _MOTOR_LAG, _TELLING = 0.02, 0.06
+_REACTION = 0.008  # s, of a flight loop to a pose
 _PARTS = 4  # of the flight; the scatter of their offsets is the uncertainty
 _FEWEST_WINDOWS = 40
 _MOVING = 0.3  # m/s2: the acceleration of a hovering vehicle by pose noise
@@ -105,21 +106,26 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
     if log.commanded or not (log.has_rotor_speeds and log.has_pose):
         return log, ()
     delay = pose_delay(log, vehicle)
-    if delay is None or not delay.is_clear:
+    if delay is None:
         return log, ()
-    why = "beyond a vehicle's own delay"
-    if not delay.beyond_honest:
-        ahead = answered_ahead(log, vehicle)
-        if ahead is None or abs(ahead[0] - delay.seconds) > ahead[1] + LEAST:
-            return log, ()
-        why = "and the rotor speeds answer the pose's noise ahead of its rows"
-    if delay.at_bound:
+    late, std, why = delay.seconds, delay.std, "beyond a vehicle's own delay"
+    answer = answer_to_noise(log, vehicle) if abs(late) > LEAST else None
+    if answer is not None and abs(answer[0] - late) < SURE * np.hypot(std, _REACTION):
+        share = _REACTION**2 / (_REACTION**2 + std**2)
+        late, std = share * late + (1.0 - share) * answer[0], float(np.sqrt(share)) * std
+        delay = replace(delay, seconds=late, std=std)
+        if answer[0] > answer[1]:
+            why = "and the rotor speeds answer the pose's noise ahead of its rows"
+            delay = replace(delay, beyond_honest=True)
+    if not (delay.is_clear and delay.beyond_honest):
+        return log, ()
+    if abs(late) > FARTHEST - LEAST:
         return log, (
-            f"the pose is {FARTHEST:g} s or more {'late' if delay.seconds > 0.0 else 'early'} "
+            f"the pose is {FARTHEST:g} s or more {'late' if late > 0.0 else 'early'} "
             "against the rotor speeds: the search ends there, and nothing was moved",
         )
-    return _rotors_later(log, delay.seconds), (
-        f"the pose is {_offset(delay.seconds, delay.std)} against the rotor speeds, {why}; the "
+    return _rotors_later(log, late), (
+        f"the pose is {_offset(late, std)} against the rotor speeds, {why}; the "
         "rotor speeds were moved to the pose's clock",
     )
 

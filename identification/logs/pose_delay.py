@@ -60,7 +60,6 @@ _NOISE_SHARE = 0.25  # of the poses' rate: above is noise alone
 _WHITE = -0.5
 _APART = 0.01  # s, of the differences, at least
 _FINEST = 0.005  # s, between two delays of an answer
-_LONGEST_ANSWER = 0.1  # s
 _FEWEST_POSES = 100
 _ANSWERED = 6.0  # standard deviations of a chance correlation
 
@@ -77,11 +76,6 @@ class PoseDelay:
     def is_clear(self) -> bool:
         """Whether the delay is beyond noise."""
         return abs(self.seconds) > max(LEAST, SURE * self.std)
-
-    @property
-    def at_bound(self) -> bool:
-        """Whether the search ended at its bound."""
-        return abs(self.seconds) > FARTHEST - LEAST
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,11 +237,13 @@ def _turns(log: FlightLog, piece: Rows) -> tuple[Array, Array]:
     return log.t[piece], np.vstack([np.zeros(3), turned(log.quaternion[piece])])
 
 
-def answered_ahead(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
+def answer_to_noise(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
     """Return by how much (s) the rotor speeds answer the pose's noise ahead of its rows, and the
-    differences' smear; None: they do not, or the pose shows no white noise.
+    least such time that is no smear of the differences. None: there is no answer, or the pose shows
+    no white noise.
 
-    Second differences leave a pose its noise. The moments pass the same differences.
+    The loop's own reaction makes the answer later. Second differences leave a pose its noise; the
+    moments pass the same differences.
 
     Args:
         log: the flight, with rotor speeds.
@@ -258,7 +254,7 @@ def answered_ahead(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
     step, fine = median_step(log.t[rows]), max(log.period, _FINEST)
     apart = max(1, round(_APART / step))  # rows
     width = apart * step
-    most = round(_LONGEST_ANSWER / fine)
+    most = round(FARTHEST / fine)
     lags = fine * np.arange(-most, most + 1)
     products, count = np.zeros(len(lags)), 0
     for piece in unbroken(log.t, rows, 1.5 * step, _FEWEST_POSES):
@@ -276,11 +272,12 @@ def answered_ahead(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
             products[i] += np.sum(noise * _without_size(answer))
         count += noise.size
     score = np.abs(products) / np.sqrt(max(count, 1))
-    ahead = lags > 2.0 * width
-    highest = float(np.max(score[ahead], initial=0.0))
-    if highest <= max(_ANSWERED, 2.0 * float(np.max(score[lags <= 0.0]))):
+    peak = int(np.argmax(score))
+    near = np.abs(lags - lags[peak]) <= 3.0 * width
+    if score[peak] <= max(_ANSWERED, 2.0 * float(np.max(score[~near], initial=0.0))):
         return None
-    return float(lags[ahead][np.argmax(score[ahead])]), 2.0 * width
+    weight = np.square(np.where(near & (score > 0.5 * _ANSWERED), score, 0.0))
+    return float(lags @ weight / np.sum(weight)), 1.5 * width
 
 
 def _without_size(x: Array) -> Array:
