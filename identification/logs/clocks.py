@@ -94,9 +94,7 @@ def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog,
         for name, x in {"gyro": log.gyro, "accelerometer": log.accelerometer}.items():
             if x is not None:
                 log = replace(log, **_moved(log.t, np.isfinite(x[:, 0]), late, {name: x}))
-    return log, (
-        f"the {whose} is {_offset(late, std)} against the {other}{rotors}; the {whose} was moved",
-    )
+    return log, (_note(whose, late, std, f"{other}{rotors}", f"the {whose} was moved"),)
 
 
 def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Names]:
@@ -124,15 +122,16 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
             f"the pose is {FARTHEST:g} s or more {'late' if late > 0.0 else 'early'} "
             "against the rotor speeds: the search ends there, and nothing was moved",
         )
-    return _rotors_later(log, late), (
-        f"the pose is {_offset(late, std)} against the rotor speeds, {why}; the "
-        "rotor speeds were moved to the pose's clock",
+    done = "the rotor speeds were moved to the pose's clock"
+    return _rotors_later(log, late), (_note("pose", late, std, f"rotor speeds, {why}", done),)
+
+
+def _note(whose: str, late: float, std: float, against: str, done: str) -> str:
+    """Return the sentence on a clock ``late`` s behind another."""
+    return (
+        f"the {whose} is {abs(late):.3f} s {'late' if late > 0.0 else 'early'} against the "
+        f"{against} (standard deviation {std:.3f} s); {done}"
     )
-
-
-def _offset(late: float, std: float) -> str:
-    side = "late" if late > 0.0 else "early"
-    return f"{abs(late):.3f} s {side} (standard deviation {std:.3f} s)"
 
 
 def _imu_delay(log: FlightLog) -> Pair:
@@ -140,15 +139,16 @@ def _imu_delay(log: FlightLog) -> Pair:
 
     The gyro tells, else the accelerometer.
     """
-    for measured, compared in ((log.gyro, _turn_errors), (log.accelerometer, _force_errors)):
+    sensors = (log.gyro, 0.0, _turn_errors), (log.accelerometer, WINDOW, _force_errors)
+    for measured, before, compared in sensors:
         seen = np.flatnonzero(log.valid)
         if measured is None or not seen.size:
             continue
         read = np.isfinite(measured[:, 0])
         t, pose_times = log.t[read], log.t[seen]
-        begins = windows(pose_times, t, before=WINDOW)
-        reach = FARTHEST + WINDOW
-        begins = begins[(begins > t[:1] + reach) & (begins < t[-1:] - reach)]
+        begins = windows(pose_times, t, before)
+        inside = (begins > t[:1] + FARTHEST + before) & (begins < t[-1:] - FARTHEST - WINDOW)
+        begins = begins[inside]
         if len(begins) < _FEWEST_WINDOWS:
             continue
         attitude = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
