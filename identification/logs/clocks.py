@@ -40,13 +40,16 @@ from .pose_delay import FARTHEST, LEAST, SURE, answer_to_noise, pose_delay
 from .table import Array, Data, Mask, NamedArrays, Names, Pair, Rows
 
 _COARSE, _FINE = 0.01, 0.001  # s, of the search's steps
-# s: between rotor speeds and motion lie a motor's lag and the search's step. Smaller offsets do not
-# show whose clock is wrong
+# s: between commands and motion lies a motor's lag of about so much. Smaller offsets of an IMU do
+# not show whose clock is wrong; for rotor speeds from commands three times as much
 _MOTOR_LAG, _TELLING = 0.02, 0.06
-_REACTION = 0.008  # s, of a flight loop to a pose
+# widths of the differences of a pose's noise (10 ms or more): the uncertainty of a loop's answer
+# with its reaction, and the smear of its time
+_REACTION, _SMEAR = 0.8, 1.5
 _PARTS = 4  # of the flight; the scatter of their offsets is the uncertainty
 _FEWEST_WINDOWS = 40
 _MOVING = 0.3  # m/s2: the acceleration of a hovering vehicle by pose noise
+_WHOLE = 2.0  # standard deviations between an offset and whole rows
 _GAP = 3.5  # median time steps; rotor speeds are not moved across
 
 _Left = Callable[[float, slice | Rows], float]  # s of delay and windows: a middle squared error
@@ -81,10 +84,11 @@ def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog,
     whose, other = "IMU", "pose"
     rotors = ", by less than the rotor speeds tell whose clock is wrong"
     is_pose = False
-    if log.has_rotor_speeds and abs(late) > _TELLING:
-        delay = pose_delay(log, vehicle)
-        lag = 0.0 if delay is None else delay.seconds - _MOTOR_LAG
-        rotors, is_pose = " and the rotor speeds", abs(lag) > abs(lag + late)
+    delay = pose_delay(log, vehicle) if log.has_rotor_speeds else None
+    lag, least = (_MOTOR_LAG, _TELLING) if log.commanded else (0.0, _MOTOR_LAG)
+    if delay is not None and abs(late) > max(least, SURE * delay.std):
+        seconds = delay.seconds - lag
+        rotors, is_pose = " and the rotor speeds", abs(seconds) > abs(seconds + late)
     if is_pose:  # rotors and IMU share a clock
         whose, other, late = "pose", "IMU", -late
         pose = {"position": log.position, "quaternion": log.quaternion}
@@ -108,13 +112,16 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
         return log, ()
     late, std, why = delay.seconds, delay.std, "beyond a vehicle's own delay"
     answer = answer_to_noise(log, vehicle) if abs(late) > LEAST else None
-    if answer is not None and abs(answer[0] - late) < SURE * np.hypot(std, _REACTION):
-        share = _REACTION**2 / (_REACTION**2 + std**2)
-        late, std = share * late + (1.0 - share) * answer[0], float(np.sqrt(share)) * std
-        delay = replace(delay, seconds=late, std=std)
-        if answer[0] > answer[1]:
-            why = "and the rotor speeds answer the pose's noise ahead of its rows"
-            delay = replace(delay, beyond_honest=True)
+    if answer is not None:
+        ahead, width = answer
+        unsure = _REACTION * width
+        if abs(ahead - late) < SURE * np.hypot(std, unsure):
+            share = unsure**2 / (unsure**2 + std**2)
+            late, std = share * late + (1.0 - share) * ahead, float(np.sqrt(share)) * std
+            delay = replace(delay, seconds=late, std=std)
+            if ahead > _SMEAR * width:
+                why = "and the rotor speeds answer the pose's noise ahead of its rows"
+                delay = replace(delay, beyond_honest=True)
     if not (delay.is_clear and delay.beyond_honest):
         return log, ()
     if abs(late) > FARTHEST - LEAST:
@@ -123,7 +130,7 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
             "against the rotor speeds: the search ends there, and nothing was moved",
         )
     done = "the rotor speeds were moved to the pose's clock"
-    return _rotors_later(log, late), (_note("pose", late, std, f"rotor speeds, {why}", done),)
+    return _rotors_later(log, late, std), (_note("pose", late, std, f"rotor speeds, {why}", done),)
 
 
 def _note(whose: str, late: float, std: float, against: str, done: str) -> str:
@@ -203,10 +210,15 @@ def _force_errors(
     return left, median_square(unbiased(needed)) + _MOVING**2
 
 
-def _rotors_later(log: FlightLog, late: float) -> FlightLog:
+def _rotors_later(log: FlightLog, late: float, std: float) -> FlightLog:
     """Return a log with rotor speeds, commands, voltage and truth moved ``late`` s on, to the clock
     of the pose. Rows without a sample on both sides are left out.
+
+    Rotor speeds answer noise from row to row, and an interpolation would smooth the answer. Whole
+    rows are taken where the uncertainty ``std`` in s allows.
     """
+    whole = round(late / log.period) * log.period
+    late = whole if abs(whole - late) < _WHOLE * std else late
     source = log.t - late
     after = np.clip(np.searchsorted(log.t, source), 1, len(log.t) - 1)
     steps = log.t[after] - log.t[after - 1]

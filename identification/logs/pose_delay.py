@@ -54,7 +54,7 @@ _GAP = 0.1  # s (or 3.5 periods) without a pose end a piece
 _PARTS = 5  # of the flight; the scatter of their delays is the uncertainty
 _FEWEST = 10  # segments
 _VISIBLE = 40.0  # deviance explained by the moments, at least
-_BEYOND = 16.0  # deviance against an honest delay and any lag
+_BEYOND = 9.0  # deviance against an honest delay and any lag
 _NOISE_SHARE = 0.25  # of the poses' rate: above is noise alone
 # correlation of second differences with the next ones: -2/3 of white noise, above 0 of motion
 _WHITE = -0.5
@@ -239,11 +239,10 @@ def _turns(log: FlightLog, piece: Rows) -> tuple[Array, Array]:
 
 def answer_to_noise(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
     """Return by how much (s) the rotor speeds answer the pose's noise ahead of its rows, and the
-    least such time that is no smear of the differences. None: there is no answer, or the pose shows
-    no white noise.
+    width (s) of the differences. None: there is no answer, or the pose shows no white noise.
 
     The loop's own reaction makes the answer later. Second differences leave a pose its noise; the
-    moments pass the same differences.
+    moments pass the same differences, which smear the answer over their width.
 
     Args:
         log: the flight, with rotor speeds.
@@ -277,7 +276,7 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
     if score[peak] <= max(_ANSWERED, 2.0 * float(np.max(score[~near], initial=0.0))):
         return None
     weight = np.square(np.where(near & (score > 0.5 * _ANSWERED), score, 0.0))
-    return float(lags @ weight / np.sum(weight)), 1.5 * width
+    return float(lags @ weight / np.sum(weight)), width
 
 
 def _without_size(x: Array) -> Array:
