@@ -38,7 +38,14 @@ from ..motion.smoothing import (
 from .flight_log import FlightLog
 from .flight_phases import carrying
 from .log_map import UNITS
-from .readings import DECLARED, OFFSET, ColumnReading, as_written, log_readings
+from .readings import (
+    DECLARED,
+    OFFSET,
+    ColumnReading,
+    applied,
+    as_written,
+    log_readings,
+)
 from .table import Array, ArrayPair, Rows, finite_rows, median_step
 
 # Filters, and when a reading is certain.
@@ -75,6 +82,7 @@ _CERTAIN_LEAD = 3.4  # log-likelihood ratio over the next best: 30 to 1
 # rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
 # answer disturbances more than they turn the body, and the mirrored order may explain more
 TURNING_RATE = 0.06
+_TRIED = 6  # readings, each with a second one behind
 _G = 9.81
 # roll and pitch of rotors 1 to 4, whatever the vehicle
 SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
@@ -396,7 +404,7 @@ class Evidence:
         flight otherwise. The variance of a chance correlation is by Bartlett's formula.
         """
         mixing = np.vstack([self._k, self._mixing])
-        sums, chance = np.zeros(1), np.full(4, 1e-300)
+        sums, chance = np.zeros(1), np.full(len(mixing), 1e-300)
         for p, (matrices, w) in zip(self._pieces, self._turned(DECLARED), strict=True):
             if self._along is None:
                 force = self._second(p) + np.array([0.0, 0.0, _G])
@@ -404,7 +412,8 @@ class Evidence:
             else:
                 along = p.even(self._t, self._along[:, None])[:, 0]
             turn = derivative(w, p.period) @ self._inertia + np.cross(w, w @ self._inertia)
-            both = p.even(self._t, self._thrusts) @ mixing.T, np.column_stack([along, turn])
+            needed = np.column_stack([along, turn])[:, : len(mixing)]
+            both = p.even(self._t, self._thrusts) @ mixing.T, needed
             thin = max(1, round(_STEP / p.period))
             most = round(_FAR / (thin * p.period))
             signs = [np.sign(p.band(x, slice(None, None, thin))[:, 0]) for x in both]
@@ -478,13 +487,22 @@ class RankedFits:
         return getattr(self.best, name), self.certain(name), why
 
 
+def _as_logged(evidence: Evidence) -> RankedFits:
+    """Return the ranking of the readings of the kit's own columns; a delay of the rotors comes
+    before all others.
+    """
+    ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
+    if evidence.enough and (late := evidence.late()):
+        fit = Fit(ColumnReading(late=late, unlikely=OFFSET), 0.0, (0.0,), np.inf)
+        return RankedFits([fit, *ranking.ranked])
+    return ranking
+
+
 def departures(evidence: Evidence) -> list[ColumnReading]:
     """Return the readings that explain a log better than its declaration: none, one, or several
     equally good.
     """
-    if evidence.enough and (late := evidence.late()):
-        return [ColumnReading(late=late)]
-    ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
+    ranking = _as_logged(evidence)
     best, left, most = ranking.best, ranking.fit.torque, GOOD_TORQUE
     if evidence.has_pose and best.moves != DECLARED.moves:  # forces tell, not torques
         left, most = ranking.fit.horizontal, GOOD
@@ -493,3 +511,41 @@ def departures(evidence: Evidence) -> list[ColumnReading]:
     least = ranking.fit.score - _CERTAIN_LEAD
     readings = [fit.reading for fit in ranking.ranked if fit.score >= least]
     return [reading for reading in readings if reading is not DECLARED]
+
+
+Advice = tuple[ColumnReading, ...]  # taken in turn
+
+
+def remedies(
+    log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False
+) -> tuple[list[Advice], bool]:
+    """Return the equally good advice for a log, and whether it leaves a consistent log. No advice:
+    the log is consistent as declared.
+
+    Args:
+        log: the flight.
+        vehicle: as declared; None: unknown.
+        by_imu: the motion is the gyro's and the accelerometer's, else the pose's.
+    """
+
+    def mended(*advice: ColumnReading) -> Evidence:
+        other, spins = log, vehicle
+        for reading in advice:
+            other = applied(other, reading)
+            if spins is not None and reading.mirrored:
+                spins = replace(spins, spin=-spins.spin)
+        return Evidence.of_log(other, spins, by_imu)
+
+    after = {reading: _as_logged(mended(reading)) for reading in departures(mended())[:3]}
+    whole: list[Advice] = [(one,) for one, ranking in after.items() if ranking.best is DECLARED]
+    if whole or not after:
+        return whole, True
+    joint: list[tuple[float, bool, Advice]] = []
+    for fit in _as_logged(mended()).ranked[:_TRIED]:
+        second = _as_logged(mended(fit.reading)).best
+        both = tuple(one for one in (fit.reading, second) if one is not DECLARED)
+        end = _as_logged(mended(*both))
+        score = end.fit.score - sum(reading.unlikely for reading in both)
+        joint.append((score, end.best is DECLARED, both))
+    score, is_whole, both = max(joint, key=lambda each: (each[1], each[0]))
+    return [both], is_whole

@@ -36,6 +36,7 @@ class Magnitudes:
     flies: Pair = (0.2, 5.0)  # its median; beyond, another vehicle flew
     doubtful: Pair = (0.5, 2.0)  # the same; beyond, another may have flown
     gravity: Pair = (0.85, 1.15)  # specific force by 1 g: the unit is certain
+    strongest: float = 300.0  # m/s2 of specific force, above all racers and most sensors' range
     fastest_gyro: float = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     slow_gyro: float = 6.0  # rad/s: 99.5 % of a flight's angular velocities are less

@@ -14,7 +14,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...runtime.yaml_file import read_yaml
+from ..motion.smoothing import resampled
 from .channels import quaternions, scaled
+from .flight_log import FlightLog
 from .log_map import SENSES, UNITS, Attitude
 from .table import Array, Data, Mask, Names, finite_rows
 from .what_flew import ORDERS, Order, order_names
@@ -302,6 +304,24 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
         replace(r, unlikely=r.unlikely + OTHER * (length in lengths and r.length != length))
         for r in _weighed(readings, 0.0, hint or "enu")
     ]
+
+
+def applied(log: FlightLog, reading: ColumnReading) -> FlightLog:
+    """Return a log with the advice of a reading taken; the vehicle's spin is no part of a log."""
+    speeds, parts = np.empty_like(log.rotor_speeds), Data()
+    speeds[:, np.subtract(reading.rotors, 1)] = log.rotor_speeds
+    if reading.late:
+        speeds = resampled(log.t + reading.late, log.t, speeds)
+    if reading.gyro.says:
+        assert log.gyro is not None
+        parts["gyro"] = log.gyro @ reading.gyro.turn.T
+    if log.valid.any():
+        quaternion = np.full_like(log.quaternion, np.nan)
+        good, turned = rotations(log.quaternion, reading)
+        quaternion[good] = turned.as_quat(scalar_first=True)
+        turn = reading.frames.position.T * UNITS["position"][reading.length]
+        parts |= {"position": log.position @ turn, "quaternion": quaternion}
+    return replace(log, rotor_speeds=speeds, **parts)
 
 
 def rotations(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:

@@ -23,12 +23,13 @@ from ...runtime.errors import InputError
 from ..motion.inertial_signals import inertial_pieces, reads_imu
 from ..motion.signals import SHORTEST_PIECE, pose_pieces
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of
-from .evidence import Evidence, departures
+from .evidence import remedies
 from .excerpt import excerpt
 from .flight_log import FlightLog
 from .flight_phases import carrying, flying
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
+from .readings import ColumnReading
 from .streams import MOTOR_RATES
 from .table import Array, Mask, Names, median_step
 
@@ -131,19 +132,20 @@ def screen_log(
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
-    others = []
+    advice: list[tuple[ColumnReading, ...]] = []
     if by_imu or pose_pieces(log):
-        evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu)
-        others = departures(evidence)[:3]
-    if others and not others[0].late:
-        says = "; or ".join(dict.fromkeys(reading.says for reading in others))
+        advice, mends = remedies(excerpt([log])[0], vehicle, by_imu)
+    says = "; or ".join(dict.fromkeys("; then ".join(r.says for r in each) for each in advice))
+    is_late = [reading.late for each in advice for reading in each]
+    if not all(is_late):
         whose = "gyro contradicts the rotors' torques"
         whose = whose if by_imu else "motion contradicts the rotor speeds and gravity"
-        hear([Refused(f"{says}. As logged, the {whose}")])
+        unmended = "" if mends else ". No usual convention mends this log; the likeliest is named"
+        hear([Refused(f"{says}. As logged, the {whose}{unmended}")])
     if not by_imu:
         hear(_steps(log))
         hear([] if least_seconds is None else _length(log, vehicle, least_seconds))
-    hear(Fault(reading.says) for reading in others[:1])
+    hear([Fault(says)] if is_late else [])
     return log, tuple(notes)
 
 
