@@ -15,7 +15,6 @@ flight counts for few independent samples ``n``. A hover tells nothing: all shar
 likeliest reading is taken, after a penalty on unusual ones.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -36,7 +35,7 @@ from ..motion.smoothing import (
     unbroken,
 )
 from .flight_log import FlightLog
-from .flight_phases import carrying
+from .flight_phases import usual_thrust
 from .log_map import UNITS
 from .readings import (
     DECLARED,
@@ -88,10 +87,12 @@ _G = 9.81
 SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 
-def likelihood(left: Sequence[float]) -> float:
-    """Return the log-likelihood, up to a constant, of shares of one component each."""
-    bounded = (min(max(x, _LEAST_SHARE), _MOST_SHARE) for x in left)
-    return -0.5 * _SAMPLES * sum(map(math.log, bounded))
+def likelihood(left: ArrayLike) -> Array:
+    """Return the log-likelihoods (...), up to a constant, of shares (..., k) of one component
+    each.
+    """
+    bounded = np.clip(left, _LEAST_SHARE, _MOST_SHARE)
+    return np.asarray(-0.5 * _SAMPLES * np.log(bounded).sum(axis=-1))
 
 
 def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
@@ -215,25 +216,16 @@ class Evidence:
         period = max(step, _PERIOD)
         count = len(rows) * step * _RATE_HZ
         every = np.ceil(count / _MOST) / (_RATE_HZ * period)
-        pieces, totals = [], []
-        gap = max(_GAP, 3.5 * step)
-        for part in unbroken(self._t, rows, gap, 8, _SHORTEST):
+        edge, every = round(_EDGE / period), max(1, round(every))
+        pieces = []
+        for part in unbroken(self._t, rows, max(_GAP, 3.5 * step), 8, _SHORTEST):
             t = np.arange(self._t[part[0]], self._t[part[-1]], period)
-            edge = round(_EDGE / period)
-            compared = np.arange(edge, len(t) - edge, max(1, round(every)))
-            piece = _Piece(part, t, period, compared)
+            piece = _Piece(part, t, period, np.arange(edge, len(t) - edge, every))
             total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
             if np.isfinite(total).all():
-                pieces.append(piece)
-                totals.append(total)
-        if not pieces:
-            return []
-        ends = np.cumsum([len(x) for x in totals])[:-1]
-        aloft = np.split(carrying(np.concatenate(totals)), ends)
-        return [
-            replace(p, compared=p.compared[x[p.compared]])
-            for p, x in zip(pieces, aloft, strict=True)
-        ]
+                pieces.append((piece, total))
+        least = 0.5 * usual_thrust(np.concatenate([np.empty(0), *(total for _, total in pieces)]))
+        return [replace(p, compared=p.compared[x[p.compared] > least]) for p, x in pieces]
 
     def _compared(self, values: Callable[[_Piece], Array]) -> Array:
         """Return values on the pieces' clocks at the samples compared."""
@@ -280,11 +272,9 @@ class Evidence:
         """
         there, out = [], []
         for x, p in zip(self._driving, self._pieces, strict=True):
-            at = p.compared - np.array(delays)[:, None] / p.period
-            row = np.clip(np.floor(at).astype(int), 0, len(x) - 2)
-            part = (at - row)[..., None]
-            out.append(x[row, :9] * (1.0 - part) + x[row + 1, :9] * part)
-            there.append((at >= 0.0) & (at <= len(x) - 1))
+            at = p.t[p.compared] - np.array(delays)[:, None]
+            out.append(np.stack([resampled(times, p.t, x[:, :9]) for times in at]))
+            there.append((at >= p.t[0]) & (at <= p.t[-1]))
         within, thrusts = np.concatenate(there, axis=1).astype(float), np.concatenate(out, axis=1)
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
@@ -362,14 +352,14 @@ class Evidence:
         mixing = self._mixing if torques else self._mixing[:0]
         mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
         left, horizontal, cost = self._left(mixing, reading, _DELAYS if torques else (0.0,))
-        vertical, *others = max(left.tolist(), key=likelihood)
-        score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
-        return Fit(reading, horizontal, tuple(others), score)
+        least = left[np.argmax(likelihood(left))]
+        score = likelihood([horizontal, horizontal, *least]) - cost - reading.unlikely
+        return Fit(reading, horizontal, tuple(least[1:].tolist()), float(score))
 
     def delay(self) -> float:
         """Return the likeliest delay in s of the motion behind the rotors' columns, as declared."""
-        left = self._left(self._mixing, DECLARED, _DELAYS)[0].tolist()
-        return max(zip(left, _DELAYS, strict=True), key=lambda each: likelihood(each[0]))[1]
+        left = self._left(self._mixing, DECLARED, _DELAYS)[0]
+        return _DELAYS[np.argmax(likelihood(left))]
 
     def _left(
         self, mixing: Array, reading: ColumnReading, delays: tuple[float, ...]

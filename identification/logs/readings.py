@@ -243,24 +243,16 @@ def _each(**aspects: Sequence[Any]) -> list[ColumnReading]:
     ]
 
 
-def _weighed(
-    readings: Sequence[ColumnReading], least: float, world: str = "enu"
-) -> list[ColumnReading]:
-    """Return readings with a penalty of ``least``, and 1 for each less usual convention.
-
-    Args:
-        readings: the readings.
-        least: log-likelihood ratio.
-        world: the usual one.
-    """
+def _weighed(readings: Sequence[ColumnReading], world: str = "enu") -> list[ColumnReading]:
+    """Return readings with a penalty of 1 for each less usual convention; ``world``: the usual."""
     return [
         replace(
             r,
-            unlikely=least
+            unlikely=r.unlikely
             + (r.order != "wxyz")
             + (r.euler == "xyz")
             + (r.pitch_sign < 0)
-            + (r.sense != "body_to_world")
+            + (r.sense != SENSES[0])
             + (r.world != world)
             + r.frames.unusual,
         )
@@ -277,13 +269,15 @@ def log_readings(has_pose: bool) -> list[ColumnReading]:
     others = _each(gyro=GYRO_READINGS)
     if has_pose:
         others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
-        others.append(ColumnReading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
+        others.append(ColumnReading(sense=SENSES[1], frames=_frames(**_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
-    turned = _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
+    others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
     # two departures at once are as unlikely as both
-    both = [replace(r, unlikely=2.0 * OTHER) for r in turned if r.mirrored and r.rotors != ROTORS]
-    others += [r for r in turned if not (r.mirrored and r.rotors != ROTORS)]
-    return [DECLARED, *_weighed(others, OTHER), *both]
+    counts = (1 + (r.mirrored and r.rotors != ROTORS) for r in others)
+    return [
+        DECLARED,
+        *_weighed([replace(r, unlikely=OTHER * n) for r, n in zip(others, counts, strict=True)]),
+    ]
 
 
 def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[ColumnReading]:
@@ -300,10 +294,10 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
         attitudes = {"euler": ("zyx", "xyz"), "unit": units, "pitch_sign": (1, -1)}
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
     readings = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
-    return [
-        replace(r, unlikely=r.unlikely + OTHER * (length in lengths and r.length != length))
-        for r in _weighed(readings, 0.0, hint or "enu")
+    named = [
+        replace(r, unlikely=OTHER * (length in lengths and r.length != length)) for r in readings
     ]
+    return _weighed(named, hint or "enu")
 
 
 def applied(log: FlightLog, reading: ColumnReading) -> FlightLog:

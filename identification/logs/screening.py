@@ -29,7 +29,6 @@ from .flight_log import FlightLog
 from .flight_phases import carrying, flying
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
-from .readings import ColumnReading
 from .streams import MOTOR_RATES
 from .table import Array, Mask, Names, median_step
 
@@ -132,21 +131,35 @@ def screen_log(
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
-    advice: list[tuple[ColumnReading, ...]] = []
-    if by_imu or pose_pieces(log):
-        advice, mends = remedies(excerpt([log])[0], vehicle, by_imu)
-    says = "; or ".join(dict.fromkeys("; then ".join(r.says for r in each) for each in advice))
-    is_late = [reading.late for each in advice for reading in each]
-    if not all(is_late):
-        whose = "gyro contradicts the rotors' torques"
-        whose = whose if by_imu else "motion contradicts the rotor speeds and gravity"
-        unmended = "" if mends else ". No usual convention mends this log; the likeliest is named"
-        hear([Refused(f"{says}. As logged, the {whose}{unmended}")])
+    doubt = convention_doubt(log, vehicle)
+    hear([doubt] if isinstance(doubt, Refused) else [])
     if not by_imu:
         hear(_steps(log))
         hear([] if least_seconds is None else _length(log, vehicle, least_seconds))
-    hear([Fault(says)] if is_late else [])
+    hear([doubt] if doubt else [])
     return log, tuple(notes)
+
+
+def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
+    """Return the contradiction between a log's motion and its rotors, with the advice that leaves a
+    consistent log; empty: none, or nothing to tell from. A delay alone is a ``Fault``, all others
+    are ``Refused``.
+
+    Args:
+        log: the flight.
+        vehicle: as declared; None: four rotors, front-left, rear-left, rear-right, front-right.
+    """
+    by_imu = reads_imu(log)
+    if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
+        return ""
+    advice, mends = remedies(excerpt([log])[0], vehicle, by_imu)
+    says = "; or ".join(dict.fromkeys("; then ".join(r.says for r in each) for each in advice))
+    if all(reading.late for each in advice for reading in each):
+        return Fault(says)
+    whose = "gyro contradicts the rotors' torques"
+    whose = whose if by_imu else "motion contradicts the rotor speeds and gravity"
+    unmended = "" if mends else ". No usual convention mends this log; the likeliest is named"
+    return Refused(f"{says}. As logged, the {whose}{unmended}")
 
 
 def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:

@@ -22,6 +22,7 @@ from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.logs.tables import open_table
+from windwrench.identification.report.log_check import check_log
 
 
 @pytest.mark.parametrize(
@@ -154,3 +155,19 @@ def test_an_advice_leaves_a_consistent_log(change, expected):
     log = read_log(data_file("hard_logs/perfect_model_gusts_10mN.csv.gz"), vehicle=vehicle)
     with refused(expected):
         screen_log(change(log), vehicle)
+
+
+@pytest.mark.parametrize(
+    ("name", "doubt"),
+    [
+        ("px4_mocap_enu_unturned.ulg", "the world is z down"),
+        ("ned_quaternion_swapped.csv.gz", "the body axes are right, forward, up"),
+        ("asctec_plus.csv.gz", ""),
+        ("perfect_model_gusts_30mN.csv.gz", ""),
+    ],
+)
+def test_a_convention_is_checked_without_a_vehicle(name, doubt):
+    doubts = check_log(data_file(f"hard_logs/{name}")).doubts
+    said = [text for text in doubts if "As logged, the motion contradicts" in text]
+    assert len(said) == bool(doubt)
+    assert all(doubt in text for text in said)
