@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.fft import next_fast_len
 
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import (
@@ -63,10 +62,9 @@ _FEWEST = 60  # samples in flight for a decision
 _FORCE_GAIN = (0.6, 1.6)
 _TORQUE_GAIN = (0.4, 2.5)  # and of thrust in commands
 _MOST_THRUST = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
+# s: the motion comes up to 0.22 s behind the rotors' columns on measured flights, by motors, radio
+# and filters on one clock. Then the longest delay searched, and the search's step
 _DELAYS = tuple(0.02 * k for k in range(-5, 13))
-# s, delays of rotors against the motion on one clock: motors, radio and filters make rotors up
-# to 0.22 s early on measured flights. Then the longest delay searched, and the search's step
-_NEAR = (-0.25, 0.1)
 _FAR = 5.0
 _STEP = 0.02
 
@@ -224,7 +222,9 @@ class Evidence:
             total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
             if np.isfinite(total).all():
                 pieces.append((piece, total))
-        least = 0.5 * usual_thrust(np.concatenate([np.empty(0), *(total for _, total in pieces)]))
+        if not pieces:
+            return []
+        least = 0.5 * usual_thrust(np.concatenate([total for _, total in pieces]))
         return [replace(p, compared=p.compared[x[p.compared] > least]) for p, x in pieces]
 
     def _compared(self, values: Callable[[_Piece], Array]) -> Array:
@@ -349,17 +349,35 @@ class Evidence:
 
     def fit(self, reading: ColumnReading, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
-        mixing = self._mixing if torques else self._mixing[:0]
-        mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
-        left, horizontal, cost = self._left(mixing, reading, _DELAYS if torques else (0.0,))
-        least = left[np.argmax(likelihood(left))]
-        score = likelihood([horizontal, horizontal, *least]) - cost - reading.unlikely
-        return Fit(reading, horizontal, tuple(least[1:].tolist()), float(score))
+        if torques:
+            return self._fit(reading, self._mixing, _DELAYS)[0]
+        return self._fit(reading, self._mixing[:0], (0.0,))[0]
 
     def delay(self) -> float:
         """Return the likeliest delay in s of the motion behind the rotors' columns, as declared."""
-        left = self._left(self._mixing, DECLARED, _DELAYS)[0]
-        return _DELAYS[np.argmax(likelihood(left))]
+        return self._fit(DECLARED, self._mixing, _DELAYS)[1]
+
+    def late(self) -> Fit:
+        """Return the fit of the columns as declared at the likeliest delay of the rotors beyond a
+        flight loop's own.
+        """
+        far = np.arange(-_FAR, _FAR, _STEP)
+        parts = np.array_split(far[(far < _DELAYS[0]) | (far > _DELAYS[-1] + _STEP)], 20)
+        reading = ColumnReading(unlikely=OFFSET)
+        fits = (self._fit(reading, self._mixing, tuple(part.tolist())) for part in parts)
+        fit, delay = max(fits, key=lambda each: each[0].score)
+        return replace(fit, reading=replace(reading, late=-delay))
+
+    def _fit(
+        self, reading: ColumnReading, mixing: Array, delays: tuple[float, ...]
+    ) -> tuple[Fit, float]:
+        """Return the fit of a reading at the likeliest delay in s, and the delay."""
+        mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
+        left, horizontal, cost = self._left(mixing, reading, delays)
+        best = np.argmax(likelihood(left))
+        score = likelihood([horizontal, horizontal, *left[best]]) - cost - reading.unlikely
+        torques = tuple(left[best, 1:].tolist())
+        return Fit(reading, horizontal, torques, float(score)), delays[best]
 
     def _left(
         self, mixing: Array, reading: ColumnReading, delays: tuple[float, ...]
@@ -384,41 +402,6 @@ class Evidence:
         )
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
         return left, horizontal, cost
-
-    def late(self) -> float:
-        """Return the delay in s of the rotors' columns against the motion, as declared; 0: none, or
-        unknown.
-
-        In the band of turning the force along the thrust axis follows the thrust, and angular
-        acceleration the torques. Their signs are correlated over all lags: one landing outweighs a
-        flight otherwise. The variance of a chance correlation is by Bartlett's formula.
-        """
-        mixing = np.vstack([self._k, self._mixing])
-        sums, chance = np.zeros(1), np.full(len(mixing), 1e-300)
-        for p, (matrices, w) in zip(self._pieces, self._turned(DECLARED), strict=True):
-            if self._along is None:
-                force = self._second(p) + np.array([0.0, 0.0, _G])
-                along = np.sum(force * matrices[:, :, 2], axis=1)
-            else:
-                along = p.even(self._t, self._along[:, None])[:, 0]
-            turn = derivative(w, p.period) @ self._inertia + np.cross(w, w @ self._inertia)
-            needed = np.column_stack([along, turn])[:, : len(mixing)]
-            both = p.even(self._t, self._thrusts) @ mixing.T, needed
-            thin = max(1, round(_STEP / p.period))
-            most = round(_FAR / (thin * p.period))
-            signs = [np.sign(p.band(x, slice(None, None, thin))[:, 0]) for x in both]
-            length = next_fast_len(len(signs[0]) + most, real=True)
-            given, needed = (np.fft.rfft(x, length, axis=0) for x in signs)
-            products = np.fft.irfft(given * needed.conj(), length, axis=0)
-            sums = sums + products[np.arange(-most, most + 1)]
-            chance += np.sum(np.square(products), axis=0) / len(signs[0])
-            lags = thin * p.period * np.arange(-most, most + 1)
-        squares = 0.5 * np.square(sums) / chance
-        follows = np.sum(squares * (sums > 0.0), axis=1)
-        is_near = (lags >= _NEAR[0]) & (lags <= _NEAR[1])
-        best = np.argmax(np.where(is_near, 0.0, follows))
-        lead = follows[best] - np.max(np.sum(squares, axis=1)[is_near])
-        return float(lags[best]) if lead > OFFSET else 0.0
 
     def turns(self, reading: ColumnReading) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
@@ -478,14 +461,10 @@ class RankedFits:
 
 
 def _as_logged(evidence: Evidence) -> RankedFits:
-    """Return the ranking of the readings of the kit's own columns; a delay of the rotors comes
-    before all others.
-    """
+    """Return the ranking of the readings of the kit's own columns, and of a delay of the rotors."""
     ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
-    if evidence.enough and (late := evidence.late()):
-        fit = Fit(ColumnReading(late=late, unlikely=OFFSET), 0.0, (0.0,), np.inf)
-        return RankedFits([fit, *ranking.ranked])
-    return ranking
+    fits = [*ranking.ranked, *([evidence.late()] if evidence.enough else [])]
+    return RankedFits(sorted(fits, key=lambda fit: fit.score, reverse=True))
 
 
 def departures(evidence: Evidence) -> list[ColumnReading]:
@@ -496,7 +475,7 @@ def departures(evidence: Evidence) -> list[ColumnReading]:
     best, left, most = ranking.best, ranking.fit.torque, GOOD_TORQUE
     if evidence.has_pose and best.moves != DECLARED.moves:  # forces tell, not torques
         left, most = ranking.fit.horizontal, GOOD
-    if best is DECLARED or left > most:
+    if best is DECLARED or (left > most and not best.late):
         return []
     least = ranking.fit.score - _CERTAIN_LEAD
     readings = [fit.reading for fit in ranking.ranked if fit.score >= least]
