@@ -18,6 +18,7 @@ likeliest reading is taken, after a penalty on unusual ones.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -35,11 +36,11 @@ from ..motion.smoothing import (
 )
 from .flight_log import FlightLog
 from .flight_phases import usual_thrust
-from .log_map import UNITS
+from .log_map import UNITS, Attitude
 from .readings import (
     DECLARED,
     OFFSET,
-    ColumnReading,
+    Convention,
     applied,
     as_written,
     log_readings,
@@ -107,7 +108,7 @@ def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
 class Fit:
     """Unexplained shares of variance by a reading, and its score."""
 
-    reading: Any  # a ColumnReading, or a SensorReading
+    reading: Any  # a Convention, or a SensorReading
     horizontal: float  # share of the horizontal specific force, or of the sensor's vector
     torques: tuple[float, ...]  # shares about x, y and, with a vehicle, z
     score: float  # log-likelihood less the penalty on an unusual reading
@@ -279,13 +280,13 @@ class Evidence:
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
-    def _turned(self, reading: ColumnReading) -> Iterator[ArrayPair]:
+    def _turned(self, attitude: Attitude) -> Iterator[ArrayPair]:
         """Yield each piece's rotations (m, 3, 3), zero without an attitude, and angular velocity
-        (m, 3), by a reading.
+        (m, 3), by a convention of the attitude.
         """
         quaternion = None
         if self._attitude is not None:
-            good, rotation = as_written(self._attitude, reading)
+            good, rotation = as_written(self._attitude, attitude)
             quaternion = np.full((len(good), 4), np.nan)
             quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
         for p in self._pieces:
@@ -297,13 +298,13 @@ class Evidence:
                 q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
                 yield turning(q, p.period)
 
-    def _moving(self, *attitude: Any) -> ArrayPair:
-        """Return thrust and turns by one reading of the attitude. Thrust is specific, times the
+    def _moving(self, attitude: Attitude) -> ArrayPair:
+        """Return thrust and turns by one convention of the attitude. Thrust is specific, times the
         body's axes (n, 3, 3), in m/s2, in the world. Turns in two bands (n, 2, 15) are angular
         velocity, angular acceleration and products of the angular velocity.
         """
         axes, turns = [], []
-        turned = self._turned(ColumnReading(*attitude))
+        turned = self._turned(attitude)
         for p, thrusts, (matrices, w) in zip(self._pieces, self._driving, turned, strict=True):
             axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
             products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
@@ -311,7 +312,7 @@ class Evidence:
             turns.append(p.band(columns, p.compared))
         return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turns)
 
-    def _needed(self, along: Array, reading: ColumnReading) -> Array:
+    def _needed(self, along: Array, reading: Convention) -> Array:
         """Return the force ``along`` the thrust axis (n,) above the torques in Nm of the motion, in
         the band of turning (4, n), less their means. Without a vehicle, angular accelerations stand
         for torques.
@@ -321,7 +322,7 @@ class Evidence:
         turn = reading.gyro.turn @ body.T * np.linalg.det(body)
         driven = self._inertia @ turn
         products = np.cross(turn[:, None, :], driven[:, :, None], axis=0).reshape(3, 9)
-        each, columns = np.hstack([driven, products]), self._motion(*reading.attitude)[1][..., 3:]
+        each, columns = np.hstack([driven, products]), self._motion(reading.attitude)[1][..., 3:]
         needed = np.vstack([along, each[:2] @ columns[:, 0].T, each[2] @ columns[:, 1].T])
         needed -= needed.mean(axis=1, keepdims=True)
         return needed
@@ -330,12 +331,12 @@ class Evidence:
         """Return the terms of a reading without rotors. They are the unexplained share of the
         horizontal force, the penalty on the flight's place (log-likelihood ratio), and ``_needed``.
         """
-        reading = ColumnReading(*moves)
+        reading = Convention(*moves)
         if self._attitude is None:
             force = np.zeros(len(self._t)) if self._along is None else self._along
             felt = self._compared(lambda p: p.slow(p.even(self._t, force[:, None])))
             return 0.0, 0.0, self._needed(felt[:, 0], reading)
-        frames, axes = reading.frames, self._motion(*reading.attitude)[0]
+        frames, axes = reading.frames, self._motion(reading.attitude)[0]
         push = axes @ frames.body[:, 2] @ frames.world.T
         force = self._acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
@@ -347,7 +348,7 @@ class Evidence:
         left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
         return float(left), float(cost), self._needed(along, reading)
 
-    def fit(self, reading: ColumnReading, torques: bool = True) -> Fit:
+    def fit(self, reading: Convention, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
         if torques:
             return self._fit(reading, self._mixing, _DELAYS)[0]
@@ -363,13 +364,13 @@ class Evidence:
         """
         far = np.arange(-_FAR, _FAR, _STEP)
         parts = np.array_split(far[(far < _DELAYS[0]) | (far > _DELAYS[-1] + _STEP)], 20)
-        reading = ColumnReading(unlikely=OFFSET)
+        reading = Convention(unlikely=OFFSET)
         fits = (self._fit(reading, self._mixing, tuple(part.tolist())) for part in parts)
         fit, delay = max(fits, key=lambda each: each[0].score)
         return replace(fit, reading=replace(reading, late=-delay))
 
     def _fit(
-        self, reading: ColumnReading, mixing: Array, delays: tuple[float, ...]
+        self, reading: Convention, mixing: Array, delays: tuple[float, ...]
     ) -> tuple[Fit, float]:
         """Return the fit of a reading at the likeliest delay in s, and the delay."""
         mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
@@ -380,7 +381,7 @@ class Evidence:
         return Fit(reading, horizontal, torques, float(score)), delays[best]
 
     def _left(
-        self, mixing: Array, reading: ColumnReading, delays: tuple[float, ...]
+        self, mixing: Array, reading: Convention, delays: tuple[float, ...]
     ) -> tuple[Array, float, float]:
         """Return the shares (d, 1 + torques) of vertical force and torques left at each delay of
         the rotors, and the horizontal share and the penalty on the flight's place.
@@ -403,9 +404,9 @@ class Evidence:
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
         return left, horizontal, cost
 
-    def turns(self, reading: ColumnReading) -> float:
+    def turns(self, reading: Convention) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
-        rates = self._motion(*reading.attitude)[1][:, 0, :2]
+        rates = self._motion(reading.attitude)[1][:, 0, :2]
         return float(np.sqrt(np.mean(np.square(rates))))
 
 
@@ -418,7 +419,7 @@ class RankedFits:
 
     @classmethod
     def of(
-        cls, evidence: Evidence, readings: Sequence[ColumnReading], torques: bool = True
+        cls, evidence: Evidence, readings: Sequence[Convention], torques: bool = True
     ) -> "RankedFits":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
         fits = (
@@ -442,8 +443,9 @@ class RankedFits:
         the next. The ratio is 0 where the flight tells nothing, infinite without another value.
         """
         tells = self.fit.horizontal <= GOOD
+        value_of = attrgetter(name)
         for fit in self.ranked:
-            if (value := getattr(fit.reading, name)) != getattr(self.best, name):
+            if (value := value_of(fit.reading)) != value_of(self.best):
                 return value, self.fit.score - fit.score if tells else 0.0
         return None, np.inf if tells else 0.0
 
@@ -451,13 +453,25 @@ class RankedFits:
         """Return whether every other value of properties explains the flight clearly less."""
         return all(self.other(name)[1] >= _CERTAIN_LEAD for name in names)
 
+    def departures(self, by_imu: bool) -> list[Convention]:
+        """Return the readings of a log that explain it better than its declaration; ``by_imu``: the
+        motion is the gyro's.
+        """
+        best, left, most = self.best, self.fit.torque, GOOD_TORQUE
+        if not by_imu and best.moves != DECLARED.moves:  # forces tell, not torques
+            left, most = self.fit.horizontal, GOOD
+        if best is DECLARED or (left > most and not best.late):
+            return []
+        alike = (fit.reading for fit in self.ranked if fit.score >= self.fit.score - _CERTAIN_LEAD)
+        return [reading for reading in alike if reading is not DECLARED]
+
     def says(self, name: str) -> tuple[Any, bool, str]:
         """Return the best value of a property, whether it is certain, and why."""
         other, lead = self.other(name)
         why = f"{self.fit.horizontal:.0%} of the {self.left}"
         if other is not None and lead > 0.0:
             why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
-        return getattr(self.best, name), self.certain(name), why
+        return attrgetter(name)(self.best), self.certain(name), why
 
 
 def _as_logged(evidence: Evidence) -> RankedFits:
@@ -467,22 +481,14 @@ def _as_logged(evidence: Evidence) -> RankedFits:
     return RankedFits(sorted(fits, key=lambda fit: fit.score, reverse=True))
 
 
-def departures(evidence: Evidence) -> list[ColumnReading]:
+def departures(evidence: Evidence) -> list[Convention]:
     """Return the readings that explain a log better than its declaration: none, one, or several
     equally good.
     """
-    ranking = _as_logged(evidence)
-    best, left, most = ranking.best, ranking.fit.torque, GOOD_TORQUE
-    if evidence.has_pose and best.moves != DECLARED.moves:  # forces tell, not torques
-        left, most = ranking.fit.horizontal, GOOD
-    if best is DECLARED or (left > most and not best.late):
-        return []
-    least = ranking.fit.score - _CERTAIN_LEAD
-    readings = [fit.reading for fit in ranking.ranked if fit.score >= least]
-    return [reading for reading in readings if reading is not DECLARED]
+    return _as_logged(evidence).departures(not evidence.has_pose)
 
 
-Advice = tuple[ColumnReading, ...]  # taken in turn
+Advice = tuple[Convention, ...]  # taken in turn
 
 
 def remedies(
@@ -497,24 +503,22 @@ def remedies(
         by_imu: the motion is the gyro's and the accelerometer's, else the pose's.
     """
 
-    def mended(*advice: ColumnReading) -> Evidence:
-        other, spins = log, vehicle
-        for reading in advice:
-            other = applied(other, reading)
-            if spins is not None and reading.mirrored:
-                spins = replace(spins, spin=-spins.spin)
-        return Evidence.of_log(other, spins, by_imu)
+    def ranked(*advice: Convention) -> RankedFits:
+        spins = vehicle
+        if vehicle is not None and sum(reading.mirrored for reading in advice) % 2:
+            spins = replace(vehicle, spin=-vehicle.spin)
+        return _as_logged(Evidence.of_log(applied(log, advice), spins, by_imu))
 
-    after = {reading: _as_logged(mended(reading)) for reading in departures(mended())[:3]}
-    whole: list[Advice] = [(one,) for one, ranking in after.items() if ranking.best is DECLARED]
-    if whole or not after:
+    first = ranked()
+    likely = first.departures(by_imu)[:3]
+    whole: list[Advice] = [(one,) for one in likely if ranked(one).best is DECLARED]
+    if whole or not likely:
         return whole, True
-    joint: list[tuple[float, bool, Advice]] = []
-    for fit in _as_logged(mended()).ranked[:_TRIED]:
-        second = _as_logged(mended(fit.reading)).best
-        both = tuple(one for one in (fit.reading, second) if one is not DECLARED)
-        end = _as_logged(mended(*both))
-        score = end.fit.score - sum(reading.unlikely for reading in both)
-        joint.append((score, end.best is DECLARED, both))
-    score, is_whole, both = max(joint, key=lambda each: (each[1], each[0]))
+    joint: list[tuple[bool, float, Advice]] = []
+    for fit in first.ranked[:_TRIED]:
+        both = tuple(r for r in (fit.reading, ranked(fit.reading).best) if r is not DECLARED)
+        end = ranked(*both)
+        unlikely = sum(reading.unlikely for reading in both)
+        joint.append((end.best is DECLARED, end.fit.score - unlikely, both))
+    is_whole, _, both = max(joint, key=lambda each: each[:2])
     return [both], is_whole

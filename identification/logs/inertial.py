@@ -32,6 +32,7 @@ from .readings import (
     GYRO_READINGS,
     OTHER,
     SensorReading,
+    advice_words,
     applied,
 )
 from .table import Array, Data, Mask, NamedArrays, Names, Pair, Rows, finite_rows
@@ -71,22 +72,15 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
     """
     gravity = 9.81 if vehicle is None else vehicle.gravity
     checked, notes = _agreeing(log, gravity)
-    if _sensors(checked) == _sensors(log) or not log.has_rotor_speeds:
+    if not (notes and log.has_pose and log.has_rotor_speeds):
         return checked, notes
     advice, is_whole = remedies(excerpt([log])[0], vehicle)
     for readings in advice if is_whole else ():
-        other = log
-        for reading in readings:
-            other = applied(other, reading)
-        agrees = _sensors(_agreeing(other, gravity)[0]) == _sensors(log)
-        if agrees and any(reading.moves != DECLARED.moves for reading in readings):
-            says = "; then ".join(reading.says for reading in readings)
-            return log, (f"the pose contradicts the inertial sensors and the rotors: {says}",)
+        is_pose = any(reading.moves != DECLARED.moves for reading in readings)
+        if is_pose and not _agreeing(applied(log, readings), gravity)[1]:
+            wrong = "the pose contradicts the inertial sensors and the rotors"
+            return log, (f"{wrong}: {advice_words(readings)}",)
     return checked, notes
-
-
-def _sensors(log: FlightLog) -> tuple[bool, bool]:
-    return log.gyro is not None, log.accelerometer is not None
 
 
 def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:

@@ -96,40 +96,31 @@ GYRO_READINGS = tuple(_sensor(**stated) for stated in _STATED["gyro"])
 ACCELEROMETER_READINGS = tuple(_sensor(**stated) for stated in _STATED["accelerometer"])
 
 
-@dataclass(frozen=True, eq=False)
-class ColumnReading:
-    """One way to read a flight's columns."""
+AS_WRITTEN = Attitude(())  # without columns
 
-    order: str = "wxyz"  # of a quaternion's columns
-    euler: str = ""  # order of turns of angles about x, y, z; empty: a quaternion
-    unit: str = "rad"  # of the angles
-    pitch_sign: int = 1  # of the angle about y
-    sense: str = "body_to_world"
+
+@dataclass(frozen=True, eq=False)
+class Convention:
+    """One way to read a flight's columns: frames, units, order, sense, clock and sensors."""
+
+    attitude: Attitude = AS_WRITTEN
     frames: Frames = PLAIN
     length: str = "m"  # unit of the position
     gyro: SensorReading = AS_DECLARED
     rotors: Order = ROTORS  # the kit's rotor, from 1, in each column
     mirrored: bool = False  # rotors turn against the declared spin
     late: float = 0.0  # s, delay of the rotors' columns against the motion
-    unlikely: float = 0.0  # log-likelihood ratio against an unusual reading
+    unlikely: float = 0.0  # log-likelihood ratio against an unusual convention
 
     @property
-    def attitude(self) -> tuple[Any, ...]:
-        """The fields for rotations: the first five."""
-        return self.order, self.euler, self.unit, self.pitch_sign, self.sense
-
-    def part(self, columns: Names = ()) -> Attitude:
-        """Return the map's section for an attitude in some columns."""
-        signs = (1, self.pitch_sign, 1) if self.pitch_sign < 0 else ()
-        unit = self.unit if self.euler else ""
-        return Attitude(
-            columns, unit, signs=signs, order=self.order, euler=self.euler, sense=self.sense
-        )
+    def moves(self) -> tuple[Attitude, Frames, str, SensorReading]:
+        """The fields for motion: the first four."""
+        return self.attitude, self.frames, self.length, self.gyro
 
     @property
-    def moves(self) -> tuple[Any, ...]:
-        """The fields for motion: the first eight."""
-        return *self.attitude, self.frames, self.length, self.gyro
+    def pitch_sign(self) -> int:
+        """Sign of the angle about y."""
+        return -1 if self.attitude.signs else 1
 
     @property
     def world(self) -> str:
@@ -190,8 +181,9 @@ class ColumnReading:
             "xyzw": "the quaternion is scalar last",
             "zwxy": "the quaternion is scalar first under the headers of scalar last",
         }
-        sense = "world to body" if self.order in orders else "the quaternion is world to body"
-        facts = [orders.get(self.order, ""), sense if self.sense != SENSES[0] else ""]
+        order, is_inverse = self.attitude.order, self.attitude.sense != SENSES[0]
+        sense = "world to body" if order in orders else "the quaternion is world to body"
+        facts = [orders.get(order, ""), sense if is_inverse else ""]
         facts = [fact for fact in (*facts, self.frames.fact) if fact]
         if not facts:
             return []
@@ -217,42 +209,41 @@ def _combined(matrix: Array, columns: Names) -> str:
     return f"({', '.join(rows)})"
 
 
-def _quaternion(reading: ColumnReading) -> str:
+def _quaternion(reading: Convention) -> str:
     """Return in words the kit's quaternion of the columns qw, qx, qy, qz."""
     frames = reading.frames
     mirror = np.linalg.det(frames.world)  # the body's too: a mirrored rotation is one again
     world, body = (Rotation.from_matrix(mirror * turn) for turn in (frames.world, frames.body))
-    columns = as_written(np.eye(4), reading)[1]
+    columns = as_written(np.eye(4), reading.attitude)[1]
     made = (world * columns * body).as_quat(scalar_first=True).T
     first = made[0][np.abs(made[0]) > 0.1][0]
     text = _combined(made * np.sign(first), _QUATERNION)
     return text if abs(first) > 0.9 else f"0.7071 {text}"
 
 
-DECLARED = ColumnReading()
+DECLARED = Convention()
 # penalties in log-likelihood ratios: the declared reading is right far more often, and there are
 # some 60 different time offsets
 OTHER, OFFSET = 8.0, 12.0
 
 
-def _each(**aspects: Sequence[Any]) -> list[ColumnReading]:
+def _each(**aspects: Sequence[Any]) -> list[Convention]:
     """Return the readings of all combinations of aspects."""
     return [
-        ColumnReading(**dict(zip(aspects, each, strict=True)))
-        for each in product(*aspects.values())
+        Convention(**dict(zip(aspects, each, strict=True))) for each in product(*aspects.values())
     ]
 
 
-def _weighed(readings: Sequence[ColumnReading], world: str = "enu") -> list[ColumnReading]:
+def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convention]:
     """Return readings with a penalty of 1 for each less usual convention; ``world``: the usual."""
     return [
         replace(
             r,
             unlikely=r.unlikely
-            + (r.order != "wxyz")
-            + (r.euler == "xyz")
+            + (r.attitude.order != "wxyz")
+            + (r.attitude.euler == "xyz")
             + (r.pitch_sign < 0)
-            + (r.sense != SENSES[0])
+            + (r.attitude.sense != SENSES[0])
             + (r.world != world)
             + r.frames.unusual,
         )
@@ -260,7 +251,7 @@ def _weighed(readings: Sequence[ColumnReading], world: str = "enu") -> list[Colu
     ]
 
 
-def log_readings(has_pose: bool) -> list[ColumnReading]:
+def log_readings(has_pose: bool) -> list[Convention]:
     """Return the readings of the kit's own columns, the one as declared first.
 
     Args:
@@ -268,8 +259,10 @@ def log_readings(has_pose: bool) -> list[ColumnReading]:
     """
     others = _each(gyro=GYRO_READINGS)
     if has_pose:
-        others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
-        others.append(ColumnReading(sense=SENSES[1], frames=_frames(**_STATED["mirrored"])))
+        orders = product(("wxyz", "xyzw", "zwxy"), SENSES)
+        attitudes = [Attitude((), order=order, sense=sense) for order, sense in orders]
+        others = _each(attitude=attitudes, frames=_USUAL_FRAMES)[1:]
+        others.append(Convention(attitudes[1], _frames(**_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
     others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
     # two departures at once are as unlikely as both
@@ -280,7 +273,7 @@ def log_readings(has_pose: bool) -> list[ColumnReading]:
     ]
 
 
-def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[ColumnReading]:
+def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[Convention]:
     """Return the readings of a table's pose within a map's words.
 
     Args:
@@ -289,19 +282,36 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
         length: unit of the position by the columns' names; others have a penalty.
         hint: the world by the columns' names; empty: none.
     """
-    attitudes: dict[str, Sequence[Any]] = {"order": orders}
+    attitudes = [Attitude((), order=order, sense=sense) for order, sense in product(orders, SENSES)]
     if not orders:
-        attitudes = {"euler": ("zyx", "xyz"), "unit": units, "pitch_sign": (1, -1)}
+        angles = product(("zyx", "xyz"), units, ((), (1, -1, 1)), SENSES)
+        attitudes = [
+            Attitude((), unit, signs=signs, euler=euler, sense=sense)
+            for euler, unit, signs, sense in angles
+        ]
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    readings = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
+    readings = _each(attitude=attitudes, frames=MAP_FRAMES, length=lengths)
     named = [
         replace(r, unlikely=OTHER * (length in lengths and r.length != length)) for r in readings
     ]
     return _weighed(named, hint or "enu")
 
 
-def applied(log: FlightLog, reading: ColumnReading) -> FlightLog:
-    """Return a log with the advice of a reading taken; the vehicle's spin is no part of a log."""
+def applied(log: FlightLog, advice: Sequence[Convention]) -> FlightLog:
+    """Return a log with the advice of some readings taken in turn; the vehicle's spin is no part of
+    a log.
+    """
+    for reading in advice:
+        log = _applied(log, reading)
+    return log
+
+
+def advice_words(advice: Sequence[Convention]) -> str:
+    """Return the sentences of some readings, to be taken in turn."""
+    return "; then ".join(reading.says for reading in advice)
+
+
+def _applied(log: FlightLog, reading: Convention) -> FlightLog:
     speeds, parts = np.empty_like(log.rotor_speeds), Data()
     speeds[:, np.subtract(reading.rotors, 1)] = log.rotor_speeds
     if reading.late:
@@ -318,21 +328,20 @@ def applied(log: FlightLog, reading: ColumnReading) -> FlightLog:
     return replace(log, rotor_speeds=speeds, **parts)
 
 
-def rotations(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:
+def rotations(columns: Array, reading: Convention) -> tuple[Mask, Rotation]:
     """Return the rows (N,) with an attitude, and their rotations by a reading, body to world in the
     kit's frames.
     """
-    good, rotation = as_written(columns, reading)
+    good, rotation = as_written(columns, reading.attitude)
     frames = reading.frames
     return good, Rotation.from_matrix(frames.world @ rotation.as_matrix() @ frames.body)
 
 
-def as_written(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:
+def as_written(columns: Array, attitude: Attitude) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
-    part = reading.part()
     good = finite_rows(columns)
-    if not reading.euler:
+    if not attitude.euler:
         good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
-    turns = quaternions(part, scaled(part, columns[good]))
+    turns = quaternions(attitude, scaled(attitude, columns[good]))
     rotation = Rotation.from_quat(turns, scalar_first=True)
-    return good, rotation if reading.sense == "body_to_world" else rotation.inv()
+    return good, rotation if attitude.sense == SENSES[0] else rotation.inv()

@@ -14,7 +14,6 @@ rate and even steps as evidence; an estimate does not.
 
 from collections.abc import Iterable
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
@@ -28,7 +27,8 @@ from .excerpt import excerpt
 from .flight_log import FlightLog
 from .flight_phases import carrying, flying
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
-from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
+from .magnitudes import MAGNITUDES, equal_motors, rotor_doubt, thrust_by_weight, time_doubt, within
+from .readings import advice_words
 from .streams import MOTOR_RATES
 from .table import Array, Mask, Names, median_step
 
@@ -153,7 +153,7 @@ def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
     if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
         return ""
     advice, mends = remedies(excerpt([log])[0], vehicle, by_imu)
-    says = "; or ".join(dict.fromkeys("; then ".join(r.says for r in each) for each in advice))
+    says = "; or ".join(dict.fromkeys(map(advice_words, advice)))
     if all(reading.late for each in advice for reading in each):
         return Fault(says)
     whose = "gyro contradicts the rotors' torques"
@@ -382,17 +382,10 @@ def stuck_channels(log: FlightLog, vehicle: Vehicle) -> Findings:
         others = np.delete(place, i, axis=1), "the other coordinates"
         yield from _still(f"p{axis}", log.t[seen], flown, place[:, [i]], *others)
     yield from _still("the attitude", log.t[seen], flown, turn, place, "the coordinates")
-    # in every row; a flight in one plane without noise has two such pairs
-    alike = [
-        (i + 1, j + 1)
-        for i, j in combinations(range(4), 2)
-        if np.count_nonzero(np.diff(rotors[:, i])) >= _SISTERS_CHANGE
-        and np.array_equal(rotors[:, i], rotors[:, j])
-    ]
-    if len(alike) == 1:
+    if alike := equal_motors(rotors):
         yield Note(
             "warning: the columns omega{} and omega{} are the same in every row: if one is written "
-            "under both names, force and torque are wrong".format(*alike[0])
+            "under both names, force and torque are wrong".format(*alike)
         )
 
 
