@@ -15,15 +15,14 @@ flight counts for few independent samples ``n``. A hover tells nothing: all shar
 likeliest reading is taken, after a penalty on unusual ones.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.fft import next_fast_len
 
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import (
@@ -36,9 +35,16 @@ from ..motion.smoothing import (
     unbroken,
 )
 from .flight_log import FlightLog
-from .flight_phases import carrying
-from .log_map import UNITS
-from .readings import DECLARED, OFFSET, ColumnReading, as_written, log_readings
+from .flight_phases import usual_thrust
+from .log_map import UNITS, Attitude
+from .readings import (
+    DECLARED,
+    OFFSET,
+    Convention,
+    applied,
+    as_written,
+    log_readings,
+)
 from .table import Array, ArrayPair, Rows, finite_rows, median_step
 
 # Filters, and when a reading is certain.
@@ -57,10 +63,9 @@ _FEWEST = 60  # samples in flight for a decision
 _FORCE_GAIN = (0.6, 1.6)
 _TORQUE_GAIN = (0.4, 2.5)  # and of thrust in commands
 _MOST_THRUST = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
+# s: the motion comes up to 0.22 s behind the rotors' columns on measured flights, by motors, radio
+# and filters on one clock. Then the longest delay searched, and the search's step
 _DELAYS = tuple(0.02 * k for k in range(-5, 13))
-# s, delays of rotors against the motion on one clock: motors, radio and filters make rotors up
-# to 0.22 s early on measured flights. Then the longest delay searched, and the search's step
-_NEAR = (-0.25, 0.1)
 _FAR = 5.0
 _STEP = 0.02
 
@@ -75,15 +80,18 @@ _CERTAIN_LEAD = 3.4  # log-likelihood ratio over the next best: 30 to 1
 # rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
 # answer disturbances more than they turn the body, and the mirrored order may explain more
 TURNING_RATE = 0.06
+_TRIED = 6  # readings, each with a second one behind
 _G = 9.81
 # roll and pitch of rotors 1 to 4, whatever the vehicle
 SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
 
 
-def likelihood(left: Sequence[float]) -> float:
-    """Return the log-likelihood, up to a constant, of shares of one component each."""
-    bounded = (min(max(x, _LEAST_SHARE), _MOST_SHARE) for x in left)
-    return -0.5 * _SAMPLES * sum(map(math.log, bounded))
+def likelihood(left: ArrayLike) -> Array:
+    """Return the log-likelihoods (...), up to a constant, of shares (..., k) of one component
+    each.
+    """
+    bounded = np.clip(left, _LEAST_SHARE, _MOST_SHARE)
+    return np.asarray(-0.5 * _SAMPLES * np.log(bounded).sum(axis=-1))
 
 
 def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
@@ -100,7 +108,7 @@ def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
 class Fit:
     """Unexplained shares of variance by a reading, and its score."""
 
-    reading: Any  # a ColumnReading, or a SensorReading
+    reading: Any  # a Convention, or a SensorReading
     horizontal: float  # share of the horizontal specific force, or of the sensor's vector
     torques: tuple[float, ...]  # shares about x, y and, with a vehicle, z
     score: float  # log-likelihood less the penalty on an unusual reading
@@ -207,25 +215,18 @@ class Evidence:
         period = max(step, _PERIOD)
         count = len(rows) * step * _RATE_HZ
         every = np.ceil(count / _MOST) / (_RATE_HZ * period)
-        pieces, totals = [], []
-        gap = max(_GAP, 3.5 * step)
-        for part in unbroken(self._t, rows, gap, 8, _SHORTEST):
+        edge, every = round(_EDGE / period), max(1, round(every))
+        pieces = []
+        for part in unbroken(self._t, rows, max(_GAP, 3.5 * step), 8, _SHORTEST):
             t = np.arange(self._t[part[0]], self._t[part[-1]], period)
-            edge = round(_EDGE / period)
-            compared = np.arange(edge, len(t) - edge, max(1, round(every)))
-            piece = _Piece(part, t, period, compared)
+            piece = _Piece(part, t, period, np.arange(edge, len(t) - edge, every))
             total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
             if np.isfinite(total).all():
-                pieces.append(piece)
-                totals.append(total)
+                pieces.append((piece, total))
         if not pieces:
             return []
-        ends = np.cumsum([len(x) for x in totals])[:-1]
-        aloft = np.split(carrying(np.concatenate(totals)), ends)
-        return [
-            replace(p, compared=p.compared[x[p.compared]])
-            for p, x in zip(pieces, aloft, strict=True)
-        ]
+        least = 0.5 * usual_thrust(np.concatenate([total for _, total in pieces]))
+        return [replace(p, compared=p.compared[x[p.compared] > least]) for p, x in pieces]
 
     def _compared(self, values: Callable[[_Piece], Array]) -> Array:
         """Return values on the pieces' clocks at the samples compared."""
@@ -272,22 +273,20 @@ class Evidence:
         """
         there, out = [], []
         for x, p in zip(self._driving, self._pieces, strict=True):
-            at = p.compared - np.array(delays)[:, None] / p.period
-            row = np.clip(np.floor(at).astype(int), 0, len(x) - 2)
-            part = (at - row)[..., None]
-            out.append(x[row, :9] * (1.0 - part) + x[row + 1, :9] * part)
-            there.append((at >= 0.0) & (at <= len(x) - 1))
+            at = p.t[p.compared] - np.array(delays)[:, None]
+            out.append(np.stack([resampled(times, p.t, x[:, :9]) for times in at]))
+            there.append((at >= p.t[0]) & (at <= p.t[-1]))
         within, thrusts = np.concatenate(there, axis=1).astype(float), np.concatenate(out, axis=1)
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
-    def _turned(self, reading: ColumnReading) -> Iterator[ArrayPair]:
+    def _turned(self, attitude: Attitude) -> Iterator[ArrayPair]:
         """Yield each piece's rotations (m, 3, 3), zero without an attitude, and angular velocity
-        (m, 3), by a reading.
+        (m, 3), by a convention of the attitude.
         """
         quaternion = None
         if self._attitude is not None:
-            good, rotation = as_written(self._attitude, reading)
+            good, rotation = as_written(self._attitude, attitude)
             quaternion = np.full((len(good), 4), np.nan)
             quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
         for p in self._pieces:
@@ -299,13 +298,13 @@ class Evidence:
                 q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
                 yield turning(q, p.period)
 
-    def _moving(self, *attitude: Any) -> ArrayPair:
-        """Return thrust and turns by one reading of the attitude. Thrust is specific, times the
+    def _moving(self, attitude: Attitude) -> ArrayPair:
+        """Return thrust and turns by one convention of the attitude. Thrust is specific, times the
         body's axes (n, 3, 3), in m/s2, in the world. Turns in two bands (n, 2, 15) are angular
         velocity, angular acceleration and products of the angular velocity.
         """
         axes, turns = [], []
-        turned = self._turned(ColumnReading(*attitude))
+        turned = self._turned(attitude)
         for p, thrusts, (matrices, w) in zip(self._pieces, self._driving, turned, strict=True):
             axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
             products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
@@ -313,7 +312,7 @@ class Evidence:
             turns.append(p.band(columns, p.compared))
         return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turns)
 
-    def _needed(self, along: Array, reading: ColumnReading) -> Array:
+    def _needed(self, along: Array, reading: Convention) -> Array:
         """Return the force ``along`` the thrust axis (n,) above the torques in Nm of the motion, in
         the band of turning (4, n), less their means. Without a vehicle, angular accelerations stand
         for torques.
@@ -323,7 +322,7 @@ class Evidence:
         turn = reading.gyro.turn @ body.T * np.linalg.det(body)
         driven = self._inertia @ turn
         products = np.cross(turn[:, None, :], driven[:, :, None], axis=0).reshape(3, 9)
-        each, columns = np.hstack([driven, products]), self._motion(*reading.attitude)[1][..., 3:]
+        each, columns = np.hstack([driven, products]), self._motion(reading.attitude)[1][..., 3:]
         needed = np.vstack([along, each[:2] @ columns[:, 0].T, each[2] @ columns[:, 1].T])
         needed -= needed.mean(axis=1, keepdims=True)
         return needed
@@ -332,12 +331,12 @@ class Evidence:
         """Return the terms of a reading without rotors. They are the unexplained share of the
         horizontal force, the penalty on the flight's place (log-likelihood ratio), and ``_needed``.
         """
-        reading = ColumnReading(*moves)
+        reading = Convention(*moves)
         if self._attitude is None:
             force = np.zeros(len(self._t)) if self._along is None else self._along
             felt = self._compared(lambda p: p.slow(p.even(self._t, force[:, None])))
             return 0.0, 0.0, self._needed(felt[:, 0], reading)
-        frames, axes = reading.frames, self._motion(*reading.attitude)[0]
+        frames, axes = reading.frames, self._motion(reading.attitude)[0]
         push = axes @ frames.body[:, 2] @ frames.world.T
         force = self._acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
@@ -349,17 +348,36 @@ class Evidence:
         left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
         return float(left), float(cost), self._needed(along, reading)
 
-    def fit(self, reading: ColumnReading, torques: bool = True) -> Fit:
+    def fit(self, reading: Convention, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
-        mixing = self._mixing if torques else self._mixing[:0]
+        if torques:
+            return self._fit(reading, self._mixing, _DELAYS)[0]
+        return self._fit(reading, self._mixing[:0], (0.0,))[0]
+
+    def late(self) -> Fit:
+        """Return the fit of the columns as declared at the likeliest delay of the rotors beyond a
+        flight loop's own.
+        """
+        far = np.arange(-_FAR, _FAR, _STEP)
+        parts = np.array_split(far[(far < _DELAYS[0]) | (far > _DELAYS[-1] + _STEP)], 20)
+        reading = Convention(unlikely=OFFSET)
+        fits = (self._fit(reading, self._mixing, tuple(part.tolist())) for part in parts)
+        fit, delay = max(fits, key=lambda each: each[0].score)
+        return replace(fit, reading=replace(reading, late=-delay))
+
+    def _fit(
+        self, reading: Convention, mixing: Array, delays: tuple[float, ...]
+    ) -> tuple[Fit, float]:
+        """Return the fit of a reading at the likeliest delay in s, and the delay."""
         mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
-        left, horizontal, cost = self._left(mixing, reading, _DELAYS if torques else (0.0,))
-        vertical, *others = max(left.tolist(), key=likelihood)
-        score = likelihood([horizontal, horizontal, vertical, *others]) - cost - reading.unlikely
-        return Fit(reading, horizontal, tuple(others), score)
+        left, horizontal, cost = self._left(mixing, reading, delays)
+        best = np.argmax(likelihood(left))
+        score = likelihood([horizontal, horizontal, *left[best]]) - cost - reading.unlikely
+        torques = tuple(left[best, 1:].tolist())
+        return Fit(reading, horizontal, torques, float(score)), delays[best]
 
     def _left(
-        self, mixing: Array, reading: ColumnReading, delays: tuple[float, ...]
+        self, mixing: Array, reading: Convention, delays: tuple[float, ...]
     ) -> tuple[Array, float, float]:
         """Return the shares (d, 1 + torques) of vertical force and torques left at each delay of
         the rotors, and the horizontal share and the penalty on the flight's place.
@@ -382,43 +400,9 @@ class Evidence:
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
         return left, horizontal, cost
 
-    def late(self) -> float:
-        """Return the delay in s of the rotors' columns against the motion, as declared; 0: none, or
-        unknown.
-
-        In the band of turning the force along the thrust axis follows the thrust, and angular
-        acceleration the torques. Their signs are correlated over all lags: one landing outweighs a
-        flight otherwise. The variance of a chance correlation is by Bartlett's formula.
-        """
-        mixing = np.vstack([self._k, self._mixing])
-        sums, chance = np.zeros(1), np.full(4, 1e-300)
-        for p, (matrices, w) in zip(self._pieces, self._turned(DECLARED), strict=True):
-            if self._along is None:
-                force = self._second(p) + np.array([0.0, 0.0, _G])
-                along = np.sum(force * matrices[:, :, 2], axis=1)
-            else:
-                along = p.even(self._t, self._along[:, None])[:, 0]
-            turn = derivative(w, p.period) @ self._inertia + np.cross(w, w @ self._inertia)
-            both = p.even(self._t, self._thrusts) @ mixing.T, np.column_stack([along, turn])
-            thin = max(1, round(_STEP / p.period))
-            most = round(_FAR / (thin * p.period))
-            signs = [np.sign(p.band(x, slice(None, None, thin))[:, 0]) for x in both]
-            length = next_fast_len(len(signs[0]) + most, real=True)
-            given, needed = (np.fft.rfft(x, length, axis=0) for x in signs)
-            products = np.fft.irfft(given * needed.conj(), length, axis=0)
-            sums = sums + products[np.arange(-most, most + 1)]
-            chance += np.sum(np.square(products), axis=0) / len(signs[0])
-            lags = thin * p.period * np.arange(-most, most + 1)
-        squares = 0.5 * np.square(sums) / chance
-        follows = np.sum(squares * (sums > 0.0), axis=1)
-        is_near = (lags >= _NEAR[0]) & (lags <= _NEAR[1])
-        best = np.argmax(np.where(is_near, 0.0, follows))
-        lead = follows[best] - np.max(np.sum(squares, axis=1)[is_near])
-        return float(lags[best]) if lead > OFFSET else 0.0
-
-    def turns(self, reading: ColumnReading) -> float:
+    def turns(self, reading: Convention) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
-        rates = self._motion(*reading.attitude)[1][:, 0, :2]
+        rates = self._motion(reading.attitude)[1][:, 0, :2]
         return float(np.sqrt(np.mean(np.square(rates))))
 
 
@@ -431,7 +415,7 @@ class RankedFits:
 
     @classmethod
     def of(
-        cls, evidence: Evidence, readings: Sequence[ColumnReading], torques: bool = True
+        cls, evidence: Evidence, readings: Sequence[Convention], torques: bool = True
     ) -> "RankedFits":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
         fits = (
@@ -455,8 +439,9 @@ class RankedFits:
         the next. The ratio is 0 where the flight tells nothing, infinite without another value.
         """
         tells = self.fit.horizontal <= GOOD
+        value_of = attrgetter(name)
         for fit in self.ranked:
-            if (value := getattr(fit.reading, name)) != getattr(self.best, name):
+            if (value := value_of(fit.reading)) != value_of(self.best):
                 return value, self.fit.score - fit.score if tells else 0.0
         return None, np.inf if tells else 0.0
 
@@ -464,27 +449,72 @@ class RankedFits:
         """Return whether every other value of properties explains the flight clearly less."""
         return all(self.other(name)[1] >= _CERTAIN_LEAD for name in names)
 
+    def departures(self, by_imu: bool) -> list[Convention]:
+        """Return the readings of a log that explain it better than its declaration; ``by_imu``: the
+        motion is the gyro's.
+        """
+        best, left, most = self.best, self.fit.torque, GOOD_TORQUE
+        if not by_imu and best.moves != DECLARED.moves:  # forces tell, not torques
+            left, most = self.fit.horizontal, GOOD
+        if best is DECLARED or (left > most and not best.late):
+            return []
+        alike = (fit.reading for fit in self.ranked if fit.score >= self.fit.score - _CERTAIN_LEAD)
+        return [reading for reading in alike if reading is not DECLARED]
+
     def says(self, name: str) -> tuple[Any, bool, str]:
         """Return the best value of a property, whether it is certain, and why."""
         other, lead = self.other(name)
         why = f"{self.fit.horizontal:.0%} of the {self.left}"
         if other is not None and lead > 0.0:
             why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
-        return getattr(self.best, name), self.certain(name), why
+        return attrgetter(name)(self.best), self.certain(name), why
 
 
-def departures(evidence: Evidence) -> list[ColumnReading]:
+def _as_logged(evidence: Evidence) -> RankedFits:
+    """Return the ranking of the readings of the kit's own columns, and of a delay of the rotors."""
+    ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
+    fits = [*ranking.ranked, *([evidence.late()] if evidence.enough else [])]
+    return RankedFits(sorted(fits, key=lambda fit: fit.score, reverse=True))
+
+
+def departures(evidence: Evidence) -> list[Convention]:
     """Return the readings that explain a log better than its declaration: none, one, or several
     equally good.
     """
-    if evidence.enough and (late := evidence.late()):
-        return [ColumnReading(late=late)]
-    ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
-    best, left, most = ranking.best, ranking.fit.torque, GOOD_TORQUE
-    if evidence.has_pose and best.moves != DECLARED.moves:  # forces tell, not torques
-        left, most = ranking.fit.horizontal, GOOD
-    if best is DECLARED or left > most:
-        return []
-    least = ranking.fit.score - _CERTAIN_LEAD
-    readings = [fit.reading for fit in ranking.ranked if fit.score >= least]
-    return [reading for reading in readings if reading is not DECLARED]
+    return _as_logged(evidence).departures(not evidence.has_pose)
+
+
+Advice = tuple[Convention, ...]  # taken in turn
+
+
+def remedies(
+    log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False
+) -> tuple[list[Advice], bool]:
+    """Return the equally good advice for a log, and whether it leaves a consistent log. No advice:
+    the log is consistent as declared.
+
+    Args:
+        log: the flight.
+        vehicle: as declared; None: unknown.
+        by_imu: the motion is the gyro's and the accelerometer's, else the pose's.
+    """
+
+    def ranked(*advice: Convention) -> RankedFits:
+        spins = vehicle
+        if vehicle is not None and sum(reading.mirrored for reading in advice) % 2:
+            spins = replace(vehicle, spin=-vehicle.spin)
+        return _as_logged(Evidence.of_log(applied(log, advice), spins, by_imu))
+
+    first = ranked()
+    likely = first.departures(by_imu)[:3]
+    whole: list[Advice] = [(one,) for one in likely if ranked(one).best is DECLARED]
+    if whole or not likely:
+        return whole, True
+    joint: list[tuple[bool, float, Advice]] = []
+    for fit in first.ranked[:_TRIED]:
+        both = tuple(r for r in (fit.reading, ranked(fit.reading).best) if r is not DECLARED)
+        end = ranked(*both)
+        unlikely = sum(reading.unlikely for reading in both)
+        joint.append((end.best is DECLARED, end.fit.score - unlikely, both))
+    is_whole, _, both = max(joint, key=lambda each: each[:2])
+    return [both], is_whole

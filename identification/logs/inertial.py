@@ -15,11 +15,22 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
+from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
-from .evidence import GOOD, likelihood
+from .evidence import GOOD, likelihood, remedies
+from .excerpt import excerpt
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
-from .readings import ACCELEROMETER_READINGS, AS_DECLARED, GYRO_READINGS, OTHER, SensorReading
+from .readings import (
+    ACCELEROMETER_READINGS,
+    AS_DECLARED,
+    DECLARED,
+    GYRO_READINGS,
+    OTHER,
+    SensorReading,
+    advice_words,
+    applied,
+)
 from .table import Array, Data, Names, finite_rows
 
 # How inertial sensors are compared.
@@ -30,16 +41,35 @@ _FEWEST = 10  # comparisons for a decision
 LEAST_SAMPLES = 20  # of pose and of sensor, at least
 STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
 _MOVING = 0.5  # m/s2 of horizontal acceleration, far above pose noise
+_FAR_SHARE = 0.01  # of the samples: with more, a specific force is no flight's
+_ONE_WAY = 0.8  # length of the mean direction: gravity's is near 1, that of a tumble far below
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
-def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, Names]:
-    """Return a log without the inertial sensors contradicting its pose, and a note on each.
+def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[FlightLog, Names]:
+    """Return a log without the inertial sensors contradicting its pose, and a note on each. They
+    stay where they agree with the rotors, and the pose in another convention with all of them: the
+    note is on the pose.
 
     Args:
         log: the flight.
-        gravity: m/s2, of the vehicle's flight.
+        vehicle: as declared; None: unknown.
     """
+    gravity = 9.81 if vehicle is None else vehicle.gravity
+    checked, notes = _agreeing(log, gravity)
+    if not (notes and log.has_pose and log.has_rotor_speeds):
+        return checked, notes
+    advice, is_whole = remedies(excerpt([log])[0], vehicle)
+    for readings in advice if is_whole else ():
+        is_pose = any(reading.moves != DECLARED.moves for reading in readings)
+        if is_pose and not _agreeing(applied(log, readings), gravity)[1]:
+            wrong = "the pose contradicts the inertial sensors and the rotors"
+            return log, (f"{wrong}: {advice_words(readings)}",)
+    return checked, notes
+
+
+def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
+    """Return a log without the inertial sensors contradicting its pose, and a note on each."""
     notes = []
     seen = np.flatnonzero(log.valid)
     pose = log.t[seen], Rotation.from_quat(log.quaternion[seen], scalar_first=True)
@@ -51,6 +81,8 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, Na
         shares: list[float] | None = None
         if is_stuck(measured):
             doubt = f"never change: the {field} was not read"
+        elif field == "accelerometer" and (doubt := _blown_up(measured)):
+            pass
         elif field == "gyro":
             turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
             shares = gyro_shares(t, measured, *pose, turns)
@@ -69,7 +101,7 @@ def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, Na
                 )
             otherwise = "contradict the position's acceleration and gravity"
             doubt = _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
-            alone = _sensor_doubt(_gravity_shares(measured, gravity), _BY_GRAVITY, "")
+            alone = gravity_doubt(measured, gravity, is_flight=False)
         if doubt:
             notes.append(f"{columns} {doubt}. They were left out")
             left_out: Data = {field: None}
@@ -194,25 +226,44 @@ def _force_shares(
     ], turned
 
 
-def gravity_doubt(force: Array, gravity: float) -> str:
-    """Return gravity's objection to the specific force (n, 3) of a flight, or nothing."""
-    median = np.median(force, axis=0)
-    size = np.linalg.norm(median)
-    otherwise = (
-        f"are {size:.3g} m/s2 in the median of a flight, along a{'xyz'[np.argmax(np.abs(median))]}"
-        f"; expected the specific force, which gravity makes about {gravity:.3g} along az: axes "
-        "forward, left, up, of the vehicle and not of the sensor's board"
+def _blown_up(force: Array) -> str:
+    """Return a doubt on a specific force (n, 3) beyond any flight's, or nothing. Gravity in another
+    unit has one direction.
+    """
+    size = np.linalg.norm(force, axis=1, keepdims=True)
+    far = size[:, 0] > MAGNITUDES.strongest
+    share = np.mean(far)
+    if share <= _FAR_SHARE or np.linalg.norm(np.mean((force / size)[far], axis=0)) > _ONE_WAY:
+        return ""
+    return (
+        f"are beyond {MAGNITUDES.strongest:g} m/s2, in changing directions, in {share:.0%} of the "
+        "samples: no quadrotor flies so, but a simulation that blew up does"
     )
-    if size < 0.5 * gravity:
+
+
+def gravity_doubt(force: Array, gravity: float, is_flight: bool = True) -> str:
+    """Return gravity's objection to the specific force (n, 3), or nothing; ``is_flight``: upright,
+    as in a flight.
+    """
+    median = np.median(force, axis=0)
+    length = np.linalg.norm(median)
+    otherwise = (
+        f"are {length:.3g} m/s2 in the median of a flight, along a"
+        f"{'xyz'[np.argmax(np.abs(median))]}; expected the specific force, which gravity makes "
+        f"about {gravity:.3g} along az: axes forward, left, up, of the vehicle and not of the "
+        "sensor's board"
+    )
+    if length < 0.5 * gravity:
         otherwise += " (an acceleration without gravity is none)"
-    return _sensor_doubt(_gravity_shares(force, gravity), _BY_GRAVITY, otherwise)
+    shares = _gravity_shares(median, gravity)
+    return _sensor_doubt(shares, _BY_GRAVITY, otherwise if is_flight else "")
 
 
-def _gravity_shares(force: Array, gravity: float) -> list[float]:
-    """Return the share of gravity left by the median of a specific force (n, 3), as declared and by
+def _gravity_shares(median: Array, gravity: float) -> list[float]:
+    """Return the share of gravity left by the median of a specific force (3,), as declared and by
     each reading of ``_BY_GRAVITY``.
     """
-    median, up = np.median(force, axis=0), np.array([0.0, 0.0, gravity])
+    up = np.array([0.0, 0.0, gravity])
     readings = (AS_DECLARED, *_BY_GRAVITY)
     return [float(np.sum(np.square(up - r.turn @ median))) / gravity**2 for r in readings]
 

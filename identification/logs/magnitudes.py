@@ -36,6 +36,7 @@ class Magnitudes:
     flies: Pair = (0.2, 5.0)  # its median; beyond, another vehicle flew
     doubtful: Pair = (0.5, 2.0)  # the same; beyond, another may have flown
     gravity: Pair = (0.85, 1.15)  # specific force by 1 g: the unit is certain
+    strongest: float = 300.0  # m/s2 of specific force, above all racers and most sensors' range
     fastest_gyro: float = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     slow_gyro: float = 6.0  # rad/s: 99.5 % of a flight's angular velocities are less
@@ -55,6 +56,8 @@ class Magnitudes:
 
 
 MAGNITUDES = Magnitudes()
+# changes of a column: fewer are no measurement, and equal by chance
+_CHANGES = 20
 _TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 _SPEEDS = {
     "rpm": ("revolutions per minute", UNITS["rotors"]["rpm"]),
@@ -133,6 +136,19 @@ def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     )
 
 
+def equal_motors(motors: Array) -> tuple[int, int] | None:
+    """Return the first two motors, from 1, with the same numbers in every row of (N, 4); None:
+    there are none, or two such pairs, as of a flight in one plane without noise.
+    """
+    alike = [
+        (i + 1, j + 1)
+        for i, j in combinations(range(4), 2)
+        if np.array_equal(motors[:, i], motors[:, j])
+        and np.count_nonzero(np.diff(motors[:, i])) >= _CHANGES
+    ]
+    return None if len(alike) in (0, 2) else alike[0]
+
+
 def motor_doubts(log: FlightLog) -> list[str]:
     """Return doubts on four motors, whatever the vehicle: equal columns, uneven medians in flight,
     and rotors slower than any propeller in hover.
@@ -142,11 +158,12 @@ def motor_doubts(log: FlightLog) -> list[str]:
     if motors is None or not np.isfinite(motors).all() or not np.any(motors > 0.0):
         return []
     what = "rotor speeds" if measured else "motor commands"
-    doubts = [
-        f"{what} of motors {i + 1} and {j + 1} are equal in every row; expected four motors"
-        for i, j in combinations(range(4), 2)
-        if np.array_equal(motors[:, i], motors[:, j]) and np.ptp(motors[:, i]) > 0.0
-    ][:1]
+    doubts = []
+    if alike := equal_motors(motors):
+        doubts.append(
+            f"{what} of motors {alike[0]} and {alike[1]} are equal in every row; expected "
+            "four motors"
+        )
     medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
     listed = ", ".join(f"{x:.3g}" for x in medians)
     if not measured:

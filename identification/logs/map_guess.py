@@ -55,7 +55,12 @@ from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
-_TURNS = ("world", "body", "sense", "order", "pitch_sign", "unit")  # readings of a body's turns
+_TURNS = (
+    "world",
+    "body",
+    *(f"attitude.{x}" for x in ("sense", "order", "unit")),
+    "pitch_sign",
+)  # readings of a body's turns
 _MOTORS = ("motors", "commands")
 _GYROS = [
     SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
@@ -324,20 +329,23 @@ class _Guessing:
         self.ranking = ranking = RankedFits.of(evidence, readings, torques=False)
         best = ranking.best
         length = self.unit("position", place.unit, ranking.says("length"))
-        fields = [("world", "", "world"), ("body", "", "body"), ("attitude", "sense", "sense")]
+        fields = [("world", "", "world"), ("body", "", "body")]
+        fields.append(("attitude", "sense", "attitude.sense"))
         if not is_quaternion:
-            beyond = best.unit, best.unit != group.unit, "angles beyond pi"
-            self.unit("attitude", group.unit, ranking.says("unit") if len(units) > 1 else beyond)
-            fields += [("attitude", "euler", "euler"), ("attitude", "signs", "pitch_sign")]
+            guessed = ranking.says("attitude.unit")
+            if len(units) == 1:
+                guessed = units[0], units[0] != group.unit, "angles beyond pi"
+            self.unit("attitude", group.unit, guessed)
+            fields += [("attitude", "euler", "attitude.euler"), ("attitude", "signs", "pitch_sign")]
         elif group.numbered:
-            fields.append(("attitude", "order", "order"))
+            fields.append(("attitude", "order", "attitude.order"))
         else:
             self.say("attitude", "order", True, "by the columns' names")
         for section, name, prop in fields:
             self.take(section, name, ranking.says(prop))
-        position = Columns(place.columns, length)
+        position, turned = Columns(place.columns, length), best.attitude
         self.sections |= {"world": best.world, "body": best.body}
-        self.sections |= {"position": position, "attitude": best.part(group.columns)}
+        self.sections |= {"position": position, "attitude": replace(turned, columns=group.columns)}
 
     def accelerometer(self, group: Group) -> None:
         """Find unit and axes of the accelerometer by gravity."""

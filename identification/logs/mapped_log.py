@@ -130,7 +130,10 @@ def recording_of(
         if isinstance(part, Rotors | Commands) and not flown.airframe:
             are_speeds = isinstance(part, Rotors) and samples.table is None
             if more := more_rotors(part.columns, samples.table or samples.columns, are_speeds):
-                raise InputError(f"{path}: {f'{part.topic}: ' if part.topic else ''}{more}")
+                where = f"{part.topic}: " if part.topic else ""
+                if reader or log_map.is_own:
+                    raise InputError(f"{path}: {where}{more}")
+                said.append(f"warning: {where}{more}. The map's four were taken")
         if name == "position":
             streams[name], words = _pose(path, log_map, samples, sources.get("attitude"))
             said += words

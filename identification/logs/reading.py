@@ -70,7 +70,7 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     vehicle = flown_vehicle(vehicle, log.vehicle)
     of_units = unit_doubts(log, vehicle)
     log, moved = on_one_clock(log, vehicle)
-    log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
+    log, wrong = check_inertial(log, vehicle)
     doubts = [*moved, *wrong, *of_units]
     for doubt in doubts:
         warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)

@@ -14,7 +14,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...runtime.yaml_file import read_yaml
+from ..motion.smoothing import resampled
 from .channels import quaternions, scaled
+from .flight_log import FlightLog
 from .log_map import SENSES, UNITS, Attitude
 from .table import Array, Data, Mask, Names, finite_rows
 from .what_flew import ORDERS, Order, order_names
@@ -94,40 +96,31 @@ GYRO_READINGS = tuple(_sensor(**stated) for stated in _STATED["gyro"])
 ACCELEROMETER_READINGS = tuple(_sensor(**stated) for stated in _STATED["accelerometer"])
 
 
-@dataclass(frozen=True, eq=False)
-class ColumnReading:
-    """One way to read a flight's columns."""
+AS_WRITTEN = Attitude(())  # without columns
 
-    order: str = "wxyz"  # of a quaternion's columns
-    euler: str = ""  # order of turns of angles about x, y, z; empty: a quaternion
-    unit: str = "rad"  # of the angles
-    pitch_sign: int = 1  # of the angle about y
-    sense: str = "body_to_world"
+
+@dataclass(frozen=True, eq=False)
+class Convention:
+    """One way to read a flight's columns: frames, units, order, sense, clock and sensors."""
+
+    attitude: Attitude = AS_WRITTEN
     frames: Frames = PLAIN
     length: str = "m"  # unit of the position
     gyro: SensorReading = AS_DECLARED
     rotors: Order = ROTORS  # the kit's rotor, from 1, in each column
     mirrored: bool = False  # rotors turn against the declared spin
     late: float = 0.0  # s, delay of the rotors' columns against the motion
-    unlikely: float = 0.0  # log-likelihood ratio against an unusual reading
+    unlikely: float = 0.0  # log-likelihood ratio against an unusual convention
 
     @property
-    def attitude(self) -> tuple[Any, ...]:
-        """The fields for rotations: the first five."""
-        return self.order, self.euler, self.unit, self.pitch_sign, self.sense
-
-    def part(self, columns: Names = ()) -> Attitude:
-        """Return the map's section for an attitude in some columns."""
-        signs = (1, self.pitch_sign, 1) if self.pitch_sign < 0 else ()
-        unit = self.unit if self.euler else ""
-        return Attitude(
-            columns, unit, signs=signs, order=self.order, euler=self.euler, sense=self.sense
-        )
+    def moves(self) -> tuple[Attitude, Frames, str, SensorReading]:
+        """The fields for motion: the first four."""
+        return self.attitude, self.frames, self.length, self.gyro
 
     @property
-    def moves(self) -> tuple[Any, ...]:
-        """The fields for motion: the first eight."""
-        return *self.attitude, self.frames, self.length, self.gyro
+    def pitch_sign(self) -> int:
+        """Sign of the angle about y."""
+        return -1 if self.attitude.signs else 1
 
     @property
     def world(self) -> str:
@@ -188,8 +181,9 @@ class ColumnReading:
             "xyzw": "the quaternion is scalar last",
             "zwxy": "the quaternion is scalar first under the headers of scalar last",
         }
-        sense = "world to body" if self.order in orders else "the quaternion is world to body"
-        facts = [orders.get(self.order, ""), sense if self.sense != SENSES[0] else ""]
+        order, is_inverse = self.attitude.order, self.attitude.sense != SENSES[0]
+        sense = "world to body" if order in orders else "the quaternion is world to body"
+        facts = [orders.get(order, ""), sense if is_inverse else ""]
         facts = [fact for fact in (*facts, self.frames.fact) if fact]
         if not facts:
             return []
@@ -215,50 +209,41 @@ def _combined(matrix: Array, columns: Names) -> str:
     return f"({', '.join(rows)})"
 
 
-def _quaternion(reading: ColumnReading) -> str:
+def _quaternion(reading: Convention) -> str:
     """Return in words the kit's quaternion of the columns qw, qx, qy, qz."""
     frames = reading.frames
     mirror = np.linalg.det(frames.world)  # the body's too: a mirrored rotation is one again
     world, body = (Rotation.from_matrix(mirror * turn) for turn in (frames.world, frames.body))
-    columns = as_written(np.eye(4), reading)[1]
+    columns = as_written(np.eye(4), reading.attitude)[1]
     made = (world * columns * body).as_quat(scalar_first=True).T
     first = made[0][np.abs(made[0]) > 0.1][0]
     text = _combined(made * np.sign(first), _QUATERNION)
     return text if abs(first) > 0.9 else f"0.7071 {text}"
 
 
-DECLARED = ColumnReading()
+DECLARED = Convention()
 # penalties in log-likelihood ratios: the declared reading is right far more often, and there are
 # some 60 different time offsets
 OTHER, OFFSET = 8.0, 12.0
 
 
-def _each(**aspects: Sequence[Any]) -> list[ColumnReading]:
+def _each(**aspects: Sequence[Any]) -> list[Convention]:
     """Return the readings of all combinations of aspects."""
     return [
-        ColumnReading(**dict(zip(aspects, each, strict=True)))
-        for each in product(*aspects.values())
+        Convention(**dict(zip(aspects, each, strict=True))) for each in product(*aspects.values())
     ]
 
 
-def _weighed(
-    readings: Sequence[ColumnReading], least: float, world: str = "enu"
-) -> list[ColumnReading]:
-    """Return readings with a penalty of ``least``, and 1 for each less usual convention.
-
-    Args:
-        readings: the readings.
-        least: log-likelihood ratio.
-        world: the usual one.
-    """
+def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convention]:
+    """Return readings with a penalty of 1 for each less usual convention; ``world``: the usual."""
     return [
         replace(
             r,
-            unlikely=least
-            + (r.order != "wxyz")
-            + (r.euler == "xyz")
+            unlikely=r.unlikely
+            + (r.attitude.order != "wxyz")
+            + (r.attitude.euler == "xyz")
             + (r.pitch_sign < 0)
-            + (r.sense != "body_to_world")
+            + (r.attitude.sense != SENSES[0])
             + (r.world != world)
             + r.frames.unusual,
         )
@@ -266,7 +251,7 @@ def _weighed(
     ]
 
 
-def log_readings(has_pose: bool) -> list[ColumnReading]:
+def log_readings(has_pose: bool) -> list[Convention]:
     """Return the readings of the kit's own columns, the one as declared first.
 
     Args:
@@ -274,17 +259,21 @@ def log_readings(has_pose: bool) -> list[ColumnReading]:
     """
     others = _each(gyro=GYRO_READINGS)
     if has_pose:
-        others = _each(order=("wxyz", "xyzw", "zwxy"), sense=SENSES, frames=_USUAL_FRAMES)[1:]
-        others.append(ColumnReading(sense="world_to_body", frames=_frames(**_STATED["mirrored"])))
+        orders = product(("wxyz", "xyzw", "zwxy"), SENSES)
+        attitudes = [Attitude((), order=order, sense=sense) for order, sense in orders]
+        others = _each(attitude=attitudes, frames=_USUAL_FRAMES)[1:]
+        others.append(Convention(attitudes[1], _frames(**_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
-    turned = _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
+    others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
     # two departures at once are as unlikely as both
-    both = [replace(r, unlikely=2.0 * OTHER) for r in turned if r.mirrored and r.rotors != ROTORS]
-    others += [r for r in turned if not (r.mirrored and r.rotors != ROTORS)]
-    return [DECLARED, *_weighed(others, OTHER), *both]
+    counts = (1 + (r.mirrored and r.rotors != ROTORS) for r in others)
+    return [
+        DECLARED,
+        *_weighed([replace(r, unlikely=OTHER * n) for r, n in zip(others, counts, strict=True)]),
+    ]
 
 
-def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[ColumnReading]:
+def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[Convention]:
     """Return the readings of a table's pose within a map's words.
 
     Args:
@@ -293,32 +282,66 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
         length: unit of the position by the columns' names; others have a penalty.
         hint: the world by the columns' names; empty: none.
     """
-    attitudes: dict[str, Sequence[Any]] = {"order": orders}
+    attitudes = [Attitude((), order=order, sense=sense) for order, sense in product(orders, SENSES)]
     if not orders:
-        attitudes = {"euler": ("zyx", "xyz"), "unit": units, "pitch_sign": (1, -1)}
+        angles = product(("zyx", "xyz"), units, ((), (1, -1, 1)), SENSES)
+        attitudes = [
+            Attitude((), unit, signs=signs, euler=euler, sense=sense)
+            for euler, unit, signs, sense in angles
+        ]
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    readings = _each(**attitudes, sense=SENSES, frames=MAP_FRAMES, length=lengths)
-    return [
-        replace(r, unlikely=r.unlikely + OTHER * (length in lengths and r.length != length))
-        for r in _weighed(readings, 0.0, hint or "enu")
+    readings = _each(attitude=attitudes, frames=MAP_FRAMES, length=lengths)
+    named = [
+        replace(r, unlikely=OTHER * (length in lengths and r.length != length)) for r in readings
     ]
+    return _weighed(named, hint or "enu")
 
 
-def rotations(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:
+def applied(log: FlightLog, advice: Sequence[Convention]) -> FlightLog:
+    """Return a log with the advice of some readings taken in turn; the vehicle's spin is no part of
+    a log.
+    """
+    for reading in advice:
+        log = _applied(log, reading)
+    return log
+
+
+def advice_words(advice: Sequence[Convention]) -> str:
+    """Return the sentences of some readings, to be taken in turn."""
+    return "; then ".join(reading.says for reading in advice)
+
+
+def _applied(log: FlightLog, reading: Convention) -> FlightLog:
+    speeds, parts = np.empty_like(log.rotor_speeds), Data()
+    speeds[:, np.subtract(reading.rotors, 1)] = log.rotor_speeds
+    if reading.late:
+        speeds = resampled(log.t + reading.late, log.t, speeds)
+    if reading.gyro.says:
+        assert log.gyro is not None
+        parts["gyro"] = log.gyro @ reading.gyro.turn.T
+    if log.valid.any():
+        quaternion = np.full_like(log.quaternion, np.nan)
+        good, turned = rotations(log.quaternion, reading)
+        quaternion[good] = turned.as_quat(scalar_first=True)
+        turn = reading.frames.position.T * UNITS["position"][reading.length]
+        parts |= {"position": log.position @ turn, "quaternion": quaternion}
+    return replace(log, rotor_speeds=speeds, **parts)
+
+
+def rotations(columns: Array, reading: Convention) -> tuple[Mask, Rotation]:
     """Return the rows (N,) with an attitude, and their rotations by a reading, body to world in the
     kit's frames.
     """
-    good, rotation = as_written(columns, reading)
+    good, rotation = as_written(columns, reading.attitude)
     frames = reading.frames
     return good, Rotation.from_matrix(frames.world @ rotation.as_matrix() @ frames.body)
 
 
-def as_written(columns: Array, reading: ColumnReading) -> tuple[Mask, Rotation]:
+def as_written(columns: Array, attitude: Attitude) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
-    part = reading.part()
     good = finite_rows(columns)
-    if not reading.euler:
+    if not attitude.euler:
         good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
-    turns = quaternions(part, scaled(part, columns[good]))
+    turns = quaternions(attitude, scaled(attitude, columns[good]))
     rotation = Rotation.from_quat(turns, scalar_first=True)
-    return good, rotation if reading.sense == "body_to_world" else rotation.inv()
+    return good, rotation if attitude.sense == SENSES[0] else rotation.inv()

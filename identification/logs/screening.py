@@ -14,7 +14,6 @@ rate and even steps as evidence; an estimate does not.
 
 from collections.abc import Iterable
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
@@ -23,12 +22,13 @@ from ...runtime.errors import InputError
 from ..motion.inertial_signals import inertial_pieces, reads_imu
 from ..motion.signals import SHORTEST_PIECE, pose_pieces
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of
-from .evidence import Evidence, departures
+from .evidence import remedies
 from .excerpt import excerpt
 from .flight_log import FlightLog
 from .flight_phases import carrying, flying
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
-from .magnitudes import MAGNITUDES, rotor_doubt, thrust_by_weight, time_doubt, within
+from .magnitudes import MAGNITUDES, equal_motors, rotor_doubt, thrust_by_weight, time_doubt, within
+from .readings import advice_words
 from .streams import MOTOR_RATES
 from .table import Array, Mask, Names, median_step
 
@@ -131,20 +131,35 @@ def screen_log(
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
-    others = []
-    if by_imu or pose_pieces(log):
-        evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu)
-        others = departures(evidence)[:3]
-    if others and not others[0].late:
-        says = "; or ".join(dict.fromkeys(reading.says for reading in others))
-        whose = "gyro contradicts the rotors' torques"
-        whose = whose if by_imu else "motion contradicts the rotor speeds and gravity"
-        hear([Refused(f"{says}. As logged, the {whose}")])
+    doubt = convention_doubt(log, vehicle)
+    hear([doubt] if isinstance(doubt, Refused) else [])
     if not by_imu:
         hear(_steps(log))
         hear([] if least_seconds is None else _length(log, vehicle, least_seconds))
-    hear(Fault(reading.says) for reading in others[:1])
+    hear([doubt] if doubt else [])
     return log, tuple(notes)
+
+
+def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
+    """Return the contradiction between a log's motion and its rotors, with the advice that leaves a
+    consistent log; empty: none, or nothing to tell from. A delay alone is a ``Fault``, all others
+    are ``Refused``.
+
+    Args:
+        log: the flight.
+        vehicle: as declared; None: four rotors, front-left, rear-left, rear-right, front-right.
+    """
+    by_imu = reads_imu(log)
+    if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
+        return ""
+    advice, mends = remedies(excerpt([log])[0], vehicle, by_imu)
+    says = "; or ".join(dict.fromkeys(map(advice_words, advice)))
+    if all(reading.late for each in advice for reading in each):
+        return Fault(says)
+    whose = "gyro contradicts the rotors' torques"
+    whose = whose if by_imu else "motion contradicts the rotor speeds and gravity"
+    unmended = "" if mends else ". No usual convention mends this log; the likeliest is named"
+    return Refused(f"{says}. As logged, the {whose}{unmended}")
 
 
 def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
@@ -367,17 +382,10 @@ def stuck_channels(log: FlightLog, vehicle: Vehicle) -> Findings:
         others = np.delete(place, i, axis=1), "the other coordinates"
         yield from _still(f"p{axis}", log.t[seen], flown, place[:, [i]], *others)
     yield from _still("the attitude", log.t[seen], flown, turn, place, "the coordinates")
-    # in every row; a flight in one plane without noise has two such pairs
-    alike = [
-        (i + 1, j + 1)
-        for i, j in combinations(range(4), 2)
-        if np.count_nonzero(np.diff(rotors[:, i])) >= _SISTERS_CHANGE
-        and np.array_equal(rotors[:, i], rotors[:, j])
-    ]
-    if len(alike) == 1:
+    if alike := equal_motors(rotors):
         yield Note(
             "warning: the columns omega{} and omega{} are the same in every row: if one is written "
-            "under both names, force and torque are wrong".format(*alike[0])
+            "under both names, force and torque are wrong".format(*alike)
         )
 
 

@@ -17,7 +17,7 @@ from ..logs.map_guess import Guess, guess_map
 from ..logs.map_text import map_yaml
 from ..logs.mapped_log import map_table
 from ..logs.reading import finished, read_log, unknown_table
-from ..logs.screening import screen_log
+from ..logs.screening import convention_doubt, screen_log
 from ..logs.table import Data, Names, Table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
@@ -140,10 +140,8 @@ def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
         if c.filtered
     ]
     if vehicle is None:
-        return [
-            *doubts,
-            "no vehicle is given: units and frames were not checked against its rotors",
-        ]
+        unchecked = "no vehicle is given: the rotor speeds were not checked against its weight"
+        return [*doubts, *filter(None, [convention_doubt(log, None)]), unchecked]
     try:
         doubts += screen_log(log, vehicle)[1]
     except InputError as error:

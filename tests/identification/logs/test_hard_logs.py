@@ -6,15 +6,25 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import data_file
+from tests.support.hostile_conventions import (
+    DOWN,
+    NED,
+    ONE,
+    conjugate,
+    framed,
+    permuted,
+)
 from tests.support.outcomes import refused
 from windwrench.dynamics import load_vehicle
 from windwrench.identification import diagnose
 from windwrench.identification.logs.clocks import on_one_clock
 from windwrench.identification.logs.flight_log import with_rows
+from windwrench.identification.logs.inertial import check_inertial
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.logs.tables import open_table
+from windwrench.identification.report.log_check import check_log
 
 
 @pytest.mark.parametrize(
@@ -91,3 +101,86 @@ def test_a_late_pose_is_a_clock_and_no_lag(name, late):
     found = diagnose([log], vehicle)
     assert found.effects == ()
     assert found.remainder == "none"
+
+
+def test_the_pose_that_contradicts_all_others_is_named():
+    log = read_log(data_file("hard_logs/px4_mocap_enu_unturned.ulg"))
+    assert log.gyro is not None
+    assert log.accelerometer is not None
+    (note,) = [note for note in log.notes if note.startswith("warning")]
+    assert "pose contradicts the inertial sensors and the rotors: the world is z down" in note
+
+
+@pytest.mark.parametrize(
+    ("name", "doubt"),
+    [
+        ("ardupilot_rpm_tenth.bin", "39, 39.5, 39.3, 39.3 rad/s; expected at least 100"),
+        ("px4_one_esc_low.ulg", "390, 395, 393, 70.7 rad/s; expected a ratio of at most 2"),
+        ("same_motor_four_times.csv.gz", "motors 1 and 2 are equal in every row"),
+    ],
+)
+def test_impossible_rotor_speeds_are_doubted_without_a_vehicle(name, doubt):
+    log = read_log(data_file(f"hard_logs/{name}"))
+    assert any(doubt in note for note in log.notes)
+
+
+def test_a_simulation_that_blew_up_is_no_flight_in_milli_g():
+    log = read_log(data_file("hard_logs/perfect_model_gusts_10mN_imu.csv.gz"))
+    growth = 0.3 * np.exp(np.minimum(log.t, 12.0))
+    tumbling = np.sin(np.multiply.outer(log.t, [40.0, 37.0, 43.0]))
+    wrong = replace(log, accelerometer=log.accelerometer + growth[:, None] * tumbling)
+    checked, (note,) = check_inertial(wrong)
+    assert "in changing directions" in note
+    assert checked.accelerometer is None
+    _, (note,) = check_inertial(replace(log, accelerometer=log.accelerometer * 1e3 / 9.80665))
+    assert "look like milli-g" in note
+
+
+NORTH_EAST_DOWN = np.array(
+    [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
+)  # from east, north, up
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (
+            lambda log: framed(log, ONE, NORTH_EAST_DOWN, DOWN),
+            r"attitude is north, east, down .* but the position east, north, up",
+        ),
+        (
+            lambda log: framed(log, NORTH_EAST_DOWN),
+            r"position is north, east, down but .* take \(py, px, -pz\) as the position",
+        ),
+        (
+            lambda log: permuted(conjugate(log), [3, 1, 0, 2]),
+            r"quaternion is world to body; .* \(qw, qx, qy, qz\); then .* rotors 4,2,1,3 .*px4-x",
+        ),
+        (
+            lambda log: permuted(framed(log, *NED), [2, 3, 1, 0]),
+            r"world is z down .*; then the rotors look permuted: .* rotors 3,4,2,1 .*betaflight",
+        ),
+    ],
+)
+def test_an_advice_leaves_a_consistent_log(change, expected):
+    """A first remedy leads to a second refusal; the line names both."""
+    vehicle = load_vehicle("ardrone2")
+    log = read_log(data_file("hard_logs/perfect_model_gusts_10mN.csv.gz"), vehicle=vehicle)
+    with refused(expected):
+        screen_log(change(log), vehicle)
+
+
+@pytest.mark.parametrize(
+    ("name", "doubt"),
+    [
+        ("px4_mocap_enu_unturned.ulg", "the world is z down"),
+        ("ned_quaternion_swapped.csv.gz", "the body axes are right, forward, up"),
+        ("asctec_plus.csv.gz", ""),
+        ("perfect_model_gusts_30mN.csv.gz", ""),
+    ],
+)
+def test_a_convention_is_checked_without_a_vehicle(name, doubt):
+    doubts = check_log(data_file(f"hard_logs/{name}")).doubts
+    said = [text for text in doubts if "As logged, the motion contradicts" in text]
+    assert len(said) == bool(doubt)
+    assert all(doubt in text for text in said)
