@@ -869,6 +869,22 @@ def walk_dataflash(
     bytes. Return how many they are, and how many bytes they take.
     """
 
+def read_text_rows(
+    text: bytes,
+    begin: int,
+    separator: str,
+    slots: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    columns: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+    row: int,
+) -> tuple[int, int]:
+    """Read the lines of a text table from byte `begin` on: field i of a line is put into
+    columns (K, N), line slots[i] of them, from row `row` on; none below 0. Reading ends
+    before a line of another number of fields, with quotation marks, without any number, or
+    with a field that is no plain number. Return how many rows and bytes were read.
+    """
+
 OBSERVER_SIZE: int
 
 def step_extended(address: int, parts: int, dt: float, voltage: float) -> int:

@@ -1,6 +1,7 @@
 // Readers of flight logs for Python.
 #include "../readers/blackbox.hpp"
 #include "../readers/dataflash.hpp"
+#include "../readers/text_table.hpp"
 #include "filter.hpp"
 
 namespace nb = nanobind;
@@ -36,6 +37,22 @@ Pair walk_dataflash(Bytes data, Array<std::int32_t, nb::shape<-1>> places,
   return Pair(nb::make_tuple(n.messages, n.bytes));
 }
 
+Pair read_text_rows(nb::bytes text, std::int64_t begin, char separator,
+                    Ints<nb::shape<-1>> slots, Array<double, nb::shape<-1, -1>> columns,
+                    std::int64_t row) {
+  std::int64_t size = std::int64_t(text.size()), rows = std::int64_t(columns.shape(1));
+  if (begin < 0 || begin > size || row < 0 || row > rows)
+    throw nb::value_error("text: expected a place in the text, and a row of the columns");
+  for (std::size_t i = 0; i < slots.size(); i++)
+    if (slots.data()[i] >= std::int64_t(columns.shape(0)))
+      throw nb::value_error("text: expected a column for each slot");
+  text_table::Count n = text_table::read(
+      reinterpret_cast<const std::uint8_t *>(text.c_str()) + begin, size - begin,
+      std::uint8_t(separator), slots.data(), std::int64_t(slots.size()), columns.data() + row, rows,
+      rows - row);
+  return Pair(nb::make_tuple(n.rows, n.bytes));
+}
+
 }  // namespace
 
 void bind_readers(nb::module_ &m) {
@@ -53,4 +70,10 @@ void bind_readers(nb::module_ &m) {
         "Write the places and types of all messages of a DataFlash log, at most one for each "
         "three\n"
         "bytes. Return how many they are, and how many bytes they take.");
+  m.def("read_text_rows", &read_text_rows, "text"_a, "begin"_a, "separator"_a, "slots"_a,
+        "columns"_a, "row"_a,
+        "Read the lines of a text table from byte `begin` on: field i of a line is put into\n"
+        "columns (K, N), line slots[i] of them, from row `row` on; none below 0. Reading ends\n"
+        "before a line of another number of fields, with quotation marks, without any number, or\n"
+        "with a field that is no plain number. Return how many rows and bytes were read.");
 }

@@ -8,7 +8,8 @@ sensor's sample are left out. Such rows stay where most rows have a pose (the po
 a map of whole rows. An attitude in other rows is interpolated to the position's rows.
 """
 
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .channels import ChannelGroup, in_kit_axes, in_kit_units, on_one_clock, quaternions
+from .column_names import WORDS, groups_of, take_apart
 from .commanded_speeds import flown_vehicle
 from .flight_log import NORM_TOLERANCE, VEHICLE, FlightLog
 from .log_map import (
@@ -38,6 +40,7 @@ from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
 from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
 
 _SHOWN = 30  # columns in an error
+_MOTORS = "rotor speeds or motor commands"
 NO_QUATERNION = 0.5  # length; shorter stands for a missing quaternion
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, the longest gap for interpolating an attitude
@@ -112,6 +115,8 @@ def recording_of(
             accelerometer, or numbers beyond any flight's.
     """
     recorded, of_clock = on_one_clock(path, recorded, piece)
+    for s in recorded:
+        of_clock += motors_left_out(s.table.header if s.table else [*s.columns], log_map.wanted)
     motors = (*log_map.ways("rotors"), *log_map.ways("commands"))
     poses = log_map.ways("position")
     log_map, sources = chosen(recorded, log_map)
@@ -120,7 +125,7 @@ def recording_of(
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
         wanted = [f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors]
         raise InputError(
-            f"{path}: no motors that turn; expected {' or '.join(wanted)}, found "
+            f"{path}: no motors that turn; expected {' or '.join(wanted) or _MOTORS}, found "
             f"{', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
     said = [*notes, *of_clock, *(part.note for part in log_map.sections.values() if part.note)]
@@ -175,6 +180,22 @@ def recording_of(
     return Recording(path, reader, log_map, streams, said, extra, flown)
 
 
+def motors_left_out(names: Sequence[str], used: Collection[str]) -> list[str]:
+    """Return a note on columns named as four motors', none of them used."""
+    words = "|".join((WORDS["motor_words"], *WORDS["command_words"]))
+    taken_apart = take_apart(names)
+    left = [
+        f"{group.columns[0]} ..."
+        for way in WORDS["parts"]["motors"]
+        for endings in way["endings"]
+        for group in groups_of(taken_apart, endings)
+        if re.search(words, group.key) and not re.search(WORDS["sticks"], group.key)
+        if not {*group.columns} & {*used}
+    ]
+    listed = ", ".join(dict.fromkeys(left[:_SHOWN]))
+    return [f"columns named as motors' were left out: {listed}"] if left else []
+
+
 def _pose(
     path: Path, log_map: LogMap, samples: ChannelGroup, turned: ChannelGroup | None
 ) -> tuple[Stream, list[str]]:
@@ -206,10 +227,11 @@ def _pose(
     if isinstance(place, Position) and place.held:
         new = np.append(True, np.any(np.diff(position, axis=0) != 0.0, axis=1))
         placed &= new
-        notes.append(
-            f"position: sampled and held; {np.count_nonzero(~new)} of {len(t)} rows repeat the one "
-            "before and are not valid"
-        )
+        if not new.all():
+            notes.append(
+                f"position: sampled and held; {np.count_nonzero(~new)} of {len(t)} rows repeat the "
+                "one before and are not valid"
+            )
     pose = np.full((len(t), 7), np.nan)
     if turn is None or turned is None:
         pose[:, :3] = position

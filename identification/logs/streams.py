@@ -152,7 +152,7 @@ class Recording:
         speeds = np.full((len(t), 4), np.nan)
         if "rotors" in made:
             speeds = made["rotors"].at(t)
-        elif "wrench" in made and vehicle is not None:
+        elif kind == "wrench" and vehicle is not None:
             speeds, wrench_notes = speeds_of_wrench(made["wrench"].at(t), vehicle)
             notes += tuple(wrench_notes)
         measured = {name: x for name, s in sensors.items() if np.isfinite(x := s.between(t)).any()}
@@ -177,7 +177,7 @@ class Recording:
             notes=notes,
             valid=valid,
             extra={name: x[:, 0] if x.shape[1] == 1 else x for name, x in kept.items()},
-            commanded="wrench" in made and "rotors" not in made,
+            commanded=kind == "wrench",
             command=made["commands"].at(t) if "commands" in made else None,
             vehicle=log_map.vehicle,
             flown=self.flown,

@@ -54,7 +54,9 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGr
             f"{table.path}: column {clock.column}: {len(samples.t)} time(s); expected at least two"
         )
     raw = samples.t
-    if is_whole and (even := _even_times(raw)) is not None:
+    others = [x for name, x in samples.columns.items() if name not in clock.named]
+    # a channel with a value in every row has one time for each value
+    if any(np.isfinite(x).all() for x in others) and (even := _even_times(raw)) is not None:
         rounded, raw = np.min(np.diff(np.unique(raw))), even
         samples = replace(samples, t=raw)
         notes.append(

@@ -4,39 +4,39 @@ the header, a line of units behind it, lists in fields, whose items are columns 
 The layout is found in the first lines. Each separator and each way to write decimals is tried. The
 right layout makes the most numbers of a line, in the longest run of lines with equally many fields.
 This run is the table, and the line of names before the run is its header. The rows are then
-counted, and the columns asked for are turned into numbers a block of lines at a time.
+counted, and the columns asked for are turned into numbers: by the core where fields are plain
+numbers, else a block of lines at a time.
 """
 
 import codecs
 import csv
 import gzip
-import io
 import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
-from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
+from ... import _core
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.regular_files import open_regular
 from .column_names import is_unit
-from .table import WHAT, Array, Table
+from .table import WHAT, Array, Rows, Table
 
 # people's words for a missing value
 MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
-_BUFFER = 2**18  # bytes unpacked at a time
+_BUFFER = 2**18  # bytes read or unpacked at a time: less than a longest line
 _UNUSED = 2**21  # packed bytes without a line yet
 _DAY_0 = date(1970, 1, 1).toordinal()
 _BLOCK = 200  # lines turned into numbers at a time; their texts stay in the cache of the processor
@@ -155,10 +155,10 @@ def open_text(path: Path) -> Table:
     Raises:
         InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
     """
-    written = []
-    for line in islice(_lines(path), _LINES):
+    written: list[str] = []
+    for line in (line for block in _blocks(path) for line in _text_lines(block)):
         written.append(line)
-        if sum(map(len, written)) > _LOOKED_AT:
+        if len(written) == _LINES or sum(map(len, written)) > _LOOKED_AT:
             break
     for program, beginning in _MOTION_CAPTURE.items():
         if re.match(beginning, "\n".join(written[:8])):
@@ -187,26 +187,35 @@ def open_text(path: Path) -> Table:
         names[i : i + 1] = [f"{names[i]}[{k}]" for k in range(count)]
     notes = [] if said == ["fields separated by comma"] else [f"layout: {', '.join(said)}"]
 
-    rows, last, blank = 0, "", []
-    for line in islice(_lines(path), first, None):
-        if layout.is_blank(line):
-            blank.append(rows)
-        else:
-            rows, last = rows + 1, line
-    if rows > 1 and len(layout.fields(last)) < len(names):
+    blank: list[int] = []
+    last = 0, ""  # rows up to the last line that the core does not read, and the line
+
+    def note(lines: Sequence[str], row: int) -> int:
+        nonlocal last
+        for line in lines:
+            if layout.is_blank(line):
+                blank.append(row)
+            else:
+                row, last = row + 1, (row + 1, line)
+        return row
+
+    none = np.empty((0, LIMITS.table_rows + _LINES))
+    rows = _walk(path, layout, first, np.full(len(names), -1), none, note)
+    if rows > 1 and last[0] == rows and len(layout.fields(last[1])) < len(names):
         rows -= 1
         notes.append("the last line was cut off, and left out")
 
     def load(table: Table, wanted: Sequence[str]) -> Array:
-        lines: Iterator[str] = islice(_lines(path), first, None)
-        if blank:
-            lines = (line for line in lines if not layout.is_blank(line))
-        columns, done, kept = np.empty((len(wanted), rows)), 0, islice(lines, rows)
-        while block := list(islice(kept, _BLOCK)):
-            part = columns[:, done : done + len(block)]
-            _fill(table, layout, block, done, wanted, part)
-            done += len(block)
-        if done != rows:
+        columns = np.empty((len(wanted), rows))
+        slots = np.array([wanted.index(name) if name in wanted else -1 for name in names])
+
+        def fill(lines: Sequence[str], row: int) -> int:
+            lines = [line for line in lines if not layout.is_blank(line)][: rows - row]
+            if lines:
+                _fill(table, layout, lines, row, wanted, columns[:, row : row + len(lines)])
+            return row + len(lines)
+
+        if _walk(path, layout, first, slots, columns, fill) != rows:
             raise InputError(f"{path}: changed while it was read; expected a whole file")
         return columns
 
@@ -266,36 +275,83 @@ class _Packed:
         return piece
 
 
-def _lines(path: Path) -> Iterator[str]:
-    """Yield a text's lines, unpacked, without their ends.
+def _blocks(path: Path) -> Iterator[bytes]:
+    """Yield a text in blocks of whole lines, unpacked, with one kind of line end.
 
     Raises:
         InputError: unreadable, no text, or more than ``FileLimits`` allows; everything is counted
             as it comes.
     """
-    size, number, most = 0, 0, LIMITS.table_rows + _LINES
+    size, number, rest = 0, 0, b""
     try:
         with open_regular(path, WHAT) as file:
             packed: Any = _Packed(file, path)
-            source = file
-            if path.name.lower().endswith(".gz"):
-                source = io.BufferedReader(gzip.GzipFile(fileobj=packed), _BUFFER)
-            text = io.TextIOWrapper(source, "utf-8-sig", _LATIN)
-            while line := text.readline(LIMITS.table_line + 1):
-                size, number = size + len(line), number + 1
-                packed.unpacked = size
-                if "\0" in line:
+            source = gzip.GzipFile(fileobj=packed) if path.name.lower().endswith(".gz") else file
+            while piece := source.read(_BUFFER):
+                piece += source.read(1) if piece.endswith(b"\r") else b""
+                if b"\r" in piece:
+                    piece = piece.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+                if b"\0" in piece:
                     raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
-                # checked first: a table may have millions of lines
-                if len(line) > LIMITS.table_line or size > LIMITS.table_text or number > most:
-                    check_count(path, len(line), LIMITS.table_line, f"in line {number}")
-                    check_count(path, size, LIMITS.table_text, "characters of text")
-                    check_count(path, number - _LINES, LIMITS.table_rows, "rows")
-                yield line.rstrip("\n")
+                block = rest + (piece if size else piece.removeprefix(codecs.BOM_UTF8))
+                size += len(piece)
+                packed.unpacked = size
+                check_count(path, size, LIMITS.table_text, "characters of text")
+                length = block.find(b"\n") if b"\n" in piece else len(block)
+                check_count(path, length, LIMITS.table_line, f"in line {number + 1}")
+                number += piece.count(b"\n")
+                check_count(path, number - _LINES, LIMITS.table_rows, "rows")
+                end = block.rfind(b"\n") + 1
+                rest = block[end:]
+                yield block[:end]
+            yield rest
     except (OSError, EOFError, zlib.error) as error:
         cut = "the packed data ends before its end is marked"
         why = cut if isinstance(error, EOFError) else error
         raise InputError(f"{path}: cannot be read as {WHAT}: {why}") from error
+
+
+def _text_lines(block: bytes) -> list[str]:
+    """Return the lines of a block, without their ends."""
+    return block.decode("utf-8", _LATIN).removesuffix("\n").split("\n") if block else []
+
+
+def _walk(
+    path: Path,
+    layout: TextLayout,
+    first: int,
+    slots: Rows,
+    columns: Array,
+    other: Callable[[Sequence[str], int], int],
+) -> int:
+    """Read the rows of a text from line ``first``, counted from 0, on; return their number.
+
+    Args:
+        path: the text.
+        layout: of its lines.
+        first: the line of the first row.
+        slots: (F,) of each field, the line of ``columns`` for its numbers; -1: none.
+        columns: (K, N) to fill.
+        other: reads lines of other fields than plain numbers, from a row on; returns the next row.
+    """
+    row = 0
+    is_plain = layout.separator != " " and layout.decimal == "." and not layout.lists
+    for block in _blocks(path):
+        at = 0
+        while first and at < len(block):
+            first, at = first - 1, block.find(b"\n", at) + 1 or len(block)
+        while at < len(block):
+            if is_plain:
+                count, used = _core.read_text_rows(block, at, layout.separator, slots, columns, row)
+                row, at = row + count, at + used
+            if at == len(block):
+                break
+            end = at
+            for _ in range(_BLOCK):
+                end = block.find(b"\n", end) + 1 or len(block)
+            row = other(_text_lines(block[at:end]), row)
+            at = end
+    return row
 
 
 def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:

@@ -308,9 +308,13 @@ def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
     lines = [",".join(map(repr, row)) for row in table.tolist()]
     want = read_text(tmp_path, lines)
     monkeypatch.setattr(text_table, "_BLOCK", 7)
+    monkeypatch.setattr(text_table, "_BUFFER", 1000)
+    mixed = lines.copy()
+    mixed[9::50] = ['"' + line.replace(",", '",', 1) for line in lines[9::50]]
     for log in (
         want,
         read_text(tmp_path, lines),
+        read_text(tmp_path, mixed),
         read_text(tmp_path, [f'"{line.replace(",", chr(34) + "," + chr(34))}"' for line in lines]),
         read_text(tmp_path, lines, "\r\n"),
     ):

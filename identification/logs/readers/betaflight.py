@@ -38,7 +38,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup, check_piece
 from ..flight_log import FlightLog
 from ..log_map import shipped_map
-from ..mapped_log import recording_of
+from ..mapped_log import motors_left_out, recording_of
 from ..streams import MOST_VOLTS
 from ..table import Array, NamedArrays, Table
 
@@ -131,6 +131,7 @@ def read(
         )
     if lost:
         notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
+    notes += motors_left_out(names, wanted)
     fields = dict(zip(keep, rows.T.astype(float), strict=True))
     return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
 
@@ -154,7 +155,7 @@ def read_table(
                 scales[field] = _UNITS[unit]
     read = table.read(list(names.values()))
     fields = {field: scales.get(field, 1.0) * read[name] for field, name in names.items()}
-    notes = [*table.notes]
+    notes = [*table.notes, *motors_left_out(table.header, names.values())]
     return _log(path, "betaflight_csv", fields, {*scales}, {}, option, vehicle, notes, piece)
 
 

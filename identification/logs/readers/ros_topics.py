@@ -4,6 +4,7 @@ columns: numbers by the paths of their fields, such as ``pose.position.x``, ``da
 """
 
 import re
+from array import array
 from collections.abc import Callable, Collection, Iterator, Mapping
 from itertools import islice
 from operator import attrgetter
@@ -13,7 +14,7 @@ import numpy as np
 
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
-from ..log_map import Columns, LogMap, parse_map, stated
+from ..log_map import LogMap, parse_map, stated
 from ..table import Array, Data, NamedArrays
 from .px4_ulog import unified
 
@@ -24,8 +25,8 @@ MOTORS = ("rotors", "commands")
 _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
-_PX4 = "px4_msgs/msg/"
 _SHOWN = 30  # fields in an error
+_PX4 = "px4_msgs/msg/"
 
 
 def map_of(
@@ -198,17 +199,9 @@ def stamp(message: Any) -> int:
     return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
 
 
-def empty_motors(first: tuple[int, Any] | None, held: Mapping[str, Columns]) -> list[str]:
-    """Return rotors or commands, whichever the first message of their topic leaves empty beside the
-    other.
-    """
-    paths = set(_paths(first[1])) if first else set()
-    empty = [name for name in MOTORS if not paths.issuperset(held[name].named)]
-    return empty if len(empty) < len(MOTORS) else []
-
-
 class MessageFields:
-    """The numbers of a map in a topic's messages; whole arrays.
+    """The numbers of a map in a topic's messages; whole arrays. A field that a message lacks, such
+    as a number of a shorter array, is NaN there.
 
     Args:
         where: the topic, for errors.
@@ -217,51 +210,52 @@ class MessageFields:
     """
 
     def __init__(self, where: str, kind: str, wanted: Collection[str]) -> None:
-        self.where, self._kind, self._wanted = where, kind, wanted
-        self._names: list[str] = []
-        self._getters: list[Callable[[Any], Any]] = []
+        self.where, self._kind, self._wanted = where, kind, dict.fromkeys(wanted)
+        self._is_px4 = kind.startswith(_PX4)
+        self._getters: dict[str, Callable[[Any], Any]] = {}
+        self._numbers, self._count = array("d"), 0
 
-    def take(self, message: Any) -> list[float]:
-        """Return the numbers (K,) of a message.
+    def take(self, message: Any) -> None:
+        """Add the numbers of a message.
 
         Raises:
-            InputError: the message has more than ``FileLimits.log_fields``, or less than the first
-                one.
+            InputError: the message has more than ``FileLimits.log_fields``.
         """
-        if not self._names:
+        known = self._getters
+        if not known or not (self._is_px4 or self._wanted.keys() <= known.keys()):
+            before = self._rows()
             paths = list(islice(_paths(message), LIMITS.log_fields + 1))
             check_count(self.where, len(paths), LIMITS.log_fields, "fields of a message")
             arrays = set(map(array_of, self._wanted))
-            is_px4 = self._kind.startswith(_PX4)
-            if not is_px4 and not set(self._wanted) <= set(paths):
-                raise self._lack(self._wanted, paths)
-            self._names = [name for name in paths if is_px4 or array_of(name) in arrays]
-            self._getters = [_getter(name) for name in self._names]
-        try:
-            return [float(get(message)) for get in self._getters]
-        except IndexError:
-            names, self._names = self._names, []
-            raise self._lack(names, list(_paths(message))) from None
+            used = [path for path in paths if self._is_px4 or array_of(path) in arrays]
+            if new := [path for path in used if path not in known]:
+                known |= {path: _getter(path) for path in new}
+                rows = np.pad(before, ((0, 0), (0, len(new))), constant_values=np.nan)
+                self._numbers = array("d", rows.tobytes())
+        for get in known.values():
+            try:
+                self._numbers.append(get(message))
+            except IndexError:
+                self._numbers.append(np.nan)
+        self._count += 1
 
-    def columns(self, rows: Array) -> NamedArrays:
-        """Return the columns (N,) of messages' numbers (N, K), by name.
+    def _rows(self) -> Array:
+        return np.array(self._numbers).reshape(self._count, len(self._getters))
 
-        Raises:
-            InputError: a wanted column is missing.
-        """
-        columns_by_name = dict(zip(self._names, rows.T, strict=True))
-        if self._kind.startswith(_PX4):
-            name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._kind.removeprefix(_PX4)).lower()
-            columns_by_name = unified(name, columns_by_name)
-        if not set(self._wanted) <= set(columns_by_name):
-            raise self._lack(self._wanted, list(columns_by_name))
-        return columns_by_name
+    def columns(self) -> NamedArrays:
+        """Return the columns (N,) of the messages, by name."""
+        columns_by_name = dict(zip(self._getters, self._rows().T, strict=True))
+        if not self._is_px4:
+            return columns_by_name
+        name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._kind.removeprefix(_PX4)).lower()
+        return unified(name, columns_by_name)
 
-    def _lack(self, wanted: Collection[str], names: Collection[str]) -> InputError:
-        missing = [name for name in wanted if name not in names]
+    def lack(self, columns: Collection[str]) -> InputError:
+        """Return the error for columns without some of the wanted ones."""
+        missing = [name for name in self._wanted if name not in columns]
         return InputError(
             f"{self.where}: no field {', '.join(missing)} in its {self._kind}; found "
-            f"{', '.join(islice(names, _SHOWN)) or 'no number'}"
+            f"{', '.join(islice(columns, _SHOWN)) or 'no number'}"
         )
 
 

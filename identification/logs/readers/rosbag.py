@@ -34,7 +34,6 @@ import sqlite3
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -52,8 +51,8 @@ from ....runtime.yaml_file import read_yaml
 from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..mapped_log import recording_of
-from ..table import Data, NamedArrays, one_line
-from .ros_topics import MOTORS, MessageFields, definitions, empty_motors, map_of, stamp
+from ..table import NamedArrays, one_line
+from .ros_topics import MessageFields, definitions, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -94,23 +93,26 @@ def read(
         log_map, notes = map_of(types, given, str(path), str(file))
         for topic in sorted(log_map.topics - {""}):
             held = {name: part for name, part in log_map.sections.items() if part.topic == topic}
-            if held.keys() >= {*MOTORS}:
-                for name in empty_motors(next(messages(topic), None), held):
-                    notes.append(f"no {name}: {topic} has no {held.pop(name).columns[0]} ...")
-                    log_map = log_map.with_ways({name: []})
-            wanted = dict.fromkeys(name for part in held.values() for name in part.named)
+            wanted = [name for part in held.values() for name in part.named]
             fields = MessageFields(f"{path}: topic {topic}", types[topic], wanted)
             try:
                 times, columns, doubt = _decoded_topic(fields, messages(topic))
+                left_out = {
+                    name: f"{topic} has no {part.columns[0]} ..."
+                    for name, part in held.items()
+                    if not columns.keys() >= {*part.named}
+                }
+                if len(left_out) == len(held) or left_out.keys() & {*given}:
+                    raise fields.lack(columns)
             except InputError as error:
                 if held.keys() & {*given, "position", "rotors"}:
                     raise
-                notes.append(f"no {', '.join(held)}: {error}")  # the map did not ask for it
-                left_out: Data = dict.fromkeys(held)
-                log_map = replace(log_map, **left_out)
-                continue
-            decoded.append((times, columns, topic))
-            notes += [f"{topic}: {doubt}; the times of recording were taken"] if doubt else []
+                left_out = dict.fromkeys(held, str(error))  # the map did not ask for it
+            notes += [f"no {name}: {why}" for name, why in left_out.items()]
+            log_map = log_map.with_ways(dict.fromkeys(left_out, ()))
+            if len(left_out) < len(held):
+                decoded.append((times, columns, topic))
+                notes += [f"{topic}: {doubt}; the times of recording were taken"] if doubt else []
     if not decoded:
         raise InputError(f"{path}: {notes[-1]}")
     origin = min(int(times[0]) for times, _, _ in decoded)
@@ -239,15 +241,15 @@ def _decoded_topic(fields: MessageFields, messages: Iterator[tuple[int, Any]]) -
     Raises:
         InputError: the topic has no message, too many, or an unusable one.
     """
-    recorded, stamped, values = array("q"), array("q"), array("d")
+    recorded, stamped = array("q"), array("q")
     for index, (received, message) in enumerate(messages):
         check_count(fields.where, index + 1, LIMITS.table_rows, "messages")
         recorded.append(received)
         stamped.append(stamp(message))
-        values.extend(fields.take(message))
+        fields.take(message)
     if not recorded:
         raise InputError(f"{fields.where} has no messages; expected at least two")
-    columns = fields.columns(np.array(values).reshape(len(recorded), -1))
+    columns = fields.columns()
     received_at, sampled_at = np.array(recorded), np.array(stamped)
     if not np.any(sampled_at):
         return received_at, columns, "no time stamps"

@@ -222,3 +222,21 @@ def test_the_kits_own_columns_are_read_in_any_layout(tmp_path, flown):
         assert_array_equal(log.t, own.t)
         assert_allclose(log.rotor_speeds, own.rotor_speeds, rtol=1e-12)
         assert_allclose(log.gyro, own.gyro, atol=1e-15)
+
+
+def test_rows_whose_times_were_rounded_are_even(tmp_path):
+    """A value in every row has a time of its own."""
+    path = table(tmp_path / "a.csv", {"t": [f"{0.005 * k:.2f}" for k in range(40)]})
+    log = mapped(path)
+    assert len(log.t) == 40
+    assert_allclose(log.t, 0.005 * np.arange(40), atol=2e-3)
+    assert noted(log, "the rows were taken as even in time")
+
+
+def test_columns_named_as_motors_are_said_where_they_are_left_out(tmp_path):
+    more = {f"esc_{i}_rpm": 3600.0 for i in range(1, 5)} | dict.fromkeys(
+        ("x1", "x2", "x3", "x4"), 1
+    )
+    log = mapped(table(tmp_path / "a.csv", more))
+    assert noted(log, "columns named as motors' were left out: esc_1_rpm ...")
+    assert not noted(mapped(table(tmp_path / "b.csv", {})), "left out")

@@ -102,6 +102,24 @@ def test_set_points_become_rotor_speeds(write):
     assert not any("motor_curve" in text for text in found.doubts)
 
 
+@pytest.mark.parametrize("thrust", ["thrustSI", "thrustSi"])
+def test_a_controller_that_logs_its_wrench(write, thrust):
+    """As crazyswarm2's: attitude, angular velocity and commanded wrench are the controller's."""
+    position, turn = motion(T)
+    gyro, _ = inertial(T)
+    variables = {f"stateEstimateZ.{a}(f)": 1e3 * position[:, i] for i, a in enumerate("xyz")}
+    yaw, pitch, roll = turn.as_euler("ZYX").T
+    angles = zip("xyz", (roll, pitch, yaw), strict=True)
+    variables |= {f"ctrlLee.rpy{a}(f)": angle for a, angle in angles}
+    variables |= {f"ctrlLee.omega{a}(f)": gyro[:, i] for i, a in enumerate("xyz")}
+    variables |= {f"ctrlLee.{thrust}(f)": np.full(len(T), 0.3)}
+    variables |= {f"ctrlLee.torque{a}(f)": np.zeros(len(T)) for a in "xyz"}
+    log = read_log(write(sd_card({"fixedFrequency": (T, variables)})))
+    assert_motion(log, log.t + T[0], 2e-3, 2e-3)
+    assert_allclose(log.gyro, gyro, atol=1e-4)
+    assert_allclose(load_vehicle("crazyflie").k.sum() * log.rotor_speeds[:, 0] ** 2, 0.3, rtol=1e-6)
+
+
 def test_measured_rotor_speeds_come_first(write):
     variables = fast(T) | {f"rpm.m{i + 1}(H)": np.full(len(T), 20000 + i) for i in range(4)}
     log = read_log(write(sd_card({"imu": (T, variables)})))

@@ -251,6 +251,21 @@ def test_actuators_of_gazebo_and_a_named_order(write):
     assert_allclose(read_log(path).rotor_speeds[0], OURS[::-1])
 
 
+def test_each_field_of_a_message_is_read_for_itself(write):
+    """As of Gazebo's bridge: speeds without commands, and none before the simulation runs."""
+
+    def fields(t):
+        i = round(100 * t) % 10
+        return {"header": stamp(t), "velocity": OURS[: 0 if t < 0.1 or i == 7 else 4]}
+
+    log = read_log(
+        write({"/pose": pose(), "/motors": ("actuator_msgs/msg/Actuators", WIDE, fields)})
+    )
+    assert_allclose(log.rotor_speeds, np.tile(OURS, (len(log.t), 1)))
+    assert log.command is None
+    assert noted(log, "no commands: /motors has no normalized[0] ...")
+
+
 def test_without_a_pose_an_imu_will_do(write):
     log = read_log(write({"/imu": imu(), "/motors": actuators()}))
     assert not log.has_pose

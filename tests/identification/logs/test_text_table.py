@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
@@ -114,3 +116,24 @@ def test_the_memory_of_a_check_is_in_proportion_to_the_numbers_that_are_read(tmp
         assert read == rows
     (few, before), (many, after) = taken.items()
     assert after - before < 5.0 * (many - few)  # 3.5 over three hours
+
+
+NUMBER = st.one_of(
+    st.floats(allow_infinity=False).map(repr),
+    st.floats(-1e9, 1e9).map("{:.6f}".format),
+    st.floats(-1e9, 1e9).map("{:+.11e}".format),
+    st.integers(-(10**21), 10**21).map(str),
+    st.integers(2**53, 2**54).map("{}.5".format),  # a tie
+    st.sampled_from(["", " 3.25 ", "+1.", "-.5", "-0", "NaN", "1e400", "00012.50"]),
+)
+
+
+@given(st.lists(NUMBER, min_size=3, max_size=30))
+def test_plain_numbers_are_those_of_python(tmp_path_factory, numbers):
+    path = tmp_path_factory.mktemp("numbers") / "table.csv"
+    rows = [f"{i},{text}" for i, text in enumerate(numbers)]
+    path.write_text("\n".join(["t,x", "0,0", "0,0", *rows]))
+    got = open_table(path).read(["x"])["x"][2:]
+    want = np.array([float(text or "nan") for text in numbers])
+    assert_array_equal(got, want)
+    assert_array_equal(np.signbit(got), np.signbit(want))
