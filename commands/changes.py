@@ -58,13 +58,13 @@ def compare(
     change = find_change(trims[: len(logs)], trims[len(logs) :])
     written = write_change(change, folder)
     log_notes(text for log in every for text in log.notes)
+    console.print(change_headline(change))
     console.print(f"vehicle: {model.name}")
     for session in dict.fromkeys(sessions) if by_folder else ():
         after, before = (
             part.count(session) for part in (sessions[: len(logs)], sessions[len(logs) :])
         )
         console.print(f"session {session}: {after} after, {before} before")
-    console.print(change_headline(change))
     places = sorted(change.places.items(), key=lambda item: -item[1])
     rows = [(name, f"{chance:.3f}") for name, chance in places]
     show_table(("where something changed", "probability"), rows)

@@ -55,7 +55,10 @@ def check(
     picture = plot_channels(flight.name, checked.channels, folder / "check.png")
     if write_map is not None:
         write_text(checked.map_text, write_map)
-    console.print(f"{flight.name}: {checked.sentence()}")
+    for text in (*checked.doubts, *checked.limits):
+        note(f"warning: {text}")
+    console.print(checked.headline())
+    console.print(f"{flight.name}: {checked.reading()}")
     show_table(("what flew", "", "by"), checked.what_flew())
     show_table(
         ("channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit"),
@@ -85,8 +88,6 @@ def check(
     for text in flight.notes:
         if not text.startswith("warning"):
             console.print(text)
-    for text in checked.doubts:
-        note(f"warning: {text.removeprefix('warning: ')}")
     if said:
         note(said)
     say(*(path for path in (write, picture, write_map) if path is not None))

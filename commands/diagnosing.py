@@ -102,7 +102,7 @@ def _diagnose(
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
     from ..identification.report.headline import headline
-    from ..identification.report.words import error_sentences, remainder_sentence
+    from ..identification.report.words import doubts, error_sentences, remainder_sentence
 
     (every, model), count = read, len(paths)
     folder = results_folder(out)
@@ -111,7 +111,7 @@ def _diagnose(
     diagnosis = _with_rotor_faults(diagnosis, paths, every[:count])
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(diagnosis, folder, command_line())
-    log_notes(diagnosis.notes)
+    log_notes([*(own := doubts(diagnosis)), *(x for x in diagnosis.notes if x not in own)])
     faults = [data["headline"] for data in diagnosis.rotor_faults if data["rotor"] is not None]
     sentences = (
         headline(diagnosis),
@@ -119,7 +119,7 @@ def _diagnose(
         remainder_sentence(diagnosis),
         *faults,
     )
-    for sentence in (f"vehicle: {model.name}", *sentences):
+    for sentence in (*sentences, f"vehicle: {model.name}"):
         console.print(sentence)
     _show(diagnosis)
     for line in diagnosis.advice:

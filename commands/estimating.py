@@ -58,6 +58,7 @@ def estimate(
 
     from ..estimator.noise_scale import noise_warning
     from ..identification.motion.inertial_signals import reads_imu
+    from ..identification.report.headline import wrench_headline
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
         counts,
@@ -96,8 +97,11 @@ def estimate(
     save_tuning(series.tuning, flight.period, written[2])
     log_notes(series.notes)
     seconds = float(flight.t[-1] - flight.t[0])
+    headline = wrench_headline(series)
+    console.print(headline)
     console.print(f"{flight.name}: {len(flight.t)} samples, {seconds:.1f} s, vehicle {model.name}")
     result: dict[str, Any] = {
+        "headline": headline,
         "log": flight.name,
         "vehicle": model.name,
         "samples": len(flight.t),

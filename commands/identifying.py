@@ -120,7 +120,7 @@ def identify(
             table_of(errors, beside),
         )
     console.print(use_of(identified))
-    result = identified_data(identified)
+    result = {"headline": headline(identified), **identified_data(identified)}
     if export is not None:
         text = EXPORTS[export](identified)
         console.print(text, soft_wrap=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..runtime.errors import InputError, UnreadLogError
 from ..runtime.page_files import write_text
-from .flight_logs import AS_THEY_ARE, LogOptions
+from .flight_logs import AS_THEY_ARE, LogOptions, read_logs
 from .terminal import (
     command_line,
     console,
@@ -20,9 +20,7 @@ from .terminal import (
     silently,
 )
 
-_MAKE_A_VEHICLE = """Force and torque need a vehicle. Make its file from this log and a mass:
-windwrench identify {log} --mass KG --out my_drone.yaml
-windwrench {log} --vehicle my_drone.yaml"""
+_VEHICLE = "my_drone.yaml"
 
 
 def is_path(word: str) -> bool:
@@ -63,20 +61,20 @@ def look(
     if checked["fields"]:  # its map was guessed
         write_text(checked["map"], own_map)
         reading = replace(reading, map=str(own_map))
-        for text in checked["doubts"]:
-            note(f"warning: {text}")
+    for text in checked["doubts"]:
+        note(f"warning: {text}")
     drawn, said = folder / "check.png", _what_it_holds(checked)
     steps = [Step("What the log holds", said, _typed("check", log, reading), drawn)]
     _tell(steps[0])
-    sentence, then = f"{steps[0].sentences[0]} No vehicle is known.", ""
+    sentence, then = checked["headline"], ""
     if reading.vehicle is None and checked["vehicle"] in preset_names():
         reading = replace(reading, vehicle=checked["vehicle"])
     results: dict[str, Any] = {"check": checked}
     if reading.vehicle is None:
-        then = _MAKE_A_VEHICLE.format(log=shlex.quote(str(log)))
+        then = _how_to_make_a_vehicle(log, reading)
     else:
         ways: tuple[tuple[str, str, Callable[..., Any], Any, Callable[..., Any]], ...] = (
-            ("estimate", "Which force and torque act", estimate, log, _what_acts),
+            ("estimate", "Which force and torque act", estimate, log, lambda x: (x["headline"],)),
             ("diagnose", "What the model lacks", diagnose, [log], _what_lacks),
         )
         for name, title, work, logs, told in ways:
@@ -107,7 +105,22 @@ def _typed(command: str, log: Path, reading: LogOptions) -> str:
     """Return the command line of one step alone."""
     given = vars(reading).items()
     options = [str(x) for name, value in given if value is not None for x in (f"--{name}", value)]
-    return shlex.join(["windwrench", command, str(log), *options])
+    return shlex.join(["windwrench", *filter(None, [command]), str(log), *options])
+
+
+def _how_to_make_a_vehicle(log: Path, reading: LogOptions) -> str:
+    """Return the commands that make a vehicle of a log, or the reason why none can."""
+    from ..identification.vehicle_fit.identify import checked_pieces
+
+    try:
+        checked_pieces(read_logs([log], reading))
+    except InputError as refused:
+        return f"Force and torque need a vehicle, and identify refuses this log: {refused}"
+    then = _typed("", log, replace(reading, vehicle=_VEHICLE))
+    return (
+        "Force and torque need a vehicle. Make its file from this log and a mass:\n"
+        f"{_typed('identify', log, reading)} --mass KG --out {_VEHICLE}\n{then}"
+    )
 
 
 def _tell(step: Any) -> None:
@@ -119,24 +132,15 @@ def _what_it_holds(checked: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the result of ``check`` as sentences."""
     read = f"{checked['samples']} rows, {checked['seconds']:.1f} s, read by {checked['read_by']}."
     rates = (f"{name} {c['rate_hz']:.3g} Hz" for name, c in checked["channels"].items())
-    doubts = len(checked["doubts"])
-    said = [f"{doubts} doubts: the command below tells them."] if doubts else []
-    return (read, f"Channels: {', '.join(rates)}.", *said)
-
-
-def _what_acts(result: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the mean force as a sentence."""
-    mean, spread = result["force_mean_N"], result["force_std_N"]
-    force = ", ".join(f"{x:+.2g} ({s:.2g})" for x, s in zip(mean, spread, strict=True))
-    return (f"Beside the model act {force} N along x, y and z: mean (standard deviation).",)
+    first = checked["headline"]
+    doubts = (f"Doubt: {text}." for text in checked["doubts"] if f"{text}." not in first)
+    return (first, *doubts, read, f"Channels: {', '.join(rates)}.")
 
 
 def _what_lacks(result: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the first sentence of a diagnosis, and the rest of the force: within a sentence
-    without a number of its own, else as a further one.
-    """
-    headline, error = result["headline"], result["error"]
+    """Return the first sentence of a diagnosis, and its error on held-out flight."""
+    error = result["error"]
     before, after = (1e3 * error[when]["force_rms_N"] for when in ("before", "after"))
-    change = f"falls from {before:.3g} to {after:.3g}" if result["effects"] else f"is {before:.3g}"
-    told = f"The force that it leaves on unseen stretches {change} mN."
-    return (headline, told) if any(x.isdigit() for x in headline) else (f"{headline} {told}",)
+    change = f"{before:.3g} mN before, {after:.3g} mN after" if result["effects"] else ""
+    told = (f"Held-out force error: {change}.",) if change else ()
+    return (result["headline"], *told)

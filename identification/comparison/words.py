@@ -52,25 +52,26 @@ def change_headline(change: Change) -> str:
             f"something did, it is likeliest at {other} ({change.places[other]:.2f})."
         )
     if change.sure:
-        return f"Changed: {place} (probability {chance:.2f}). {_kind(change)}"
-    return f"{_cannot_tell(change.places, place, str)} {_kind(change)}"
+        return f"Changed: {place}, probability {chance:.2f}; {_kind(change)}"
+    kind = _kind(change)
+    return f"{_cannot_tell(change.places, place, str)} {kind[:1].upper()}{kind[1:]}"
 
 
 def _kind(change: Change) -> str:
     size = f"{100 * change.amount:.0f} % (+- {100 * change.amount_std:.0f})"
     if change.place == SOMETHING_ELSE:
-        return "The rotors share the work otherwise than one weaker rotor or one weight would ask."
+        return "the rotors share the work otherwise than one weaker rotor or one weight would ask."
     if change.place == "all rotors":
         why = "a heavier vehicle, a weaker battery, thin air"
-        return f"All rotors are asked for {size} more: {why}."
+        return f"all rotors are asked for {size} more: {why}."
     if not change.place.startswith("rotor"):
-        return f"The vehicle carries {size} of its weight more at that side."
+        return f"the vehicle carries {size} of its weight more at that side."
     if change.weaker >= 0.95:
-        return f"That rotor delivers {size} less for what it is asked."
+        return f"that rotor delivers {size} less for what it is asked."
     if change.carries_more >= 0.95:
-        return f"The vehicle carries {size} of its weight more there."
+        return f"the vehicle carries {size} of its weight more there."
     return (
-        f"Either that rotor delivers less (probability {change.weaker:.2f}) or the vehicle carries "
+        f"either that rotor delivers less (probability {change.weaker:.2f}) or the vehicle carries "
         f"more there ({change.carries_more:.2f}), by about {size}; these look alike."
     )
 

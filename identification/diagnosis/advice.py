@@ -145,9 +145,9 @@ def advice(
             )
     if remainder == "structured":
         yield (
-            "The residual still has structure that no effect of the library explains, so the "
-            "named effects are tentative. Fly one thing at a time (hover, climbs, level flight at "
-            "several speeds, turns) to see what the residual follows."
+            "Fly one thing at a time (hover, climbs, level flight at several speeds, turns) to see "
+            "the variable that the residual follows: no effect of the library explains the "
+            "residual's structure."
         )
     if needs_pose:
         yield (

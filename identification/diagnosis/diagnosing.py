@@ -310,8 +310,8 @@ class Judged:
         doubts = {"composite": tuple(alike)}
         if strange > rule.most_unknown:
             doubts["unknown"] = (
-                "something that no effect of the library is acts with a probability of "
-                f"{strange:.0%}: all names are tentative",
+                f"a cause outside the library acts with a probability of {strange:.0%}"
+                f"{': all names are tentative' if named else ''}",
             )
         if flights.seconds < rule.least_seconds:
             doubts["short"] = (

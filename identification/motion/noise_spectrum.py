@@ -58,6 +58,7 @@ class ChannelNoise:
 
 POSE_CHANNELS = ("position", "attitude")
 ROTORS = "rotor speeds"
+_MEASURED = 0.9  # measurements a row, below which the reader interpolated the channel
 
 
 @lru_cache(maxsize=1)  # a diagnosis asks three times
@@ -76,7 +77,9 @@ def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
 
 
 def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
-    """Yield each channel's name, its unbroken pieces (n, k) and its period (s)."""
+    """Yield the name, the unbroken pieces (n, k) and the period (s) of each channel with a
+    measurement a row: the spectrum of others is the reader's interpolation.
+    """
     quaternion = np.where(log.valid[:, None], log.quaternion, [1.0, 0.0, 0.0, 0.0])
     position = np.where(log.valid[:, None], log.position, np.nan)
     for name, x in (
@@ -92,6 +95,9 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         if len(rows) <= SEGMENT:
             continue
         period = median_step(log.t[rows])
+        rate = log.rates.get("rotors" if name == ROTORS else name, np.inf)
+        if name not in POSE_CHANNELS and rate * period < _MEASURED:
+            continue
         pieces = unbroken(log.t, rows, GAP * period, SEGMENT)
         turning = name == "attitude"
         yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period

@@ -6,12 +6,15 @@ user's own.
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...dynamics import effects as library
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Diagnosis, NamedEffect
+from ..logs.table import Array, Pair
 from .words import SPACE, coefficient_meaning, effect_summary, in_words, scale_of, with_std
 
 _ROTORS = 4
@@ -33,6 +36,8 @@ _RELATIVE = {"1": (100.0, "%"), "1/s": (6000.0, "% a minute")}
 _PLACE = re.compile(r"(along|about) (body|world) ([xyz])|(rotor \d)$")
 _SIDES = {"x": ("forward", "backward"), "y": ("left", "right"), "z": ("up", "down")}
 _KNOWN = 2.0  # least standard deviations of a coefficient in the sentence
+_MOST = 2  # coefficients of an effect in the sentence
+_BESIDE = 0.38  # share of a wind's speed, sin(22.5 degrees): least part along a named axis
 _BLOCK = 3.0  # s: longer than the correlation of a residual
 _LEAST_BLOCKS = 4
 _STEADY = 4.0  # least standard errors of a mean over blocks, beyond chance
@@ -95,40 +100,74 @@ def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
     return Amount(value, std, "" if unit == "1" else unit, where, when)
 
 
-def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
-    """Return an effect's plain name, the known quantities of a sure effect, and its name in files
-    and options.
-    """
-    plain = title(effect.name)
-    told = [] if plain.replace(" ", "_") == effect.name else [effect.name]
-    known = [
-        amount(effect, name, vehicle)
+def known(effect: NamedEffect) -> list[str]:
+    """Return the coefficients of at least two standard deviations."""
+    return [
+        name
         for name, value in effect.coefficients.items()
-        if abs(value) > _KNOWN * effect.std.get(name, math.inf) > 0.0
+        if math.isfinite(value) and abs(value) > _KNOWN * effect.std.get(name, 0.0)
     ]
-    if known and not effect.tentative:
-        when = known[0].when if len({one.when for one in known}) == 1 else ""
-        parts = [f"{one} {one.when}" if one.when and not when else f"{one}" for one in known]
-        told.insert(0, in_words(parts) + (f" {when}" if when else ""))
-    return f"{plain} ({'; '.join(told)})" if told else plain
 
 
-def steady_wrench(diagnosis: Diagnosis) -> str:
-    """Return the mean force and torque of the residual, if beyond chance; else nothing.
+def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
+    """Return an effect's plain name with its amount: the speed and direction of a wind; else the
+    known coefficients in the first one's unit, or of more than two the largest.
+    """
+    if effect.name in library.names() and library.get(effect.name).sets_wind:
+        return f"{title(effect.name)} {_wind(effect)}"
+    names = known(effect) or list(effect.coefficients)[:1]
+    names = [name for name in names if effect.units.get(name) == effect.units.get(names[0])]
+    acts = {name: amount(effect, name, vehicle) for name in names}
+    if not acts[names[0]].unit:
+        return f"{title(effect.name)} {names[0]} = {acts[names[0]]}"
+    most = ""
+    if len(names) > _MOST:
+        most, names = "up to ", [max(names, key=lambda name: abs(effect.coefficients[name]))]
+    told = ", ".join(str(acts[name]) for name in names)
+    return f"{title(effect.name)} {most}{told} {acts[names[0]].when}".rstrip()
+
+
+def _wind(effect: NamedEffect) -> Amount:
+    """Return the speed of a wind, and the side from which the wind blows."""
+    axes = {
+        place[3]: name
+        for name in effect.coefficients
+        if (place := _PLACE.search(coefficient_meaning(effect.name, name))) and place[2] == "world"
+    }
+    wind, std = (
+        np.nan_to_num([x.get(axes[axis], 0.0) for axis in axes])
+        for x in (effect.coefficients, effect.std)
+    )
+    speed = float(np.linalg.norm(wind))
+    spread = float(np.linalg.norm(wind * std)) / speed if speed else float(np.linalg.norm(std))
+    sides = [
+        f"{'−' if x > 0.0 else '+'}{axis}"
+        for axis, x in zip(axes, wind, strict=True)
+        if abs(x) > _BESIDE * speed
+    ]
+    return Amount(speed, spread, "m/s", f"from {' '.join(sides)}" if sides else "", "")
+
+
+def steady_wrench(pieces: Sequence[Array], periods: Sequence[float], floors: Pair) -> str:
+    """Return the mean force and torque, each if beyond chance and its floor; else nothing.
 
     The mean of a block of 3 s is one number; all blocks together say how sure their mean is.
+
+    Args:
+        pieces: (n, 6) N and Nm, NaN where not known.
+        periods: s, of each piece.
+        floors: least mean force, N, and torque, Nm.
     """
-    counts = (max(1, round(len(x.after) * x.period / _BLOCK)) for x in diagnosis.traces)
-    pieces = map(np.array_split, (x.after for x in diagnosis.traces), counts)
-    blocks = [part.mean(axis=0) for parts in pieces for part in parts]
+    counts = (max(1, round(len(x) * dt / _BLOCK)) for x, dt in zip(pieces, periods, strict=True))
+    blocks = [part.mean(axis=0) for parts in map(np.array_split, pieces, counts) for part in parts]
     if len(blocks) < _LEAST_BLOCKS:
         return ""
     mean = np.mean(blocks, axis=0)
     error = np.std(blocks, axis=0, ddof=1) / math.sqrt(len(blocks))
     told = []
     for what, unit, way, first, floor in (
-        ("force", "N", "along", 0, diagnosis.floor_force_rms),
-        ("torque", "Nm", "about", 3, diagnosis.floor_torque_rms),
+        ("force", "N", "along", 0, floors[0]),
+        ("torque", "Nm", "about", 3, floors[1]),
     ):
         i = first + int(np.argmax(np.abs(mean[first : first + 3])))
         if abs(mean[i]) > _STEADY * error[i] and not abs(mean[i]) < floor:
@@ -136,3 +175,10 @@ def steady_wrench(diagnosis: Diagnosis) -> str:
             size = with_std(factor * float(mean[i]), factor * float(error[i]))
             told.append(f"a {what} of {size}{SPACE}{small} {way} {CHANNELS[i][-1]}")
     return in_words(told)
+
+
+def steady_residual(diagnosis: Diagnosis) -> str:
+    """Return the mean force and torque that the named effects leave, in words, or nothing."""
+    traces = diagnosis.traces
+    floors = diagnosis.floor_force_rms, diagnosis.floor_torque_rms
+    return steady_wrench([x.after for x in traces], [x.period for x in traces], floors)

@@ -1,81 +1,114 @@
-"""The first sentences of a diagnosis: acting effects, with plain names and quantities."""
+"""First sentences: the causes that a model lacks, by the energy that each explains, and the mean of
+an estimated wrench.
+"""
 
-from collections.abc import Sequence
+import numpy as np
 
 from ..findings import Diagnosis, NamedEffect
-from .amounts import steady_wrench, title, with_amounts
-from .words import in_words, tried
+from ..logs.table import finite_rows
+from ..wrench_series import WrenchSeries
+from .amounts import known, steady_residual, steady_wrench, title, with_amounts
+from .words import (
+    chance,
+    disturbance_at,
+    doubts,
+    error_amounts,
+    in_unit,
+    in_words,
+    is_outside,
+    percent,
+    tried,
+    without_warning,
+)
+
+_NAMED = 4  # effects in the sentence; the table has the others
+_RIVALS = 3  # rivals of an effect in the sentence
+_UNDECIDED = 0.1  # share of its energy by which an undecided effect is ordered
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """Return the verdict in plain words, as sure as its least sure part."""
-    undecided = [e for e in diagnosis.effects if e.indistinguishable_from]
-    rest = [e for e in diagnosis.effects if e not in undecided]
-    sure, unsure = ([e for e in rest if e.tentative == told] for told in (False, True))
-    if diagnosis.verdict == "nothing to explain":
-        return "The model explains these logs: nothing needs to be added to it."
-    if diagnosis.verdict == "unexplained" or not diagnosis.effects:
-        random, none = diagnosis.remainder == "random", f"no effect {tried(diagnosis)} explains"
-        if steady := steady_wrench(diagnosis):
-            return (
-                f"On average {steady} acts that the model lacks. What changes of its error "
-                f"{'looks random' if random else 'has structure'}, and {none} it."
-            )
-        how = f"looks random: {none} it" if random else f"has structure that {none}"
-        return f"The model's error {how}."
-    told = []
-    if sure:
-        told.append(
-            f"The model {_lacked(diagnosis, sure)}"
-            + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
-        )
-    if undecided:
-        told.append(_undecided(diagnosis, undecided))
-    if unsure and not sure:
-        told.append(f"The model perhaps {_lacked(diagnosis, unsure)}")
-    if diagnosis.verdict == "partly explained" and diagnosis.remainder != "none":
-        told[-1] += (
-            ", and an error is left that may or may not be the sensors' noise"
-            if diagnosis.floor_is_bound and diagnosis.remainder == "random"
-            else ", and an unexplained error is left"
-        )
-    return " ".join(f"{sentence}." for sentence in told)
-
-
-def _undecided(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
-    """Return one sentence on effects indistinguishable in these logs."""
-    pairs = [
-        f"{with_amounts(e, diagnosis.declared)} from "
-        f"{in_words([title(x) for x in e.indistinguishable_from], 'or')}"
-        for e in effects
-    ]
-    declared = {e.name for e in diagnosis.declared.effects}
-    known = declared & {x for e in effects for x in (e.name, *e.indistinguishable_from)}
-    perhaps = "perhaps " if any(e.tentative for e in effects) else ""
-    what = "one of them" if len(effects) == 1 else "one of each"
-    model = f"is {perhaps}wrong in" if known else f"{perhaps}lacked"
-    return f"These logs cannot tell {', or '.join(pairs)}: the model {model} {what}"
-
-
-def _lacked(
-    diagnosis: Diagnosis, effects: Sequence[NamedEffect], before: Sequence[NamedEffect] = ()
-) -> str:
-    """Return effects in words: new to the model, or declared with other coefficients.
-
-    After effects ``before``, all new like these, the verb is not repeated.
+    """Return the verdict in plain words: a cause outside the library where one is likeliest, else
+    the effects by the energy that each explains, undecided ones last.
     """
-    declared = {e.name: set(e.coefficients) for e in diagnosis.declared.effects}
-    changed = [
-        e.name
-        for e in (*before, *effects)
-        if e.name in declared and e.coefficients.keys() <= declared[e.name]
-    ]
-    if before and not changed:
-        return in_words([with_amounts(e, diagnosis.declared) for e in effects])
-    new = in_words([with_amounts(e, diagnosis.declared) for e in effects if e.name not in changed])
-    other = in_words([title(e.name) for e in effects if e.name in changed])
-    told = [
-        f"lacked {new}" if new else "",
-        f"declares {other} with wrong coefficients" if other else "",
-    ]
-    return in_words([*filter(None, told)])
+    error = next(error_amounts(diagnosis))
+    if diagnosis.verdict == "nothing to explain":
+        return f"The model explains these logs; {error}."
+    lacking = _lacking(diagnosis)
+    if is_outside(diagnosis):
+        hidden = ", or hidden in these logs," if diagnosis.needs_pose else ""
+        probable = f"probability {chance(diagnosis.probabilities.unknown)}"
+        rest = f"H{error[1:]}"
+        if lacking:
+            rest = f"Effects of the library that imitate the cause, no findings: {lacking}"
+        sign = _sign(diagnosis)
+        return f"A cause outside the library{hidden} acts ({probable}){sign}. {rest}."
+    if lacking:
+        perhaps = "perhaps " if all(e.tentative for e in diagnosis.effects) else ""
+        return f"The model {perhaps}lacks {lacking}."
+    looks = "looks random" if diagnosis.remainder == "random" else "has structure"
+    unexplained = f"H{error[1:]}; the rest {looks}, and no effect {tried(diagnosis)} explains it."
+    steady = steady_residual(diagnosis)
+    return (
+        f"On average {steady} acts that the model lacks. {unexplained}" if steady else unexplained
+    )
+
+
+def _sign(diagnosis: Diagnosis) -> str:
+    """Return the clearest sign of a cause outside the library: a doubtful log, a variable, or a
+    transient disturbance.
+    """
+    if suspects := [text for text in doubts(diagnosis) if without_warning(text) != text]:
+        return f". First suspect: {without_warning(suspects[0])}"
+    if diagnosis.structure:
+        clearest = diagnosis.structure[0]
+        return f"; its clearest sign is in {clearest.where}, {percent(clearest.gain)} of the rest"
+    return f"; its clearest sign is {disturbance_at(diagnosis)}" if diagnosis.pushes else ""
+
+
+def _lacking(diagnosis: Diagnosis) -> str:
+    """Return the effects with their amounts: those that explain most first, undecided ones after
+    decided ones with a tenth of their energy, and last the ones of unknown amount.
+    """
+
+    def energy(effect: NamedEffect) -> float:
+        return effect.evidence.get("energy_explained", 0.0)
+
+    def place(effect: NamedEffect) -> tuple[bool, float]:
+        share = _UNDECIDED if effect.indistinguishable_from else 1.0
+        return not known(effect), -share * energy(effect)
+
+    largest = sorted(diagnosis.effects, key=energy, reverse=True)[:_NAMED]
+    all_perhaps = is_outside(diagnosis) or all(e.tentative for e in diagnosis.effects)
+    told = [_told(e, diagnosis, all_perhaps) for e in sorted(largest, key=place)]
+    if more := len(diagnosis.effects) - len(told):
+        told.append(f"and {more} smaller")
+    return "; ".join(told)
+
+
+def _told(effect: NamedEffect, diagnosis: Diagnosis, all_perhaps: bool) -> str:
+    """Return one effect with its amount and its rivals; declared ones as wrong coefficients."""
+    declared = {e.name: e.coefficients.keys() for e in diagnosis.declared.effects}
+    is_new = not effect.coefficients.keys() <= declared.get(effect.name, set())
+    told = ("" if is_new else "the right ") + with_amounts(effect, diagnosis.declared)
+    if rivals := [title(name) for name in effect.indistinguishable_from]:
+        some = [f"{len(rivals) - _RIVALS + 1} others"] if len(rivals) > _RIVALS else []
+        told = f"one of {in_words([told, *rivals[: _RIVALS - len(some)], *some], 'or')}"
+    return f"perhaps {told}" if effect.tentative and not all_perhaps else told
+
+
+def wrench_headline(series: WrenchSeries) -> str:
+    """Return the mean external force and torque, each if beyond chance and its stated deviation,
+    and the force's spread.
+    """
+    rows = finite_rows(series.force)
+    force, name = series.force[rows], series.vehicle.name
+    spread = in_unit(float(np.sqrt(np.var(force, axis=0).sum())), "N")
+    stated = (np.nan_to_num(x[rows]) for x in (series.std_force, series.std_torque))
+    floor, least_torque = (float(np.median(x, axis=0).max()) for x in stated)
+    wrench = np.column_stack([force, np.nan_to_num(series.torque[rows])])
+    period = float(np.median(np.diff(series.t)))
+    if steady := steady_wrench([wrench], [period], (floor, least_torque)):
+        told = f"Beside the model of {name}, on average {steady} acts"
+    else:
+        told = f"No steady force above {in_unit(floor, 'N')} acts beside the model of {name}"
+    return f"{told}; the force is {spread} rms about its mean."

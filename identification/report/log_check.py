@@ -9,6 +9,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, UnreadLogError
+from ..diagnosis.settings import DIAGNOSIS
 from ..logs.commanded_speeds import flown_vehicle
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import flew
@@ -17,10 +18,11 @@ from ..logs.map_guess import Guess, guess_map
 from ..logs.map_text import map_yaml
 from ..logs.mapped_log import map_table
 from ..logs.reading import finished, read_log, unknown_table
-from ..logs.screening import convention_doubt, screen_log
+from ..logs.screening import LEAST_SECONDS, convention_doubt, screen_log
 from ..logs.table import Data, Names, Table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
+from .words import without_warning
 
 _SAID = ("unit", "samples", "rate_hz", "gaps", "longest_gap_s")  # attributes of each channel
 
@@ -32,12 +34,24 @@ class LogCheck:
     log: FlightLog
     read_by: str
     channels: list[Channel]
-    doubts: Names
+    doubts: Names  # of the reading; the gravest first
+    limits: Names = ()  # what the log does not show
     guess: Guess | None = None
     map_text: str = ""  # the log's map as a YAML file; empty without one
 
-    def sentence(self) -> str:
-        """Return a sentence on the log's length and reader."""
+    def headline(self) -> str:
+        """Return the gravest doubt, and what flew how long and how far."""
+        answer, by = flew(self.log)
+        what = self.log.vehicle or self.log.flown.airframe.replace("a ", "A ", 1) or "The vehicle"
+        told = [f"Doubt: {self.doubts[0]}."] if self.doubts else []
+        if answer.startswith("yes"):
+            told.append(f"{what} flew {answer[5:]}: {by}.")
+        elif answer == "unknown":
+            told.append(f"Whether {what} flew is not known: {by}.")
+        return " ".join(told)
+
+    def reading(self) -> str:
+        """Return the log's length and reader."""
         seconds = float(self.log.t[-1] - self.log.t[0])
         return f"{len(self.log.t)} rows, {seconds:.1f} s, read by {self.read_by}"
 
@@ -54,6 +68,7 @@ class LogCheck:
             for r in reasons
         )
         return {
+            "headline": self.headline(),
             "log": log.name,
             "read_by": self.read_by,
             "samples": len(log.t),
@@ -65,7 +80,7 @@ class LogCheck:
             "vehicle": log.vehicle or None,
             "flown": asdict(log.flown) | dict(zip(("flew", "flew_by"), flew(log), strict=True)),
             "notes": list(log.notes),
-            "doubts": list(self.doubts),
+            "doubts": [*self.doubts, *self.limits],
             "map": self.map_text or None,
             "fields": list(fields),
         }
@@ -105,15 +120,20 @@ def check_log(
             log = read_log(path, reader, vehicle, piece=piece)
             named = re.search(r"\(reader ([^()]+)\)$", log.source)
             read_by = f"the reader {named[1]}" if named else "this kit's own format"
-    vehicle = flown_vehicle(vehicle, log.vehicle)
-    guesses = guess.doubts if guess else ()
-    doubts = [f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}" for r in guesses]
-    doubts += [note for note in log.notes if note.startswith("warning")]
-    answer, by = flew(log)
-    if answer in ("no", "not shown"):
-        doubts.append(f"the log does not show that anything flew: {by}")
-    doubts += _doubts(log, vehicle)
-    return LogCheck(log, read_by, log_channels(log), tuple(doubts), guess, text)
+    doubts = _doubts(log, flown_vehicle(vehicle, log.vehicle))
+    for r in guess.doubts if guess else ():
+        doubts.append(f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}")
+    limits = [
+        f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
+        f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "
+        "how large it was"
+        for c in noise_spectra(log)
+        if c.filtered
+    ]
+    if flown_vehicle(vehicle, log.vehicle) is None:
+        limits.append("no vehicle is given: units and frames were not checked against its rotors")
+    channels = log_channels(log)
+    return LogCheck(log, read_by, channels, tuple(doubts), tuple(limits), guess, text)
 
 
 def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:
@@ -131,20 +151,20 @@ def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[
 
 
 def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
-    """Return the doubts raised by the motion and the noise of a log."""
-    doubts = [
-        f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
-        f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "
-        "how large it was"
-        for c in noise_spectra(log)
-        if c.filtered
-    ]
+    """Return the doubts of a log's reading, the gravest first: no flight, a refusal by a diagnosis,
+    warnings.
+    """
+    answer, by = flew(log)
+    doubts = [f"the log does not show a flight: {by}"] if answer in ("no", "not shown") else []
+    told = [note for note in log.notes if note.startswith("warning")]
     if vehicle is None:
-        unchecked = "no vehicle is given: the rotor speeds were not checked against its weight"
-        return [*doubts, *filter(None, [convention_doubt(log, None)]), unchecked]
-    try:
-        doubts += screen_log(log, vehicle)[1]
-    except InputError as error:
-        said = str(error).removeprefix(f"{log.source}: ")
-        doubts.append(f"a diagnosis refuses it: {said}")
-    return doubts
+        told += filter(None, [convention_doubt(log, None)])
+    else:
+        least = DIAGNOSIS.least_seconds_each if log.commanded else LEAST_SECONDS
+        try:
+            told += screen_log(log, vehicle, least)[1]
+        except InputError as error:
+            refusal = str(error).removeprefix(f"{log.source}: ")
+            doubts.append(f"diagnose refuses this log: {refusal}")
+            told = [text for text in told if without_warning(text) != refusal]
+    return list(dict.fromkeys([*doubts, *map(without_warning, told)]))

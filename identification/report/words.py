@@ -1,7 +1,7 @@
 """A diagnosis in words and rounded numbers, as its report gives them to a reader."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from ...dynamics import effects as library
 from ..findings import CHANNELS, Diagnosis, NamedEffect
@@ -12,6 +12,9 @@ SPACE = "\N{NO-BREAK SPACE}"
 _LONGEST = 190  # letters in a piece of advice on the first screen
 _CERTAIN = 0.001  # probability; closer to 0 or 1 no digit is meant
 _TELLING = 1.3  # times the floor: least error in the first sentence
+_LIKELIER = 0.5  # probability of a cause outside the library, from which this comes first
+_MILLI = 0.8  # N or Nm, below which an error is in thousandths
+_WARNING = "warning: "  # marks a note on a doubtful log
 
 
 def rounded(value: float, digits: int = 3) -> str:
@@ -46,10 +49,12 @@ def with_std(value: float, std: float) -> str:
     return text
 
 
-def scale_of(values: Iterable[float], unit: str) -> tuple[float, str]:
-    """Return the common factor and unit, plain or milli, for compared numbers (in ``unit``)."""
+def scale_of(values: Iterable[float], unit: str, least: float = 0.1) -> tuple[float, str]:
+    """Return the common factor and unit, plain or below ``least`` milli, for compared numbers (in
+    ``unit``).
+    """
     largest = max((abs(v) for v in values if math.isfinite(v)), default=math.inf)
-    return (1e3, f"m{unit}") if largest < 0.1 else (1.0, unit)
+    return (1e3, f"m{unit}") if largest < least else (1.0, unit)
 
 
 def in_words(names: Sequence[str], last: str = "and") -> str:
@@ -58,7 +63,7 @@ def in_words(names: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
-def _in_unit(value: float, unit: str) -> str:
+def in_unit(value: float, unit: str) -> str:
     """Return a number with its unit, plain or milli."""
     factor, unit = scale_of([value], unit)
     return f"{rounded(factor * value, 2)}{SPACE}{unit}"
@@ -106,10 +111,25 @@ def tried(diagnosis: Diagnosis) -> str:
     return "that these logs can show" if diagnosis.needs_pose else "in the library"
 
 
-def error_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return the change of the error on held-out data: force and torque well above the noise
-    floor.
-    """
+def is_outside(diagnosis: Diagnosis) -> bool:
+    """Return whether a cause outside the library is likelier than none."""
+    return diagnosis.probabilities.unknown > _LIKELIER
+
+
+def without_warning(text: str) -> str:
+    """Return a note without its log's name and its mark of a warning, if it has one."""
+    return text.rpartition(_WARNING)[2]
+
+
+def doubts(diagnosis: Diagnosis) -> list[str]:
+    """Return the reasons to doubt the logs, and then the names."""
+    names = {text for some in diagnosis.doubts.values() for text in some}
+    logs = [text for text in diagnosis.notes if _WARNING in text]
+    return [*logs, *(text for text in diagnosis.notes if text in names and text not in logs)]
+
+
+def error_amounts(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield the error on held-out data in words: force and torque well above the noise floor."""
     before, after = diagnosis.before, diagnosis.after
     rows = [
         ("force", before.force_rms, after.force_rms, diagnosis.floor_force_rms, "N"),
@@ -117,20 +137,19 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
     ]
     known = [row for row in rows if math.isfinite(row[1]) and math.isfinite(row[2])]
     if not known:
-        return ["The error on held-out data could not be computed."]
-    telling = [row for row in known if row[1] > _TELLING * row[3]] or known[:1]
-    told: list[str] = []
-    for what, old, new, floor, unit in telling:
-        factor, unit = scale_of((old, new, floor), unit)
+        yield "held-out error: not known"
+    for what, old, new, floor, unit in [x for x in known if x[1] > _TELLING * x[3]] or known[:1]:
+        factor, unit = scale_of((old, new, floor), unit, _MILLI)
         start, end, least = (f"{rounded(factor * x, 2)}{SPACE}{unit}" for x in (old, new, floor))
-        way = "falls" if new < 0.98 * old else "rises" if new > 1.02 * old else ""
-        sentence = f"The {what} error{'' if told else ' on held-out data'} "
-        sentence += f"{way} from {start} to {end}" if way else f"is {end}"
-        if math.isfinite(floor):
-            floor_is = f"not known (at least {least})" if diagnosis.floor_is_bound else least
-            sentence += f"; the noise floor is {floor_is}"
-        told.append(f"{sentence}.")
-    return told
+        change = f"{start} before, {end} after" if diagnosis.effects and start != end else start
+        bound = "not known, at least " if diagnosis.floor_is_bound else ""
+        noise = f" (noise floor {bound}{least})" if math.isfinite(floor) else ""
+        yield f"held-out {what} error: {change}{noise}"
+
+
+def error_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return the error on held-out data, before and after, as sentences."""
+    return [f"{text[:1].upper()}{text[1:]}." for text in error_amounts(diagnosis)]
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
@@ -141,7 +160,7 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
         if diagnosis.pushes:
             return (
                 "The residual holds transient disturbances; the clearest is "
-                f"{_transient(diagnosis)}. No test found other structure in it."
+                f"{disturbance_at(diagnosis)}. No test found other structure in it."
             )
         return (
             f"The residual looks random, as turbulence does{_disturbances(diagnosis)}: "
@@ -164,14 +183,14 @@ def _disturbances(diagnosis: Diagnosis) -> str:
         if own:
             largest = max(own, key=lambda gusts: gusts.rms)
             time = f"correlation time {rounded(largest.time, 2)}{SPACE}s"
-            stated.append(f"{_in_unit(largest.rms, unit)} rms ({time})")
+            stated.append(f"{in_unit(largest.rms, unit)} rms ({time})")
     return f", with disturbances of up to {in_words(stated)}" if stated else ""
 
 
-def _transient(diagnosis: Diagnosis) -> str:
-    """Return when the clearest transient disturbance was, and how strong."""
+def disturbance_at(diagnosis: Diagnosis) -> str:
+    """Return the size and time of the clearest transient disturbance."""
     largest = diagnosis.pushes[0]
-    size = _in_unit(largest.peak, "Nm" if largest.channel.startswith("tau") else "N")
+    size = in_unit(largest.peak, "Nm" if largest.channel.startswith("tau") else "N")
     where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
     return f"{size} in {largest.channel} at {rounded(largest.t)}{SPACE}s{where}"
 
@@ -227,7 +246,6 @@ def sureness_sentences(diagnosis: Diagnosis) -> list[str]:
             f"{in_words([e.name for e in sure])}: no other effect of the library explains the "
             "flight as well."
         )
-    told += _doubts(diagnosis)
     if not diagnosis.effects:
         told.append(
             "The residual was tested for random disturbances and for structure, and "
@@ -260,25 +278,6 @@ def _probability(diagnosis: Diagnosis) -> list[str]:
     return [f"{acts}Probability of a cause outside the library: {chance(stated.unknown)}."]
 
 
-def _doubts(diagnosis: Diagnosis) -> list[str]:
-    """Return the open questions: effects indistinguishable in these logs, and tentative ones.
-
-    Several of the former share one sentence, since the headline has the alternatives.
-    """
-    undecided = [effect for effect in diagnosis.effects if effect.indistinguishable_from]
-    told = [confusion(effect) for effect in undecided]
-    if len(undecided) > 1:
-        names = in_words([effect.name for effect in undecided])
-        told = [f"For {names}, another effect explains these logs equally well."]
-    unsure = [effect.name for effect in diagnosis.effects if effect.tentative]
-    if unsure:
-        told.append(
-            f"{in_words(unsure)} {'is' if len(unsure) == 1 else 'are'} tentative: the true cause "
-            "may be another effect, in the library or not."
-        )
-    return told
-
-
 def next_step(diagnosis: Diagnosis) -> str:
     """Return the one thing to do next, in a sentence or two."""
     undecided = [e for e in diagnosis.effects if e.indistinguishable_from]
@@ -299,7 +298,7 @@ def next_step(diagnosis: Diagnosis) -> str:
         return f"{use}, and confirm it on another flight (--test)."
     if first:
         return _short(first)
-    better = diagnosis.effects and "held out" not in diagnosis.doubts
+    better = diagnosis.effects and "held out" not in diagnosis.doubts and not is_outside(diagnosis)
     use = "Use vehicle.yaml, which holds the named effects. " if better else ""
     return f"{use}To see whether the rest is wind, fly again in still air."
 

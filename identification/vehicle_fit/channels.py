@@ -93,10 +93,14 @@ def sources_of(logs: Logs) -> Sources:
         log.has_rotor_speeds and not log.commanded and _is_fast(log, "rotors") for log in logs
     ]
     if not all(speeds) and not all(commands):
+        log = logs[speeds.index(False)]
+        names = {"rotors": "rotor speeds", "commands": "motor commands"}
+        found = [f"{what} {log.rates[x]:.3g}" for x, what in names.items() if x in log.rates]
         raise InputError(
-            f"{logs[speeds.index(False)].source or logs[0].name}: expected rotor speeds "
-            "(omega1..omega4) in every log, or motor commands (cmd1..cmd4) in every log, "
-            f"{MOTOR_RATES.torque_hz:g} times a second"
+            f"{log.source or logs[0].name}: expected rotor speeds (omega1..omega4) in every log, "
+            "or motor commands (cmd1..cmd4) in every log, "
+            f"{MOTOR_RATES.torque_hz:g} times a second{', found ' if found else ''}"
+            f"{' and '.join(found)}"
         )
     accelerometer = all(log.accelerometer is not None for log in logs)
     gyro = all(log.gyro is not None for log in logs)

@@ -76,10 +76,7 @@ def identify(
         raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
-    pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
-    for log in logs:
-        for wrong in motor_doubts(log):
-            raise InputError(f"{log.name}: {wrong}")
+    pieces, sources = checked_pieces(logs, windows)
     notes = []
     voltage = _voltage(pieces)
     commands = sources.rotors == "commands"
@@ -177,6 +174,19 @@ def _lag_alone(pieces: Pieces, fit: VehicleFit) -> Estimate:
     known = alone.interval("lag")
     how = "of a model without a time offset: what other tools call the lag"
     return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
+
+
+def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[Pieces, Sources]:
+    """Return the pieces of the logs for an identification, and their sensors.
+
+    Raises:
+        InputError: the logs lack a channel, or their motors are doubtful.
+    """
+    pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
+    for log in logs:
+        for wrong in motor_doubts(log):
+            raise InputError(f"{log.name}: {wrong}")
+    return pieces, sources
 
 
 def _voltage(pieces: Sequence[MotionPiece]) -> float:

@@ -20,7 +20,7 @@ from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
 from .held_out import LEAST_HZ, powers
 from .model import coefficients
-from .result import ASSUMED, NOTHING, Identified
+from .result import ASSUMED, NOTHING, REFUTED, Identified
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,13 +66,22 @@ def identified_data(identified: Identified) -> Data:
 
 
 def headline(identified: Identified) -> str:
-    """Return one sentence on how much of the vehicle the logs tell."""
-    essential = ["Jxx", "Jyy", "Jzz", "p/k"]
-    open_ones = [n for n in essential if identified.estimates[n].status in (ASSUMED, NOTHING)]
-    told = "thrust" if identified.fit.drive.commands else "k"
-    if not open_ones:
-        return f"{told}, inertia and reaction torque are identified"
-    return f"{told} is identified; assumed, since these logs do not tell: {', '.join(open_ones)}"
+    """Return one sentence: the parts that held-out flight refutes, the identified quantities with
+    half of their 95 % interval, and the assumed ones.
+    """
+    status = identified.vehicle.status
+    parts = [part for part in ("force", "torque") if getattr(status, part) == REFUTED]
+    refuted = f"held-out flight refutes the {' and the '.join(parts)}; " if parts else ""
+    thrust = "thrust(0.5)" if identified.fit.drive.commands else "k"
+    essential = [identified.estimates[n] for n in (thrust, "Jxx", "Jyy", "Jzz", "p/k")]
+    told = (
+        f"{e.name} {e.value:.3g} ± {0.5 * (e.high - e.low):.2g} {e.unit}"
+        for e in essential
+        if e.status not in (ASSUMED, NOTHING)
+    )
+    open_ones = ", ".join(e.name for e in essential if e.status in (ASSUMED, NOTHING))
+    assumed = f"; assumed, since these logs do not tell: {open_ones}" if open_ones else ""
+    return f"{refuted}identified: {', '.join(told)}{assumed}"
 
 
 def use_of(identified: Identified) -> str:

@@ -95,7 +95,7 @@ def _file(name):
         found = check_log(path, vehicle=vehicle_of(path))
     except InputError as error:
         return {"error": _plain(str(error), path.parent)}
-    said = [d for d in found.doubts if not d.startswith(("guessed", "the noise"))]
+    said = [d for d in found.doubts if not d.startswith("guessed")]
     return {
         "read_by": found.read_by,
         "doubts": [_plain(text, path.parent) for text in said],

@@ -78,6 +78,11 @@ def diagnoses():
     yield "ranked otherwise", replace(made, effects=(rival,), candidates=candidates)
     stated = Probabilities({"rotor_drag": 0.95}, (Alternative((), 0.05),), 0.03)
     yield "probabilities", replace(made, probabilities=stated)
+    outside = Probabilities({"rotor_drag": 0.05}, (), 0.95)
+    unlike = replace(partly, remainder="structured", structure=signs, probabilities=outside)
+    yield "outside the library", unlike
+    yield "outside, pushed", replace(unlike, effects=(), structure=(), pushes=pushes)
+    yield "outside, doubtful log", replace(unlike, notes=("flight: warning: pz stands still",))
 
 
 def said():

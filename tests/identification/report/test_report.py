@@ -213,10 +213,13 @@ def test_the_page_says_it(reports):
     diagnosis, (_, path, _) = reports["plain"]
     page = Page(path.read_text("utf-8"))
     before, after = (rounded(1e3 * e.force_rms, 2) for e in (diagnosis.before, diagnosis.after))
-    assert f"falls from {before} mN to {after} mN; the noise floor is 12 mN." in page.text
+    assert (
+        f"Held-out force error: {before} mN before, {after} mN after (noise floor 12 mN)."
+        in page.text
+    )
     kdx = with_std(diagnosis.effects[0].coefficients["kdx"], diagnosis.effects[0].std["kdx"])
     for words in (
-        "The model lacked rotor drag (0.3614",
+        "The model lacks rotor drag 0.3614",
         kdx,
         "per rotor, along body x",
         "looks random",
