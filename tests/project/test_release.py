@@ -39,6 +39,9 @@ def test_the_citation_says_what_the_project_says():
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert cited["license"] == PROJECT["license"]
     assert cited["version"] == windwrench.__version__
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"version = {{{windwrench.__version__}}}" in readme
+    assert f"title = {{{cited['title']}}}" in readme
 
 
 MOST = 5_400_000  # bytes, of all that git keeps of docs/ beside its films
