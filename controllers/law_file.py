@@ -38,7 +38,7 @@ def read_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> La
     Args:
         name: the file.
         task: to be flown.
-        laws: of this task, by name.
+        laws: the task's laws by name.
 
     Raises:
         InputError: no such file, another task's law, an unknown law, or a gain that it lacks.

@@ -58,10 +58,10 @@ class LQG:
         InputError: a number is not above zero.
     """
 
-    effort: float = 1e-5  # m2 of error that an acceleration of 1 m/s2 is worth
-    force: float = 0.13  # of the weight, standard deviation of the external force
-    torque: float = 0.2  # of weight times arm, likewise
-    force_time: float = 4.0  # s, over which the force lasts
+    effort: float = 1e-5  # m2 of error per (m/s2)2 of acceleration
+    force: float = 0.13  # standard deviation of the external force, share of the weight
+    torque: float = 0.2  # likewise, share of weight times arm
+    force_time: float = 4.0  # s, correlation time of the force
     torque_time: float = 0.5  # s
     estimate_lag: float = 0.28  # s, of the estimates
     noise: Mapping[str, float] = field(

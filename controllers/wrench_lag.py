@@ -49,8 +49,8 @@ def axis_lag(
         noise: assumed noise of the model (N or Nm, a step), of the wrench's walk (likewise) and of
             the measurement (m or rad).
         air: whose times count.
-        period: of the filter, s.
-        steps: of the filter in a decision.
+        period: the filter's, s.
+        steps: the filter's in a decision.
     """
     from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 

@@ -1,8 +1,8 @@
 """The paper's filter, equation by equation, with all of its sigma points: to read and to judge by.
 
 It is slow, knows no gate and no restart, and shares no code with the fast filters, which the tests
-hold to it. Where the printed paper slips, the equation that holds is coded: ``docs/estimator.md``
-lists the slips. Equation numbers are those of McKinnon and Schoellig (2016).
+hold to it. ``docs/estimator.md`` lists the errors of the printed paper; the code has the right
+equations. Equation numbers are those of McKinnon and Schoellig (2016).
 
 States are rows (..., 19): quaternion, then the parts of the error state (rho, omega, x, v, torque,
 force) behind rho, in their order.

@@ -65,10 +65,10 @@ class UKFTuning:
         accelerometer_noise: m/s2, likewise.
         gyro_bias_walk: rad/s: change of the gyro's bias in a step.
         accelerometer_bias_walk: m/s2: change of the accelerometer's in a step.
-        gyro_bias_std: rad/s: of the gyro's bias, before it is estimated.
-        accelerometer_bias_std: m/s2: of the accelerometer's, likewise.
-        gyro_bias_bound: rad/s: largest bias of the gyro that is believed.
-        accelerometer_bias_bound: m/s2: of the accelerometer, likewise.
+        gyro_bias_std: rad/s: standard deviation of the gyro's bias at the start.
+        accelerometer_bias_std: m/s2: the same for the accelerometer.
+        gyro_bias_bound: rad/s: largest estimate of the gyro's bias.
+        accelerometer_bias_bound: m/s2: the same for the accelerometer.
     """
 
     motor_torque_noise: ArrayLike = 0.03

@@ -25,7 +25,7 @@ R = TypeVar("R")
 
 # for new processes: forked workers would share the locks of linear algebra
 SPAWNED = multiprocessing.get_context("spawn")
-_FIRST_TO_GO = 500  # of 1000: where memory runs out, the system ends a worker before its parent
+_FIRST_TO_GO = 500  # of 1000: without memory, the system ends a worker before its parent
 _LOOK = 0.2  # s between two checks of the time and calls of ``idle``
 _ATTEMPTS = 4  # at a task of ``every``
 

@@ -192,7 +192,7 @@ def _add_header(path: str, files: dict[str, str]) -> None:
             _add_header(normpath(join(dirname(path), included)), files)
 
 
-# fields of a model with a row for each effect: of which kind, and numbers of a row
+# fields of a model with a row for each effect: kind of the effect, and numbers in a row
 _ROOMS = {
     "wrench_models": (0, 1),
     "wrench_hooks": (0, 1),

@@ -9,7 +9,7 @@ import struct
 from typing import Any
 
 NUMBER = 291
-# by MAVLink's rule: the sender's and our definition must agree
+# MAVLink's check that sender and receiver have one definition
 CHECKSUM = 10
 _LAYOUT = "<Q4i4f4fB"  # in the order of the wire: larger types first
 
