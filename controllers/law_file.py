@@ -41,7 +41,7 @@ def read_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> La
         laws: the task's laws by name.
 
     Raises:
-        InputError: no such file, another task's law, an unknown law, or a gain that it lacks.
+        InputError: no such file, another task's law, an unknown law, or an unknown gain.
     """
     stated = checked(LawFile, read_yaml(Path(name), WHAT), name)
     if stated.task not in ("", task):

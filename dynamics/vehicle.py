@@ -306,7 +306,7 @@ class Vehicle:
 
     def commanded_thrust(self, command: Array, voltage: Array | None = None) -> Array:
         """Return the static thrust (N, 4) in N of motor commands (N, 4), 0 to 1, by the vehicle's
-        motor curve; ``voltage`` (N,) in V, None: that at which the curve holds.
+        motor curve; ``voltage`` (N,) in V, default: the curve's.
 
         Raises:
             InputError: the vehicle states no motor curve.

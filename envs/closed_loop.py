@@ -8,8 +8,8 @@ A tick takes 5 ms and is a pipeline of named stages, ``STAGES``:
 | `sense`    | `position`, `quaternion`               | `sample`: pose and logged rotor speeds     |
 | `estimate` | `sample`                               | `state`: pose, twist and external wrench   |
 | `steer`    | `state`, `setpoint`, `action`          | `command`: rotor speeds                    |
-| `actuate`  | `command`, `air`, `applied`            | `external`, and the wrench that MuJoCo has |
-| `move`     | that wrench                            | `position`, `quaternion`, `velocity`       |
+| `actuate`  | `command`, `air`, `applied`            | `external`, and MuJoCo's wrench            |
+| `move`     | MuJoCo's wrench                        | `position`, `quaternion`, `velocity`       |
 
 A user's own ``Stage`` stands before one of them.
 """

@@ -232,8 +232,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._some_fresh = which is not self._all and bool(self._fresh.any())
 
     def _taken(self, actions: Any, which: Flags) -> bool:
-        """Return whether actions (num_envs, n) are finite and of the right shape; then those of
-        ``which`` are written down.
+        """Return whether actions (num_envs, n) are finite and of the right shape. If so, write
+        down the actions of ``which``.
         """
         if not self._ready:
             raise InputError(f"{self.task.name}: call reset before step")

@@ -194,7 +194,7 @@ class TimedFilter:
         return self.ukf.estimate
 
     def _append(self, event: _Event, now: float) -> WrenchEstimate:
-        """Do the newest event, and keep it unless it fails."""
+        """Process the newest event, and append it if no error comes."""
         if not self._events or now - self._snapped >= self.horizon / _SNAPSHOTS:
             event.before = self._snapshot()
         estimate = self._do(event, now)

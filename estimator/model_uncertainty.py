@@ -8,7 +8,7 @@ A wrong vehicle acts on the filter as a wrench ``sum_j e_j L_j``. In the world f
 relative errors e, the loads L are:
 
     mass              force   m (a + g) = thrust z + force + effects
-    thrust, command   force   thrust z;  torque  that of the rotors
+    thrust, command   force   thrust z;  torque  the rotors'
     one rotor of four force   thrust z / 4;  torque  thrust / 4 at the rotor's place
     torque, arm_l     torque  the rotors' about z, and about x and y
     inertia           torque  all that turns the body

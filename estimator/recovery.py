@@ -38,8 +38,8 @@ So a filter is in one of three phases, and each measured pose has one verdict, i
     ONE_REFUSED, more   neither                           REJECTED    REFUSING
     ONE_REFUSED, more   lasting (``judge``)               RESTARTED   BELIEVING
 
-An unlikely pose that goes on or is back restarts the filter if it lies beyond a linear correction
-(``is_beyond``). The phase stays while a part with an open jump is not measured.
+Beyond a linear correction (``is_beyond``), an unlikely pose that goes on or is back restarts the
+filter. The phase stays while a part with an open jump is not measured.
 
 The agreement of refused poses depends on the poses alone. After a wrong attitude the filter's
 velocity runs away, and by this velocity two poses at one place would disagree.

@@ -34,8 +34,8 @@ def rise_times(vehicle: Vehicle, tuning: UKFTuning, period: float) -> tuple[Arra
 
 @np.vectorize(otypes=[float])
 def _rise(dt: float, inertia: float, white: float, walk: float, time: float, noise: float) -> float:
-    """Return the rise time (s) of the wrench w in ``inertia * x'' = w``, x being measured: to what
-    is shown of a steady wrench, which is all of a walk.
+    """Return the rise time (s) of the wrench w in ``inertia * x'' = w`` with measured x: from 10 to
+    90 % of the final estimate of a steady wrench.
     """
     # in units of the noise, time in periods: w is then the change of x in a step squared
     scale = dt * dt / inertia / noise

@@ -51,8 +51,8 @@ from .recovery import BELIEVING, N, Recovery
 from .sample import Sample
 from .tuning import UKFTuning
 
-# A call of a filter: rotor speeds and pose, which parts of the pose there are, s, V; or gyro and
-# accelerometer, and which of both
+# A call of a filter: rotor speeds and pose, bits of the measured parts, s, V; or gyro and
+# accelerometer, and their bits
 CALL = np.dtype([("z", "f8", (11,)), ("parts", "i8"), ("dt", "f8"), ("voltage", "f8")])
 IMU_PARTS = 4, 8  # gyro and accelerometer, beside the parts of a pose
 _VARIANCES = slice(WITHOUT_COVARIANCE, None, N + 1)  # among an estimate's numbers
@@ -85,9 +85,9 @@ class WrenchUKF:
     """Unscented Kalman filter for the external force and torque on a quadrotor.
 
     Call ``reset`` with a first pose, then ``step`` once a period; or ``predict`` and ``correct``
-    with measurements that come at their own times. A measurement, or a part of it, that is None or
-    not finite was not made. The sign of a quaternion means nothing. Rotor speeds that are not
-    finite are taken to be the last ones that were.
+    with measurements at separate times. A measurement, or a part, that is None or not finite counts
+    as missing. The sign of a quaternion has no meaning. The last finite rotor speeds replace speeds
+    that are not finite.
 
     Args:
         vehicle: the declared vehicle; its declared effects are part of the prediction model, and
@@ -255,7 +255,7 @@ class WrenchUKF:
 
     @property
     def memory(self) -> tuple[NDArray[np.uint8], ...]:
-        """All that a step changes, as bytes that can be copied and put back."""
+        """The filter's memory, as bytes to copy and to write back."""
         return (self.record.view(np.uint8),)
 
     @property

@@ -99,8 +99,8 @@ class WrenchUKFBatch:
             vehicle without declared effects.
 
     Raises:
-        InputError: a count that does not fit, or what ``WrenchUKF`` refuses; "single" for other
-            filters.
+        InputError: a count that does not fit, an argument that ``WrenchUKF`` refuses, or
+            "single" for other filters.
     """
 
     def __init__(

@@ -36,8 +36,8 @@ _NONE = math.nan, math.nan
 class Standing:
     """One line of a leaderboard: a law, a policy, or all policies of a kind.
 
-    Score, wins, changes and probabilities are those of the figure that ranks. The remaining time of
-    a lost episode counts at 2.5 m, so that one loss may be most of a mean and of its interval. The
+    Score, wins, changes and probabilities belong to the ranking figure. The remaining time of a
+    lost episode counts at 2.5 m, so one loss may dominate a mean and its interval. The
     interquartile mean leaves out the best and the worst quarter of the episodes.
     """
 

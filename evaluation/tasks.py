@@ -50,7 +50,7 @@ class BenchmarkTask:
     # 95 % interval of one law's mean RMSE
     interval: Callable[..., tuple[float, float]] = hierarchical_bootstrap
     spec: EnvSpec | None = None  # if the task is a user's
-    kin: str = ""  # the kit's task whose class it extends, with its action and observation
+    kin: str = ""  # the kit's task with the parent class, action and observation
 
     @property
     def name(self) -> str:
@@ -149,8 +149,8 @@ class BenchmarkTask:
         return gym.make_vec(spec, count, vectorization_mode=mode, **given)
 
     def units(self, envs: gym.vector.VectorEnv, judge: Any) -> dict[str, Any]:
-        """Return the entries of a policy's card that lead from a learner's units to those of
-        ``make``: ``scale`` of the observation, ``largest`` of the action.
+        """Return the entries of a policy's card for the units of ``make``: ``scale`` of the
+        observation, ``largest`` of the action.
 
         Args:
             envs: from ``make_many``.

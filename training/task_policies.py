@@ -49,12 +49,12 @@ _FIT: dict[str, dict[str, Any]] = {
     | {"batch_size": 32, "learning_rate": 5e-3, "wander": (0.3, 0.5)},
 }
 _LINEAR = {"rounds": 4, "episodes": 64}
-_LEAST_RATE = 0.1  # share of the learning rate that is left at the end of a round
+_LEAST_RATE = 0.1  # share of the learning rate at the end of a round
 _ACTIVATION = "tanh"
-# signs of a frame of FanTracking2D after half a turn about the jet's axis: it changes the sign of
-# all that is taught
+# signs of a frame of FanTracking2D after half a turn about the jet's axis; taught quantities change
+# their signs, too
 _TURNED = np.array([1, -1, -1, 1, -1, -1, -1, -1, -1, -1], dtype=np.float32)
-_GAINS = (1.2, 2.0, 3.0)  # 1/s, on what it says of the fan's offset; one is chosen
+_GAINS = (1.2, 2.0, 3.0)  # 1/s, on the network's offset of the fan; validation chooses one
 VALIDATION = 10  # episodes
 BASE = "base"
 

@@ -13,7 +13,7 @@ from .learners import cell_weights, dense_layers, dense_weights
 Array = NDArray[np.float32]
 
 CELLS: dict[str, Any] = {"lstm": torch.nn.LSTM, "gru": torch.nn.GRU}
-_SURE = -4.0  # bounds of what it may say of a logarithmic standard deviation
+_SURE = -4.0  # bounds of an output's logarithmic standard deviation
 _UNSURE = 1.5
 _MIRRORED = 0.5  # share of the episodes
 _SMALLEST = 1.4e-3  # smallest relevant size of a scaled quantity
@@ -50,7 +50,7 @@ class TaughtNetwork(torch.nn.Module):
         self._name = cell
         self._white: tuple[torch.Tensor, torch.Tensor] | None = None
         self.cell = CELLS[cell](quantities, state)
-        if cell == "lstm":  # it begins by keeping what it has, or it never learns to keep it long
+        if cell == "lstm":  # starts with open forget gates, or long memory is never learned
             with torch.no_grad():
                 self.cell.bias_ih_l0[state : 2 * state] = 1.0
         self.dense = dense_layers([state, *net, 2 * taught], activation)

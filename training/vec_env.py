@@ -26,8 +26,8 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     At an episode's end, ``infos[i]["terminal_observation"]`` holds the environment's last features.
     ``infos[i]["TimeLimit.truncated"]`` is True if the clock alone ended the episode. The returned
     observation is the first of the next episode. Every episode's seed is given by ``seed_of``.
-    ``episode`` (n,) holds the numbers of the episodes in flight: set to those of another run,
-    ``reset`` goes on with the episodes that follow.
+    ``episode`` (n,) holds the numbers of the episodes in flight. With the numbers of another run,
+    ``reset`` continues with that run's next episodes.
 
     Args:
         envs: Gymnasium's, with the option ``reset_mask``.

@@ -39,8 +39,8 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
 
 
 def implausible(found: Found) -> str:
-    """Return why a found jet is none: it is not much faster than the vehicle, whose drag in still
-    air it may stand for.
+    """Return the reason against a fitted jet: a jet hardly faster than the vehicle may be the
+    vehicle's drag in still air.
     """
     if found.coefficients["u0"] >= _LEAST_SPEED_RATIO * found.speed:
         return ""

@@ -1,4 +1,4 @@
-"""Rotor inertia: the torque of rotors that spin up, and of rotors that turn with the body.
+"""Rotor inertia: the torque of rotors as they spin up, and as they turn with the body.
 
 The angular momentum along body z is h = jr sum spin_i W_i. The torque in body axes is
 tau = -dh/dt e_z - omega x h e_z, with delivered rotor speeds W and the mean of dW/dt over a step.

@@ -9,9 +9,9 @@ the same cause.
 
 Inflow leans towards the rear rotors by the induced velocity v times tan(chi / 2), chi the angle by
 which the wake is blown back: s = 2 v tan(chi / 2) / u_h = 2 v / (sqrt(u_h^2 + w^2) + w), with u_h
-the airspeed along the disc and w = u_z + v that through it. It is 1 at low speed, falls in fast
-flight and in climbs, and grows in descents. v is that of momentum theory, of the mean rotor:
-v sqrt(u_h^2 + w^2) = T / (2 rho A).
+the airspeed along the disc and w = u_z + v the airspeed through the disc. s is 1 at low speed,
+falls in fast flight and in climbs, and grows in descents. Momentum theory gives v for the mean
+rotor: v sqrt(u_h^2 + w^2) = T / (2 rho A).
 """
 
 from .base import Coefficient, Effect

@@ -1,9 +1,9 @@
 """Wind: a steady wind, fixed in the world frame.
 
-Every declared effect that asks for the wind (rotor_drag, body_drag, inflow_thrust ...) feels it.
+The wind acts through each declared effect with an airspeed (rotor_drag, body_drag, ...).
 ``cd`` is a drag for a vehicle that declares none. With w the wind and u = w - v, the force at the
 centre of mass is F = cd |u| u + cd |v| v: the change against the same drag in still air. So
-nothing happens without wind, and what differs from a constant force is how the force changes with
+nothing happens without wind. Unlike a constant force, the force changes with
 the velocity.
 """
 

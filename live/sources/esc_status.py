@@ -1,5 +1,5 @@
-"""MAVLink's ESC_STATUS: PX4 sends it, and pymavlink's dialects lack it. This file adds the message
-to a dialect.
+"""MAVLink's ESC_STATUS: a message of PX4, missing in pymavlink's dialects. This file adds the
+message to a dialect.
 
 Message 291 of MAVLink's common set: index (of the first of four ESCs), time_usec, rpm[4] (with the
 sense of rotation), voltage[4] in V, current[4] in A.
