@@ -94,6 +94,11 @@ $(VENV)-lowest/.lowest: pyproject.toml .ci/lowest.py
 	$(@D)/bin/pip install --quiet --disable-pip-version-check -c $(@D)/lowest.txt -e '.[test]'
 	touch $@
 
+# README with the repository's address: make address ADDRESS=https://...
+.PHONY: address
+address:
+	sed -i 's|ADDRESS-OF-THIS-REPOSITORY|$(ADDRESS)|' README.md
+
 # one line on each log of FOLDER: read, or refused and why
 foreign: $(VENV)/.tested
 	@find $(FOLDER) -type f | sort | while read -r log; do \

@@ -69,7 +69,7 @@ def git(*words: str) -> str:
 
 
 def texts(source: str) -> Iterator[str]:
-    """Yield docstrings and blocks of comment lines of a file."""
+    """Yield docstrings, blocks of comment lines, and comments behind code of a file."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, (ast.Module, *DEFINITIONS)) and (text := ast.get_docstring(node)):
             yield text
@@ -77,11 +77,12 @@ def texts(source: str) -> Iterator[str]:
     last = -1
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type == tokenize.COMMENT:
-            if block and token.start[0] != last + 1:
+            behind_code = bool(token.line[: token.start[1]].strip())
+            if block and (behind_code or token.start[0] != last + 1):
                 yield "\n".join(block)
                 block = []
             block.append(token.string.lstrip("#").strip())
-            last = token.start[0]
+            last = -1 if behind_code else token.start[0]
     yield "\n".join(block)
 
 

@@ -22,10 +22,10 @@ from .flight import FlightGains
 
 Array = NDArray[np.float64]
 
-MOTOR_LAG = 0.04  # s, of the tasks' plant
-PLACE, SPEED, TILT, RATE, ALPHA = range(5)  # of a horizontal axis; its last state is the integral
-SET_POINT = 6  # of a horizontal axis with its set point
-THRUST = 2  # of the vertical axis: place, speed, the rotors' acceleration, integral
+MOTOR_LAG = 0.04  # s, in the tasks' plant
+PLACE, SPEED, TILT, RATE, ALPHA = range(5)  # states of a horizontal axis; then the integral
+SET_POINT = 6  # state of a horizontal axis that has a set point
+THRUST = 2  # vertical states: place, speed, the rotors' acceleration, integral
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,10 +36,10 @@ class JetMap:
     the axis. The vehicle faces the fan at the height of the axis.
     """
 
-    mean: Array  # of a vehicle at rest
-    slope: Array  # with its own velocity along y, per m/s
-    turning: Array  # with its own yaw rate, per rad/s
-    gust: Array  # variance of what gusts add
+    mean: Array  # for a vehicle at rest
+    slope: Array  # per m/s of the vehicle's velocity along y
+    turning: Array  # per rad/s of the vehicle's yaw rate
+    gust: Array  # variance due to gusts
 
 
 @lru_cache(maxsize=16)

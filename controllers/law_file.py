@@ -38,10 +38,10 @@ def read_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> La
     Args:
         name: the file.
         task: to be flown.
-        laws: of this task, by name.
+        laws: the task's laws by name.
 
     Raises:
-        InputError: no such file, another task's law, an unknown law, or a gain that it lacks.
+        InputError: no such file, another task's law, an unknown law, or an unknown gain.
     """
     stated = checked(LawFile, read_yaml(Path(name), WHAT), name)
     if stated.task not in ("", task):

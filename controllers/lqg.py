@@ -45,9 +45,9 @@ class LQG:
     Each axis is a Kalman filter and a regulator (Anderson and Moore, *Optimal Control: Linear
     Quadratic Methods*, 1990). Force and torque are Ornstein-Uhlenbeck processes. Their estimates
     from the wrench filter follow behind a lag of first order. The accelerometer less the rotors'
-    force shows the force at once, but biased: its bias is a state, found in the first seconds. The
-    rotors' force shows the tilt. The torque matters: a tilt comes before any motion. A reference
-    that changes its acceleration goes on with that for a while.
+    force shows the external force at once, with a bias; the bias is a state, known after a few
+    seconds. The rotors' force shows the tilt. The torque matters, because a tilt precedes the
+    motion. A changed acceleration of the reference is assumed to last for a while.
 
     Everything but ``effort`` describes the wind, the filter and the sensors. The numbers were
     searched on six validation episodes each of WindHover's base and noisy and WindTrajectory's
@@ -58,10 +58,10 @@ class LQG:
         InputError: a number is not above zero.
     """
 
-    effort: float = 1e-5  # m2 of error that an acceleration of 1 m/s2 is worth
-    force: float = 0.13  # of the weight, standard deviation of the external force
-    torque: float = 0.2  # of weight times arm, likewise
-    force_time: float = 4.0  # s, over which the force lasts
+    effort: float = 1e-5  # m2 of error per (m/s2)2 of acceleration
+    force: float = 0.13  # standard deviation of the external force, share of the weight
+    torque: float = 0.2  # likewise, share of weight times arm
+    force_time: float = 4.0  # s, correlation time of the force
     torque_time: float = 0.5  # s
     estimate_lag: float = 0.28  # s, of the estimates
     noise: Mapping[str, float] = field(
@@ -75,7 +75,10 @@ class LQG:
         }
     )
     bias: float = 0.05  # m/s2, standard deviation of the accelerometer's bias
-    model: tuple[float, float] = (0.07, 0.7)  # m/s2 and rad/s2 that it lacks, per root of a second
+    model: tuple[float, float] = (
+        0.07,
+        0.7,
+    )  # m/s2 and rad/s2 per root of a second, errors of the model
     vehicle: Vehicle = field(default_factory=standard_vehicle)
 
     def __post_init__(self) -> None:

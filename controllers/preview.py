@@ -68,7 +68,7 @@ class _PreviewLaw:
 
     effort: float  # m2 of error that a command of 1 is worth
     foresight: int  # decisions; the environment's is set to it
-    axes: tuple[int, ...]  # of the world, that are commanded
+    axes: tuple[int, ...]  # commanded axes of the world
     vehicle: Vehicle = field(default_factory=standard_vehicle)
     largest: ClassVar[float]  # command
     tells: ClassVar[str]  # entry of ``info`` with what is to come
@@ -189,7 +189,7 @@ class Oracle(_PreviewLaw):
     commands that know their own limit (a quadratic program). Efforts of 1e-4 and 1e-3 give .0083
     and .0136, .0091 and .0130 m. Most of the rest is the start, up to 0.1 m off the axis. After 3 s
     (16 fresh episodes) an effort of 1e-4 changes the RMSE by -16 % (-20 to -10) on base and +17 %
-    (-6 to 29) on fast; with a quadratic program within the limit fast is no better.
+    (-6 to 29) on fast. A quadratic program within the limit does not improve fast.
     """
 
     effort: float = 3e-4

@@ -31,8 +31,8 @@ class SensorModel(NamedTuple):
     tables: Array  # (COUNT, 4, AXES)
     keep: Array  # (AXES, 3, 3), of the filter's error
     enter: Array  # (AXES, 3)
-    # of the residual, in standard deviations, on those before: of the first decisions, and of all
-    # others; and what they leave
+    # regression of the residual, in standard deviations, on earlier residuals: in the first
+    # decisions, and in all others; and the remaining variance
     regression: Array  # (ORDER + 1, AXES, ORDER)
     variance: Array  # (ORDER + 1, AXES)
     yaw: Array  # (3, 5): integral, angle and rate of yaw after a decision; torque and its rate

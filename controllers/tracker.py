@@ -29,16 +29,16 @@ from .wrench_lag import lags
 
 Array = NDArray[np.float64]
 
-_ALONG_Y, _LOOK = 1, 24  # the axis that is commanded; decisions that ``Limit`` looks ahead
+_ALONG_Y, _LOOK = 1, 24  # commanded axis; decisions of preview in ``Limit``
 # the wrench along y, N and Nm: standard deviations and correlation times (s)
 _SIZES, _TIMES = (0.1, 0.01), (1.0, 0.5)
-_MODEL = (0.05, 0.5)  # m/s2 and rad/s2 that the model lacks, per root of a second
+_MODEL = (0.05, 0.5)  # m/s2 and rad/s2 per root of a second, errors of the model
 # standard deviations of place (m), speed (m/s) and estimated wrench (N, Nm)
 _NOISE = (0.002, 0.02, 0.02, 0.002)
-_SEED = 2016  # the own generator's, the same in every episode
+_SEED = 2016  # the generator's, the same in every episode
 FEW = 0.5  # share of effective particles below which they are drawn anew
-# what a fan that changes its velocity at once does: a third of them stop, half turn round, the rest
-# take any other velocity
+# a fan with a sudden change of velocity: a third of them stop, half turn round, the rest take any
+# other velocity
 STOP, TURN = 1 / 3, 1 / 2
 _FEWEST = 8  # particles of a kind of motion whose covariance means something
 _SMALLEST = 1e-12  # variance of particles of a kind
@@ -190,8 +190,8 @@ class InformedTracker(_Belief):
 
     gain: float = 1.429
     damping: float = 0.407
-    ahead: float = 0.08354  # s, over which the commanded velocity is that of the motion to come
-    spread: float = 0.1486  # of particles drawn anew, as a share of their standard deviation
+    ahead: float = 0.08354  # s, preview of the commanded velocity
+    spread: float = 0.1486  # share of their standard deviation, in particles drawn anew
     # 1/s, how often a particle leaves the family and moves as those of ``Tracker``; 0: never
     leave: float = 0.03
     _arrays = (*_Belief._arrays, "_kind", "_sign", "_side", "_motion", "_free")

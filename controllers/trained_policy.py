@@ -119,7 +119,7 @@ class _Network:
             actual = weights[part].shape if part in weights else "none"
             if actual != shape:
                 raise InputError(f"{name}: {part} must have the shape {shape}, got {actual}")
-        self.size = below  # of the action
+        self.size = below  # numbers of an action
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -207,8 +207,8 @@ class TaskPolicy(_Network):
 
     Args:
         card: ``task``; ``observation``, if another than the task's own; ``scale`` (n,), divisors
-            of the observation; ``largest``, of the action;
-            ``activation``; ``squash`` (a tanh of the output is a share of ``largest``). ``memory``
+            of the observation; ``largest``, the largest action; ``activation``.
+            ``squash``: a tanh of the output is a share of ``largest``. ``memory``
             (m,), if any: the layers see m first-order low-passes of the observation, each of so
             many decisions.
         weights: as of a ``TrainedPolicy``.

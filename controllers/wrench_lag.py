@@ -26,9 +26,9 @@ ORDER = 3  # the autoregression's
 class AxisLag:
     """One axis of the filter, from decision to decision."""
 
-    keep: Array  # (3, 3), what a decision leaves of the error
-    enter: Array  # (3,), what an even change of the wrench over it adds
-    disturbance: Array  # (ORDER + 1,) autocovariance that a disturbance of unit variance leaves,
+    keep: Array  # (3, 3), remainder of the error after a decision
+    enter: Array  # (3,), error of an even change of the wrench in a decision
+    disturbance: Array  # (ORDER + 1,) autocovariance due to a disturbance of unit variance,
     gust: Array  # (ORDER + 1,) a gust of unit variance,
     pose: Array  # (ORDER + 1,) and the noise of the pose
 
@@ -49,8 +49,8 @@ def axis_lag(
         noise: assumed noise of the model (N or Nm, a step), of the wrench's walk (likewise) and of
             the measurement (m or rad).
         air: whose times count.
-        period: of the filter, s.
-        steps: of the filter in a decision.
+        period: the filter's, s.
+        steps: the filter's in a decision.
     """
     from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 

@@ -28,7 +28,7 @@ from .steps import Step
 
 CONTROLLER, SCENARIO = "admittance", "base"
 LAWS = ("hover", "admittance", "ratio", "oracle")  # on the leaderboard
-SECONDS = 25.0  # of the recorded flight
+SECONDS = 25.0  # length of the recorded flight
 TRAJECTORY = "excite"
 
 Report = Callable[[float], None]  # takes the share done
@@ -41,12 +41,12 @@ class Story:
     Attributes:
         vehicle: as declared.
         vehicle_name: as typed by a user.
-        effect: of the true vehicle, missing in the model.
+        effect: acts on the true vehicle, missing in the model.
         seed: for all flights.
         episodes: flights before and after the diagnosis.
         out: folder for the results.
         log: the recorded flight.
-        diagnosis: of the recorded flight.
+        diagnosis: the recorded flight's.
         reports: files of the diagnosis.
     """
 

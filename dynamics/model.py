@@ -44,7 +44,8 @@ MODEL_FIELDS: list[tuple[object, ...]] = [
     ("sensing_coefficients", "f8", (MAX_SENSING, PARAMETERS)),
     ("sensing_count", "i8"),
     ("sample", "f8", (SAMPLE_SIZE,)),  # on its way through the sensing effects
-    # of rotor-input and sensing effects; last: whether rotor speeds were delivered, and which
+    # memories of rotor-input and sensing effects; last: whether rotor speeds were delivered, and
+    # which
     ("memory", "f8", (MAX_EFFECTS + MAX_SENSING + 1, MEMORY)),
     ("time", "f8"),
     ("voltage", "f8"),

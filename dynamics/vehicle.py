@@ -150,9 +150,9 @@ class Uncertainty:
             this makes the same torque.
         torque: all rotors' ``p`` in common.
         inertia: the whole tensor's.
-        arm_l: of the rotors' distances in common.
-        command: of thrust and torques at one command, from day to day and over a battery; counts
-            where rotor speeds are worked out from commands.
+        arm_l: all rotors' distances in common.
+        command: thrust and torques at one command, from day to day and over a battery; counts
+            if a reader computes rotor speeds from commands.
     """
 
     __pydantic_config__ = STRICT
@@ -171,7 +171,7 @@ Standing = Literal["identified", "assumed", "refuted"]
 
 @dataclass(frozen=True)
 class ModelStatus:
-    """What predictions of held-out flights say of a vehicle's model.
+    """Verdict of predictions of held-out flights on a vehicle's model.
 
     A refuted force keeps the velocity of a prediction, a refuted torque the body rate: see
     ``windwrench.identification.predict``. Plant and filter use the numbers in any case.
@@ -196,7 +196,7 @@ class EffectSetting:
 
     Attributes:
         name: an effect of the library.
-        coefficients: by their names, in the effect's units.
+        coefficients: values by name, in the effect's units.
     """
 
     __pydantic_config__ = STRICT
@@ -210,7 +210,7 @@ class Vehicle:
     """A declared quadrotor; SI units, body axes x forward, y left, z up.
 
     Attributes:
-        name: of the vehicle, as messages and reports give it.
+        name: in messages and reports.
         mass: kg.
         inertia: (3, 3) kg m2, about the centre of mass.
         arm_l: m, distance of every rotor from the body x and the body y axis.
@@ -219,7 +219,7 @@ class Vehicle:
         rotor_radius: m.
         omega_lsb: rad/s, step of the logged rotor speeds; 0: not quantised.
         omega_max: rad/s, fastest rotor speed.
-        omega_source: "measured" or "commanded": what rotor speeds in logs are.
+        omega_source: "measured" or "commanded": origin of the rotor speeds in logs.
         voltage_ref: V, battery voltage at which k and p hold; 0: not stated.
         gravity: m/s2.
         spin: (4,) turning sense about body +z.
@@ -231,7 +231,7 @@ class Vehicle:
         floor_z: m, world, height of the floor.
         ceiling_z: m, world, height of the ceiling.
         uncertainty: how well these numbers are known.
-        status: what predictions of held-out flights say of force, torque and single numbers.
+        status: verdict of predictions of held-out flights on force, torque and single numbers.
     """
 
     __pydantic_config__ = STRICT
@@ -306,7 +306,7 @@ class Vehicle:
 
     def commanded_thrust(self, command: Array, voltage: Array | None = None) -> Array:
         """Return the static thrust (N, 4) in N of motor commands (N, 4), 0 to 1, by the vehicle's
-        motor curve; ``voltage`` (N,) in V, None: that at which the curve holds.
+        motor curve; ``voltage`` (N,) in V, default: the curve's.
 
         Raises:
             InputError: the vehicle states no motor curve.

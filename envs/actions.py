@@ -1,4 +1,4 @@
-"""What an agent commands: the five actions, and their numbers in the flight loop's units."""
+"""Actions of an agent: the five kinds, and their numbers in the flight loop's units."""
 
 from __future__ import annotations
 
@@ -60,19 +60,19 @@ def make_action(
 ) -> Action:
     """Return an action by its name.
 
-    * ``"velocity"``: of the set point, along ``axes`` of the world, to 1 m/s;
-    * ``"acceleration"``: to 4 m/s2 along ``axes``, beside the flight loop's own where there is a
-      reference, and of the set point where there is none;
-    * ``"attitude"``: roll and pitch to the flight loop's limit of tilt (0.5 rad), yaw rate to the
-      loop's answer to 1 rad (2 rad/s), and thrust of 0.3 to 1.7 times the weight;
-    * ``"rates"``: angular velocities, body, to the loop's answer to an axis at a right angle
-      (6.1 rad/s) and to 1 rad of yaw (2 rad/s), and thrust;
+    * ``"velocity"``: velocity of the set point along ``axes`` of the world, up to 1 m/s;
+    * ``"acceleration"``: up to 4 m/s2 along ``axes``, added to the flight loop's if the task has a
+      reference, else the set point's;
+    * ``"attitude"``: roll and pitch up to the flight loop's limit (0.5 rad), yaw rate up to 2 rad/s
+      (the loop's answer to 1 rad), thrust of 0.3 to 1.7 times the weight;
+    * ``"rates"``: body rates up to 6.1 rad/s (the loop's answer to a right angle) and, in yaw, 2
+      rad/s; the same thrust;
     * ``"rotors"``: four rotor speeds; -1: none, 0: hover, 1: the largest.
 
     Args:
         name: one of ``ACTIONS``.
         vehicle: the declared one.
-        axes: of the world.
+        axes: axes of the world.
         follows: whether the flight loop follows a reference.
         largest: m/s or m/s2; default: as above.
         gains: the flight loop's.

@@ -32,7 +32,7 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
 
     Args:
         env: the task, drawn as ``"rgb_array"``.
-        title: of the episode.
+        title: the episode's.
         flown: ``info`` of its decisions so far.
     """
     from PIL import Image, ImageDraw

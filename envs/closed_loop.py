@@ -8,8 +8,8 @@ A tick takes 5 ms and is a pipeline of named stages, ``STAGES``:
 | `sense`    | `position`, `quaternion`               | `sample`: pose and logged rotor speeds     |
 | `estimate` | `sample`                               | `state`: pose, twist and external wrench   |
 | `steer`    | `state`, `setpoint`, `action`          | `command`: rotor speeds                    |
-| `actuate`  | `command`, `air`, `applied`            | `external`, and the wrench that MuJoCo has |
-| `move`     | that wrench                            | `position`, `quaternion`, `velocity`       |
+| `actuate`  | `command`, `air`, `applied`            | `external`, and MuJoCo's wrench            |
+| `move`     | MuJoCo's wrench                        | `position`, `quaternion`, `velocity`       |
 
 A user's own ``Stage`` stands before one of them.
 """
@@ -71,13 +71,12 @@ LOOP = np.dtype(
         ("specific", "f8", (3,)),
         ("thrust", "f8", (3,)),
         ("ticks", "i8"),  # since the start of the episode; below zero while the filter settles
-        ("kind", "i8"),  # of the commands
+        ("kind", "i8"),  # commands
         ("model_in_loop", "i8"),  # whether the flight loop counters the effects of its model
-        ("points", "f8", (3, STATIONS)),  # m, world, of the vehicle's stations in the last winds
-        ("air", "f8", (3, STATIONS)),  # m/s, world, of the winds there
-        # addresses, and how many: the filter and its step; MuJoCo's pose, velocity and applied
-        # wrench; the jet's table; the reference; the core's winds, and how many blow in all;
-        # MuJoCo's step, model and data
+        ("points", "f8", (3, STATIONS)),  # m, world, the vehicle's stations in the last winds
+        ("air", "f8", (3, STATIONS)),  # m/s, world, the winds there
+        # addresses: the filter and its step; MuJoCo's pose, velocity and applied wrench; the jet's
+        # table; the reference; the core's winds. Numbers of winds. MuJoCo's step, model and data
         *[(name, "i8") for name in ("filter", "step", "qpos", "qvel", "xfrc", "jet")],
         *[(name, "i8") for name in ("reference", "rows", "winds", "wind_count", "blowing")],
         *[(name, "i8") for name in ("mujoco_step", "model", "data")],
@@ -187,7 +186,7 @@ class ClosedLoop:
         accelerometer: standard deviation in m/s2 of its noise, a tick, and of its bias. None: there
             is no accelerometer, and a tick uses ``NOISE`` unit normals instead of three more.
         model_in_loop: whether the flight loop counters the effects of ``declared``.
-        kind: of the commands in ``action``, once the filter has settled.
+        kind: commands in ``action``, once the filter has settled.
         stages: a user's own, in the pipeline of a tick.
         like: a loop whose MuJoCo model is this one's, too, if the rigid bodies are the same.
 

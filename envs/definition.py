@@ -50,7 +50,7 @@ class TaskDefinition:
     episode_s: float = EPISODE_SECONDS
     normalize: bool = True
     largest_action: Any = None  # m/s or m/s2; None: as of ``make_action``
-    axes: ClassVar[tuple[int, ...]] = (0, 1, 2)  # of velocities and accelerations
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2)  # commanded, for velocities and accelerations
     follows: ClassVar[bool] = True  # whether accelerations are beside a flight to the reference
     model_in_loop: bool = True
     accelerometer: ClassVar[tuple[float, float] | None] = ACCELEROMETER
@@ -249,7 +249,7 @@ class TaskDefinition:
             "torque": s.torque,
         }
 
-    # ---- what a task is flown with ---------------------------------------------------------
+    # ---- parts of a task's flight ----------------------------------------------------------
 
     def draw_winds(self, rng: np.random.Generator) -> list[Any]:
         """Draw the scenario's winds of an episode."""

@@ -38,7 +38,7 @@ class Viewer:
 
     Args:
         mode: ``"rgb_array"`` for pictures, ``"human"`` for a window.
-        width: of the picture, in pixels.
+        width: pixels.
         height: likewise.
 
     Raises:

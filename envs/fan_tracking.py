@@ -161,7 +161,7 @@ class FanTrackingEnv(FanTask):
         return s.position[:, 1:2] - s.fan[:, :1]
 
     def observe(self, s: State) -> Array:
-        """Return the frame, or what ``observe`` chose of it."""
+        """Return the frame, or the part chosen by ``observe``."""
         frame, n = super().observe(s), len(s.time)
         if self.view == "history":
             past = s.memory.setdefault("past", np.zeros((n, FRAMES, frame.shape[1])))

@@ -11,7 +11,7 @@ from .scene_shapes import MARKS
 
 _COLOURS = 96
 _SAMPLES = 6  # pictures from which colours are chosen
-_SHADES, _DARKEST = 4, 0.4  # of a mark's colour in the light, and the darkest one's share
+_SHADES, _DARKEST = 4, 0.4  # shades of a mark's colour in the light, and the darkest one's share
 
 
 def write_gif(pictures: Sequence[NDArray[np.uint8]], fps: float, path: Path) -> None:

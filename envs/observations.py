@@ -1,4 +1,4 @@
-"""What an agent observes on every task: pose and twist, the felt wrench, the accelerometer."""
+"""Observations of all tasks: pose and twist, the felt wrench, the accelerometer."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +19,8 @@ _WRENCH = [(2.0, 0.2), (2.0, 0.05)]  # weights, and weights times the arm
 def parts(name: str, s: State) -> list[Array]:
     """Return the arrays (n, .) of an observation; all but the last have three columns.
 
-    * ``"pose"``: position and velocity of the reference less the estimate's (m, m/s), attitude
-      error (rad) and angular velocity (rad/s, body), and the last action;
+    * ``"pose"``: position and velocity (m, m/s) of the reference less the estimate's, attitude
+      error (rad), angular velocity (rad/s, body), last action;
     * ``"wrench"``: before the last action the external force (N) and torque (Nm);
     * ``"imu"``: there the specific force (m/s2) of the accelerometer, and of the rotors by the
       declared model;

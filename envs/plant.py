@@ -45,9 +45,9 @@ class PlantSettings:
     disturbance_torque: float = 0.01  # Nm
     disturbance_time: float = 0.3  # s, its correlation time
     # s, delay of a command or measurement: at most ``MAX_DELAY``, whole ticks
-    actuator_delay: float = 0.0  # of rotor commands, before the motors' lag
-    pose_delay: float = 0.0  # of the pose, not of its rotor speeds
-    imu_delay: float = 0.0  # of the accelerometer, where there is one
+    actuator_delay: float = 0.0  # rotor commands, before the motors' lag
+    pose_delay: float = 0.0  # the pose, not the logged rotor speeds
+    imu_delay: float = 0.0  # the accelerometer, if any
     dropout: float = 0.0  # share of the poses that are lost
     dropout_burst: float = 0.0  # s, mean length of a run of lost poses; 0: each alone
     battery_life: float = 480.0  # s, over which the voltage falls by a tenth
@@ -89,7 +89,7 @@ PLANT = np.dtype(
         ("actuator_late", "f8"),  # ticks
         ("pose_late", "f8"),
         ("imu_late", "f8"),
-        ("speeds", "f8", (4,)),  # of the motors, rad/s
+        ("speeds", "f8", (4,)),  # motors, rad/s
         # the sample: logged rotor speeds of the last tick, position, quaternion
         ("z", "f8", (11,)),
         ("disturbance", "f8", (6,)),

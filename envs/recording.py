@@ -213,16 +213,16 @@ def record_flight(
             about the centre of mass, world frame; None leaves the last one on. Default: no push.
         report: called now and then with the share done.
         imu: whether to add the true ``gyro`` (n, 3) rad/s and ``accelerometer`` (n, 3) m/s2, body
-            axes, without noise or bias. They are the angular velocity at the instant of the pose,
-            and the specific force of the geometric centre, its mean over one tick on either side.
+            axes, without noise or bias: the angular velocity at the instant of the pose, and the
+            specific force of the geometric centre, averaged over one tick on either side.
         fan: at the origin, blowing along x with gusts; None: none.
         distance: m, of the trajectory's origin from the fan.
 
     Returns:
         ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s at
         the instant of the sample, and ``voltage`` (n,) V. ``force`` (n, 3) N and ``torque`` (n, 3)
-        Nm are the true external ones, in the world frame and about the centre of mass, over the
-        interval before the sample.
+        Nm are the true external force and torque, world frame, about the centre of mass, averaged
+        since the sample before.
 
     Raises:
         InputError: an unknown trajectory, or a length out of range.

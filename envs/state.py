@@ -1,4 +1,4 @@
-"""The state of n worlds as arrays with n rows: what a task's functions are given."""
+"""The state of n worlds as arrays with n rows: the argument of a task's functions."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

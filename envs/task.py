@@ -59,7 +59,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         episode_s: s, until an episode is truncated.
         winds: in place of the scenario's: any objects with ``velocity(points, time)``.
         model_in_loop: whether the flight loop counters the effects that ``vehicle`` declares.
-        gains: of the flight loop.
+        gains: the flight loop's.
 
     Raises:
         InputError: an argument names nothing known.

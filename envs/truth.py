@@ -1,4 +1,4 @@
-"""What an oracle knows of a vehicle."""
+"""An oracle's knowledge of a vehicle."""
 
 from typing import Any
 

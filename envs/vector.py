@@ -26,7 +26,7 @@ SETTLE_TICKS = 300  # the filter settles before an episode starts
 
 
 class JudgedStep(NamedTuple):
-    """What a task says of the state of n worlds."""
+    """A task's answer to the state of n worlds."""
 
     observations: Frame  # (n, k) as the agent sees them
     rewards: Array  # (n,)
@@ -38,9 +38,9 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     """``num_envs`` environments side by side, each bit for bit the single one with its seed.
 
     ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. After an episode the
-    next one starts at the following step, whose action is ignored (``AutoresetMode.NEXT_STEP``, the
-    default), or within the same step (``AutoresetMode.SAME_STEP``). There ``infos["final_obs"]``
-    and ``infos["final_info"]`` hold the episode's end, as in Gymnasium's own vector environments.
+    following step starts the next episode and ignores its action (``AutoresetMode.NEXT_STEP``, the
+    default). With ``AutoresetMode.SAME_STEP`` the same step does, and ``infos["final_obs"]`` and
+    ``infos["final_info"]`` hold the episode's end, as in Gymnasium's vector environments.
     Each entry of ``infos`` is an array with a row for each environment.
 
     Args:
@@ -97,7 +97,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             np.zeros(num_envs, dtype=object),
             np.ones(num_envs, dtype=np.bool_),
         )
-        self.viewers: dict[int, Any] = {}  # of the pictures, where there are any
+        self.viewers: dict[int, Any] = {}  # one for each drawn environment
         self._pool: ThreadPoolExecutor | None = None
         # closed loops of each environment: in flight, and kept for its episodes
         self.loops: list[ClosedLoop] = []
@@ -232,8 +232,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._some_fresh = which is not self._all and bool(self._fresh.any())
 
     def _taken(self, actions: Any, which: Flags) -> bool:
-        """Return whether actions (num_envs, n) are finite and of the right shape; then those of
-        ``which`` are written down.
+        """Return whether actions (num_envs, n) are finite and of the right shape. If so, write
+        down the actions of ``which``.
         """
         if not self._ready:
             raise InputError(f"{self.task.name}: call reset before step")

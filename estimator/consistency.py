@@ -21,7 +21,7 @@ from .estimate import Array, WrenchEstimate
 from .reference import difference
 
 MEASURED = 6  # numbers in a pose
-_REFERENCE = np.r_[3:7, 10:13, 0:3, 7:10, 13:19]  # of a state, in ``reference``'s order
+_REFERENCE = np.r_[3:7, 10:13, 0:3, 7:10, 13:19]  # indices of a state, in ``reference``'s order
 
 
 def state_error(estimate: WrenchEstimate, truth: Array) -> Array:
@@ -67,8 +67,11 @@ class Consistency:
     def __init__(self) -> None:
         self.poses = self.seconds = 0
         self._nis = self._nis_over_seconds = 0.0  # sums; the latter's of the seconds before
-        self._end = -math.inf  # s, of this second
-        self._total, self._count = np.zeros(MEASURED), 0  # of this second's innovations
+        self._end = -math.inf  # s, end of this second
+        self._total, self._count = (
+            np.zeros(MEASURED),
+            0,
+        )  # sum of this second's innovations, and their number
 
     def add(self, t: float, white: Array) -> None:
         """Take in the whitened innovation (6,) of a pose at ``t``, s."""

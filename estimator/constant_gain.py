@@ -28,8 +28,8 @@ from .ukf import WrenchUKF
 _MEASURED = (0, 1, 2, 6, 7, 8)  # rows of (rho, x) in the error state
 _LONGEST = 60  # s of hover until the gain must have converged
 _CONVERGED = 1e-9  # relative change of the covariance in a second
-_HEIGHT = 1.2  # m, of that hover
-_NOTHING = 1e-9  # of the largest part of an acceleration's deviation: rounding of a derivative
+_HEIGHT = 1.2  # m, in hover
+_NOTHING = 1e-9  # share of an acceleration's largest deviation: rounding of a derivative
 # The variances must have been near for so many time constants of the wrench. A difference of e^-4
 # remains: a step earlier or later makes no difference.
 _SETTLE = 2.0
@@ -109,7 +109,7 @@ def _jacobian_at_hover(address: int, voltage: float, deviations: Array) -> Array
     of the filter at an address, without rounding errors. The filter hovers facing along x.
 
     Args:
-        address: of the filter's record.
+        address: the filter's record.
         voltage: V.
         deviations: (18,) of the error state: the scale of an acceleration's parts.
     """

@@ -80,8 +80,8 @@ class WrenchEstimate:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a
-        world-frame MRP, by noise and the wrench's changes, for a vehicle exactly as declared.
+        """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), by noise and
+        the wrench's changes, for a vehicle exactly as declared; rho is a world-frame MRP.
 
         Raises:
             InputError: the estimate has none: a batch's stands in the batch, a smoothed one must

@@ -11,30 +11,30 @@ from .model_uncertainty import FACTORS, LOAD, factors_of
 from .recovery import MEMORY, N, Recovery, load_recovery
 from .tuning import UKFTuning
 
-BIASES = 6  # of gyro and accelerometer
+BIASES = 6  # gyro and accelerometer, three each
 AGREEING = 5  # accelerometer samples in a row that make a push
-# of the hover's rotor speed: no vehicle lifts 900 of its weights, and a log in rpm still shows
+# multiple of the hover's rotor speed: no vehicle lifts 900 of its weights; a log in rpm exceeds it
 FASTEST = 30.0
 COMPANIONS = 12  # the biases, and the noise of the last step: ``imu``
 
 IMU = np.dtype(
     [
         ("used", "i8"),  # whether ``correct_imu`` was ever called
-        ("known", "i8"),  # whether the last step's noise is: there was one
+        ("known", "i8"),  # whether there was a step, so that its noise is known
         ("refused", "i8"),
         # largest NIS of three numbers, of six, and of ``AGREEING`` that agree
         ("gate", "f8", (3,)),
-        ("in_row", "i8"),  # accelerometer samples that the gate would refuse
-        ("unlikely", "f8", (AGREEING, 3)),  # innovations (m/s2) of the last of them
-        ("doubt", "f8", (2,)),  # s for which a sensor was refused; negative: it was not
+        ("in_row", "i8"),  # refusable accelerometer samples in a row
+        ("unlikely", "f8", (AGREEING, 3)),  # their last innovations, m/s2
+        ("doubt", "f8", (2,)),  # s for which a sensor was refused; negative: never
         ("prior", "f8", (BIASES,)),  # variances
         ("walk", "f8", (BIASES,)),  # likewise, a period
         ("bound", "f8", (BIASES,)),  # largest bias of a sensor of its class
         ("mean", "f8", (COMPANIONS,)),
         ("regression", "f8", (N, COMPANIONS)),  # on the error state
-        ("rest", "f8", (COMPANIONS, COMPANIONS)),  # covariance of what that leaves
+        ("rest", "f8", (COMPANIONS, COMPANIONS)),  # covariance of the regression's remainder
         ("bias_covariance", "f8", (BIASES, BIASES)),
-        ("sensitivity", "f8", (6, COMPANIONS)),  # of gyro and accelerometer
+        ("sensitivity", "f8", (6, COMPANIONS)),  # gyro and accelerometer
     ]
 )
 
@@ -44,53 +44,52 @@ FILTER = np.dtype(
         ("poses", MEMORY),  # gaps, refusals and restarts: estimator.recovery
         # the estimate, in one piece
         ("x", "f8", (STATE_SIZE,)),
-        ("status", "f8"),  # what became of the last step's measurement
+        ("status", "f8"),  # verdict on the last step's measurement
         ("restarts", "f8"),  # since the reset
-        # by how much the variances of measured attitudes and positions exceed the declared ones, a
-        # share of those, as the poses show: estimator.recovery
+        # variances of measured attitudes and positions, learned from the poses: relative excess
+        # over the declared ones (estimator.recovery)
         ("excess", "f8", (2,)),
         ("model", "f8", (6,)),  # variances of torque and force by the vehicle's uncertainty
         ("P", "f8", (N, N)),
-        ("load", "f8", LOAD),  # what that uncertainty scales: estimator.model_uncertainty
+        ("load", "f8", LOAD),  # loads that this uncertainty scales: estimator.model_uncertainty
         ("predicted", "f8", (6,)),  # variances of torque and force before the last measurement
-        ("last_speeds", "f8", (4,)),  # rotor speeds that were measured last
+        ("last_speeds", "f8", (4,)),  # last measured rotor speeds
         ("gated", "i8"),
-        ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
-        ("restart_at", "f8"),  # NIS beyond which no linear correction is made
+        ("alarm", "f8", (2,)),  # largest NIS without a check: three numbers, six
+        ("restart_at", "f8"),  # largest NIS for a linear correction
         ("patience", "f8"),  # s
         ("give_up", "f8"),  # s
-        ("prior", "f8", (N,)),  # variances of what nothing is known of
-        ("reason", "f8", (6,)),  # squares of torque and force beyond which none is believed
-        ("lost", "f8", (N,)),  # variances beyond which what is not measured is given up
-        ("push", "f8", (2,)),  # rad/s2 and m/s2, of the hardest push
+        ("prior", "f8", (N,)),  # variances of unknown states
+        ("reason", "f8", (6,)),  # largest believed squares of torque and force
+        ("lost", "f8", (N,)),  # variances beyond which an unmeasured state is lost
+        ("push", "f8", (2,)),  # rad/s2 and m/s2, the hardest push
         ("response", "f8"),  # s
-        ("fastest", "f8"),  # rad/s, beyond which a rotor speed counts as not measured
+        ("fastest", "f8"),  # rad/s, largest measured rotor speed
         # tuning, as variances
         ("motor_torque", "f8", (3,)),
         ("torque_walk", "f8", (3,)),
         ("thrust", "f8", (3,)),
         ("force_walk", "f8", (3,)),
-        # 1/s, at which torque and force decay; 0: they only walk
+        # 1/s, decay of torque and force; 0: a random walk
         ("torque_rate", "f8", (3,)),
         ("force_rate", "f8", (3,)),
-        ("noise", "f8", (6,)),  # of the measurement (rho, x)
-        ("imu_noise", "f8", (6,)),  # of gyro and accelerometer
-        ("uncertain", "f8", (FACTORS,)),  # of the vehicle
+        ("noise", "f8", (6,)),  # measured pose (rho, x)
+        ("imu_noise", "f8", (6,)),  # gyro and accelerometer
+        ("uncertain", "f8", (FACTORS,)),  # the vehicle's uncertainty
         ("kappa", "f8"),
         ("period", "f8"),
         ("imu", IMU),
-        # rotor speeds, position and quaternion, for a step that is called from elsewhere
+        # rotor speeds, position and quaternion of a step called from the core
         ("z", "f8", (11,)),
         ("centre_rotation", "f8", (3, 3)),  # attitude at the start of the last step
-        ("innovation", "f8", (6,)),  # of the last pose, (rho, x), whitened
-        # of the filter with a constant gain, facing along x: the gain, and the inverse covariance
-        # of the innovation
+        ("innovation", "f8", (6,)),  # last pose (rho, x), whitened
+        # constant gain, facing along x: the gain, and the innovation's inverse covariance
         ("gain", "f8", (N, 6)),
         ("information", "f8", (6, 6)),
-        ("steady", "i8"),  # whether that gain holds now
-        ("converged", "f8", (N, N)),  # the covariance that goes with it
-        ("near", "f8"),  # s for which the covariance has been near that
-        ("settle", "f8"),  # s for which it must have been
+        ("steady", "i8"),  # whether the constant gain is in use
+        ("converged", "f8", (N, N)),  # the covariance of that gain
+        ("near", "f8"),  # s since the covariance came near it
+        ("settle", "f8"),  # s until the constant gain starts
         ("hover", "f8", (6, N)),  # derivatives of the accelerations at hover by the error state
     ]
 )

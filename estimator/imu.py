@@ -1,6 +1,6 @@
 """Gyro and accelerometer as further measurements of the same filter.
 
-The paper says that it "can easily be extended to GPS and IMU". A gyro measures the body rate and
+The paper's filter "can easily be extended to GPS and IMU". A gyro measures the body rate and
 its bias. An accelerometer at the geometric centre measures its bias and the specific force ``R' (a
 + g)``, ``a`` being the acceleration (4) over the last step. The accelerometer sees the external
 force at once, a pose only after two integrations. The rotor model's error in that step

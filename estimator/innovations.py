@@ -25,7 +25,7 @@ from .ukf import WrenchUKF
 Mask = NDArray[np.bool_]
 
 _TWIST = 0.03  # s between the poses whose difference starts a piece's velocity
-_MRP_VOLUME = 4.0 * math.pi / 3.0  # of all attitudes: MRPs of at most length 1
+_MRP_VOLUME = 4.0 * math.pi / 3.0  # volume of all attitudes: MRPs of at most length 1
 
 # A row of a flight; layouts of ``core/innovations.hpp``
 ROW = np.dtype(
@@ -44,11 +44,11 @@ INNOVATION = np.dtype(
     [
         ("t", "f8"),  # s
         ("nis", "f8"),
-        ("log_likelihood", "f8"),  # of the pose, given all before it
+        ("log_likelihood", "f8"),  # given all poses before
         ("outlier", "?"),  # likelier an outlier than a pose of this filter
-        ("innovation", "f8", (6,)),  # of (rho, x), rho an MRP
-        ("white", "f8", (6,)),  # the same as the filter expects it: six normal numbers of size 1
-        ("root", "f8", (6, 6)),  # of its covariance, lower triangular
+        ("innovation", "f8", (6,)),  # (rho, x), rho an MRP
+        ("white", "f8", (6,)),  # whitened: six standard normal numbers, if the filter is right
+        ("root", "f8", (6, 6)),  # root of the innovation's covariance, lower triangular
     ],
     align=True,
 )
@@ -146,7 +146,7 @@ def innovations(
         vehicle: with its declared effects.
         tuning: the filter's.
         period: s, of the tuning.
-        pieces: of the flight.
+        pieces: the flight's.
         outlier_chance: from 0, every pose is taken in, to 1.
         outlier_range: m.
         covariance: (18, 18) at the start of each piece; default: the filter's own.

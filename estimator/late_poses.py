@@ -25,8 +25,8 @@ from ..runtime.errors import InputError
 from .estimate import WrenchEstimate
 from .ukf import WrenchUKF
 
-_DIGITS = 9  # of a time stamp in s: what is nearer to one another than a clock can tell is one time
-_SNAPSHOTS = 16  # of the filter's memory in a horizon: a replay is longer by a sixteenth at most
+_DIGITS = 9  # decimals of a time stamp in s: closer stamps count as equal
+_SNAPSHOTS = 16  # of the memory in a horizon: they lengthen a replay by a sixteenth at most
 
 Snapshot = list[NDArray[np.uint8]]
 
@@ -77,7 +77,7 @@ class TimedFilter:
         self.horizon = float(horizon)
         self.late = self.too_late = 0
         self.fused: WrenchEstimate | None = None
-        self._events: list[_Event] = []  # by time; the first has a snapshot
+        self._events: list[_Event] = []  # in order of time; the first has a snapshot
         self._start = math.nan  # s, time of the filter before the first event
         self._snapped = math.nan  # s, time of the last snapshot
 
@@ -194,7 +194,7 @@ class TimedFilter:
         return self.ukf.estimate
 
     def _append(self, event: _Event, now: float) -> WrenchEstimate:
-        """Do the newest event, and keep it unless it fails."""
+        """Process the newest event, and append it if no error comes."""
         if not self._events or now - self._snapped >= self.horizon / _SNAPSHOTS:
             event.before = self._snapshot()
         estimate = self._do(event, now)

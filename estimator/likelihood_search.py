@@ -14,11 +14,11 @@ import numpy as np
 from .estimate import Array
 from .innovations import Innovations, fisher_information
 
-_DIFFERENCE = 1e-3  # of a parameter, for slopes
+_DIFFERENCE = 1e-3  # in a parameter, for slopes
 _LONGEST = 1.5  # largest step of a parameter
 _TOLERANCE = 0.2  # expected gain of log-likelihood at which the search ends
 _MOST = 40  # steps
-_RIDGE = 1e-2  # information on a parameter that tells nothing, so that it stays where it is
+_RIDGE = 1e-2  # least information on a parameter: without any, its value stays
 
 
 def climb(

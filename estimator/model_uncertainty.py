@@ -8,7 +8,7 @@ A wrong vehicle acts on the filter as a wrench ``sum_j e_j L_j``. In the world f
 relative errors e, the loads L are:
 
     mass              force   m (a + g) = thrust z + force + effects
-    thrust, command   force   thrust z;  torque  that of the rotors
+    thrust, command   force   thrust z;  torque  the rotors'
     one rotor of four force   thrust z / 4;  torque  thrust / 4 at the rotor's place
     torque, arm_l     torque  the rotors' about z, and about x and y
     inertia           torque  all that turns the body
@@ -30,8 +30,8 @@ from .estimate import Array
 # force that moves the mass (N), and torques of the rotors about body x and y, about z, and all
 # torques (Nm). The third and fourth are followed as the force is, the others as the torque
 LOAD = (7, 3)
-# Variances by which squares of the loads count: of mass, thrust, command, arm, reaction torque,
-# inertia, then (m2) of the rotors' places y y, x x, x y
+# Variances that multiply squares of the loads: mass, thrust, command, arm, reaction torque,
+# inertia, then (m2) the rotors' places y y, x x, x y
 FACTORS = 9
 
 # the stated numbers' names in a sentence

@@ -12,9 +12,9 @@ White noise often is not: below some size white noise changes nothing, and then 
 rest on its bound.
 
 With ``NoiseFitSettings.gusts`` the correlation times of force and torque are fitted, too, each
-horizontally and vertically, from the likeliest walk on. They have to be likelier than the walk by
-a likelihood ratio that chance exceeds in one of a thousand flights of a walk (four numbers more,
-Wilks 1938).
+horizontally and vertically, from the likeliest walk on. The fit keeps them if they are likelier
+than the walk beyond chance: in a flight of a walk, one of a thousand exceeds the bound on the
+likelihood ratio (four numbers more, Wilks 1938).
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ def noise_warning(scales: ArrayLike, tuning: UKFTuning, file: bool) -> str:
     """Say what is to be set where poses are noisier or calmer than declared; empty: nothing.
 
     Args:
-        scales: of attitude and position (2,), medians over some seconds.
-        tuning: of the filter, which has the declared noise.
-        file: whether that noise is the vehicle file's; else it is a tuning's.
+        scales: (2,) attitude and position, medians over some seconds.
+        tuning: the filter's, with the declared noise.
+        file: whether the vehicle file declares the noise; else a tuning does.
     """
     attitude, position = np.asarray(scales, dtype=np.float64).tolist()
     declared = "vehicle file's" if file else "tuning's"

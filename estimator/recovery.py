@@ -9,22 +9,22 @@ A Kalman filter's model knows none of five events. Each breaks another assumptio
 * A *gap* makes the covariance grow. A part known no better than a prior is *lost*: pose and twist
   are held with the prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: far from the filter's expectation and, by more than a vehicle
-  can move, from the pose just before. A gate refuses the pose and its successors, likely to a
-  filter that has not seen for a while. Poses are accepted again once the jumps cancel, however
-  wrong the wrench is. Or once the innovation says that there was no jump: a clock's blur also
-  exceeds a vehicle's motion by a little.
+  can move, from the pose just before. A gate refuses the pose and its successors, even if
+  they look likely to a filter without recent poses. Poses are accepted again when the accumulated
+  jump returns to zero, or when the innovation shows no jump: the jitter of a clock also exceeds a
+  vehicle's motion by a little.
 * A *push* is harder than the random walk of the wrench expects. The pose is far from the
   expectation, yet goes on from the pose before. The filter takes the pose in, gate or not.
 * A *jump for good* is an outlier whose successors all agree with each other. The filter restarts
   there after ``Recovery.patience``, without a gate at once. Poses in disagreement restart the
   filter after ``Recovery.give_up``, with their disagreement as deviation.
 
-After a restart attitude and rate may be little known: a spin, and then a torque, would explain a
-contradicting pose. So the filter restarts again at poses that come back to a guessed attitude.
-Within ``Recovery.patience`` it restarts once at an unlikely pose that goes on. A repeated restart
-allows no third: with noise twice the declared each restart brought the next, 44 a second. The
-wrench after unlikely poses is not known either: while they are taken in, and as the filter forgets
-them, the stated variances are widened by their NIS.
+After a restart attitude and rate may be uncertain: a spin, and then a torque, would explain a
+contradicting pose. So the filter restarts again at poses that return to a guessed attitude. Within
+``Recovery.patience`` the filter restarts once more at an unlikely pose that continues the motion. A
+third restart is not allowed: with noise twice the declared each restart caused the next, 44 a
+second. The wrench after unlikely poses is uncertain, too: until the filter forgets them, their NIS
+widens the stated variances.
 
 So a filter is in one of three phases, and each measured pose has one verdict, its ``Status``:
 
@@ -38,16 +38,15 @@ So a filter is in one of three phases, and each measured pose has one verdict, i
     ONE_REFUSED, more   neither                           REJECTED    REFUSING
     ONE_REFUSED, more   lasting (``judge``)               RESTARTED   BELIEVING
 
-Where an unlikely pose goes on or is back, and no linear correction leads there (``is_beyond``),
-the filter restarts instead of tracking. The phase stays while a part with uncancelled jumps is not
-measured.
+Beyond a linear correction (``is_beyond``), an unlikely pose that goes on or is back restarts the
+filter. The phase stays while a part with an open jump is not measured.
 
-Whether refused poses agree is asked of the poses alone. After a wrong attitude the filter's
-velocity runs away, and by that velocity two poses at one spot would not agree.
+The agreement of refused poses depends on the poses alone. After a wrong attitude the filter's
+velocity runs away, and by this velocity two poses at one place would disagree.
 
-A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates,
-with variances so wide that there may be no wrench at all. An impossible wrench explains a
-contradiction as well as a jump of the pose. After a gap nothing says that the wrench still acts.
+A restart sets pose and twist to the measurement, with a prior's covariance. Force and torque keep
+their estimates, with variances wide enough for no wrench at all. An impossible wrench explains a
+contradiction as well as a jump of the pose. After a gap the wrench may have ended.
 
 ``core/recovery.hpp`` has the functions in brackets, ``core/noise.hpp`` learns the noise.
 """
@@ -64,33 +63,33 @@ from .estimate import Array
 N = 18  # error state (rho, omega, x, v, torque, force)
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
 LARGEST_MRP_VARIANCE = 0.25  # a standard deviation of about 115 degrees
-_LOST = 0.9  # of a prior's variance: known no better than that
+_LOST = 0.9  # share of a prior's variance: a state known no better is lost
 BELIEVING = 0.0  # phase: the last pose was taken in, or the filter restarted there
 
-# What is remembered of poses from one step to the next
+# Memory of poses between steps
 MEMORY = np.dtype(
     [
         ("phase", "f8"),
-        ("strain", "f8"),  # NIS, of 1 expected, of unlikely poses that were taken in; falls
-        ("astray", "f8"),  # s for which a jump that was followed at once may have been an outlier
-        ("settling", "f8"),  # s for which a restart may be repeated; a repetition ends it
-        ("judged", "f8"),  # poses that the noise was learned from, up to 200
-        ("widened", "f8", (2,)),  # by this share the filter takes more than the declared variance
-        # of attitude and position
-        ("residual", "f8", (6,)),  # (rho, x) of the last measurement after its correction
-        ("seen", "f8", (7,)),  # position and quaternion that were believed last
-        ("position_age", "f8"),  # s since a position was believed
-        ("attitude_age", "f8"),  # s since an attitude was
-        ("doubted", "f8", (7,)),  # position and quaternion that were refused last
-        ("doubted_position_age", "f8"),  # s since a position was refused
-        ("doubted_attitude_age", "f8"),  # s since an attitude was
-        ("position_stride", "f8"),  # s between the last two positions refused; 0: not two
-        ("attitude_stride", "f8"),  # the same of attitudes
-        ("pace", "f8", (6,)),  # motion of (rho, x) over that time, per second
-        ("agreeing", "f8"),  # of those refused: how many went on from each other, up to the last
-        ("agreed_for", "f8"),  # s for which they have
-        ("jump", "f8", (6,)),  # of (rho, x): what those from one to the next add up to
-        ("blur", "f8", (6,)),  # what these may miss by
+        ("strain", "f8"),  # NIS over its expectation, of accepted unlikely poses; decays
+        ("astray", "f8"),  # s in which an accepted jump may still prove an outlier
+        ("settling", "f8"),  # s in which one more restart is allowed
+        ("judged", "f8"),  # poses behind the learned noise, up to 200
+        # relative excess over the declared variances of attitude and position, in use
+        ("widened", "f8", (2,)),
+        ("residual", "f8", (6,)),  # (rho, x) of the last pose after its correction
+        ("seen", "f8", (7,)),  # last accepted position and quaternion
+        ("position_age", "f8"),  # s since an accepted position
+        ("attitude_age", "f8"),  # s since an accepted attitude
+        ("doubted", "f8", (7,)),  # last refused position and quaternion
+        ("doubted_position_age", "f8"),  # s since a refused position
+        ("doubted_attitude_age", "f8"),  # s since a refused attitude
+        ("position_stride", "f8"),  # s between the last two refused positions; 0: fewer than two
+        ("attitude_stride", "f8"),  # the same for attitudes
+        ("pace", "f8", (6,)),  # motion of (rho, x) between them, per second
+        ("agreeing", "f8"),  # refused poses in agreement, up to the last
+        ("agreed_for", "f8"),  # s of this agreement
+        ("jump", "f8", (6,)),  # accumulated jump of (rho, x)
+        ("blur", "f8", (6,)),  # uncertainty of the accumulated jump
     ]
 )
 
@@ -104,19 +103,18 @@ class Recovery:
         patience: s of refused poses in a row, in agreement with each other, until they are
             believed; longer than the bursts of motion capture (0.1 to 0.5 s).
         give_up: s of refused poses until they are believed in spite of disagreement.
-        jump_at: standard deviations of an innovation beyond which a filter without a gate asks
-            whether the pose jumped; a consistent filter never sees them.
+        jump_at: standard deviations of an innovation beyond which a filter without a gate checks
+            for a jump; a consistent filter has none so large.
         restart_at: standard deviations beyond which the filter restarts instead of following a
-            push. A push of one weight makes 70 on a filter that rises in 1 s.
+            push. A push of one weight gives 70 with a rise time of 1 s.
         attitude_std: rad, of the attitude, beyond which a vehicle without a measured attitude is no
             longer predicted: its thrust's direction is a guess, and sigma points reach half a turn.
-        velocity_std: m/s, of a vehicle of which only the pose is known; a small multirotor in brisk
-            flight.
-        angular_velocity_std: rad/s, likewise. At long periods this and the torque's are less: no
-            more than attitudes a period apart can tell.
-        position_std: m, beyond which a position means nothing; a flight hall.
-        force_std: share of the weight, of a force of which a contradiction has left nothing known.
-        torque_std: share of weight times arm, likewise.
+        velocity_std: m/s, with a known pose alone; a small multirotor in brisk flight.
+        angular_velocity_std: rad/s, likewise. At long periods this and the torque's are smaller:
+            attitudes a period apart limit both.
+        position_std: m, of an unknown position; a flight hall.
+        force_std: share of the weight, of an unknown force.
+        torque_std: share of weight times arm, of an unknown torque.
         response: s to follow a push of at most two weights, and the same about the arm. The largest
             distance between two poses in a row follows.
     """
@@ -148,11 +146,11 @@ def largest_nis(gate: float, *numbers: int) -> Array:
 
 
 def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: Recovery) -> None:
-    """Write a filter's gate (a probability or None) and recovery into its record, which has its
+    """Write a filter's gate (a probability or None) and recovery into its record; the record has
     period and kappa.
     """
     weight = vehicle.weight
-    # largest NIS that is taken in unseen, of three numbers and of six
+    # largest NIS without a check, three numbers and six
     record["alarm"] = given.jump_at**2
     if gate is not None:
         record["alarm"] = largest_nis(gate, 3, 6)
@@ -160,15 +158,15 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     record["restart_at"] = given.restart_at**2
     record["patience"], record["give_up"] = given.patience, given.give_up
     torque = given.torque_std * weight * vehicle.arm_l
-    # attitudes do not tell a rate from one that is faster by a turn from each to the next: sigma
-    # points that lie further out than half a turn would find such rates, and torques that make them
+    # attitudes a period apart do not tell a rate from a rate one turn faster. Sigma points beyond
+    # half a turn would find such rates, and the torques behind them
     period, inertia = float(record["period"]), float(np.linalg.eigvalsh(vehicle.inertia)[0])
     rate = math.pi / (math.sqrt(N + NOISE + float(record["kappa"])) * period)
-    told = rate / period * inertia
+    largest_torque = rate / period * inertia
     record["reason"] = np.repeat(
-        np.square((min(4.0 * torque, told), 4.0 * given.force_std * weight)), 3
+        np.square((min(4.0 * torque, largest_torque), 4.0 * given.force_std * weight)), 3
     )
-    torque = min(torque, told)
+    torque = min(torque, largest_torque)
     deviations = (
         math.sqrt(LARGEST_MRP_VARIANCE),
         min(given.angular_velocity_std, rate),

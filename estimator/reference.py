@@ -1,8 +1,8 @@
 """The paper's filter, equation by equation, with all of its sigma points: to read and to judge by.
 
-It is slow, knows no gate and no restart, and shares no code with the fast filters, which the tests
-hold to it. Where the printed paper slips, the equation that holds is coded: ``docs/estimator.md``
-lists the slips. Equation numbers are those of McKinnon and Schoellig (2016).
+The filter is slow, has no gate and no restart, and shares no code with the fast filters. The tests
+compare the fast filters with this one. ``docs/estimator.md`` lists the errors of the printed paper;
+the code has the right equations. Equation numbers are those of McKinnon and Schoellig (2016).
 
 States are rows (..., 19): quaternion, then the parts of the error state (rho, omega, x, v, torque,
 force) behind rho, in their order.
@@ -116,8 +116,9 @@ class ReferenceUKF:
     ) -> None:
         self.vehicle, self.period, self.kappa = vehicle, period, tuning.kappa
         self.effect_wrench = effect_wrench
-        # an Ornstein-Uhlenbeck process, exactly over a step: w' = exp(-T / time) w + n, and n of
-        # such variance that w keeps its own, walk^2 time / (2 T); without an end it walks
+        # an Ornstein-Uhlenbeck process, exact over a step: w' = exp(-T / time) w + n. With the
+        # variance of n, w keeps the variance walk^2 time / (2 T); with an infinite time, w is a
+        # walk
         times = tuning.torque_time, tuning.force_time
         decay = [np.exp(-period / np.broadcast_to(time, 3)) for time in times]
         self.torque_decay, self.force_decay = decay

@@ -34,8 +34,8 @@ def rise_times(vehicle: Vehicle, tuning: UKFTuning, period: float) -> tuple[Arra
 
 @np.vectorize(otypes=[float])
 def _rise(dt: float, inertia: float, white: float, walk: float, time: float, noise: float) -> float:
-    """Return the rise time (s) of the wrench w in ``inertia * x'' = w``, x being measured: to what
-    is shown of a steady wrench, which is all of a walk.
+    """Return the rise time (s) of the wrench w in ``inertia * x'' = w`` with measured x: from 10 to
+    90 % of the final estimate of a steady wrench.
     """
     # in units of the noise, time in periods: w is then the change of x in a step squared
     scale = dt * dt / inertia / noise
@@ -49,7 +49,7 @@ def _rise(dt: float, inertia: float, white: float, walk: float, time: float, noi
     gain = P[:, 0] / (P[0, 0] + 1.0)
     kept = np.eye(3) - np.outer(gain, C[0])
     input_ = kept @ [0.0, 0.0, 1.0 - decay]  # the truth does not decay
-    rest = np.linalg.solve(np.eye(3) - kept @ A, input_)[2]  # of a step of one, never shown
+    rest = np.linalg.solve(np.eye(3) - kept @ A, input_)[2]  # share of a unit step that never shows
     error = np.array([0.0, 0.0, 1.0])  # truth minus estimate
     response = [0.0]
     while response[-1] < 0.9:

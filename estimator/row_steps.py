@@ -4,7 +4,7 @@ import math
 
 _FORGETS = 20.0  # s without a row after which the filter holds its pose: steps of any length do
 _REST = 1000  # steps, at most, of the time beyond
-_SLACK = 0.1  # of a period: a step so little too long is still one step
+_SLACK = 0.1  # share of a period: a step so little too long is still one step
 
 
 def steps_between(dt: float, period: float) -> list[float]:

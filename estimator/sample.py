@@ -36,7 +36,7 @@ class Sample:
     ) -> int:
         """Take in rotor speeds (4,) and what there is of a pose, (3,) and (4,); return its parts.
 
-        What an array masks was not measured.
+        Masked numbers were not measured.
 
         Raises:
             InputError: a shape or a type is wrong, or a rotor speed is negative.

@@ -2,8 +2,8 @@
 
 Rauch, Tung and Striebel, *Maximum likelihood estimates of linear dynamic systems*, AIAA Journal
 3(8), 1965; for sigma points Sarkka, *Unscented Rauch-Tung-Striebel smoother*, IEEE TAC 53(3), 2008.
-With the covariance P of the filter before a prediction, P- after it, and the cross covariance C of
-both errors, the estimate before, given the one after, has
+P is the filter's covariance before a prediction, P- the covariance after, C the cross covariance of
+both errors. Given the estimate after, the estimate before has
 
     gain G = C P-^-1 and covariance K = P - G P- G',
 
@@ -12,8 +12,8 @@ both errors, the estimate before, given the one after, has
 a prime being the later time. Differences of states are error states (rho, omega, x, v, torque,
 force) with the world-frame MRP of (24) and (25). K is a conditional covariance and P_s a sum of two
 positive matrices, so nothing is subtracted on the way back. C comes from the sigma points of the
-filter's own prediction. With the columns S of the root of P and half differences H after the step,
-C is ``S' H`` plus the linear part ``M A'``, exactly as of 61 points.
+filter's own prediction. S are the columns of the root of P, H half differences after the step. C is
+``S' H`` plus the linear part ``M A'``, exactly as from 61 points.
 
 ``G = 0, K = P`` cuts: later measurements say nothing about earlier states. A restart cuts. A
 covariance held at a bound cuts, too: it shares no probability distribution with the covariance

@@ -19,9 +19,8 @@ _ARM = 0.1262
 
 
 def decay_of(time: ArrayLike, dt: float, period: float) -> tuple[Array, Array]:
-    """Return how a wrench with a correlation time, s, changes by itself over ``dt`` s: the factor
-    that multiplies it, and the variance that is added, as a multiple of the squared walk of a step
-    of ``period`` s.
+    """Return the decay of a wrench with a correlation time, s, over ``dt`` s: a factor, and the
+    added variance, as a multiple of the squared walk of a step of ``period`` s.
     """
     rate = 1.0 / np.asarray(time, dtype=np.float64)
     with np.errstate(invalid="ignore"):
@@ -39,12 +38,13 @@ class UKFTuning:
     ``motor_torque_noise`` far below the model's real error the filter loses the attitude when the
     torque steps. A wrong lateral force is the sign.
 
-    The external wrench is the paper's random walk, which has no size: unseen, its variance grows
-    without bound. Gusts have a size and a memory. With ``force_time`` and ``torque_time`` the
-    wrench is an Ornstein-Uhlenbeck process: unseen, it falls to 1/e in that time, and its standard
-    deviation rests at ``walk * sqrt(time / (2 period))``. The walk stays the change in a step
-    (Gelb, *Applied Optimal Estimation*, 1974, section 2.3). A steady wrench is then underestimated:
-    choose times well beyond the time in which measurements show a wrench, the rise time.
+    The external wrench is the paper's random walk: without poses, its variance grows without bound.
+    Gusts have a size and a memory. With ``force_time`` and ``torque_time`` the wrench is an
+    Ornstein-Uhlenbeck process: without poses, the estimate falls to 1/e in this time, and its
+    standard deviation approaches ``walk * sqrt(time / (2 period))``. The walk stays the change in a
+    step (Gelb, *Applied Optimal Estimation*, 1974, section 2.3). A steady wrench is then
+    underestimated: choose times well beyond the time in which measurements show a wrench, the rise
+    time.
 
     The biases of an IMU begin with the deviations of PX4's EKF2 (``GBIAS_INIT`` 0.1 rad/s,
     ``ABIAS_INIT`` 0.2 m/s2). They walk within a factor of five of EKF2's process noise, 7e-6 rad/s
@@ -65,10 +65,10 @@ class UKFTuning:
         accelerometer_noise: m/s2, likewise.
         gyro_bias_walk: rad/s: change of the gyro's bias in a step.
         accelerometer_bias_walk: m/s2: change of the accelerometer's in a step.
-        gyro_bias_std: rad/s: of the gyro's bias, before it is estimated.
-        accelerometer_bias_std: m/s2: of the accelerometer's, likewise.
-        gyro_bias_bound: rad/s: largest bias of the gyro that is believed.
-        accelerometer_bias_bound: m/s2: of the accelerometer, likewise.
+        gyro_bias_std: rad/s: standard deviation of the gyro's bias at the start.
+        accelerometer_bias_std: m/s2: the same for the accelerometer.
+        gyro_bias_bound: rad/s: largest estimate of the gyro's bias.
+        accelerometer_bias_bound: m/s2: the same for the accelerometer.
     """
 
     motor_torque_noise: ArrayLike = 0.03

@@ -51,13 +51,13 @@ from .recovery import BELIEVING, N, Recovery
 from .sample import Sample
 from .tuning import UKFTuning
 
-# A call of a filter: rotor speeds and pose, which parts of the pose there are, s, V; or gyro and
-# accelerometer, and which of both
+# A call of a filter: rotor speeds and pose, bits of the measured parts, s, V; or gyro and
+# accelerometer, and their bits
 CALL = np.dtype([("z", "f8", (11,)), ("parts", "i8"), ("dt", "f8"), ("voltage", "f8")])
 IMU_PARTS = 4, 8  # gyro and accelerometer, beside the parts of a pose
-_VARIANCES = slice(WITHOUT_COVARIANCE, None, N + 1)  # of an estimate's numbers
+_VARIANCES = slice(WITHOUT_COVARIANCE, None, N + 1)  # among an estimate's numbers
 _POSES = FILTER.fields["poses"][1]  # type: ignore[index]  # where their memory begins
-_STRAINED = 0.01  # of a variance: less is not told
+_STRAINED = 0.01  # share of a variance: less is not reported
 
 
 def make_calls(
@@ -71,8 +71,8 @@ def make_calls(
 ) -> int:
     """Make calls (n,) of an unscented filter, and write the results into the row of each. Results
     are numbers (N, 30) and standard deviations (N, 18) of an estimate, and the loads of the
-    vehicle's uncertainty (N, 7, 3). ``innovations`` (N, 12): of the last measured pose whitened,
-    and the diagonal of the root of its covariance. Return the number of calls up to a quaternion
+    vehicle's uncertainty (N, 7, 3). ``innovations`` (N, 12): the last pose's, whitened, and
+    the diagonal of the root of their covariance. Return the number of calls up to a quaternion
     that is no rotation.
     """
     given = np.ascontiguousarray(calls).view(np.uint8)
@@ -85,23 +85,23 @@ class WrenchUKF:
     """Unscented Kalman filter for the external force and torque on a quadrotor.
 
     Call ``reset`` with a first pose, then ``step`` once a period; or ``predict`` and ``correct``
-    with measurements that come at their own times. A measurement, or a part of it, that is None or
-    not finite was not made. The sign of a quaternion means nothing. Rotor speeds that are not
-    finite are taken to be the last ones that were.
+    with measurements at separate times. A measurement, or a part, that is None or not finite counts
+    as missing. The sign of a quaternion has no meaning. The last finite rotor speeds replace speeds
+    that are not finite.
 
     Args:
         vehicle: the declared vehicle; its declared effects are part of the prediction model, and
             the estimated wrench is what they do not explain.
         tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
         period: time between steps, s.
-        gate: refuse poses, or parts of one, with an NIS of a smaller chance than ``1 - gate``
-            (0.999, say), unless they go on from the pose before; None takes in any. Refused poses
-            that agree with each other for ``recovery.patience`` are believed, and the filter
-            restarts there.
+        gate: a probability, such as 0.999. The filter refuses a pose, or a part, whose NIS has a
+            smaller chance than ``1 - gate``, unless the pose continues the one before; None: no
+            gate. Refused poses that agree with each other for ``recovery.patience`` are believed,
+            and the filter restarts there.
         recovery: how gaps, outliers and restarts are dealt with, gate or not; default
             ``Recovery()``.
 
-    What became of a step's measurement is ``estimate.status``, and ``estimate.restarts`` counts
+    ``estimate.status`` is the verdict on a step's measurement, ``estimate.restarts`` counts
     restarts (``estimator.recovery`` says when and why).
 
     Raises:
@@ -197,8 +197,8 @@ class WrenchUKF:
             angular_velocity: (3,) rad/s, body.
 
         Raises:
-            InputError: a shape is wrong, a number is not finite, the quaternion is not one of a
-                rotation, or the covariance is not symmetric and positive definite.
+            InputError: a wrong shape, a number that is not finite, a quaternion without a rotation,
+                or a covariance that is not symmetric and positive definite.
         """
         x = np.zeros(STATE_SIZE)
         for name, value, where in (
@@ -255,7 +255,7 @@ class WrenchUKF:
 
     @property
     def memory(self) -> tuple[NDArray[np.uint8], ...]:
-        """All that a step changes, as bytes that can be copied and put back."""
+        """The filter's memory, as bytes to copy and to write back."""
         return (self.record.view(np.uint8),)
 
     @property

@@ -85,22 +85,22 @@ class WrenchUKFBatch:
     """``WrenchUKF`` for ``count`` vehicles: the same numbers, bit for bit, for all of them in one
     call.
 
-    Filters of one vehicle without declared effects cost less than half of a single one in a
-    compiled loop, others as much (``python -m evidence.speed`` prints both).
+    Filters of one vehicle without declared effects cost less than half of single filters in a
+    compiled loop; other filters cost the same (``python -m evidence.speed`` prints both).
 
     Args:
         vehicles: the declared vehicle of all, or a sequence of ``count``.
         count: how many; default: as many as ``vehicles`` lists, or one.
-        tuning: of all of them; default: ``UKFTuning.for_vehicle`` of each.
+        tuning: for all filters; default: ``UKFTuning.for_vehicle`` of each.
         period: time between steps, s.
         gate: as of ``WrenchUKF``.
         recovery: as of ``WrenchUKF``.
-        precision: "double", or "single" in less than two thirds of the time: of filters of one
+        precision: "double", or "single" in less than two thirds of the time, for filters of one
             vehicle without declared effects.
 
     Raises:
-        InputError: a count that does not fit, or what ``WrenchUKF`` refuses; "single" for other
-            filters.
+        InputError: a count that does not fit, an argument that ``WrenchUKF`` refuses, or
+            "single" for other filters.
     """
 
     def __init__(

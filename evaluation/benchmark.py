@@ -14,7 +14,7 @@ from .tasks import BenchmarkTask, import_files, make_pilot, scenario_names, task
 _CHUNK = 5  # episodes of a worker at a time
 _SEEDS = 2**32  # bound of a benchmark's seeds
 
-Results = dict[tuple[str, str], list[Episode]]  # by controller and scenario
+Results = dict[tuple[str, str], list[Episode]]  # for each controller and scenario
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,11 @@ class Episode:
     """
 
     seed: int
-    motion: str  # of the fan, or the name of the reference
+    motion: str  # the fan's motion, or the reference's name
     lost: bool
     uses_truth: bool  # whether the controller read a true value or a preview
     total_reward: float
-    decisions: int  # of a whole episode
+    decisions: int  # in a whole episode
     time: Array  # (n,) s
     error: Array  # (n,) m, distance from the fan's axis or from the reference; (0,): unstated
     position: Array  # (n, 3) m, true, world

@@ -36,14 +36,14 @@ _NONE = math.nan, math.nan
 class Standing:
     """One line of a leaderboard: a law, a policy, or all policies of a kind.
 
-    Score, wins, changes and probabilities are those of the figure that ranks. The remaining time of
-    a lost episode counts at 2.5 m, so that one loss may be most of a mean and of its interval. The
+    Score, wins, changes and probabilities belong to the ranking figure. The remaining time of a
+    lost episode counts at 2.5 m, so one loss may dominate a mean and its interval. The
     interquartile mean leaves out the best and the worst quarter of the episodes.
     """
 
     controller: str
     scenario: str
-    episodes: int  # of each policy
+    episodes: int  # for each policy
     seed: int
     rmse_m: float  # over whole episodes, mean over episodes; null where the task states no error
     rmse_ci95_m: tuple[float, float]  # over episodes; of a kind, over policies and episodes
@@ -54,16 +54,16 @@ class Standing:
     task: str
     rival: str  # the law of ``wins_over_rival``
     wins_over_rival: float  # share of the paired episodes that are better; a tie is half
-    change_over_rival: float  # of the mean RMSE after 3 s; null where the return ranks
+    change_over_rival: float  # in mean RMSE after 3 s; null if the return ranks
     change_ci95: tuple[float, float]  # over policies and episodes
     improvement_over_rival: float  # probability of improvement
     best_law: str  # the best designed law in this scenario, of those flown
     change_over_best: float
     change_over_best_ci95: tuple[float, float]
-    # of no change, corrected (Holm); null for laws, and for policies of a kind
+    # probability of no change, corrected (Holm); null for laws, and for policies of a kind
     p_over_best: float | None
     policies: int  # counted together in this row
-    most_lost_fraction: float  # of the policy with most losses
+    most_lost_fraction: float  # the policy's with most losses
     # (rival - this) / (rival - limit), of the means: share of the way from the rival to the best
     # possible by the measurements; null where ``limit`` does not fly
     share_of_limit: float
@@ -73,12 +73,12 @@ class Standing:
     rmse_transient_m: float  # before 3 s
     iqm_rmse_m: float  # interquartile mean of the RMSE after 3 s, over policies and episodes
     iqm_ci95_m: tuple[float, float]
-    improvement_ci95: tuple[float, float]  # of ``improvement_over_rival``
+    improvement_ci95: tuple[float, float]  # bounds of ``improvement_over_rival``
     return_mean: float
     return_ci95: tuple[float, float]
     command_activity: float  # as ``Episode.command_activity``, mean over episodes
-    saturated_fraction: float  # of decisions, with a command at its bound
-    lost_episodes: int  # of all policies
+    saturated_fraction: float  # share of decisions with a command at its bound
+    lost_episodes: int  # by all policies
     uses_truth: bool  # whether it read ``info``'s truth or a preview in any episode
 
 

@@ -33,8 +33,8 @@ _OTHERS = (*SERIES[2:], "#5f0f40", "#6a994e", "#8c564b", "#e08dac", "#3d405b")
 @styled()
 def draw_episode(episode: Episode, title: str, path: Path) -> None:
     """Draw an episode over time. In the jet of a fan on one path: fan and vehicle, torque, force
-    and command, as the paper's Fig. 7; in other tasks: the error and the three forces. Where the
-    task states no error: the actions, and up to three numbers of the observation.
+    and command, as the paper's Fig. 7; in other tasks: the error and the three forces. Without an
+    error of the task: the actions, and up to three numbers of the observation.
     """
     t, estimate = episode.time, episode.estimate
     true = np.hstack([episode.force, episode.torque])
@@ -91,7 +91,7 @@ def _legend(axes: Any, columns: int) -> None:
 def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> None:
     """Draw a scenario a row: the RMSE after 3 s of every episode and the mean with its interval,
     and the rival's median episode. A kind has the episodes of all policies, and the first one's
-    path. Where the task states no error, the return stands in place of the RMSE.
+    path. In tasks without an error, the return replaces the RMSE.
     """
     rows = shown(rows)
     scenarios = list(dict.fromkeys(row.scenario for row in rows))

@@ -19,7 +19,7 @@ from ..runtime.errors import InputError
 
 Array = NDArray[np.float64]
 _RESAMPLES = 2_000
-_LEVEL = 0.95  # of an interval
+_LEVEL = 0.95  # probability of an interval
 _AT_ONCE = 1_000_000  # numbers per draw
 _LAST_TWO = (-2, -1)
 

@@ -49,8 +49,8 @@ class BenchmarkTask:
     bounds: tuple[str, ...] = ("hover", "oracle")  # no designed laws: the ends of the scales
     # 95 % interval of one law's mean RMSE
     interval: Callable[..., tuple[float, float]] = hierarchical_bootstrap
-    spec: EnvSpec | None = None  # of a task of a user's own
-    kin: str = ""  # the kit's task whose class it extends, with its action and observation
+    spec: EnvSpec | None = None  # if the task is a user's
+    kin: str = ""  # the kit's task with the parent class, action and observation
 
     @property
     def name(self) -> str:
@@ -149,12 +149,12 @@ class BenchmarkTask:
         return gym.make_vec(spec, count, vectorization_mode=mode, **given)
 
     def units(self, envs: gym.vector.VectorEnv, judge: Any) -> dict[str, Any]:
-        """Return the entries of a policy's card that lead from a learner's units to those of
-        ``make``: ``scale`` of the observation, ``largest`` of the action.
+        """Return the entries of a policy's card for the units of ``make``: ``scale`` of the
+        observation, ``largest`` of the action.
 
         Args:
-            envs: of ``make_many``.
-            judge: of ``make``, with the same observation.
+            envs: from ``make_many``.
+            judge: from ``make``, with the same observation.
 
         Raises:
             InputError: the spaces of ``envs`` are no boxes of one dimension, or the action's range
@@ -282,7 +282,7 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
 
     Args:
         name: a law, one of the kit's policies, the path of a trained policy, a YAML file of a law,
-            or FILE.py:CLASS; a Python file is then run. In a task of a user's own ``hover`` is the
+            or FILE.py:CLASS, which runs the file. In a task of a user's own ``hover`` is the
             middle of the action space.
         task: as of ``task_of``.
 
@@ -307,8 +307,8 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
-    """Return the controllers' names in tables and pictures: of a policy's file the name, with
-    enough of its folders to tell policies apart.
+    """Return the controllers' names in tables and pictures. A policy's file shows its name, with
+    the folders that tell policies apart.
     """
     parts = {
         name: Path(name).with_suffix("").parts if is_policy_path(name) else (name,)

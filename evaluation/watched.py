@@ -1,4 +1,4 @@
-"""What a control law reads of ``info``: a law that reads the truth is marked on the leaderboard."""
+"""Records whether a control law reads true values in ``info``: the leaderboard marks such laws."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

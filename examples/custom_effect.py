@@ -1,8 +1,7 @@
-"""A physical effect of one's own: written once, flown as truth, and named by a diagnosis that knows
-of it.
+"""Your own physical effect: written once, flown in simulation, and named by the diagnosis.
 
-The effect is ``effects/tether.py`` beside this script, an elastic thread to a hook in the room. On
-the command line a folder of effects is known by ``WINDWRENCH_EFFECTS=examples/effects``.
+The effect is ``effects/tether.py``: an elastic thread from the vehicle to a hook in the room.
+Commands load a folder of effects from ``WINDWRENCH_EFFECTS=examples/effects``.
 
 Install:  pip install .    (in a checkout)
 Run:      python examples/custom_effect.py
@@ -31,9 +30,9 @@ def main(seconds=60.0, stiffness=0.1, seed=0):
     log = FlightLog(
         flown["t"], flown["position"], flown["quaternion"], flown["rotor_speeds"], name="tethered"
     )
-    found = diagnose([log], vehicle)
-    print(f"verdict: {found.verdict}")
-    for effect in found.effects:
+    diagnosis = diagnose([log], vehicle)
+    print(f"verdict: {diagnosis.verdict}")
+    for effect in diagnosis.effects:
         for name, value in effect.coefficients.items():
             print(
                 f"{effect.name}: {name} = {value:.4f} +- {effect.std[name]:.4f} "
@@ -41,11 +40,10 @@ def main(seconds=60.0, stiffness=0.1, seed=0):
             )
     print(f"truth: tether: k = {stiffness:.4f} N/m")
     print(
-        f"force left over: {found.before.force_rms:.3f} N before, {found.after.force_rms:.3f} N "
-        f"after; "
-        f"the sensors alone leave {found.floor_force_rms:.3f} N"
+        f"force error: {diagnosis.before.force_rms:.3f} N before, "
+        f"{diagnosis.after.force_rms:.3f} N after; sensors alone: {diagnosis.floor_force_rms:.3f} N"
     )
-    return found
+    return diagnosis
 
 
 if __name__ == "__main__":

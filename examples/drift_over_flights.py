@@ -1,8 +1,8 @@
-"""A coefficient that changes from flight to flight: all logs of a folder, one diagnosis each, and a
-regression on time.
+"""The drift of a coefficient over flights: a diagnosis of each log of a folder, and a regression on
+time.
 
-Names of logs are times, such as 2026-03-01T1030.ulg. A flight counts where its diagnosis names the
-effect. An effect too small to be named has no coefficient: a line through few flights misses it.
+Names of logs are times, such as 2026-03-01T1030.ulg. Only flights with a named effect count: a
+diagnosis gives no coefficient of an effect too small to be named.
 
 Install:  pip install .    (in a checkout)
 Run:      python examples/drift_over_flights.py FOLDER crazyflie rotor_drag kdx

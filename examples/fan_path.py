@@ -1,5 +1,4 @@
-"""Fans that move as one pleases: a chirp and sudden steps, followed by the admittance controller,
-in one picture.
+"""Your own paths of the fan, a chirp and sudden steps, and the admittance controller behind them.
 
 Install:  pip install .    (in a checkout)
 Run:      python examples/fan_path.py
@@ -17,9 +16,7 @@ from windwrench.runtime.page_files import write_png
 
 
 def chirp(t):
-    """Return a sine of 0.4 m that quickens from 0.02 to 0.12 Hz within 20 s: y (n,) m at times (n,)
-    s.
-    """
+    """Return y (n,) m at times (n,) s: 0.4 m at 0.02 Hz, rising to 0.12 Hz within 20 s."""
     return 0.4 * np.sin(2 * np.pi * (0.02 + 0.0025 * t) * t)
 
 
@@ -40,12 +37,12 @@ def main(out="results/fan_path", controller="admittance", seed=4):
     folder.mkdir(parents=True, exist_ok=True)
     figure = new_figure(5.0)
     axes = figure.subplots(len(PATHS), 1, sharex=True)
-    found = {}
+    rmse = {}
     for ax, (name, path) in zip(axes, PATHS.items(), strict=True):
         flown = fly_episode(
             FanTrackingEnv("base", fan_path=path), make_controller(controller), seed
         )
-        found[name] = flown.rmse
+        rmse[name] = flown.rmse
         ax.plot(flown.time, flown.fan_y, "--", color=BLACK, label="fan")
         ax.plot(flown.time, flown.y, color=SERIES[1], label=f"vehicle, {controller}")
         ax.set(
@@ -57,7 +54,7 @@ def main(out="results/fan_path", controller="admittance", seed=4):
     axes[-1].set_xlabel("time (s)")
     write_png(figure, folder / "fan_path.png")
     print(folder / "fan_path.png")
-    return found
+    return rmse
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
-"""A controller of one's own in the plain Gymnasium loop, beside a vehicle that hovers and the
-paper's law.
+"""Your own controller in the plain Gymnasium loop, beside hovering and the paper's law.
 
-This one answers the yaw torque that the filter feels and the torque's rate, smoothed over 0.2 s: it
-brakes before it is on the axis.
+``Lead`` commands a velocity against the estimated yaw torque and against the torque's rate,
+smoothed over 0.2 s. The rate brakes the vehicle before the fan's axis.
 
 Install:  pip install .    (in a checkout)
 Run:      python examples/own_controller.py
@@ -34,9 +33,8 @@ class Lead:
 
     def __call__(self, observation, info=None):
         """Return the velocity (1,) m/s along world y for an observation (8,)."""
-        torque_z = float(
-            observation[5]
-        )  # Nm, world: positive where the vehicle is on the fan's left
+        # Nm, world: positive if the vehicle is on the fan's left
+        torque_z = float(observation[5])
         change = 0.0 if self.last is None else (torque_z - self.last) / DECISION
         self.rate += DECISION / self.smoothing * (change - self.rate)
         self.last = torque_z
@@ -65,14 +63,14 @@ def main(episodes=20, scenario="base"):
         "admittance": make_controller("admittance"),
         "own": Lead(),
     }
-    found = {
+    errors = {
         name: float(np.mean([rmse(env, law, seed) for seed in range(episodes)]))
         for name, law in laws.items()
     }
     env.close()
-    for name, value in found.items():
+    for name, value in errors.items():
         print(f"{name:10s} {value:.3f} m off the axis (RMSE, mean of {episodes} episodes)")
-    return found
+    return errors
 
 
 if __name__ == "__main__":

@@ -1,9 +1,8 @@
-"""Train stable-baselines3's SAC straight on the Gymnasium environment: ten lines for training and
-scoring.
+"""Train stable-baselines3's SAC on the Gymnasium environment, in ten lines.
 
-3000 decisions take a minute or two on one core. That is enough to stay with the fans of ``base``
-(some 204 of 250 reward, where hover has 100 to 115), close to the law of the paper (some 210) but
-not beyond it: docs/learning.md says what it takes.
+3000 decisions take one or two minutes of one core. The policy then follows the fans of ``base`` (a
+return of about 204 of 250; hover 100 to 115, the paper's law 210). Better policies:
+docs/learning.md.
 
 Install:  pip install '.[rl]'    (in a checkout)
 Run:      python examples/sb3_ten_lines.py
@@ -19,7 +18,7 @@ import windwrench  # noqa: F401  (registers the environment)
 
 
 class Hover:
-    """What ``evaluate_policy`` asks of a policy, for a vehicle that stays where it is."""
+    """The policy of ``evaluate_policy`` that commands nothing."""
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
         """Return actions (n, 1) for observations (n, 8)."""
@@ -33,15 +32,15 @@ def main(steps=3000, episodes=20, seed=0):
     env = Monitor(gym.make("windwrench/FanTracking-v1", scenario="base"))
     learner = SAC("MlpPolicy", env, learning_starts=min(100, steps // 2), seed=seed)
     learner.learn(steps)
-    found = {}
+    rewards = {}
     for name, policy in (("learned", learner), ("hover", Hover())):
         env.reset(seed=1_000_000)
-        found[name], spread = evaluate_policy(policy, env, episodes)
+        rewards[name], spread = evaluate_policy(policy, env, episodes)
         print(
-            f"{name:8s} {found[name]:6.1f} of at most 250 reward an episode (+- {spread:.1f} over "
-            f"{episodes} episodes)"
+            f"{name:8s} {rewards[name]:6.1f} of at most 250 reward an episode "
+            f"(+- {spread:.1f} over {episodes} episodes)"
         )
-    return found
+    return rewards
 
 
 if __name__ == "__main__":

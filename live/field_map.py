@@ -24,7 +24,7 @@ from ..identification.logs.magnitudes import Magnitudes
 from ..identification.logs.mapped_log import with_range
 from .messages import SECOND, Array, Malformed, Measurement
 
-_OUTSIDE = 0.01  # of a command's range: its tolerance
+_OUTSIDE = 0.01  # tolerance, share of a command's range
 _LARGEST = Magnitudes().largest
 _FIELDS = {
     "rotors": "rotor_speeds",
@@ -52,7 +52,7 @@ class FieldMap:
 
         Args:
             fields: numbers by name; None, NaN or no entry: not measured.
-            arrival: of the message, ns.
+            arrival: ns, when the message came.
 
         Raises:
             Malformed: a quantity is incomplete, none is there, or a number is none of a flight.

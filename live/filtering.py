@@ -31,7 +31,7 @@ class LiveSettings:
 
     gate: float | None = GATE  # as for a log
     horizon: float = 0.3  # s, largest age of a row
-    rate_hz: float | None = None  # of rows, if known; then no row is held back
+    rate_hz: float | None = None  # rate of rows, if known; then no row waits
     wait: float = 10.0  # s until the first estimate; 0: for ever
     seconds: float | None = None  # s, length of the stream
     tuning: UKFTuning | None = None  # for steps of 5 ms; default: the vehicle's

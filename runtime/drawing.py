@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 9.0  # in
-MOST_ROWS = 12  # of panels or of names below each other
+MOST_ROWS = 12  # panels, or names, below each other
 BLACK, GREY, PALE = "#222222", "#8c8c8c", "#d9d9d9"
 # those of a report's page
 BEFORE, AFTER, HELD_OUT = "#c95400", "#0068a8", "#e6edda"

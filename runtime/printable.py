@@ -4,8 +4,8 @@ are shown as an escape, never sent.
 
 import unicodedata
 
-# control characters, formats such as changes of the direction of writing, halves of characters
-# (bytes of a name outside UTF-8), private and unassigned ones, separators of lines
+# control characters; formats, such as changes of the direction of writing; halves of characters
+# (bytes of a name outside UTF-8); private and unassigned characters; line separators
 _UNFIT = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
 
 

@@ -75,7 +75,7 @@ def made_by(command: str, commits: Iterable[str | None], version: str = __versio
 
     Args:
         command: the whole command line.
-        commits: of the code behind the page's results, as ``commit`` returned them.
+        commits: the commits of the code behind the page's results, as ``commit`` returned them.
         version: version of the code; default: this one's.
     """
     known = list(dict.fromkeys(name for name in commits if name))

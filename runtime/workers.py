@@ -25,7 +25,7 @@ R = TypeVar("R")
 
 # for new processes: forked workers would share the locks of linear algebra
 SPAWNED = multiprocessing.get_context("spawn")
-_FIRST_TO_GO = 500  # of 1000: where memory runs out, the system ends a worker before its parent
+_FIRST_TO_GO = 500  # of 1000: without memory, the system ends a worker before its parent
 _LOOK = 0.2  # s between two checks of the time and calls of ``idle``
 _ATTEMPTS = 4  # at a task of ``every``
 
@@ -127,7 +127,7 @@ class _Local:
         self._busy.pop(future).end()
 
     def death(self, future: Future[Any]) -> str | None:
-        """Return how the process of a task that is done ended, in words; None if it did not."""
+        """Return in words how the process of a finished task ended; None if the process lives."""
         worker = self._busy.pop(future)
         if not isinstance(future.exception(), BrokenProcessPool):
             self._resting.append(worker)
@@ -191,7 +191,7 @@ class _OnCluster:
         self._ray.cancel(self._running.pop(future)[0], force=True)
 
     def death(self, future: Future[Any]) -> str | None:
-        """Return how the process of a task that is done ended, in words; None if it did not."""
+        """Return in words how the process of a finished task ended; None if the process lives."""
         del self._running[future]
         died = isinstance(future.exception(), self._ray.exceptions.RayError)
         return "its process on the cluster died" if died else None

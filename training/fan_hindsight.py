@@ -24,12 +24,12 @@ from ..envs.observations import as_numbers
 Array = NDArray[np.float64]
 Frames = NDArray[np.float32]
 
-AHEAD = 24  # decisions, of which a command knows the fan's places
-_COUNTS = 10  # of them the vehicle must have flown for a command to count
+AHEAD = 24  # decisions with known places of the fan, for a command
+_COUNTS = 10  # decisions flown until a command counts
 _LEAD = 2.0  # 1/s, gain of the law with sight of the fan that flies the first round
 _VELOCITY = 3  # decisions, over which the fan's velocity is taught
 _ALONG_Y = 1
-# of nineteen episodes so many fly in each scenario
+# episodes in each scenario, out of nineteen
 MIX = {"base": 4, "fast": 3, "varied": 4, "far": 4} | dict.fromkeys(
     ("static", "noisy", "gusty", "slow-filter"), 1
 )
@@ -125,8 +125,8 @@ def _felt(infos: dict[str, Any]) -> Array:
 
 
 def _moved(set_point: Array | None, own: Array, commands: Array) -> Array:
-    """Return the set points (n,) m after a decision at ``commands`` (n,) m/s; it waits where it
-    would run too far ahead (``core/flight_loop.hpp``).
+    """Return the set points (n,) m after a decision at ``commands`` (n,) m/s. A set point too far
+    ahead of its vehicle waits (``core/flight_loop.hpp``).
     """
     if set_point is None:
         return own.copy()

@@ -9,9 +9,9 @@ States = tuple[torch.Tensor, torch.Tensor]
 class FastLstmPolicy(RecurrentActorCriticPolicy):  # type: ignore[misc]
     """The LSTM policy of sb3-contrib, with the same numbers up to rounding.
 
-    It goes through a sequence step by step as soon as an episode starts anywhere in it, and its
-    rollouts are cut at the starts of episodes: of each sequence it is the first step, or none. A
-    state that is zero from there on says the same.
+    The class steps through a sequence one by one if an episode starts anywhere in the sequence. Its
+    rollouts are cut at the starts of episodes, so an episode starts at a sequence's first step or
+    not at all. A zero state at that step has the same effect.
     """
 
     @staticmethod

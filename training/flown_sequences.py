@@ -24,7 +24,7 @@ class Flights:
             another episode.
         lesson: inputs and taught quantities: a ``FanHindsight``, or an object with its constants
             and methods.
-        wander: of an error of the commands its size, of the largest, and s that it lasts.
+        wander: size of an error of the commands, as a share of the largest, and its duration, s.
         seed: the run's.
     """
 

@@ -42,7 +42,7 @@ _LATE = replace(
     ),
 )
 MIX = "wide-late"
-# of its sixteen episodes so many fly in each scenario
+# episodes in each scenario, out of sixteen
 _PARTS = {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2} | dict.fromkeys(
     ("varied", "gusts", "wash", "fan-wall"), 1
 )
@@ -96,9 +96,9 @@ class WindLesson:
 
         Args:
             task: WindHover or WindTrajectory.
-            limit: on what is taught, in largest actions. The mean of limited commands is not the
-                limited mean, and noise brings many beyond 1 (to 40 % along x and y of ``lqg`` in
-                WindHover, to 7 % on ``base``). Yet a few far beyond would rule the fit. Tried with
+            limit: largest taught command, in largest actions. The mean of limited commands is not
+                the limited mean. Noise brings many commands beyond 1 (40 % along x and y of ``lqg``
+                in WindHover, 7 % on ``base``). Yet a few far beyond would rule the fit. Tried with
                 one seed, RMSE against ``lqg`` on 96 validation episodes at 1, 1.5 and 4:
                 WindHover's ``noisy`` -7, -10 and -8 %, WindTrajectory's ``noisy`` -11, -12 and -12
                 % and ``turbulent`` -2, 0 and 0 %; ``base`` the same within 1 %.
@@ -110,7 +110,7 @@ class WindLesson:
         self._envs, self._late = envs, envs.late()
         self._scale = as_numbers(envs.task.bounds()[1] or 1.0)
         self._commands: list[Array] = []
-        self._states: list[list[Array]] = []  # of each axis (n, its states)
+        self._states: list[list[Array]] = []  # for each axis (n, its states)
         self._laws = [make_controller("lqg", self._task) for _ in range(envs.num_envs * leads)]
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Any]:

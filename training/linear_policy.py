@@ -20,7 +20,7 @@ Array = NDArray[np.float32]
 
 # decisions of the low-passes; 1: the newest observation itself
 MEMORY = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 32.0)
-RIDGE = 3e-3  # of the quantities' variances
+RIDGE = 3e-3  # share of the quantities' variances
 
 
 class LinearLaw:

@@ -38,7 +38,7 @@ class Progress:
     by_error: bool = True
     lost: list[int] = field(default_factory=list)  # episodes of each validation
     best: int = -1  # index of the best
-    seconds: float = 0.0  # of all parts of the run, validation included
+    seconds: float = 0.0  # in all parts of the run, with validation
 
     @property
     def best_rmse(self) -> float:

@@ -37,9 +37,9 @@ FAN = "FanTracking"
 FAN_PLANE = "FanTracking2D"
 WIND = "wind"
 LINEAR = "linear"
-# of each kind of task: cell, its size, sizes of the layers after it; rounds of DAgger, episodes of
-# each, epochs of its fit (of the last thrice); episodes of a batch, the learning rate; an error
-# added to half of the flights: a share of the largest action, and s that it lasts
+# for each kind of task. Network: cell, its size, sizes of the layers after. DAgger: rounds, their
+# episodes, epochs of a fit (in the last round three times as many). Fit: episodes in a batch,
+# learning rate. Error in half of the flights: share of the largest action, duration in s
 _FIT: dict[str, dict[str, Any]] = {
     FAN: {"cell": "lstm", "state": 96, "net": [64], "rounds": 4, "episodes": 1024, "epochs": 5}
     | {"batch_size": 32, "learning_rate": 3e-3, "wander": (0.4, 1.0)},
@@ -49,12 +49,12 @@ _FIT: dict[str, dict[str, Any]] = {
     | {"batch_size": 32, "learning_rate": 5e-3, "wander": (0.3, 0.5)},
 }
 _LINEAR = {"rounds": 4, "episodes": 64}
-_LEAST_RATE = 0.1  # share of the learning rate that is left at the end of a round
+_LEAST_RATE = 0.1  # share of the learning rate at the end of a round
 _ACTIVATION = "tanh"
-# signs of a frame of FanTracking2D after half a turn about the jet's axis: it changes the sign of
-# all that is taught
+# signs of a frame of FanTracking2D after half a turn about the jet's axis; taught quantities change
+# their signs, too
 _TURNED = np.array([1, -1, -1, 1, -1, -1, -1, -1, -1, -1], dtype=np.float32)
-_GAINS = (1.2, 2.0, 3.0)  # 1/s, on what it says of the fan's offset; one is chosen
+_GAINS = (1.2, 2.0, 3.0)  # 1/s, on the network's offset of the fan; validation chooses one
 VALIDATION = 10  # episodes
 BASE = "base"
 
@@ -131,8 +131,8 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
 
     Args:
         task: its name.
-        scenario: of the tasks in the wind, or a mix of them: ``hindsight.MIX``.
-        seed: of flights and network.
+        scenario: a scenario of the tasks in the wind, or the mix ``hindsight.MIX``.
+        seed: for flights and network.
         **changed: entries of ``_FIT`` in place of the task's: ``rounds``, ``episodes``, ``epochs``.
     """
     given = _fit_of(task) | changed

@@ -13,10 +13,10 @@ from .learners import cell_weights, dense_layers, dense_weights
 Array = NDArray[np.float32]
 
 CELLS: dict[str, Any] = {"lstm": torch.nn.LSTM, "gru": torch.nn.GRU}
-_SURE = -4.0  # bounds of what it may say of a logarithmic standard deviation
+_SURE = -4.0  # bounds of an output's logarithmic standard deviation
 _UNSURE = 1.5
 _MIRRORED = 0.5  # share of the episodes
-_SMALLEST = 1.4e-3  # of what is seen, in its scales, that counts
+_SMALLEST = 1.4e-3  # smallest relevant size of a scaled quantity
 _STEEPEST = 1.0  # norm to which a gradient is cut
 
 
@@ -34,12 +34,12 @@ class TaughtNetwork(torch.nn.Module):
     of a standard deviation.
 
     Args:
-        quantities: of a frame.
+        quantities: numbers in a frame.
         taught: quantities of the output.
         cell: ``gru`` or ``lstm``; torch fits an LSTM in half the time.
         state: size of the cell.
         net: sizes of the dense layers between.
-        activation: of these layers.
+        activation: the layers'.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class TaughtNetwork(torch.nn.Module):
         self._name = cell
         self._white: tuple[torch.Tensor, torch.Tensor] | None = None
         self.cell = CELLS[cell](quantities, state)
-        if cell == "lstm":  # it begins by keeping what it has, or it never learns to keep it long
+        if cell == "lstm":  # starts with open forget gates, or long memory is never learned
             with torch.no_grad():
                 self.cell.bias_ih_l0[state : 2 * state] = 1.0
         self.dense = dense_layers([state, *net, 2 * taught], activation)
@@ -109,8 +109,8 @@ def fit(
     epoch's mean loss.
 
     The loss is the likelihood of normal errors, each times the deviation of the output. Samples
-    with a fan hard to locate count less, but more than by the likelihood alone, with which hard
-    episodes would be lost (beta-NLL with beta 0.5: Seitzer and others, *On the pitfalls of
+    with a fan hard to locate count less. They count more than by the likelihood alone, which would
+    give up hard episodes (beta-NLL with beta 0.5: Seitzer and others, *On the pitfalls of
     heteroscedastic uncertainty estimation with probabilistic neural networks*, 2022).
 
     Args:
@@ -119,7 +119,7 @@ def fit(
         epochs: over all of them.
         batch_size: episodes.
         rates: learning rate at first and in the end; it falls as a cosine.
-        generator: of the order, and of which episodes are mirrored.
+        generator: for the order, and the choice of mirrored episodes.
         mirrored: signs (quantities,) of a frame where left and right change places, and all taught
             quantities change their signs. At each use an episode is mirrored or not. Default: none
             is.

@@ -101,7 +101,7 @@ def make_training_envs(
     Args:
         name: scenario or tier.
         count: how many.
-        estimator: of the environments: ``ukf``, ``constant-gain``, its fast stand-in, or
+        estimator: the environments': ``ukf``, ``constant-gain``, its fast stand-in, or
             ``ukf-lanes``: the full filter, plant and flight loop in the lanes of a vector unit.
         task: a name, as of ``evaluation.tasks.task_of``.
         observation: one of ``OBSERVATIONS``, normalised, in place of the task's own.

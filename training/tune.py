@@ -18,8 +18,10 @@ from .seeds import validation_seeds
 from .training_envs import check_training_env, make_training_env
 
 _GAINS = read_yaml(Path(__file__).parent / "configs" / "gains.yaml", "ranges of gains")
-RANGES: dict[str, dict[str, dict[str, list[float]]]] = _GAINS["ranges"]  # by task, law and gain
-STARTS: dict[str, dict[str, float]] = _GAINS["starts"]  # by law
+RANGES: dict[str, dict[str, dict[str, list[float]]]] = _GAINS[
+    "ranges"
+]  # for each task, law and gain
+STARTS: dict[str, dict[str, float]] = _GAINS["starts"]  # for each law
 _PRUNE_AFTER = 10  # episodes
 
 

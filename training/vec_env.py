@@ -23,17 +23,17 @@ Array = NDArray[np.float32]
 class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     """An SB3 ``VecEnv`` over a Gymnasium vector environment.
 
-    Each environment on its own: at an episode's end, ``infos[i]["terminal_observation"]`` holds its
-    last features, and ``infos[i]["TimeLimit.truncated"]`` is True where only the clock ended the
-    episode. The returned observation is the first of the next episode. Every episode's seed is
-    given by ``seed_of``. ``episode`` (n,) holds the numbers of the episodes in flight: set to those
-    of another run, ``reset`` goes on with the episodes that follow.
+    At an episode's end, ``infos[i]["terminal_observation"]`` holds the environment's last features.
+    ``infos[i]["TimeLimit.truncated"]`` is True if the clock alone ended the episode. The returned
+    observation is the first of the next episode. Every episode's seed is given by ``seed_of``.
+    ``episode`` (n,) holds the numbers of the episodes in flight. With the numbers of another run,
+    ``reset`` continues with that run's next episodes.
 
     Args:
-        envs: of Gymnasium, with the option ``reset_mask``.
-        features: of a policy of FanTracking; None: the observations as they are.
+        envs: Gymnasium's, with the option ``reset_mask``.
+        features: a FanTracking policy's; None: the observations as they are.
         seed_of: from environment and episode to the episode's seed; default: those of run 0.
-        reward: of ``infos``; None: the environments' own.
+        reward: computed from ``infos``; None: the environments' own.
     """
 
     render_mode: str | None = None  # SB3 asks for it

@@ -1,8 +1,8 @@
 """Attitude gain: the reported tilt is the true one times 1 + g, as that of an onboard estimate may
 be.
 
-With the attitude split into a turn about the vertical and a tilt by an angle about a horizontal
-axis, the angle is reported as (1 + g) times what it is, axis and turn as they are.
+An attitude is a turn about the vertical and a tilt about a horizontal axis. The reported
+tilt angle is (1 + g) times the true angle; its axis and the turn are right.
 """
 
 from .base import Coefficient, Effect

@@ -2,9 +2,9 @@
 of a log.
 
 An effect is one file in this folder with an ``EFFECT``. Its equation, the effect model, is a
-function of the core, ``core/effects/NAME.hpp``, called through its address by a tick of the plant,
-a sigma point of the filter and a sample of a log. The model of a user's own effect may be a Python
-function in the effect's file. There are four kinds:
+function of the core, ``core/effects/NAME.hpp``. A tick of the plant, a sigma point of the filter
+and a sample of a log call the function through its address. The model of a user's own effect may be
+a Python function in the effect's file. There are four kinds:
 
 ``rotor input``
     changes the delivered rotor speeds. Model ``(c, vehicle, rotors, memory)``: rewrites
@@ -162,7 +162,7 @@ class Effect:
         name: as vehicle files and reports write it.
         kind: changed part: rotor input, wrench, rigid body or sensing.
         coefficients: each with its unit.
-        source: of equation and sizes.
+        source: publication of equation and sizes.
         excitation: flight to tell the effect from others with much the same traces in a log.
         model: name of an equation of the core, or a Python function; for rotor input, wrench and
             sensing.

@@ -1,8 +1,8 @@
 """Clock offset: pose and rotor speeds of one row of the log are not of the same instant.
 
-With dt > 0 the pose is that of dt earlier than the rotor speeds; with dt < 0 the rotor speeds are
-those of -dt earlier than the pose. Between samples by a cubic. An estimator that knows of it delays
-the other of the two, and so estimates the flight of dt ago.
+With dt > 0 the pose is dt older than the rotor speeds; with dt < 0 the rotor speeds are -dt older
+than the pose. A cubic interpolates between samples. An estimator with this effect delays the other
+signal, and so estimates the flight of dt ago.
 """
 
 from .base import Coefficient, Effect

@@ -1,7 +1,7 @@
 """Centre-of-mass offset: the centre of mass lies away from the geometric centre of the rotors.
 
-Thrust then makes a torque about it, and the pose, which is that of the geometric centre, swings
-about it.
+Thrust makes a torque about the centre of mass. The logged pose, of the geometric centre, swings
+about the centre of mass.
 """
 
 from dataclasses import replace

@@ -57,7 +57,7 @@ class Role(StrEnum):
     MARKER = "marker", "m", "m", "m"  # place of the point with the logged position
     SUSPENDED_LOAD = "suspended load", "kg"  # mass of the load
     THRUST = "thrust", "1"  # relative change of all rotors' thrust
-    ROTOR_THRUSTS = "thrust of each rotor", "1", "1", "1", "1"  # relative change of 1 to 4
+    ROTOR_THRUSTS = "thrust of each rotor", "1", "1", "1", "1"  # relative changes, rotors 1 to 4
     THRUST_CURVE = "thrust curve", "1"  # difference from the square of the rotor speed
     THRUST_OVER_TIME = "thrust over time", "1/s"  # relative loss
     THRUST_OVER_VOLTAGE = ("thrust over voltage",)  # as a function of the battery's voltage

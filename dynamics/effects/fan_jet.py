@@ -2,10 +2,10 @@
 
 The mean wind is that of ``dynamics.mean_jet``: ``u^2 = u0^2 (annular disc) * Gaussian``, with the
 inflow that continuity asks for. The fan stands at (x, y, z) m and blows horizontally, along world x
-turned by ``heading`` about the vertical. Drag acts at stations, each in its own wind, which is why
-a symmetric vehicle feels a torque: F = kd u in its plane at each rotor, and F = 0.6 kg/m3 * area /
-8 |u| u at each of eight points of a ring on the hull, u being the wind relative to the station. It
-is the jet of the fan-tracking environment without its gusts.
+turned by ``heading`` about the vertical. Drag acts at stations, each in its own wind, so
+a symmetric vehicle feels a torque. With u the wind relative to a station, F = kd u acts in the
+plane of each rotor, and F = 0.6 kg/m3 * area / 8 |u| u at eight points of a ring on the hull. The
+fan-tracking environment has the same jet, with gusts.
 """
 
 import itertools
@@ -22,8 +22,7 @@ from .declaration import Coefficients, Family, Found, Unexplained
 _core.set_jet_table(*jet_table(0.45, 0.10))  # m, radii of the fan and its hub
 
 _LEAST_SPEED_RATIO = 2.0  # times the vehicle's speed, of a jet at its source
-# where a fan may stand as a fit starts: the way it blows (rad), m from the flight against that
-# way, and m across
+# starting points of a fit: the fan's heading (rad), m upwind of the flight, and m across
 _HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
 _DISTANCES, _ACROSS = (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
 
@@ -40,8 +39,8 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
 
 
 def implausible(found: Found) -> str:
-    """Return why a found jet is none: it is not much faster than the vehicle, whose drag in still
-    air it may stand for.
+    """Return the reason against a fitted jet: a jet hardly faster than the vehicle may be the
+    vehicle's drag in still air.
     """
     if found.coefficients["u0"] >= _LEAST_SPEED_RATIO * found.speed:
         return ""

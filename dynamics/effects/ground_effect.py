@@ -1,9 +1,9 @@
 """Ground effect: a rotor near the floor delivers more thrust at the same rotor speed.
 
-Thrust of a rotor at height z above the floor is multiplied by 1 / (1 - rho (R / (4 z))^2),
-Cheeseman and Bennett's equation for rho = 1; rho of about 3 was measured for whole quadrotors.
-Applied rotor by rotor, so a tilted vehicle feels a torque. The height is taken as no less than
-where the factor reaches 2, as the equation has a pole below it.
+Thrust of a rotor at height z above the floor grows by the factor 1 / (1 - rho (R / (4 z))^2). This
+is Cheeseman and Bennett's equation for rho = 1; for whole quadrotors rho is about 3. Each rotor has
+its own height, so a tilted vehicle feels a torque. The factor is at most 2, as the equation has a
+pole near the floor.
 """
 
 from .base import CENTRAL, Coefficient, Effect

@@ -1,5 +1,4 @@
-"""Inflow thrust: a rotor that climbs into its own inflow delivers less thrust, one that sinks
-delivers more.
+"""Inflow thrust: a climbing rotor delivers less thrust, a sinking rotor more.
 
 At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kz W_i u_iz along body z,
 applied at the rotor. Roll and pitch so feel a damping torque. It is the k_z of RotorPy.

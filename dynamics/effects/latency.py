@@ -1,7 +1,7 @@
-"""Latency: what the rotors do is what was logged a while ago, a pure delay.
+"""Latency: the rotors follow their logged speeds after a pure delay.
 
-The delivered rotor speeds at t are the logged ones at t - d, between samples by a cubic. In front
-of the first sample the first one holds.
+The delivered rotor speeds at t are the logged speeds at t - d. A cubic interpolates between
+samples. Before the first sample, the first speeds hold.
 """
 
 from .base import Coefficient, Effect

@@ -1,5 +1,4 @@
-"""Marker offset: the reported position is not that of the geometric centre but of a point beside
-it.
+"""Marker offset: the reported position belongs to a point beside the geometric centre.
 
 p' = p + R m with m = (mx, my, mz) in body axes. To undo it takes the attitude, measured or, where
 none was, estimated.

@@ -20,7 +20,7 @@ from .base import MEMORY, PARAMETERS, ROTORS, ROW_SIZE, SAMPLE, STATE, VEHICLE, 
 Function = Callable[..., None]
 Layout = np.dtype[Any] | int  # a record, or so many numbers
 
-ERRORS: list[BaseException] = []  # of functions that ran in a step, until raised
+ERRORS: list[BaseException] = []  # raised in functions of a step, until reported
 _C_FUNCTION = ctypes.CFUNCTYPE(None, *(ctypes.c_void_p,) * 4)
 _KEPT_VIEWS = 4096
 

@@ -1,7 +1,7 @@
-"""Rotor inertia: the torque that it takes to spin rotors up and to turn them with the body.
+"""Rotor inertia: the torque of rotors as they spin up, and as they turn with the body.
 
-With the angular momentum h = jr sum spin_i W_i along body z: tau = -dh/dt e_z - omega x h e_z in
-body axes, W being delivered rotor speeds and dW/dt their mean over the step.
+The angular momentum along body z is h = jr sum spin_i W_i. The torque in body axes is
+tau = -dh/dt e_z - omega x h e_z, with delivered rotor speeds W and the mean of dW/dt over a step.
 """
 
 from .base import Coefficient, Effect

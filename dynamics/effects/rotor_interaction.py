@@ -1,17 +1,17 @@
-"""Rotor interaction: in edgewise flight rotors that follow fly in the wake of those that lead.
+"""Rotor interaction: in edgewise flight the rear rotors fly in the wake of the front rotors.
 
 With u = R'(v - wind) the airspeed in body axes and e_i the direction of rotor i from the geometric
-centre, p_i = e_ix u_x + e_iy u_y says how fast rotor i leads (> 0) or follows (< 0), and
-F = -sum_i W_i (kp s p_i + kw max(-p_i, 0)) along body z, at the geometric centre. ``kw`` is thrust
-that the followers lose in the wake. ``kp`` is what all gain where the leading ones need to turn
-slower than the others for the moments to balance; where all rotors turn alike its part is zero. The
-moment that goes with it is that of ``flapping_moment``.
+centre, p_i = e_ix u_x + e_iy u_y says how fast rotor i leads (> 0) or follows (< 0). The force
+F = -sum_i W_i (kp s p_i + kw max(-p_i, 0)) acts along body z, at the geometric centre. ``kw``: the
+rear rotors lose thrust in the wake. ``kp``: in balance, the front rotors turn slower, and all
+rotors gain thrust; with equal rotor speeds this part is zero. ``flapping_moment`` is the moment of
+the same cause.
 
-Inflow leans towards the followers by the induced velocity v times tan(chi / 2), chi the angle by
+Inflow leans towards the rear rotors by the induced velocity v times tan(chi / 2), chi the angle by
 which the wake is blown back: s = 2 v tan(chi / 2) / u_h = 2 v / (sqrt(u_h^2 + w^2) + w), with u_h
-the airspeed along the disc and w = u_z + v that through it. It is 1 at low speed, falls in fast
-flight and in climbs, and grows in descents. v is that of momentum theory, of the mean rotor:
-v sqrt(u_h^2 + w^2) = T / (2 rho A).
+the airspeed along the disc and w = u_z + v the airspeed through the disc. s is 1 at low speed,
+falls in fast flight and in climbs, and grows in descents. Momentum theory gives v for the mean
+rotor: v sqrt(u_h^2 + w^2) = T / (2 rho A).
 """
 
 from .base import Coefficient, Effect

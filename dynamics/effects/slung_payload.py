@@ -7,10 +7,10 @@ damping (v + l n' - wind) the load's drag in the air by its mass, the cable's te
 swings by l n'' = -f - a - T n (1/m + 1/M). n and n' are the effect's own state, carried on once a
 step; they start at rest, straight down. In hover it pulls with the load's weight.
 
-It holds while the cable is taut. Forces on the vehicle other than thrust and weight (its drag, say)
-are left out of the swing. No measurement corrects the swing: how it was at the start is forgotten,
-and an error of its phase dies out, at half the damping. With a damping well below 1/s a real load
-drifts out of phase with the equation, which then may explain less than ``mass`` with the same mass.
+The equation holds for a taut cable. The swing neglects forces on the vehicle other than thrust and
+weight, such as drag. No measurement corrects the swing. Errors of its start and phase decay at half
+the damping. With a damping well below 1/s a real load drifts out of phase with the equation. Then
+``mass`` with the same mass may explain more.
 """
 
 import math
@@ -23,7 +23,7 @@ from .declaration import Coefficients, Family, Found, Role, Unexplained
 _LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, cables at the start of a fit
 _DAMPINGS = (0.3, 2.0)  # 1/s, the same
 _LEAST_LENGTH = 0.1  # typical lengths
-_MOST_DAMPING_RATIO = 0.2  # of a load that swings in air
+_MOST_DAMPING_RATIO = 0.2  # a load that swings in air
 
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:

@@ -1,8 +1,8 @@
 """Thrust curvature: thrust does not grow exactly with the square of the rotor speed.
 
-Thrust and reaction torque are those declared times 1 + a (W^2 / W_hover^2 - 1), no less than zero,
-so that nothing changes at the rotor speed of hover. The delivered rotor speed is W times the root
-of that.
+Thrust and reaction torque are the declared ones times 1 + a (W^2 / W_hover^2 - 1), at least zero.
+Nothing changes at the rotor speed of hover. The delivered rotor speed is W times the root of the
+factor.
 """
 
 from .base import Coefficient, Effect

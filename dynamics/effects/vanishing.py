@@ -14,7 +14,7 @@ from .own import addresses, raise_errors
 
 _SAMPLES = 60
 _SIZES = (0.5, 1.5)  # between which every number of vehicle and flight is drawn
-_SHARE = 0.5  # of a typical size: the change by which a diagnosis asks what a coefficient does
+_SHARE = 0.5  # a diagnosis tries coefficients changed by this share of a typical size
 
 
 def does_nothing_alone(effect: Effect) -> bool:

@@ -1,9 +1,9 @@
 """Wind: a steady wind, fixed in the world frame.
 
-Every declared effect that asks for the wind (rotor_drag, body_drag, inflow_thrust ...) feels it.
-``cd`` is a drag of its own, for a vehicle that declares none: with w the wind and u = w - v, F = cd
-|u| u + cd |v| v at the centre of mass, that is the change against the same drag in still air. So
-nothing happens without wind, and what differs from a constant force is how the force changes with
+The wind acts through each declared effect with an airspeed (rotor_drag, body_drag, ...).
+``cd`` is a drag for a vehicle that declares none. With w the wind and u = w - v, the force at the
+centre of mass is F = cd |u| u + cd |v| v: the change against the same drag in still air. So
+nothing happens without wind. Unlike a constant force, the force changes with
 the velocity.
 """
 
@@ -23,7 +23,7 @@ _LEAST_DRAG = 0.1
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     """Return winds along the mean force, and along the force's part with the form of a slow wind's
-    drag: a wind does nothing without a drag, nor this drag without a wind. Where the vehicle has
+    drag: a wind does nothing without a drag, nor this drag without a wind. If the vehicle has
     another drag, a wind may act on this one alone.
 
     That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may act.

@@ -55,7 +55,7 @@ class TaskLanes(TaskVectorEnv):
     def _make_memory(self) -> None:
         self._like = self.task.make_loop(self.task.truth, self.task.fan)
         _refuse(self.task)
-        # the loop of which all are drawn; the next draw overwrites it
+        # one loop draws all environments; the next draw overwrites its state
         self._kept = [{self.task.scenario: self._like}] * self.num_envs
         self._lanes: int = PRECISIONS[self.precision].lanes
         self._flying = self._blocks(-(-self.num_envs // self._lanes))

@@ -1,8 +1,8 @@
 """Winds on a grid in time and space: from a file, or sampled from any other wind.
 
 A file is ``.npz`` with ``t`` (s), ``x``, ``y``, ``z`` (m), each (n,) and evenly spaced, and
-``wind`` (t, x, y, z, 3) m/s. Or it is netCDF (``.nc``, needs xarray) with the coordinates ``time``,
-``x``, ``y``, ``z`` in the same units and the variables ``u``, ``v``, ``w`` in any order of
+``wind`` (t, x, y, z, 3) m/s. A netCDF file (``.nc``, needs xarray) has the coordinates ``time``,
+``x``, ``y``, ``z`` in the same units, and the variables ``u``, ``v``, ``w`` in any order of
 dimensions. A file without a time is steady.
 """
 

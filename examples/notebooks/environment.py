@@ -8,10 +8,10 @@
 # ---
 
 # %% [markdown]
-# # The environment: hold the vehicle in a jet that it cannot see
+# # The environment: stay in the jet of a moving fan
 #
-# A fan moves from side to side. The vehicle must stay in front of it. It sees neither the fan nor
-# its own position: the observation is the external force and torque that the filter estimates.
+# A fan moves from side to side, and the vehicle must stay in front of the fan. The observation has
+# neither the fan nor the vehicle's position, but the estimated external force and torque.
 
 # %%
 import gymnasium as gym
@@ -26,9 +26,9 @@ print(env.observation_space, env.action_space)
 # %% [markdown]
 # ## Two controllers
 #
-# Off the axis the jet turns the vehicle, because its drag is larger on one side: the sign of the
-# torque about the vertical says where the axis is. The law of the paper commands a velocity in
-# proportion to it.
+# Off the axis the jet turns the vehicle, because the drag is larger on one side. The sign of the
+# yaw torque tells the side of the axis. The paper's law commands a velocity in proportion to the
+# yaw torque.
 
 
 # %%
@@ -45,8 +45,8 @@ def admittance(observation):
 # %% [markdown]
 # ## The same episode for both
 #
-# A seed is an episode: the same path of the fan, the same turbulence, the same sensor noise.
-# `info["offset"]` is the true distance from the axis; no controller may use it.
+# Equal seeds give equal episodes: path of the fan, turbulence and sensor noise. `info["offset"]`
+# is the true distance from the axis, for the score alone.
 
 
 # %%
@@ -54,11 +54,10 @@ def fly(controller, seed=4):
     """Return the offset in m at each decision of an episode."""
     observation, info = env.reset(seed=seed)
     offsets = [info["offset"]]
-    over = False
-    while not over:
+    terminated = truncated = False
+    while not (terminated or truncated):
         observation, _, terminated, truncated, info = env.step(controller(observation))
         offsets.append(info["offset"])
-        over = terminated or truncated
     return offsets
 
 
@@ -68,8 +67,8 @@ rmse = {name: (sum(x * x for x in y) / len(y)) ** 0.5 for name, y in flights.ite
 # %%
 figure, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
 for (name, offsets), colour in zip(flights.items(), (GREY, SERIES[1]), strict=True):
-    told = f"{name}: {rmse[name]:.2f} m RMSE"
-    ax.plot([k / 12.5 for k in range(len(offsets))], offsets, color=colour, label=told)
+    label = f"{name}: {rmse[name]:.2f} m RMSE"
+    ax.plot([k / 12.5 for k in range(len(offsets))], offsets, color=colour, label=label)
     print(f"{name}: {rmse[name]:.3f} m")
 ax.set(xlabel="time (s)", ylabel="distance from the axis (m)", title="One episode, two controllers")
 ax.legend()
@@ -77,6 +76,6 @@ ax.grid(alpha=0.3)
 figure.savefig("environment.png", dpi=110)
 
 # %% [markdown]
-# One episode ranks nobody: `windwrench benchmark` flies 40 paired ones and gives intervals. Next:
+# One episode is no ranking: `windwrench benchmark` flies 40 paired episodes, with intervals. Next:
 # [Design a controller](../../docs/tutorials/train.md), [Train a
 # policy](../../docs/tutorials/train.md).

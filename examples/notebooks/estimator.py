@@ -10,12 +10,12 @@
 # %% [markdown]
 # # The estimator: a force that nobody measures
 #
-# A quadrotor hovers. After 2 s something pulls it sideways with 0.3 N, after 5 s it lets go. No
-# sensor measures that force. The filter finds it from two things that every laboratory logs: the
-# rotor speeds and the pose.
+# A quadrotor hovers. From 2 s to 5 s a string pulls the vehicle sideways with 0.3 N. No sensor
+# measures this force. The filter estimates the force from rotor speeds and pose, which most
+# laboratories log.
 #
-# Run it as a script (`python estimator.py`), or open it as a notebook: `pip install jupytext
-# jupyterlab`, then open the file with *Jupytext*.
+# `estimator.py` runs as a script, too; `python examples/render_notebooks.py` writes
+# `estimator.ipynb` from the script.
 
 # %%
 
@@ -30,8 +30,8 @@ from windwrench.runtime.drawing import SERIES, TRUTH
 # %% [markdown]
 # ## A flight
 #
-# `record_flight` flies a vehicle in MuJoCo and returns what its log would hold. `push` is asked
-# before each step for the wrench that acts (N and Nm, world axes).
+# `record_flight` flies a vehicle in MuJoCo and returns the columns of its log, with the true
+# force. Before each step, `push` returns an external force and torque (N and Nm, world axes).
 
 # %%
 vehicle = load_vehicle("ardrone2")
@@ -47,9 +47,9 @@ flight = record_flight(vehicle, trajectory="hover", seconds=8.0, seed=1, push=pu
 # %% [markdown]
 # ## The filter
 #
-# One call of `step` takes the rotor speeds over the interval that ends at a measurement, and the
-# measurement. It returns force and torque in world axes, with a covariance. `force_walk` says how
-# quickly a force may change: the estimate of the default follows in about 1 s.
+# One call of `step` takes a measured pose and the rotor speeds since the pose before. `step`
+# returns force and torque in world axes, with a covariance. `force_walk` sets how quickly a force
+# may change: the default estimate follows in about 1 s.
 
 # %%
 tunings = {"default": UKFTuning(), "ten times quicker": UKFTuning(force_walk=3.26e-2)}
@@ -65,10 +65,10 @@ for name, tuning in tunings.items():
     estimates[name] = np.array(force)
 
 # %% [markdown]
-# ## What it found
+# ## The estimates
 #
-# The true force holds the pull and the weak turbulence of every flight. The quick filter is
-# there sooner, and noisier.
+# The true force is the pull plus the weak turbulence of every flight. The quick filter follows
+# sooner, with more noise.
 
 # %%
 settled = (flight["t"] > 3.5) & (flight["t"] < 5.0)

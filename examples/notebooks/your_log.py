@@ -10,12 +10,11 @@
 # %% [markdown]
 # # Your own log: what does the model lack?
 #
-# You have a log (time, pose, rotor speeds) and a vehicle's file. `diagnose` says which physical
-# effect the model lacks, with its coefficients, and how much better the model predicts with it.
+# You have a log (time, pose, rotor speeds) and a vehicle file. `diagnose` names the physical effect
+# that the model lacks, with its coefficients, and compares the prediction errors before and after.
 #
-# Here the log is simulated, so that the truth is known: the vehicle has rotor drag and its model
-# does not. Put your own file in place of `flight.csv` and your own YAML file in place of
-# `ardrone2`.
+# This log is simulated, with a known truth: the vehicle has rotor drag, the model has none. Put
+# your own log in place of `flight.csv`, and your vehicle's YAML file in place of `ardrone2`.
 
 # %%
 
@@ -41,25 +40,25 @@ write_log(
 # %% [markdown]
 # ## The diagnosis
 #
-# Every fourth block of 3 s is held out of all fits. Errors before and after are reported on these
-# blocks alone.
+# No fit uses every fourth block of 3 s. Errors before and after are those of these blocks.
 
 # %%
-found = diagnose([read_log("flight.csv", vehicle=vehicle)], vehicle)
-print(found.verdict)
-for effect in found.effects:
+diagnosis = diagnose([read_log("flight.csv", vehicle=vehicle)], vehicle)
+print(diagnosis.verdict)
+for effect in diagnosis.effects:
     for name, value in effect.coefficients.items():
         print(f"{effect.name}: {name} = {value:.3g} ± {effect.std[name]:.1g} {effect.units[name]}")
-print(f"force error {found.before.force_rms:.3f} N before, {found.after.force_rms:.3f} N after")
+before, after = diagnosis.before.force_rms, diagnosis.after.force_rms
+print(f"force error {before:.3f} N before, {after:.3f} N after")
 
 # %% [markdown]
 # ## Before and after
 #
-# The residual is the force that the measured motion needed and the model did not deliver.
+# The residual is the force that the measured motion needs beyond the model's.
 
 # %%
-trace = found.traces[0]
-names = ", ".join(effect.name for effect in found.effects) or "nothing"
+trace = diagnosis.traces[0]
+names = ", ".join(effect.name for effect in diagnosis.effects) or "nothing"
 figure, axes = plt.subplots(2, 1, figsize=(7, 4.2), sharex=True, layout="constrained")
 for ax, channel, label in zip(axes, (0, 1), "xy", strict=True):
     ax.plot(trace.t, trace.before[:, channel], color=BEFORE, lw=1.2, label="before")
@@ -74,14 +73,14 @@ for ax, channel, label in zip(axes, (0, 1), "xy", strict=True):
     )
     ax.set_ylabel(f"residual force {label} (N)")
 axes[0].set_title(
-    f"The model lacked {names}: force error {found.before.force_rms:.2f} → "
-    f"{found.after.force_rms:.2f} N (noise floor {found.floor_force_rms:.2f} N)"
+    f"The model lacked {names}: force error {diagnosis.before.force_rms:.2f} → "
+    f"{diagnosis.after.force_rms:.2f} N (noise floor {diagnosis.floor_force_rms:.2f} N)"
 )
 figure.legend(*axes[0].get_legend_handles_labels(), ncols=3, loc="outside lower center")
 axes[1].set_xlabel("time (s)")
 figure.savefig("your_log.png", dpi=110)
 
 # %% [markdown]
-# `windwrench diagnose flight.csv --vehicle ardrone2` does the same and writes a page,
-# `report.html`. Next: [Diagnose your own drone](../../docs/tutorials/diagnose.md), [Your log in
-# ten minutes](../../docs/tutorials/your-log.md).
+# `windwrench diagnose flight.csv --vehicle ardrone2` does the same, and writes `report.html`. Next:
+# [Diagnose your own drone](../../docs/tutorials/diagnose.md), [Your log in ten
+# minutes](../../docs/tutorials/your-log.md).

@@ -167,8 +167,8 @@ def _effects(vehicle: Vehicle) -> dict[str, list[Effect]]:
 
 
 def _room(effects: Mapping[str, list[Effect]]) -> tuple[int, int, int, int]:
-    """Return how many effects on wrench, rotors and sensors a model has room for, and numbers of
-    memory of each: all, unless no equation delays what it changes.
+    """Return the room of a model: effects on wrench, rotors and sensors, and numbers of memory of
+    each. Without a delaying equation the memory is small.
     """
     wrench, rotor, sensing = (max(1, len(kind)) for kind in effects.values())
     long = any(
@@ -185,14 +185,14 @@ def _source(path: str) -> str:
 
 
 def _add_header(path: str, files: dict[str, str]) -> None:
-    """Add a header of the core, and those that it includes, as they lie."""
+    """Add a header of the core and its included headers, unchanged."""
     if path not in files:
         files[path] = _source(path)
         for included in _INCLUDE.findall(files[path]):
             _add_header(normpath(join(dirname(path), included)), files)
 
 
-# fields of a model with a row for each effect: of which kind, and numbers of a row
+# fields of a model with a row for each effect: kind of the effect, and numbers in a row
 _ROOMS = {
     "wrench_models": (0, 1),
     "wrench_hooks": (0, 1),

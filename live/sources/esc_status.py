@@ -1,5 +1,5 @@
-"""MAVLink's ESC_STATUS: PX4 sends it, and pymavlink's dialects lack it. This file adds the message
-to a dialect.
+"""MAVLink's ESC_STATUS: a message of PX4, missing in pymavlink's dialects. This file adds the
+message to a dialect.
 
 Message 291 of MAVLink's common set: index (of the first of four ESCs), time_usec, rpm[4] (with the
 sense of rotation), voltage[4] in V, current[4] in A.
@@ -9,7 +9,7 @@ import struct
 from typing import Any
 
 NUMBER = 291
-# by MAVLink's rule: the sender's and our definition must agree
+# MAVLink's check that sender and receiver have one definition
 CHECKSUM = 10
 _LAYOUT = "<Q4i4f4fB"  # in the order of the wire: larger types first
 

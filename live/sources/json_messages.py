@@ -23,8 +23,8 @@ from .links import Datagrams, sender_name
 from .senders import Senders
 
 _AT_ONCE = 64  # datagrams, and objects of one message, taken before their estimates are out
-_LARGEST = 16_384  # bytes of a message
-_VALUES = 1_024  # of a message
+_LARGEST = 16_384  # bytes in a message
+_VALUES = 1_024  # in a message
 _COLUMNS = "t, px, py, pz, qw, qx, qy, qz and omega1 ... omega4"
 _PIECE = 65_536  # bytes read at once
 _PIPE_WAITS = 1.0  # s: the writer of a pipe may fly; a pipe holds more than 1 s at 200 Hz

@@ -36,7 +36,7 @@ from .senders import Senders
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 _OURS = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
-_BAUD = 57_600  # of telemetry radios
+_BAUD = 57_600  # baud rate of telemetry radios
 _PLOTTED = 100_000_000  # ns, between values for plots
 _WANTED = (
     *POSES,

@@ -67,7 +67,9 @@ def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
     if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
         return None
     inverse = np.linalg.inv(drag)
-    noise = output.estimate.covariance[15:17, 15:17]  # of the force; the vehicle's adds to it
+    noise = output.estimate.covariance[
+        15:17, 15:17
+    ]  # the force's noise; the vehicle's uncertainty comes on top
     force = noise + np.diag(output.std[:2] ** 2 - np.diag(noise))
     covariance = inverse @ force @ inverse.T
     return inverse @ output.estimate.force[:2], np.sqrt(np.diagonal(covariance))

@@ -126,25 +126,46 @@ def test_topics_of_ros_2_are_estimated(example, monkeypatch, capsys):
 
 
 NOTEBOOKS = FOLDER / "notebooks"
-MARKERS = re.compile(r"^# %%.*$", re.MULTILINE)
 
 
 @pytest.fixture
-def run(monkeypatch, tmp_path):
-    """Return what runs a notebook in an empty folder and returns its names."""
-    monkeypatch.chdir(tmp_path)
+def run(example, monkeypatch):
+    """Return a function that runs a notebook in an empty folder, compares cells, printed words and
+    number of figures with the notebook in the checkout, and returns the names of its cells.
+    """
     monkeypatch.setenv("MPLBACKEND", "Agg")
-    import matplotlib.pyplot as plt
 
     def run_one(name):
         names = {"__name__": "__main__"}
-        path = NOTEBOOKS / f"{name}.py"
-        exec(compile(path.read_text(encoding="utf-8"), path, "exec"), names)
-        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        made = example("render_notebooks").notebook(NOTEBOOKS / f"{name}.py", names)
+        there = json.loads((NOTEBOOKS / f"{name}.ipynb").read_text(encoding="utf-8"))
+        assert summary(made) == summary(there), "python examples/render_notebooks.py"
+        assert Path(f"{name}.png").read_bytes().startswith(b"\x89PNG")
         return names
 
-    yield run_one
-    plt.close("all")
+    return run_one
+
+
+def summary(notebook):
+    """Return the source, the printed text without its numbers, and the number of figures of each
+    cell.
+    """
+    cells = []
+    for cell in notebook["cells"]:
+        outputs = cell.get("outputs", [])
+        printed = "".join(line for output in outputs for line in output.get("text", []))
+        figures = sum("data" in output for output in outputs)
+        cells.append(("".join(cell["source"]), re.sub(r"[\d.e-]+", "0", printed), figures))
+    return cells
+
+
+def test_a_script_with_cells_becomes_a_notebook(example, tmp_path):
+    script = "# %% [markdown]\n# # Title\n#\n# Text.\n\n# %%\nx = 1\n\n# %%\nprint(x)\n"
+    (tmp_path / "small.py").write_text(script, encoding="utf-8")
+    example("render_notebooks").main(tmp_path)
+    made = json.loads((tmp_path / "small.ipynb").read_text(encoding="utf-8"))
+    assert summary(made) == [("# Title\n\nText.", "", 0), ("x = 1", "", 0), ("print(x)", "0\n", 0)]
+    assert (made["nbformat"], made["nbformat_minor"]) == (4, 5)
 
 
 def test_every_notebook_is_in_the_table_the_gallery_and_these_tests():
@@ -152,18 +173,17 @@ def test_every_notebook_is_in_the_table_the_gallery_and_these_tests():
     table = (ROOT / "examples" / "README.md").read_text(encoding="utf-8")
     gallery = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     assert names == set(re.findall(r"\(notebooks/(\w+)\.py\)", table))
+    assert names == set(re.findall(r"\(notebooks/(\w+)\.ipynb\)", table))
+    assert names == {path.stem for path in NOTEBOOKS.glob("*.ipynb")}
     assert names == set(re.findall(r"examples/notebooks/(\w+)\.py", gallery))
     assert names == {"estimator", "environment", "your_log"}
 
 
 @pytest.mark.parametrize("path", sorted(NOTEBOOKS.glob("*.py")), ids=lambda path: path.stem)
-def test_a_notebook_is_text_and_code_in_turn(path):
-    text = path.read_text(encoding="utf-8")
-    cells = MARKERS.findall(text)
-    assert cells[0] == "# %% [markdown]"
-    assert len(cells) >= 6
-    for target in re.findall(r"\]\s*\(([^)]+)\)", text):
-        assert (path.parent / target).exists(), target
+def test_links_of_a_notebook_lead_somewhere(path):
+    targets = re.findall(r"\]\s*\(([^)]+)\)", path.read_text(encoding="utf-8"))
+    assert targets
+    assert [target for target in targets if not (path.parent / target).exists()] == []
 
 
 def test_the_filter_finds_a_force_that_nobody_measures(run):
@@ -181,7 +201,7 @@ def test_the_papers_law_stays_in_the_jet_and_hovering_does_not(run):
 
 @pytest.mark.slow  # a diagnosis names a drag in tests/identification, the other notebooks run here
 def test_the_diagnosis_of_a_log_names_what_was_added(run):
-    found = run("your_log")["found"]
-    assert [effect.name for effect in found.effects] == ["rotor_drag"]
-    assert found.effects[0].coefficients["kdx"] == pytest.approx(1.2e-4, rel=0.1)
-    assert found.after.force_rms < 0.5 * found.before.force_rms
+    diagnosis = run("your_log")["diagnosis"]
+    assert [effect.name for effect in diagnosis.effects] == ["rotor_drag"]
+    assert diagnosis.effects[0].coefficients["kdx"] == pytest.approx(1.2e-4, rel=0.1)
+    assert diagnosis.after.force_rms < 0.5 * diagnosis.before.force_rms

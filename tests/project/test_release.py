@@ -37,8 +37,21 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 
 def test_the_citation_says_what_the_project_says():
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    assert cited["license"] == PROJECT["license"]
+    assert cited["license"] == PROJECT["license"].partition(" AND ")[0]  # the kit's own
     assert cited["version"] == windwrench.__version__
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"version = {{{windwrench.__version__}}}" in readme
+    assert f"title = {{{cited['title']}}}" in readme
+
+
+def test_the_wheel_names_every_licence_of_what_it_holds():
+    if not (ROOT / ".git").exists():
+        pytest.skip("needs a checkout: licences are those that git tracks")
+    tracked_licences = git("ls-files", "-co", "--exclude-standard", "--", "*LICENSE").split()
+    shipped = {name for name in tracked_licences if not name.startswith("tests/")}
+    assert set(PROJECT["license-files"]) == shipped
+    page = (ROOT / "docs/release.md").read_text(encoding="utf-8")
+    assert [name for name in shipped - {"LICENSE"} if name not in page] == []
 
 
 MOST = 5_400_000  # bytes, of all that git keeps of docs/ beside its films
