@@ -131,7 +131,7 @@ def check_log(
         if c.filtered
     ]
     if flown_vehicle(vehicle, log.vehicle) is None:
-        limits.append("no vehicle is given: units and frames were not checked against its rotors")
+        limits.append("no vehicle is given: the rotor speeds were not checked against its weight")
     channels = log_channels(log)
     return LogCheck(log, read_by, channels, tuple(doubts), tuple(limits), guess, text)
 
