@@ -41,6 +41,7 @@ from ..wrench_series import pose_notes
 from .advice import FILTERED, advice, composites, inertial_notes, late_rotors, outside_the_fit
 from .commanded_rotors import THRUST_FACTORS
 from .commands import what_commands_show
+from .log_offsets import delays_at_bound
 from .priors import NUISANCE
 from .ranking import LEAST_RIVAL, Report, rank, rank_by_rows
 from .regression import (
@@ -250,6 +251,7 @@ class Judged:
             *inertial_notes(flights, named),
             *(sentence for sentences in self.doubts.values() for sentence in sentences),
             *late_rotors(flights, fitted.setting, fitted.sensors),
+            *delays_at_bound(self.setting),
         )
         stated = tuple(
             Alternative(tuple(e for e in x.effects if e not in given.first), p)

@@ -6,13 +6,14 @@ force along the body differs from a bias only where attitude, thrust or the forc
 """
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from ...dynamics.effects import Role, get
+from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Pair, Values
 from ..motion.signals import Signals
@@ -53,11 +54,24 @@ TIMINGS = {
 # for a pose filtered before the log was written: a causal low-pass of 5 Hz is 45 ms late, an
 # estimator some more
 BEHIND_A_FILTER = Offset(0.02, (-0.1, 0.1))
+_NEAR = 0.98  # share of a bound: the last step of a search
 
 
 def bias_column(log: int, axis: int) -> tuple[str, str]:
     """Return the column of a bias (m/s2) along an axis of the body."""
     return "", f"accelerometer bias {'xyz'[axis]} {log}"
+
+
+def delays_at_bound(setting: Mapping[str, Values]) -> Iterator[str]:
+    """Yield the delays of a setting, coefficients by effect, whose search ended at its bound."""
+    for effect in playing(Role.DELAY, among=filter(None, setting)):
+        for c in get(effect).coefficients:
+            bound = c.maximum if setting[effect].get(c.name, 0.0) > 0.0 else c.minimum
+            if bound and abs(setting[effect].get(c.name, 0.0)) > _NEAR * abs(bound):
+                yield (
+                    f"{effect}: the search ends at {1000.0 * bound:.3g} ms, and the delay may be "
+                    "longer. Compare the clocks of pose and rotor speeds"
+                )
 
 
 def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Signals:

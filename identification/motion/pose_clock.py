@@ -12,11 +12,11 @@ import numpy as np
 from ..logs.flight_log import FlightLog, with_rows
 from ..logs.table import Array, Rows, median_step
 
-_RARE = 2.5  # rows a pose, from which a log is thinned: every second row is dense enough
+_RARE = 1.5  # rows a pose, from which a log is thinned
 
 
 def on_pose_clock(log: FlightLog) -> FlightLog:
-    """Return a log with one row a pose, or the log itself where poses stand in every second row.
+    """Return a log with one row a pose, or the log itself where poses stand in every row.
 
     Rotor speeds are the root of the mean square, commands, voltage and true wrench the mean over
     the interval that ends at the pose. Gyro and accelerometer are means around the pose.

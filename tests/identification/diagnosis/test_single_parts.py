@@ -14,7 +14,7 @@ from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis.advice import composites
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
-from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY
+from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY, delays_at_bound
 from windwrench.identification.diagnosis.priors import prior_size
 from windwrench.identification.diagnosis.ranking import rank, starts_of
 from windwrench.identification.diagnosis.regression import RegressedFlights
@@ -169,3 +169,13 @@ def test_a_hanging_load_of_half_the_vehicles_mass_is_expected():
     """A prior of a tenth of that mass told measured loads of a half too small by a third."""
     flights = SimpleNamespace(vehicle=load_vehicle("crazyflie"), thrust_std=0.0)
     assert 0.5 * flights.vehicle.mass < 2.0 * prior_size(("slung_payload", "m"), flights)
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "bound"),
+    [("clock_offset", "dt", -0.06), ("clock_offset", "dt", 0.06), ("latency", "d", 0.1)],
+)
+def test_a_delay_at_the_bound_of_its_search_is_said(effect, name, bound):
+    (line,) = delays_at_bound({effect: {name: bound}, "mass": {"dm": 0.01}, "": {"offset": 1.0}})
+    assert line.startswith(f"{effect}: the search ends at {1000 * bound:.3g} ms")
+    assert list(delays_at_bound({effect: {name: 0.9 * bound}})) == []

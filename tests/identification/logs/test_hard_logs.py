@@ -92,6 +92,20 @@ def test_a_late_clock_is_found_and_mended(whose, rows):
         assert np.median(np.abs(off)) < 0.02 * np.ptp(getattr(log, name)[inside])
 
 
+@pytest.mark.parametrize("rows", [-30, -6, 6, 30])
+def test_without_a_gyro_the_accelerometer_tells_its_clock(rows):
+    log = read_log(data_file("hard_logs/imu_clock_late.csv.gz"), vehicle=load_vehicle("ardrone2"))
+    log = with_rows(log, np.isfinite(log.gyro[:, 0]))
+    late = replace(log, gyro=None, accelerometer=np.roll(log.accelerometer, rows, axis=0))
+    mended, notes = on_one_clock(late, load_vehicle("ardrone2"))
+    assert float(notes[0].split(" s ")[0].split()[-1]) == pytest.approx(
+        abs(rows) * log.period, abs=0.003
+    )
+    inside = slice(60, -60)
+    off = mended.accelerometer[inside] - log.accelerometer[inside]
+    assert np.median(np.abs(off)) < 0.02 * np.ptp(log.accelerometer[inside])
+
+
 @pytest.mark.parametrize(("name", "late"), [("pose_late_40", 0.04), ("pose_late_80", 0.08)])
 def test_a_late_pose_is_a_clock_and_no_lag(name, late):
     vehicle = load_vehicle("ardrone2")
