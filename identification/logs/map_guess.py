@@ -240,32 +240,34 @@ class _Guessing:
                     why += "wrote the table left out its digits; expected a time in each row"
                     break
             lack("time", "time", why, "column")
-        pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
+        pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), {*self.sections}
         if "position" not in has and not has.issuperset(imu):
             half = [part for part in pose if part in self.parts]
             # the nearest to a whole: half a pose, half an IMU, else a pose
             for part in pose if half or not has.intersection(imu) else imu:
-                if part not in has and part not in half:
-                    why = f"no columns look like one (such as {_EXAMPLES[part]})"
-                    lack(part, part, why)
-            for part in half:  # for a person to complete
-                columns, unit = self.parts[part].columns, self.parts[part].unit
-                most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
-                made = Columns(columns, unit or "m")
-                if part == "attitude":
-                    euler = "zyx" if len(columns) == 3 else ""
-                    unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
-                    made = Attitude(columns, unit, euler=euler)
-                self.say(part, "columns", False, self.ranked[part][0].why)
-                if made.unit:
-                    self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
-                self.sections[part] = made
+                if part in half:
+                    self.half_a_pose(part)
+                elif part not in has:
+                    lack(part, part, f"no columns look like one (such as {_EXAMPLES[part]})")
         for part, why in self.further.items():
             lack(part, "rotors", why)
         if not {"rotors", "commands"} & set(self.sections) and not self.further:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lack("motors", "rotors", why)
         return out
+
+    def half_a_pose(self, part: str) -> None:
+        """Keep a position without an attitude, or the reverse, for a person to complete."""
+        columns, unit = self.parts[part].columns, self.parts[part].unit
+        most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
+        made = Columns(columns, unit or "m")
+        if part == "attitude":
+            unit = unit or ("deg" if most > 2.0 * np.pi else "rad")
+            made = Attitude(columns, unit, euler="zyx") if len(columns) == 3 else Attitude(columns)
+        self.say(part, "columns", False, self.ranked[part][0].why)
+        if made.unit:
+            self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
+        self.sections[part] = made
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep the reason for a field's value."""
