@@ -15,7 +15,7 @@ flight counts for few independent samples ``n``. A hover tells nothing: all shar
 likeliest reading is taken, after a penalty on unusual ones.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from operator import attrgetter
@@ -40,10 +40,13 @@ from .log_map import UNITS, Attitude
 from .readings import (
     DECLARED,
     OFFSET,
+    ROTOR_READINGS,
+    ROTORS,
     Convention,
     applied,
     as_written,
     log_readings,
+    turned,
 )
 from .table import Array, ArrayPair, Rows, finite_rows, median_step
 
@@ -310,20 +313,21 @@ class Evidence:
     def fit(self, reading: Convention, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone."""
         if torques:
-            return self._fit(reading, self._mixing, _DELAYS)[0]
+            delays = tuple(delay - reading.late for delay in _DELAYS)
+            return self._fit(reading, self._mixing, delays)[0]
         return self._fit(reading, self._mixing[:0], (0.0,))[0]
 
     def delay(self) -> float:
         """Return the likeliest delay in s of the motion behind the rotors' columns, as declared."""
         return self._fit(DECLARED, self._mixing, _DELAYS)[1]
 
-    def late(self) -> Fit:
-        """Return the fit of the columns as declared at the likeliest delay of the rotors beyond a
-        flight loop's own.
+    def late(self, reading: Convention = DECLARED) -> Fit:
+        """Return the fit of a reading at the likeliest delay of the rotors beyond a flight loop's
+        own.
         """
         far = np.arange(-_FAR, _FAR, _STEP)
         parts = np.array_split(far[(far < _DELAYS[0]) | (far > _DELAYS[-1] + _STEP)], 20)
-        reading = Convention(unlikely=OFFSET)
+        reading = replace(reading, unlikely=reading.unlikely + OFFSET)
         fits = (self._fit(reading, self._mixing, tuple(part.tolist())) for part in parts)
         fit, delay = max(fits, key=lambda each: each[0].score)
         return replace(fit, reading=replace(reading, late=-delay))
@@ -385,6 +389,11 @@ class RankedFits:
             evidence.fit(r, torques) if evidence.enough else Fit(r, 1.0, (), -r.unlikely)
             for r in readings
         )
+        return cls.sorted(fits)
+
+    @classmethod
+    def sorted(cls, fits: Iterable[Fit]) -> "RankedFits":
+        """Return the ranking of some fits."""
         return cls(sorted(fits, key=lambda fit: fit.score, reverse=True))
 
     @property
@@ -436,8 +445,7 @@ class RankedFits:
 def _as_logged(evidence: Evidence) -> RankedFits:
     """Return the ranking of the readings of the kit's own columns, and of a delay of the rotors."""
     ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
-    fits = [*ranking.ranked, *([evidence.late()] if evidence.enough else [])]
-    return RankedFits(sorted(fits, key=lambda fit: fit.score, reverse=True))
+    return RankedFits.sorted([*ranking.ranked, *([evidence.late()] if evidence.enough else [])])
 
 
 def departures(evidence: Evidence) -> list[Convention]:
@@ -447,14 +455,11 @@ def departures(evidence: Evidence) -> list[Convention]:
     return _as_logged(evidence).departures(not evidence.has_pose)
 
 
-Advice = tuple[Convention, ...]  # taken in turn
-
-
 def remedies(
     log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False
-) -> tuple[list[Advice], bool]:
-    """Return the equally good advice for a log, and whether it leaves a consistent log. No advice:
-    the log is consistent as declared.
+) -> tuple[list[Convention], bool]:
+    """Return the equally good readings of a contradictory log, and whether each of them, applied,
+    leaves a consistent log. No reading: the log is consistent as declared.
 
     Args:
         log: the flight.
@@ -462,22 +467,23 @@ def remedies(
         by_imu: the motion is the gyro's and the accelerometer's, else the pose's.
     """
 
-    def ranked(*advice: Convention) -> RankedFits:
+    def mends(reading: Convention) -> bool:
         spins = vehicle
-        if vehicle is not None and sum(reading.mirrored for reading in advice) % 2:
+        if vehicle is not None and reading.mirrored:
             spins = replace(vehicle, spin=-vehicle.spin)
-        return _as_logged(Evidence.of_log(applied(log, advice), spins, by_imu))
+        mended = Evidence.of_log(applied(log, reading), spins, by_imu)
+        return _as_logged(mended).best is DECLARED
 
-    first = ranked()
-    likely = first.departures(by_imu)[:3]
-    whole: list[Advice] = [(one,) for one in likely if ranked(one).best is DECLARED]
-    if whole or not likely:
-        return whole, True
-    joint: list[tuple[bool, float, Advice]] = []
-    for fit in first.ranked[:_TRIED]:
-        both = tuple(r for r in (fit.reading, ranked(fit.reading).best) if r is not DECLARED)
-        end = ranked(*both)
-        unlikely = sum(reading.unlikely for reading in both)
-        joint.append((end.best is DECLARED, end.fit.score - unlikely, both))
-    is_whole, _, both = max(joint, key=lambda each: each[:2])
-    return [both], is_whole
+    evidence = Evidence.of_log(log, vehicle, by_imu)
+    ranking = _as_logged(evidence)
+    if not ranking.departures(by_imu):
+        return [], True
+    fits = [*ranking.ranked]
+    for one in (fit.reading for fit in ranking.ranked[:_TRIED] if fit.reading is not DECLARED):
+        if not one.late:
+            fits.append(evidence.late(one))
+        if one.rotors == ROTORS and not one.mirrored:
+            fits += [evidence.fit(turned(one, rotors)) for rotors in ROTOR_READINGS]
+    alike = RankedFits.sorted(fits).departures(by_imu)[:3] or ranking.departures(by_imu)[:1]
+    mending = [reading for reading in alike if mends(reading)]
+    return mending or alike[:1], bool(mending)

@@ -32,7 +32,6 @@ from .readings import (
     GYRO_READINGS,
     OTHER,
     SensorReading,
-    advice_words,
     applied,
 )
 from .table import Array, Data, Mask, NamedArrays, Names, Pair, Rows, finite_rows
@@ -75,11 +74,10 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
     if not (notes and log.has_pose and log.has_rotor_speeds):
         return checked, notes
     advice, is_whole = remedies(excerpt([log])[0], vehicle)
-    for readings in advice if is_whole else ():
-        is_pose = any(reading.moves != DECLARED.moves for reading in readings)
-        if is_pose and not _agreeing(applied(log, readings), gravity)[1]:
+    for reading in advice if is_whole else ():
+        if not (reading.moves == DECLARED.moves or _agreeing(applied(log, reading), gravity)[1]):
             wrong = "the pose contradicts the inertial sensors and the rotors"
-            return log, (f"{wrong}: {advice_words(readings)}",)
+            return log, (f"{wrong}: {reading.says}",)
     return checked, notes
 
 
