@@ -311,7 +311,11 @@ class Evidence:
         return float(left), float(cost), self._needed(along, reading)
 
     def fit(self, reading: Convention, torques: bool = True) -> Fit:
-        """Return how well a reading explains the flight; without torques, by forces alone."""
+        """Return how well a reading explains the flight; without torques, by forces alone. A flight
+        too short for a decision leaves all of its motion.
+        """
+        if not self.enough:
+            return Fit(reading, 1.0, (), -reading.unlikely)
         if torques:
             delays = tuple(delay - reading.late for delay in _DELAYS)
             return self._fit(reading, self._mixing, delays)[0]
@@ -385,11 +389,7 @@ class RankedFits:
         cls, evidence: Evidence, readings: Sequence[Convention], torques: bool = True
     ) -> "RankedFits":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
-        fits = (
-            evidence.fit(r, torques) if evidence.enough else Fit(r, 1.0, (), -r.unlikely)
-            for r in readings
-        )
-        return cls.sorted(fits)
+        return cls.sorted(evidence.fit(reading, torques) for reading in readings)
 
     @classmethod
     def sorted(cls, fits: Iterable[Fit]) -> "RankedFits":
@@ -442,17 +442,10 @@ class RankedFits:
         return attrgetter(name)(self.best), self.certain(name), why
 
 
-def _as_logged(evidence: Evidence) -> RankedFits:
+def log_ranking(evidence: Evidence) -> RankedFits:
     """Return the ranking of the readings of the kit's own columns, and of a delay of the rotors."""
     ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
-    return RankedFits.sorted([*ranking.ranked, *([evidence.late()] if evidence.enough else [])])
-
-
-def departures(evidence: Evidence) -> list[Convention]:
-    """Return the readings that explain a log better than its declaration: none, one, or several
-    equally good.
-    """
-    return _as_logged(evidence).departures(not evidence.has_pose)
+    return RankedFits.sorted([*ranking.ranked, evidence.late()]) if evidence.enough else ranking
 
 
 def remedies(
@@ -472,10 +465,10 @@ def remedies(
         if vehicle is not None and reading.mirrored:
             spins = replace(vehicle, spin=-vehicle.spin)
         mended = Evidence.of_log(applied(log, reading), spins, by_imu)
-        return _as_logged(mended).best is DECLARED
+        return log_ranking(mended).best is DECLARED
 
     evidence = Evidence.of_log(log, vehicle, by_imu)
-    ranking = _as_logged(evidence)
+    ranking = log_ranking(evidence)
     if not ranking.departures(by_imu):
         return [], True
     fits = [*ranking.ranked]
