@@ -15,7 +15,7 @@ flight counts for few independent samples ``n``. A hover tells nothing: all shar
 likeliest reading is taken, after a penalty on unusual ones.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from operator import attrgetter
@@ -40,10 +40,13 @@ from .log_map import UNITS, Attitude
 from .readings import (
     DECLARED,
     OFFSET,
+    ROTOR_READINGS,
+    ROTORS,
     Convention,
     applied,
     as_written,
     log_readings,
+    turned,
 )
 from .table import Array, ArrayPair, Rows, finite_rows, median_step
 
@@ -54,9 +57,10 @@ _TURN_HZ = (1.0, 4.0, 3.0)
 _RATE_HZ = 20.0  # rate of the samples compared
 _MOST = 2000  # samples; of longer flights every second one, or third ...
 _PERIOD = 0.005  # s, the shortest of the filters' clock
-_EDGE = 0.3  # s at either end of a piece, for the filters' start
-_GAP = 0.1  # s (or 3.5 periods) without a sample end a piece
-_SHORTEST = 3.0  # s of a piece
+_EDGE = 0.3  # s at either end of a run, for the filters' start
+_GAP = 0.1  # s (or 3.5 periods) without a sample end a run
+_SHORTEST = 3.0  # s of a run
+_PAUSE = 2.0  # s, between two runs on the even clock: longer than the filters remember
 _FEWEST = 60  # samples in flight for a decision
 
 # gains and delays (s) by undeclared effects
@@ -119,36 +123,6 @@ class Fit:
         return float(np.mean(self.torques)) if self.torques else 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Piece:
-    """An unbroken piece: its rows, its clock (m,) in s, and the samples compared."""
-
-    rows: Rows
-    t: Array
-    period: float
-    compared: Rows
-
-    def even(self, t: Array, values: Array) -> Array:
-        """Return columns (m, k) on the piece's clock, also from rows between the piece's own; NaN:
-        there are none.
-        """
-        inside = slice(self.rows[0], self.rows[-1] + 1)
-        x, at = values[inside], t[inside]
-        there = finite_rows(x) & np.isfinite(at)
-        if not there.any():
-            return np.full((len(self.t), x.shape[1]), np.nan)
-        return resampled(self.t, at[there], x[there])
-
-    def slow(self, x: Array) -> Array:
-        """Return columns (m, k), low-passed as a trajectory's motion is."""
-        return low_pass(x, CUTOFFS.convention_hz, self.period)
-
-    def band(self, x: Array, rows: Rows | slice = slice(None)) -> Array:
-        """Return rows of columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
-        low, high, yaw = (low_pass(x, hz, self.period)[rows] for hz in _TURN_HZ)
-        return np.stack([high - low, yaw - low], axis=1)
-
-
 class Evidence:
     """A flight's motion, ready to be compared with any reading of its columns.
 
@@ -187,10 +161,9 @@ class Evidence:
             self._thrusts = np.minimum(thrusts, most)
         moving = [x for x in (position, attitude, gyro) if x is not None]
         there = np.isfinite(t) & np.all([finite_rows(x) for x in moving], axis=0)
-        self._pieces = self._cut(np.flatnonzero(there))
+        self._compared = self._laid_out(np.flatnonzero(there))
         self.has_pose = attitude is not None
-        # whether the flight is long enough for a decision
-        self.enough = sum(len(p.compared) for p in self._pieces) >= _FEWEST
+        self.enough = len(self._compared) >= _FEWEST  # whether the flight is long enough
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
 
@@ -207,110 +180,98 @@ class Evidence:
         )
         return cls(log.t, squares, position, quaternion, vehicle=vehicle)
 
-    def _cut(self, rows: Rows) -> list[_Piece]:
-        """Return the pieces of known motion, each with its samples in flight."""
-        if len(rows) < 2:
-            return []
-        step = median_step(self._t[rows])
-        period = max(step, _PERIOD)
-        count = len(rows) * step * _RATE_HZ
-        every = np.ceil(count / _MOST) / (_RATE_HZ * period)
-        edge, every = round(_EDGE / period), max(1, round(every))
-        pieces = []
-        for part in unbroken(self._t, rows, max(_GAP, 3.5 * step), 8, _SHORTEST):
-            t = np.arange(self._t[part[0]], self._t[part[-1]], period)
-            piece = _Piece(part, t, period, np.arange(edge, len(t) - edge, every))
-            total = piece.slow(piece.even(self._t, self._thrusts)) @ self._k
-            if np.isfinite(total).all():
-                pieces.append((piece, total))
-        if not pieces:
-            return []
-        least = 0.5 * usual_thrust(np.concatenate([total for _, total in pieces]))
-        return [replace(p, compared=p.compared[x[p.compared] > least]) for p, x in pieces]
-
-    def _compared(self, values: Callable[[_Piece], Array]) -> Array:
-        """Return values on the pieces' clocks at the samples compared."""
-        return np.concatenate([values(p)[p.compared] for p in self._pieces])
-
-    @cached_property
-    def _acceleration(self) -> Array:
-        """Acceleration (n, 3) in the columns' world and unit of length, by s2."""
-        return self._compared(lambda p: p.slow(self._second(p)))
-
-    def _second(self, p: _Piece) -> Array:
-        assert self._position is not None
-        smooth = low_pass(p.even(self._t, self._position), CUTOFFS.pose_hz, p.period)
-        return derivative(smooth, p.period, 2)
-
-    @cached_property
-    def _middle(self) -> Array:
-        """Median position (3,) in the columns' world and unit; zero: unknown."""
-        if self._position is None:
-            return np.zeros(3)
-        rows = np.concatenate([p.rows for p in self._pieces])
-        return np.asarray(np.median(self._position[rows], axis=0))
-
-    @cached_property
-    def _driving(self) -> list[Array]:
-        """Thrusts of each piece (m, 10): four in the band of roll and pitch, four in the band of
-        yaw, and the total, low-passed and raw. The total is in m/s2, with gravity as its median in
-        flight.
+    def _laid_out(self, rows: Rows) -> Rows:
+        """Lay the runs of known motion out on one even clock, ``_PAUSE`` apart. Return the samples
+        in flight, far enough from the runs' ends for the filters.
         """
-        thrusts = [p.even(self._t, self._thrusts) for p in self._pieces]
-        each = list(zip(thrusts, self._pieces, strict=True))
-        totals = np.concatenate([(x @ self._k)[p.compared] for x, p in each])
-        scale = _G / max(np.median(totals), 1e-300)
-        out = []
-        for x, p in each:
-            total = scale * (x @ self._k)
-            out.append(np.column_stack([p.band(x).reshape(-1, 8), p.slow(total), total]))
-        return out
+        if len(rows) < 2:
+            return np.empty(0, np.intp)
+        step = median_step(self._t[rows])
+        self._period = period = max(step, _PERIOD)
+        runs = unbroken(self._t, rows, max(_GAP, 3.5 * step), 8, _SHORTEST)
+        known = np.flatnonzero(finite_rows(self._thrusts))
+        runs = [run for run in runs if np.any((known >= run[0]) & (known <= run[-1]))]
+        if not runs:
+            return np.empty(0, np.intp)
+        ends = np.array([self._t[run[[0, -1]]] for run in runs])
+        before = np.append(0.0, np.cumsum(np.diff(ends)[:-1, 0] + _PAUSE))
+        laid = before[:, None] + ends - ends[:, :1]
+        # of the rows; NaN outside the runs
+        self._times = np.interp(self._t, ends.ravel(), laid.ravel(), left=np.nan, right=np.nan)
+        self._clock = clock = np.arange(0.0, laid[-1, 1], period)
+        self._ends = begin, end = laid[np.searchsorted(before, clock, "right") - 1].T
+        total = self._slow(self._even(self._thrusts)) @ self._k
+        aloft = total > 0.5 * usual_thrust(total[clock <= end])
+        aloft &= (clock >= begin + _EDGE) & (clock <= end - _EDGE)
+        every = np.ceil(len(rows) * step * _RATE_HZ / _MOST) / (_RATE_HZ * period)
+        return np.flatnonzero(aloft & (np.arange(len(clock)) % max(1, round(every)) == 0))
+
+    def _even(self, x: Array) -> Array:
+        """Return columns (N, k) on the even clock, (m, k); NaN: there are none."""
+        there = finite_rows(x) & np.isfinite(self._times)
+        if not there.any():
+            return np.full((len(self._clock), x.shape[1]), np.nan)
+        return resampled(self._clock, self._times[there], x[there])
+
+    def _slow(self, x: Array) -> Array:
+        """Return columns (m, k), low-passed as a trajectory's motion is."""
+        return low_pass(x, CUTOFFS.convention_hz, self._period)
+
+    def _band(self, x: Array) -> Array:
+        """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
+        low, high, yaw = (low_pass(x, hz, self._period) for hz in _TURN_HZ)
+        return np.stack([high - low, yaw - low], axis=1)
+
+    @cached_property
+    def _place(self) -> ArrayPair:
+        """Acceleration (n, 3) by s2, and median position (3,), in the columns' world and length."""
+        assert self._position is not None
+        place = self._even(self._position)
+        second = derivative(low_pass(place, CUTOFFS.pose_hz, self._period), self._period, 2)
+        return self._slow(second)[self._compared], np.asarray(np.median(place, axis=0))
+
+    @cached_property
+    def _driving(self) -> Array:
+        """Thrusts (m, 10): four in the band of roll and pitch, four in the band of yaw, and the
+        total, low-passed and raw. The total is in m/s2, with gravity as its median in flight.
+        """
+        thrusts = self._even(self._thrusts)
+        total = thrusts @ self._k
+        total *= _G / max(np.median(total[self._compared]), 1e-300)
+        return np.column_stack([self._band(thrusts).reshape(-1, 8), self._slow(total), total])
 
     def _pushes(self, *delays: float) -> ArrayPair:
-        """Return whether the samples compared, less each delay (d, n), lie within their piece (1,
-        or 0), and thrusts. The thrusts (d, 9, n) are the first nine of ``_driving``, less their
-        means; zero elsewhere.
+        """Return whether the samples compared, less each delay (d, n), lie within their run (1, or
+        0), and thrusts. The thrusts (d, 9, n) are the first nine of ``_driving``, less their means;
+        zero elsewhere.
         """
-        there, out = [], []
-        for x, p in zip(self._driving, self._pieces, strict=True):
-            at = p.t[p.compared] - np.array(delays)[:, None]
-            out.append(np.stack([resampled(times, p.t, x[:, :9]) for times in at]))
-            there.append((at >= p.t[0]) & (at <= p.t[-1]))
-        within, thrusts = np.concatenate(there, axis=1).astype(float), np.concatenate(out, axis=1)
+        at = self._clock[self._compared] - np.array(delays)[:, None]
+        begin, end = (x[self._compared] for x in self._ends)
+        within = ((at >= begin) & (at <= end)).astype(float)
+        driving = self._driving[:, :9]
+        thrusts = np.stack([resampled(times, self._clock, driving) for times in at])
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
-
-    def _turned(self, attitude: Attitude) -> Iterator[ArrayPair]:
-        """Yield each piece's rotations (m, 3, 3), zero without an attitude, and angular velocity
-        (m, 3), by a convention of the attitude.
-        """
-        quaternion = None
-        if self._attitude is not None:
-            good, rotation = as_written(self._attitude, attitude)
-            quaternion = np.full((len(good), 4), np.nan)
-            quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
-        for p in self._pieces:
-            if quaternion is None:
-                assert self._gyro is not None
-                w = p.even(self._t, self._gyro)
-                yield np.zeros((len(w), 3, 3)), w
-            else:
-                q = low_pass(p.even(self._t, quaternion), CUTOFFS.pose_hz, p.period)
-                yield turning(q, p.period)
 
     def _moving(self, attitude: Attitude) -> ArrayPair:
         """Return thrust and turns by one convention of the attitude. Thrust is specific, times the
         body's axes (n, 3, 3), in m/s2, in the world. Turns in two bands (n, 2, 15) are angular
         velocity, angular acceleration and products of the angular velocity.
         """
-        axes, turns = [], []
-        turned = self._turned(attitude)
-        for p, thrusts, (matrices, w) in zip(self._pieces, self._driving, turned, strict=True):
-            axes.append(p.slow(thrusts[:, 9:] * matrices.reshape(-1, 9))[p.compared])
-            products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
-            columns = np.column_stack([w, derivative(w, p.period), products])
-            turns.append(p.band(columns, p.compared))
-        return np.concatenate(axes).reshape(-1, 3, 3), np.concatenate(turns)
+        if self._attitude is None:
+            assert self._gyro is not None
+            w = self._even(self._gyro)
+            matrices = np.zeros((len(w), 3, 3))
+        else:
+            good, rotation = as_written(self._attitude, attitude)
+            quaternion = np.full((len(good), 4), np.nan)
+            quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
+            smooth = low_pass(self._even(quaternion), CUTOFFS.pose_hz, self._period)
+            matrices, w = turning(smooth, self._period)
+        axes = self._slow(self._driving[:, 9:] * matrices.reshape(-1, 9))
+        products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
+        turns = self._band(np.column_stack([w, derivative(w, self._period), products]))
+        return axes[self._compared].reshape(-1, 3, 3), turns[self._compared]
 
     def _needed(self, along: Array, reading: Convention) -> Array:
         """Return the force ``along`` the thrust axis (n,) above the torques in Nm of the motion, in
@@ -334,33 +295,39 @@ class Evidence:
         reading = Convention(*moves)
         if self._attitude is None:
             force = np.zeros(len(self._t)) if self._along is None else self._along
-            felt = self._compared(lambda p: p.slow(p.even(self._t, force[:, None])))
+            felt = self._slow(self._even(force[:, None]))[self._compared]
             return 0.0, 0.0, self._needed(felt[:, 0], reading)
         frames, axes = reading.frames, self._motion(reading.attitude)[0]
         push = axes @ frames.body[:, 2] @ frames.world.T
-        force = self._acceleration @ frames.position.T * UNITS["position"][reading.length]
+        acceleration, middle = self._place
+        force = acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
         mean, size = push.mean(axis=0), np.linalg.norm(push, axis=1)
         along = np.sum(force * push, axis=1) / np.maximum(size, 1e-9)
         cost = _FALLEN * (mean[2] <= GOOD * np.linalg.norm(mean))
-        cost += _BELOW * ((frames.position @ self._middle)[2] < 0.0)
+        cost += _BELOW * ((frames.position @ middle)[2] < 0.0)
         left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
         return float(left), float(cost), self._needed(along, reading)
 
     def fit(self, reading: Convention, torques: bool = True) -> Fit:
-        """Return how well a reading explains the flight; without torques, by forces alone."""
+        """Return how well a reading explains the flight; without torques, by forces alone. A flight
+        too short for a decision leaves all of its motion.
+        """
+        if not self.enough:
+            return Fit(reading, 1.0, (), -reading.unlikely)
         if torques:
-            return self._fit(reading, self._mixing, _DELAYS)[0]
+            delays = tuple(delay - reading.late for delay in _DELAYS)
+            return self._fit(reading, self._mixing, delays)[0]
         return self._fit(reading, self._mixing[:0], (0.0,))[0]
 
-    def late(self) -> Fit:
-        """Return the fit of the columns as declared at the likeliest delay of the rotors beyond a
-        flight loop's own.
+    def late(self, reading: Convention = DECLARED) -> Fit:
+        """Return the fit of a reading at the likeliest delay of the rotors beyond a flight loop's
+        own.
         """
         far = np.arange(-_FAR, _FAR, _STEP)
         parts = np.array_split(far[(far < _DELAYS[0]) | (far > _DELAYS[-1] + _STEP)], 20)
-        reading = Convention(unlikely=OFFSET)
+        reading = replace(reading, unlikely=reading.unlikely + OFFSET)
         fits = (self._fit(reading, self._mixing, tuple(part.tolist())) for part in parts)
         fit, delay = max(fits, key=lambda each: each[0].score)
         return replace(fit, reading=replace(reading, late=-delay))
@@ -418,10 +385,11 @@ class RankedFits:
         cls, evidence: Evidence, readings: Sequence[Convention], torques: bool = True
     ) -> "RankedFits":
         """Return the ranking of readings; where a flight does not tell, the usual come first."""
-        fits = (
-            evidence.fit(r, torques) if evidence.enough else Fit(r, 1.0, (), -r.unlikely)
-            for r in readings
-        )
+        return cls.sorted(evidence.fit(reading, torques) for reading in readings)
+
+    @classmethod
+    def sorted(cls, fits: Iterable[Fit]) -> "RankedFits":
+        """Return the ranking of some fits."""
         return cls(sorted(fits, key=lambda fit: fit.score, reverse=True))
 
     @property
@@ -470,28 +438,17 @@ class RankedFits:
         return attrgetter(name)(self.best), self.certain(name), why
 
 
-def _as_logged(evidence: Evidence) -> RankedFits:
+def log_ranking(evidence: Evidence) -> RankedFits:
     """Return the ranking of the readings of the kit's own columns, and of a delay of the rotors."""
     ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
-    fits = [*ranking.ranked, *([evidence.late()] if evidence.enough else [])]
-    return RankedFits(sorted(fits, key=lambda fit: fit.score, reverse=True))
-
-
-def departures(evidence: Evidence) -> list[Convention]:
-    """Return the readings that explain a log better than its declaration: none, one, or several
-    equally good.
-    """
-    return _as_logged(evidence).departures(not evidence.has_pose)
-
-
-Advice = tuple[Convention, ...]  # taken in turn
+    return RankedFits.sorted([*ranking.ranked, evidence.late()]) if evidence.enough else ranking
 
 
 def remedies(
     log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False
-) -> tuple[list[Advice], bool]:
-    """Return the equally good advice for a log, and whether it leaves a consistent log. No advice:
-    the log is consistent as declared.
+) -> tuple[list[Convention], bool]:
+    """Return the equally good readings of a contradictory log, and whether each of them, applied,
+    leaves a consistent log. No reading: the log is consistent as declared.
 
     Args:
         log: the flight.
@@ -499,22 +456,23 @@ def remedies(
         by_imu: the motion is the gyro's and the accelerometer's, else the pose's.
     """
 
-    def ranked(*advice: Convention) -> RankedFits:
+    def mends(reading: Convention) -> bool:
         spins = vehicle
-        if vehicle is not None and sum(reading.mirrored for reading in advice) % 2:
+        if vehicle is not None and reading.mirrored:
             spins = replace(vehicle, spin=-vehicle.spin)
-        return _as_logged(Evidence.of_log(applied(log, advice), spins, by_imu))
+        mended = Evidence.of_log(applied(log, reading), spins, by_imu)
+        return log_ranking(mended).best is DECLARED
 
-    first = ranked()
-    likely = first.departures(by_imu)[:3]
-    whole: list[Advice] = [(one,) for one in likely if ranked(one).best is DECLARED]
-    if whole or not likely:
-        return whole, True
-    joint: list[tuple[bool, float, Advice]] = []
-    for fit in first.ranked[:_TRIED]:
-        both = tuple(r for r in (fit.reading, ranked(fit.reading).best) if r is not DECLARED)
-        end = ranked(*both)
-        unlikely = sum(reading.unlikely for reading in both)
-        joint.append((end.best is DECLARED, end.fit.score - unlikely, both))
-    is_whole, _, both = max(joint, key=lambda each: each[:2])
-    return [both], is_whole
+    evidence = Evidence.of_log(log, vehicle, by_imu)
+    ranking = log_ranking(evidence)
+    if not ranking.departures(by_imu):
+        return [], True
+    fits = [*ranking.ranked]
+    for one in (fit.reading for fit in ranking.ranked[:_TRIED] if fit.reading is not DECLARED):
+        if not one.late:
+            fits.append(evidence.late(one))
+        if one.rotors == ROTORS and not one.mirrored:
+            fits += [evidence.fit(turned(one, rotors)) for rotors in ROTOR_READINGS]
+    alike = RankedFits.sorted(fits).departures(by_imu)[:3] or ranking.departures(by_imu)[:1]
+    mending = [reading for reading in alike if mends(reading)]
+    return mending or alike[:1], bool(mending)

@@ -28,7 +28,6 @@ from .readings import (
     GYRO_READINGS,
     OTHER,
     SensorReading,
-    advice_words,
     applied,
 )
 from .table import Array, Data, Names, finite_rows
@@ -60,11 +59,10 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
     if not (notes and log.has_pose and log.has_rotor_speeds):
         return checked, notes
     advice, is_whole = remedies(excerpt([log])[0], vehicle)
-    for readings in advice if is_whole else ():
-        is_pose = any(reading.moves != DECLARED.moves for reading in readings)
-        if is_pose and not _agreeing(applied(log, readings), gravity)[1]:
+    for reading in advice if is_whole else ():
+        if not (reading.moves == DECLARED.moves or _agreeing(applied(log, reading), gravity)[1]):
             wrong = "the pose contradicts the inertial sensors and the rotors"
-            return log, (f"{wrong}: {advice_words(readings)}",)
+            return log, (f"{wrong}: {reading.says}",)
     return checked, notes
 
 
@@ -128,11 +126,10 @@ def _sensor_doubt(
     """
     if shares is None or shares[0] <= GOOD:
         return ""
-    declared, *others = (likelihood([share] * 3) for share in shares)
-    best = max(others)
-    if min(shares[1:]) > GOOD or best - declared < OTHER:
+    declared, *others = likelihood(np.array([shares] * 3).T)
+    if min(shares[1:]) > GOOD or max(others) - declared < OTHER:
         return otherwise
-    alike = [r.says for score, r in zip(others, readings, strict=True) if score > best - 1.0]
+    alike = [r.says for r, score in zip(readings, others, strict=True) if score > max(others) - 1.0]
     return "; or ".join(alike[:3])
 
 
@@ -255,17 +252,9 @@ def gravity_doubt(force: Array, gravity: float, is_flight: bool = True) -> str:
     )
     if length < 0.5 * gravity:
         otherwise += " (an acceleration without gravity is none)"
-    shares = _gravity_shares(median, gravity)
+    up, readings = np.array([0.0, 0.0, gravity]), (AS_DECLARED, *_BY_GRAVITY)
+    shares = [float(np.sum(np.square(up - r.turn @ median))) / gravity**2 for r in readings]
     return _sensor_doubt(shares, _BY_GRAVITY, otherwise if is_flight else "")
-
-
-def _gravity_shares(median: Array, gravity: float) -> list[float]:
-    """Return the share of gravity left by the median of a specific force (3,), as declared and by
-    each reading of ``_BY_GRAVITY``.
-    """
-    up = np.array([0.0, 0.0, gravity])
-    readings = (AS_DECLARED, *_BY_GRAVITY)
-    return [float(np.sum(np.square(up - r.turn @ median))) / gravity**2 for r in readings]
 
 
 def median_square(vectors: Array) -> float:

@@ -6,6 +6,7 @@ The guess of a map, the reading of a log and its screening decide here, with the
 import re
 from dataclasses import dataclass
 from itertools import combinations
+from typing import ClassVar
 
 import numpy as np
 
@@ -22,20 +23,22 @@ from .table import Array, Pair, finite_rows
 class Magnitudes:
     """How large and how small the numbers of a log may be."""
 
+    # sizes of a likely unit, and of a certain one: Hz of rows, V of a battery, 1 g
+    units: ClassVar[dict[str, tuple[Pair, Pair]]] = {
+        "time": ((5.0, 5000.0), (15.0, 2500.0)),
+        "battery": ((2.7, 100.0), (2.7, 60.0)),
+        "accelerometer": ((0.85, 1.15), (0.85, 1.15)),
+    }
+
     shortest_period: float = 1e-5  # s, of the median step: 100 kHz, far above any pose's rate
     # s, of any step. A log in nanoseconds has steps of 1e7; a step of a year is no flight
     longest_step: float = 1e12
     largest: float = 1e9  # SI units, all other numbers; millimetres or rpm stay far below
-    rates: Pair = (5.0, 5000.0)  # Hz of rows: a unit of time is likely
-    sure_rates: Pair = (15.0, 2500.0)  # the same: the unit is certain
-    voltages: Pair = (2.7, 100.0)  # V of a battery: the unit is likely
-    sure_voltages: Pair = (2.7, 60.0)  # the same: the unit is certain
     widest: float = 300.0  # m, spread of one flight's positions
     # thrust by weight of rotors in their right unit; mass and thrust curve may be off
     carries: Pair = (0.55, 1.8)
     flies: Pair = (0.2, 5.0)  # its median; beyond, another vehicle flew
     doubtful: Pair = (0.5, 2.0)  # the same; beyond, another may have flown
-    gravity: Pair = (0.85, 1.15)  # specific force by 1 g: the unit is certain
     strongest: float = 300.0  # m/s2 of specific force, above all racers and most sensors' range
     fastest_gyro: float = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
@@ -78,13 +81,11 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     """
     units = {unit: one for unit, one in UNITS[section].items() if unit not in ("min", "raw")}
     sizes = {unit: size * one for unit, one in units.items()}
-    likely, sure = MAGNITUDES.voltages, MAGNITUDES.sure_voltages
     if section == "time":
         sizes = {unit: 1.0 / max(step, 1e-300) for unit, step in sizes.items()}
-        likely, sure = MAGNITUDES.rates, MAGNITUDES.sure_rates
     elif section == "accelerometer":
         sizes = {unit: force / units["g"] for unit, force in sizes.items()}
-        likely = sure = MAGNITUDES.gravity
+    likely, sure = MAGNITUDES.units[section]
     unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
     return unit, within(sizes[unit], sure)
 

@@ -240,32 +240,34 @@ class _Guessing:
                     why += "wrote the table left out its digits; expected a time in each row"
                     break
             lack("time", "time", why, "column")
-        pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), set(self.sections)
+        pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), {*self.sections}
         if "position" not in has and not has.issuperset(imu):
             half = [part for part in pose if part in self.parts]
             # the nearest to a whole: half a pose, half an IMU, else a pose
             for part in pose if half or not has.intersection(imu) else imu:
-                if part not in has and part not in half:
-                    why = f"no columns look like one (such as {_EXAMPLES[part]})"
-                    lack(part, part, why)
-            for part in half:  # for a person to complete
-                columns, unit = self.parts[part].columns, self.parts[part].unit
-                most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
-                made = Columns(columns, unit or "m")
-                if part == "attitude":
-                    euler = "zyx" if len(columns) == 3 else ""
-                    unit = euler and (unit or ("deg" if most > 2.0 * np.pi else "rad"))
-                    made = Attitude(columns, unit, euler=euler)
-                self.say(part, "columns", False, self.ranked[part][0].why)
-                if made.unit:
-                    self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
-                self.sections[part] = made
+                if part in half:
+                    self.half_a_pose(part)
+                elif part not in has:
+                    lack(part, part, f"no columns look like one (such as {_EXAMPLES[part]})")
         for part, why in self.further.items():
             lack(part, "rotors", why)
         if not {"rotors", "commands"} & set(self.sections) and not self.further:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lack("motors", "rotors", why)
         return out
+
+    def half_a_pose(self, part: str) -> None:
+        """Keep a position without an attitude, or the reverse, for a person to complete."""
+        columns, unit = self.parts[part].columns, self.parts[part].unit
+        most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
+        made = Columns(columns, unit or "m")
+        if part == "attitude":
+            unit = unit or ("deg" if most > 2.0 * np.pi else "rad")
+            made = Attitude(columns, unit, euler="zyx") if len(columns) == 3 else Attitude(columns)
+        self.say(part, "columns", False, self.ranked[part][0].why)
+        if made.unit:
+            self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
+        self.sections[part] = made
 
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep the reason for a field's value."""
@@ -296,11 +298,11 @@ class _Guessing:
         steps = np.diff(raw[np.isfinite(raw)])
         step = float(np.median(steps[steps > 0.0]))
         guessed, sure = likely_unit("time", step)
-        rate = f"{1.0 / max(step * UNITS['time'][guessed], 1e-300):.4g} rows a second"
-        if clock.unit in UNITS["time"]:  # an unusual rate is no reason to doubt a name
-            named = 1.0 / max(step * UNITS["time"][clock.unit], 1e-300)
-            sure &= not within(named, MAGNITUDES.named_rates)
-        unit = self.unit("time", "s" if nanoseconds else clock.unit, (guessed, sure, rate))
+        rates = {unit: 1.0 / max(step * one, 1e-300) for unit, one in UNITS["time"].items()}
+        if clock.unit in rates:  # an unusual rate is no reason to doubt a name
+            sure &= not within(rates[clock.unit], MAGNITUDES.named_rates)
+        choice = guessed, sure, f"{rates[guessed]:.4g} rows a second"
+        unit = self.unit("time", "s" if nanoseconds else clock.unit, choice)
         t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
@@ -466,18 +468,16 @@ class _Guessing:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
         ranking = RankedFits.of(evidence, ways)
-        left, lead = ranking.fit.torque, ranking.other("rotors")[1]
-        order = ranking.best.motors
+        left, lead, order = ranking.fit.torque, ranking.other("rotors")[1], ranking.best.motors
         names = order_names(order)
         why = (
             f"{names[0] if names else order_words(order)}: {left:.0%} of the angular acceleration "
             f"is left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
         )
         turns = evidence.turns(best) >= TURNING_RATE
-        if left <= GOOD_TORQUE and ranking.certain("rotors") and turns:
-            return order, True, why
-        if names and left <= 0.9 and lead >= 1.0:
-            return order, False, why
+        is_sure = left <= GOOD_TORQUE and ranking.certain("rotors") and turns
+        if is_sure or (names and left <= 0.9 and lead >= 1.0):
+            return order, is_sure, why
         plus = RankedFits.of(Evidence(self.t, np.square(values), sides=_PLUS, **motion), ways)
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))

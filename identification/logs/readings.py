@@ -118,6 +118,11 @@ class Convention:
         return self.attitude, self.frames, self.length, self.gyro
 
     @property
+    def is_delay(self) -> bool:
+        """Whether the rotors' clock alone is another one."""
+        return bool(self.late) and not replace(self, late=0.0).says
+
+    @property
     def pitch_sign(self) -> int:
         """Sign of the angle about y."""
         return -1 if self.attitude.signs else 1
@@ -141,22 +146,21 @@ class Convention:
     @property
     def says(self) -> str:
         """The columns' look, the expected columns, and the remedy, in words."""
-        if self.gyro.says:
-            return f"gx, gy, gz {self.gyro.says}"
+        words = [f"gx, gy, gz {self.gyro.says}"] if self.gyro.says else []
         if self.late:
             late, sooner = ("late", "earlier") if self.late > 0.0 else ("early", "later")
-            return (
+            words.append(
                 f"the rotor speeds come {abs(self.late):.2f} s too {late} against the motion; "
                 "expected both on one clock: put omega1..omega4 (or the commands behind them) "
                 f"{abs(self.late):.2f} s {sooner}"
             )
         if self.length != "m":
             name = {"mm": "milli", "cm": "centi"}[self.length]
-            return (
+            words.append(
                 f"px, py, pz look like {name}metres; expected metres: divide them by "
                 f"{1.0 / UNITS['position'][self.length]:.0f}"
             )
-        words = self._pose_words()
+        words += self._pose_words()
         if self.rotors != ROTORS:
             known = " or ".join(order_names(self.motors))
             words.append(
@@ -251,6 +255,12 @@ def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convent
     ]
 
 
+ROTOR_READINGS = [  # two departures at once are as unlikely as both
+    replace(r, unlikely=OTHER * (r.mirrored + (r.rotors != ROTORS)))
+    for r in _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
+]
+
+
 def log_readings(has_pose: bool) -> list[Convention]:
     """Return the readings of the kit's own columns, the one as declared first.
 
@@ -264,13 +274,8 @@ def log_readings(has_pose: bool) -> list[Convention]:
         others = _each(attitude=attitudes, frames=_USUAL_FRAMES)[1:]
         others.append(Convention(attitudes[1], _frames(**_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
-    others += _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
-    # two departures at once are as unlikely as both
-    counts = (1 + (r.mirrored and r.rotors != ROTORS) for r in others)
-    return [
-        DECLARED,
-        *_weighed([replace(r, unlikely=OTHER * n) for r, n in zip(others, counts, strict=True)]),
-    ]
+    others = [replace(reading, unlikely=OTHER) for reading in others]
+    return [DECLARED, *_weighed(others), *ROTOR_READINGS]
 
 
 def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[Convention]:
@@ -297,21 +302,14 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
     return _weighed(named, hint or "enu")
 
 
-def applied(log: FlightLog, advice: Sequence[Convention]) -> FlightLog:
-    """Return a log with the advice of some readings taken in turn; the vehicle's spin is no part of
-    a log.
-    """
-    for reading in advice:
-        log = _applied(log, reading)
-    return log
+def turned(reading: Convention, rotors: Convention) -> Convention:
+    """Return a reading with the rotors of another, as unlikely as both."""
+    unlikely = reading.unlikely + rotors.unlikely
+    return replace(reading, rotors=rotors.rotors, mirrored=rotors.mirrored, unlikely=unlikely)
 
 
-def advice_words(advice: Sequence[Convention]) -> str:
-    """Return the sentences of some readings, to be taken in turn."""
-    return "; then ".join(reading.says for reading in advice)
-
-
-def _applied(log: FlightLog, reading: Convention) -> FlightLog:
+def applied(log: FlightLog, reading: Convention) -> FlightLog:
+    """Return a log with the advice of a reading taken; the vehicle's spin is no part of a log."""
     speeds, parts = np.empty_like(log.rotor_speeds), Data()
     speeds[:, np.subtract(reading.rotors, 1)] = log.rotor_speeds
     if reading.late:

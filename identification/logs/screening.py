@@ -28,7 +28,6 @@ from .flight_log import FlightLog
 from .flight_phases import carrying, flying
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, equal_motors, rotor_doubt, thrust_by_weight, time_doubt, within
-from .readings import advice_words
 from .streams import MOTOR_RATES
 from .table import Array, Mask, Names, median_step
 
@@ -153,8 +152,8 @@ def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
     if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
         return ""
     advice, mends = remedies(excerpt([log])[0], vehicle, by_imu)
-    says = "; or ".join(dict.fromkeys(map(advice_words, advice)))
-    if all(reading.late for each in advice for reading in each):
+    says = "; or ".join(dict.fromkeys(reading.says for reading in advice))
+    if all(reading.is_delay for reading in advice):
         return Fault(says)
     whose = "gyro contradicts the rotors' torques"
     whose = whose if by_imu else "motion contradicts the rotor speeds and gravity"

@@ -168,16 +168,16 @@ NORTH_EAST_DOWN = np.array(
         ),
         (
             lambda log: permuted(conjugate(log), [3, 1, 0, 2]),
-            r"quaternion is world to body; .* \(qw, qx, qy, qz\); then .* rotors 4,2,1,3 .*px4-x",
+            r"quaternion is world to body; .* \(qw, qx, qy, qz\); the rotors .* 4,2,1,3 .*px4-x",
         ),
         (
             lambda log: permuted(framed(log, *NED), [2, 3, 1, 0]),
-            r"world is z down .*; then the rotors look permuted: .* rotors 3,4,2,1 .*betaflight",
+            r"world is z down .*; the rotors look permuted: .* rotors 3,4,2,1 .*betaflight",
         ),
     ],
 )
 def test_an_advice_leaves_a_consistent_log(change, expected):
-    """A first remedy leads to a second refusal; the line names both."""
+    """One remedy would lead to a second refusal; the line names both."""
     vehicle = load_vehicle("ardrone2")
     log = read_log(data_file("hard_logs/perfect_model_gusts_10mN.csv.gz"), vehicle=vehicle)
     with refused(expected):

@@ -23,7 +23,7 @@ from tests.support.sizes import rms
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.evidence.trials.practice_flights import practise
-from windwrench.identification.logs.evidence import Evidence, departures
+from windwrench.identification.logs.evidence import Evidence, log_ranking
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
@@ -57,7 +57,8 @@ def test_every_order_of_rotors_is_told_apart(trajectory, step):
     for order in list(permutations(range(4)))[::step]:
         for mirrored in (False, True):
             vehicle = replace(VEHICLE, spin=-VEHICLE.spin) if mirrored else VEHICLE
-            found = departures(Evidence.of_log(permuted(log, order), vehicle))
+            evidence = Evidence.of_log(permuted(log, order), vehicle)
+            found = log_ranking(evidence).departures(by_imu=False)
             rotors = tuple(i + 1 for i in order)
             expected = [] if rotors == (1, 2, 3, 4) and not mirrored else [(rotors, mirrored)]
             assert [(reading.rotors, reading.mirrored) for reading in found] == expected
