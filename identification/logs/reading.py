@@ -12,8 +12,16 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from . import readers
-from .commanded_speeds import flown_vehicle
-from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
+from .flight_log import (
+    ACCELEROMETER,
+    COMMANDS,
+    GYRO,
+    POSE,
+    REQUIRED,
+    ROTORS,
+    FlightLog,
+    flown_vehicle,
+)
 from .inertial import check_inertial, on_one_clock
 from .log_map import OWN_MAP, load_map
 from .magnitudes import unit_doubts
