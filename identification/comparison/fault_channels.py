@@ -19,8 +19,8 @@ from ...runtime.errors import InputError
 from ..logs.channels import Stream, readable
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import carrying, usual_thrust
-from ..logs.readers import px4_ulog, reader_by_content
-from ..logs.reading import read_log
+from ..logs.readers import px4_ulog
+from ..logs.reading import read_log, reader_by_content
 from ..logs.table import Data, Names, median_step
 from ..motion.smoothing import lagged, resampled, runs_of
 

@@ -13,7 +13,7 @@ from windwrench.identification.logs.inertial import on_one_clock
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.text_table import open_table
 
 
 @pytest.mark.parametrize(
