@@ -39,7 +39,7 @@ from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.text_table import open_table
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import Signals, log_signals

@@ -30,7 +30,7 @@ from scipy.spatial.transform import Rotation
 from windwrench import __version__
 from windwrench.evidence.kept_results import DOCS
 from windwrench.evidence.runner import start
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.text_table import open_table
 from windwrench.identification.motion.smoothing import runs_of
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json

@@ -40,9 +40,8 @@ from ..estimator.ukf import CALL, IMU_PARTS, make_calls
 from ..runtime.errors import InputError
 from ..runtime.threads import one_thread
 from .inertial_wrench import inertial_wrench
-from .logs.flight_log import FlightLog
+from .logs.flight_log import MOTOR_RATES, FlightLog, between_samples
 from .logs.screening import screen_log
-from .logs.streams import MOTOR_RATES, between_samples
 from .logs.table import Array, ArrayPair, Names, Rows, finite_rows
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu

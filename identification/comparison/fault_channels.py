@@ -16,11 +16,11 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from ...dynamics.vehicle import Vehicle
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
+from ..logs.channels import Stream, readable
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import carrying, usual_thrust
-from ..logs.readers import px4_ulog, reader_by_content
-from ..logs.reading import read_log
-from ..logs.streams import Stream, readable
+from ..logs.readers import px4_ulog
+from ..logs.reading import read_log, reader_by_content
 from ..logs.table import Data, Names, median_step
 from ..motion.smoothing import lagged, resampled, runs_of
 
@@ -106,14 +106,14 @@ def read_channels(
     if by_content is None or by_content.name != _PX4:
         log = log or read_log(path, reader, vehicle, log_map)
         return channels_of_log(log), log.notes
-    recording = px4_ulog.channels(path, has_ranges=False)
-    streams: Data = {part: readable(recording.streams.get(part)) for part in _CHANNELS}
+    (log_map_of, channels, _, notes), _ = px4_ulog.channels(path, has_ranges=False)
+    streams: Data = {part: readable(channels.get(part)) for part in _CHANNELS}
     if missing := [part for part, stream in streams.items() if stream is None]:
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
-    assert recording.log_map.commands is not None
-    names = tuple(f"PX4 motor {i}" for i in recording.log_map.commands.order)
+    assert log_map_of.commands is not None
+    names = tuple(f"PX4 motor {i}" for i in log_map_of.commands.order)
     gyro, accelerometer, command = streams.values()
-    return Channels(str(path), gyro, accelerometer, command, False, names), tuple(recording.notes)
+    return Channels(str(path), gyro, accelerometer, command, False, names), tuple(notes)
 
 
 def channels_of_log(log: FlightLog) -> Channels:

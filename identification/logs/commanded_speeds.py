@@ -11,12 +11,10 @@ Without a curve only the ratio of thrusts is assumed, ``f a^2 + (1 - f) a`` of a
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
-from ...dynamics.vehicle_file import load_vehicle, preset_names
 from .flight_log import FlightLog
 from .flight_phases import flying
 from .log_map import Commands
@@ -28,14 +26,6 @@ from .table import Array
 _DIP = 1.0
 _SATURATED = 0.9995  # share of the full command
 _FELT = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be another
-
-
-def flown_vehicle(vehicle: Vehicle | None, name: str) -> Vehicle | None:
-    """Return the vehicle, or else the preset of a log's vehicle name; None: there is none."""
-    return _preset(name) if vehicle is None and name in preset_names() else vehicle
-
-
-_preset = cache(load_vehicle)  # asked three times a log
 
 
 def with_commanded_speeds(

@@ -26,11 +26,26 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from .table import Array, ArrayMap, Data, Mask, NamedArrays, Names, Values, finite_rows, median_step
+from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle_file import load_vehicle, preset_names
+from ..motion.smoothing import resampled
+from .table import (
+    Array,
+    ArrayMap,
+    Data,
+    Mask,
+    NamedArrays,
+    Names,
+    Rows,
+    Values,
+    finite_rows,
+    median_step,
+)
 from .tables import write_table
 from .what_flew import UNSTATED, WhatFlew
 
@@ -75,9 +90,9 @@ class FlightLog:
             be trusted.
         command: (N, 4) motor commands, 0 to 1, in the rotors' order.
         vehicle: the vehicle's name, where the log or its reader knows one.
-        rates: Hz, the rate of measurement of each channel (``streams``), by its section of a log
-            map: position, rotors, commands, wrench, battery, accelerometer, gyro. Channels without
-            a rate were measured in every row.
+        rates: Hz, the rate of measurement of each channel (``source_rate``), by its section of a
+            log map: position, rotors, commands, wrench, battery, accelerometer, gyro. Channels
+            without a rate were measured in every row.
         flown: the log's statements on its vehicle.
     """
 
@@ -141,6 +156,14 @@ class FlightLog:
 Logs = Sequence[FlightLog]
 
 
+def flown_vehicle(vehicle: Vehicle | None, name: str) -> Vehicle | None:
+    """Return the vehicle, or else the preset of a log's vehicle name; None: there is none."""
+    return _preset(name) if vehicle is None and name in preset_names() else vehicle
+
+
+_preset = cache(load_vehicle)  # asked three times a log
+
+
 def time_notes(t: Array) -> Names:
     """Return a note on the gaps in times (N,) in s: steps of more than 3 median ones."""
     step = np.diff(t)
@@ -153,6 +176,102 @@ def time_notes(t: Array) -> Names:
         f"{t[longest]:.6g} s "
         f"(median step {np.median(step):.4g} s)",
     )
+
+
+@dataclass(frozen=True)
+class MotorRates:
+    """How often rotor speeds or commands must be measured.
+
+    Between samples they are taken along a straight line: 0.9 of an oscillation's amplitude passes
+    up to 0.18 of their rate. Forces are judged up to 3.5 Hz. Torques turn a vehicle within a tenth
+    of a second: they need the rate of a pose and a gyro.
+    """
+
+    force_hz: float = 20.0
+    torque_hz: float = 45.0
+    jitter: float = 1.1  # tolerance of a rate, as a factor
+
+    def serves(self, rate: float, least: float) -> bool:
+        """Return whether a rate is high enough, Hz."""
+        return rate * self.jitter >= least
+
+
+MOTOR_RATES = MotorRates()
+
+
+# When values repeat because nothing was measured, and not because they were rounded.
+# share of the median spacing of changes: rounded values change at any spacing, held ones at
+# their own
+_LEAST_SPACING = 0.6
+_LEAST_ROWS = 2.0  # median spacing in rows; below, each row is a sample
+_EARLY = 0.05  # quantile of spacings compared with the median
+# share of the RMS distance from the line between both neighbours: on the line
+_ON_LINE = 1e-3
+_ROUNDED = 1.001  # rounding steps by which three rounded values leave a line, at most
+_MOST_CORNERS = 2 / 3  # of the rows; with more no two corners can be told apart
+_LEAST_CHANGES = 8  # for a spacing
+
+
+def source_rate(t: Array, values: Array) -> float:
+    """Return a channel's rate of measurement, Hz; 0: less than two samples.
+
+    Args:
+        t: (N,) s, increasing.
+        values: (N, K); a row with NaN is no sample.
+    """
+    finite = finite_rows(values)
+    t, values = (t, values) if finite.all() else (t[finite], values[finite])
+    if len(t) < 2:
+        return 0.0
+    changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1))
+    step = median_step(t)
+    return 1.0 / (step * max(_spacing(changes), _spacing(_corners(t, values))))
+
+
+def between_samples(t: Array, values: Array, rate: float) -> Array:
+    """Return by how much a channel (N, K) leaves the line between its samples (K,), one standard
+    deviation: at most as much as a sample leaves the line between its neighbours.
+
+    Args:
+        t: (N,) s, increasing.
+        values: (N, K), finite, of a channel measured less often.
+        rate: of the measurement, Hz.
+    """
+    beats = np.arange(t[0], t[-1], 1.0 / rate)
+    off = 0.5 * np.diff(resampled(beats, t, values), n=2, axis=0)
+    return np.sqrt(np.mean(np.square(off), axis=0)) if len(off) else np.zeros(4)
+
+
+def _corners(t: Array, values: Array) -> Rows:
+    """Return where values (N, K) leave the straight line between their neighbours by more than
+    their rounding: the first of consecutive rows, since a sample between rows bends the line in
+    both.
+    """
+    if len(t) < 3:
+        return np.empty(0, dtype=np.intp)
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    steps = np.abs(np.diff(values, axis=0))
+    rounding = np.min(steps, axis=0, where=steps > 0.0, initial=np.inf)
+    off = values[2:] - values[:-2]  # in place: a copy of an hour takes 23 MB a column
+    off *= share
+    off += values[:-2]
+    np.abs(np.subtract(values[1:-1], off, out=off), out=off)
+    rms = np.sqrt(np.mean(np.square(off), axis=0))
+    is_corner = (off > np.maximum(_ON_LINE * rms, _ROUNDED * rounding)).any(axis=1)
+    if np.mean(is_corner) > _MOST_CORNERS:
+        return np.empty(0, dtype=np.intp)
+    return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))
+
+
+def _spacing(events: Rows) -> float:
+    """Return the usual number of rows between regular events; else 1."""
+    spacing = np.diff(events)
+    if len(spacing) < _LEAST_CHANGES:
+        return 1.0
+    median = np.median(spacing)
+    beat = np.quantile(spacing, _EARLY) >= _LEAST_SPACING * median
+    usual = spacing[spacing < median / _LEAST_SPACING]  # no gap
+    return float(np.mean(usual)) if beat and median >= _LEAST_ROWS else 1.0
 
 
 def with_rows(log: FlightLog, keep: Mask) -> FlightLog:

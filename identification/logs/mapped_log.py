@@ -2,14 +2,16 @@
 of a recording with groups of channels on separate clocks.
 
 A section is filled in the first way with columns and measurements in the log. Each section of the
-map becomes a stream (``streams``). For channels in rows of their own, the log has the pose's rows,
-and the others are interpolated to the pose. Else a table's rows without a pose and an inertial
-sensor's sample are left out. Such rows stay where most rows have a pose (the pose was lost), and in
-a map of whole rows. An attitude in other rows is interpolated to the position's rows.
+map becomes a stream. Rows of the log are the pose's samples; for an inertial sensor much faster
+than the pose, or without a pose, the sensor's: the kit's form has room for rows without a pose. For
+channels in rows of their own, the log has the pose's rows, and the others are interpolated to them.
+Else a table's rows without a pose and an inertial sensor's sample are left out. Such rows stay
+where most rows have a pose (the pose was lost), and in a map of whole rows. An attitude in other
+rows is interpolated to the position's rows.
 """
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -18,10 +20,30 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .channels import ChannelGroup, in_kit_axes, in_kit_units, on_one_clock, quaternions
+from .channels import (
+    LONGEST_STEPS,
+    ChannelGroup,
+    Stream,
+    check_rows,
+    in_kit_axes,
+    in_kit_units,
+    on_one_clock,
+    quaternions,
+    readable,
+    rows_apart,
+    rows_of,
+    slerp,
+)
 from .column_names import WORDS, groups_of, take_apart
-from .commanded_speeds import flown_vehicle
-from .flight_log import NORM_TOLERANCE, VEHICLE, FlightLog
+from .commanded_speeds import speeds_of_wrench, with_commanded_speeds
+from .flight_log import (
+    NORM_TOLERANCE,
+    VEHICLE,
+    FlightLog,
+    flown_vehicle,
+    source_rate,
+    time_notes,
+)
 from .log_map import (
     Attitude,
     Battery,
@@ -34,17 +56,22 @@ from .log_map import (
     check_whole,
     constant,
 )
-from .streams import Recording, Stream, readable, slerp
-from .table import Mask, Table, finite_rows
-from .table_rows import LONGEST_STEPS, check_rows, rows_apart, rows_of
+from .table import Array, Mask, Names, Table, finite_rows, median_step
 from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
 
 _SHOWN = 30  # columns in an error
-_MOTORS = "rotor speeds or motor commands"
+_MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commanded wrenches"}
 NO_QUATERNION = 0.5  # length; shorter stands for a missing quaternion
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, the longest gap for interpolating an attitude
 _OUTSIDE = 0.5  # share of commands beyond a wrong range
+# V: below, a lithium cell is empty, and above no multirotor's pack of 14 cells of 4.35 V
+LEAST_VOLTS, MOST_VOLTS = 2.5, 61.0
+_ROTOR_GAP = 0.5  # s without rotor speeds; longer gaps get a note
+# times faster than the pose: an inertial sensor has rows of its own. A pose is put to the nearest
+# row, so the pose moves by a tenth of its step at most, with its own noise
+_OWN_ROWS = 5.0
+Sections = tuple[LogMap, dict[str, Stream], dict[str, Stream], list[str]]
 
 
 def map_table(
@@ -61,7 +88,7 @@ def map_table(
         log_map: the meaning of its columns.
         vehicle: the vehicle, to turn commands into rotor speeds; None: the map's, if a preset.
         reader: name of the map's reader.
-        piece: as of ``recording_of``.
+        piece: as of ``sections_of``.
 
     Raises:
         InputError: the map does not fit the table, or a number is beyond any flight's; the message
@@ -84,13 +111,28 @@ def map_table(
         notes.insert(0, f"columns: by the map {log_map.name}")
     samples, words = rows_of(table, columns, log_map)
     notes += words
-    recording = recording_of(table.path, [samples], log_map, reader, notes, piece)
+    sections = sections_of(table.path, [samples], log_map, reader, notes, piece)
     del columns, samples
     table.forget()  # the streams are copies
-    return recording.log(vehicle)
+    return flight_log(table.path, reader, sections, vehicle)
 
 
-def recording_of(
+def log_of(
+    path: Path,
+    recorded: Sequence[ChannelGroup],
+    log_map: LogMap,
+    reader: str,
+    notes: Sequence[str],
+    vehicle: Vehicle | None,
+    piece: int | None = None,
+    flown: WhatFlew = UNSTATED,
+) -> FlightLog:
+    """Return the flight log of groups of columns by a map, as of ``sections_of``."""
+    sections = sections_of(path, recorded, log_map, reader, notes, piece, flown)
+    return flight_log(path, reader, sections, vehicle, flown)
+
+
+def sections_of(
     path: Path,
     recorded: Sequence[ChannelGroup],
     log_map: LogMap,
@@ -98,8 +140,13 @@ def recording_of(
     notes: Sequence[str],
     piece: int | None = None,
     flown: WhatFlew = UNSTATED,
-) -> Recording:
-    """Return the channels of groups of columns by a map; each group has a clock.
+) -> Sections:
+    """Return the map with the sections that are there; their streams and those of further channels,
+    in the kit's units, axes and order of rotors, by name; and notes. Each group has a clock.
+
+    Streams: position (N, 7) m, with its scalar-first quaternion; rotors (N, 4) rad/s, commands
+    (N, 4) 0 to 1, or wrench (N, 4) N and Nm, commanded; battery (N, 1) V; accelerometer (N, 3) m/s2
+    and gyro (N, 3) rad/s; force and torque (N, 3), truth.
 
     Args:
         path: the file, for errors and the log's name.
@@ -124,8 +171,9 @@ def recording_of(
     if not (log_map.rotors or log_map.commands or log_map.wrench):
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
         wanted = [f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors]
+        wanted = wanted or ["rotor speeds or motor commands"]
         raise InputError(
-            f"{path}: no motors that turn; expected {' or '.join(wanted) or _MOTORS}, found "
+            f"{path}: no motors that turn; expected {' or '.join(wanted)}, found "
             f"{', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
     said = [*notes, *of_clock, *(part.note for part in log_map.sections.values() if part.note)]
@@ -177,7 +225,7 @@ def recording_of(
         for samples in recorded
         if samples.has(part)
     }
-    return Recording(path, reader, log_map, streams, said, extra, flown)
+    return log_map, streams, extra, said
 
 
 def motors_left_out(names: Sequence[str], used: Collection[str]) -> list[str]:
@@ -426,3 +474,185 @@ def _is_measured(section: str, way: Columns, samples: ChannelGroup, rows: str) -
     if section == "position" and rows != "messages" and len(values):
         return bool(np.any(np.ptp(values, axis=0) > 0.0))
     return len(values) > 1
+
+
+def flight_log(
+    path: Path,
+    reader: str,
+    sections: Sections,
+    vehicle: Vehicle | None,
+    flown: WhatFlew = UNSTATED,
+) -> FlightLog:
+    """Return the flight log of streams.
+
+    Rows are the pose's samples within the span of the motors' stream. For a sensor 5 times faster
+    than the pose, or without a pose, rows are the sensor's. A pose then stands in the nearest row,
+    moved there along the line to its neighbour. Everything else is interpolated to the rows. A pose
+    with NaN or an infinite number is not valid.
+
+    Args:
+        path: the file, for errors and the log's name.
+        reader: its name; nothing: the file is a table of the kit's own or of a map.
+        sections: as of ``sections_of``.
+        vehicle: the vehicle, to turn commands into rotor speeds by its motor curve or by an
+            assumption in the notes; None: the map's, if a preset.
+        flown: the log's statements on its vehicle.
+
+    Raises:
+        InputError: too few samples, an infinite rotor speed, neither a pose nor gyro and
+            accelerometer, no motors, or streams without overlap.
+    """
+    log_map, streams, extra, said = sections
+    vehicle = flown_vehicle(vehicle, log_map.vehicle)
+    made, words = _cleaned(path, streams)
+    notes = (*said, *words)
+    sensors = {name: made[name] for name in ("gyro", "accelerometer") if name in made}
+    kind = next(name for name in _MOTORS if name in made)
+    motors = made[kind].whole()
+    t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
+    notes += words
+    after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
+    steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
+    if (longest := steps.max(initial=0.0)) > _ROTOR_GAP:
+        notes += (
+            f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
+            "are interpolated",
+        )
+    valid = finite_rows(pose)
+    if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
+        pose[~valid] = np.nan
+    pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
+    speeds = np.full((len(t), 4), np.nan)
+    if "rotors" in made:
+        speeds = made["rotors"].at(t)
+    elif kind == "wrench" and vehicle is not None:
+        speeds, wrench_notes = speeds_of_wrench(made["wrench"].at(t), vehicle)
+        notes += tuple(wrench_notes)
+    measured = {name: x for name, s in sensors.items() if np.isfinite(x := s.between(t)).any()}
+    truth = {name: made[name].at(t) for name in ("force", "torque") if name in made}
+    kept = {name: stream.between(t) for name, stream in extra.items()}
+    times = t - t[0] if log_map.time.offset is None else t
+    notes += time_notes(times)
+    without = np.count_nonzero(~valid) if valid.any() else 0
+    if without and measured:  # the sensor may be faster than the pose
+        notes += tuple(f"of the pose: {text}" for text in time_notes(times[valid]))
+    elif without:
+        first = times[np.argmin(valid)]
+        notes += (f"{without} of {len(t)} rows without a pose, the first at t = {first:.6g} s",)
+    log = FlightLog(
+        times,
+        pose[:, :3],
+        pose[:, 3:],
+        speeds,
+        voltage=made["battery"].at(t)[:, 0] if "battery" in made else None,
+        name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
+        source=f"{path} (reader {reader})" if reader else str(path),
+        notes=notes,
+        valid=valid,
+        extra={name: x[:, 0] if x.shape[1] == 1 else x for name, x in kept.items()},
+        commanded=kind == "wrench",
+        command=made["commands"].at(t) if "commands" in made else None,
+        vehicle=log_map.vehicle,
+        flown=flown,
+        rates={name: source_rate(s.t, s.values) for name, s in made.items()},
+        **measured,
+        **truth,
+    )
+    is_known = log.command is None or log.has_rotor_speeds
+    return log if is_known else with_commanded_speeds(log, vehicle, log_map.commands)
+
+
+def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Stream], Names]:
+    """Return the streams with values, within a flight's limits, and notes.
+
+    Raises:
+        InputError: too few samples, or an infinite rotor speed.
+    """
+    made: dict[str, Stream] = {}
+    notes: Names = ()
+    for name, stream in streams.items():
+        if name in ("position", *_MOTORS) and len(stream.t) < 2:
+            raise InputError(
+                f"{path}: {stream.name}: {len(stream.t)} message(s); expected at least two"
+            )
+        values = stream.values
+        if name in _MOTORS:
+            infinite = np.argwhere(np.isinf(values))
+            if infinite.size and name == "rotors":
+                row, rotor = infinite[0]
+                raise InputError(
+                    f"{path}: {stream.name}, message {row + 1}: the rotor speed of rotor "
+                    f"{rotor + 1} is {values[row, rotor]}; expected a finite number"
+                )
+            if len(stream.whole().t) < 2:
+                raise InputError(
+                    f"{path}: {stream.name}: no two samples have four finite {_MOTORS[name]}; "
+                    "expected some"
+                )
+            if name == "rotors" and np.any(values < 0.0):
+                notes += (f"{stream.name}: negative rotor speeds were taken as positive",)
+            values = np.abs(values) if name == "rotors" else values
+            values = np.clip(values, 0.0, 1.0) if name == "commands" else values
+        elif name == "battery":
+            plausible = (values >= LEAST_VOLTS) & (values <= MOST_VOLTS)
+            wrong = values[~plausible & (values > 0.0)]
+            if len(wrong):
+                notes += (
+                    f"{stream.name}: {len(wrong)} of {len(values)} voltages, {wrong.min():.3g} to "
+                    f"{wrong.max():.3g} V, are none of a vehicle's battery; left out",
+                )
+            values = np.where(plausible, values, np.nan)
+        elif name in ("accelerometer", "gyro"):
+            values = np.where(np.isfinite(values).all(axis=1, keepdims=True), values, np.nan)
+        if name == "position" or (np.isfinite(values).any() and len(values) > 1):
+            made[name] = Stream(stream.name, stream.t, values)
+        elif name == "battery" and not np.any(values > 0.0):
+            notes += (f"{stream.name}: no positive voltage; left out",)
+    return made, notes
+
+
+def _rows(
+    path: Path, pose: Stream | None, motors: Stream, sensors: Sequence[Stream]
+) -> tuple[Array, Array, Names]:
+    """Return the rows' times (M,) in s, the poses (M, 7) in them, NaN where there is none, and
+    notes.
+
+    Raises:
+        InputError: fewer than two rows lie within the span of the motors' stream.
+    """
+    sensor = sensors[0] if sensors else None
+    own = sensor is not None and (
+        pose is None or median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0
+    )
+    stream = sensor if own else pose
+    assert stream is not None
+    inside = (stream.t >= motors.t[0]) & (stream.t <= motors.t[-1])
+    if pose is not None and own:  # the pose and the motors must meet, too
+        together = (pose.t >= motors.t[0]) & (pose.t <= motors.t[-1])
+        stream, inside = (pose, together) if together.sum() < 2 else (stream, inside)
+    if inside.sum() < 2:
+        raise InputError(
+            f"{path}: {stream.name} (from {stream.t[0]:.6g} to {stream.t[-1]:.6g} s) and "
+            f"{motors.name} (from {motors.t[0]:.6g} to {motors.t[-1]:.6g} s) do not overlap; "
+            "expected both over the same flight"
+        )
+    t = stream.t[inside]
+    if not own:
+        assert pose is not None
+        return t, pose.values[inside], ()
+    rows = f"rows are those of {stream.name}, {1.0 / median_step(stream.t):.4g} Hz"
+    placed = np.full((len(t), 7), np.nan)
+    if pose is None:
+        return t, placed, (rows,)
+    seen = pose.whole()
+    if len(seen.t) >= 2:
+        near = np.clip(np.searchsorted(t, seen.t), 1, len(t) - 1)
+        near -= seen.t - t[near - 1] < t[near] - seen.t
+        reach = max(0.6 * median_step(t), 0.5 * median_step(seen.t) / _OWN_ROWS)
+        near = np.unique(near[np.abs(t[near] - seen.t) <= reach])
+        near = near[(t[near] >= seen.t[0]) & (t[near] <= seen.t[-1])]
+        placed[near, :3] = Stream(pose.name, seen.t, seen.values[:, :3]).at(t[near])
+        placed[near, 3:] = slerp(t[near], Stream(pose.name, seen.t, seen.values[:, 3:]))
+    rate = 1.0 / median_step(pose.t)
+    rows += f"; the pose of {pose.name}, {rate:.4g} Hz, stands in the nearest of them"
+    return t, placed, (rows,)

@@ -24,11 +24,10 @@ from ..motion.signals import SHORTEST_PIECE, pose_pieces
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of
 from .evidence import remedies
 from .excerpt import excerpt
-from .flight_log import FlightLog
+from .flight_log import MOTOR_RATES, FlightLog
 from .flight_phases import carrying, flying
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, equal_motors, rotor_doubt, thrust_by_weight, time_doubt, within
-from .streams import MOTOR_RATES
 from .table import Array, Mask, Names, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight

@@ -1,5 +1,5 @@
-"""Tables of numbers in text, Parquet, MATLAB and NumPy files: read with the places of errors,
-written whole or not at all.
+"""Tables of numbers in Parquet, MATLAB and NumPy files: read with the places of errors. Tables of
+results and of logs are written whole or not at all.
 
 In Parquet a field of a struct is the column ``struct.field``, an item of a list ``name[0]``,
 ``name[1]`` ... Arrays of MATLAB (.mat) and NumPy (.npz) files make columns in the same way. A
@@ -29,9 +29,6 @@ from ...runtime.regular_files import check_archive, check_regular, open_regular
 from ...runtime.threads import SINGLE_THREADED
 from ...runtime.whole_files import replaced
 from .table import (
-    ARRAY_SUFFIXES,
-    SUFFIXES,
-    TEXT_SUFFIXES,
     WHAT,
     Array,
     ArrayMap,
@@ -40,37 +37,10 @@ from .table import (
     file_kind,
     one_line,
 )
-from .text_table import open_text
 
 _MEMORY = 7 * 2**27  # bytes of the process for MATLAB's files
 _SHOWN = 10  # arrays in a note
 _BUFFER = 2**20  # bytes of a column of Parquet, read at a time
-
-
-def is_table(path: Path) -> bool:
-    """Return whether a file has a table's name: arrays, or a text, packed or not."""
-    name = path.name.lower()
-    return name.endswith((".parquet", *ARRAY_SUFFIXES)) or name.removesuffix(".gz").endswith(
-        TEXT_SUFFIXES
-    )
-
-
-def open_table(path: Path) -> Table:
-    """Open a table of any layout.
-
-    Raises:
-        InputError: unreadable, no table, no regular file, without rows, or more than
-            ``FileLimits`` allows.
-    """
-    if not is_table(path):
-        raise InputError(
-            f"{path}: unknown kind of file; expected a table whose name ends in "
-            f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES, *ARRAY_SUFFIXES)))}"
-        )
-    name = path.name.lower()
-    if name.endswith(ARRAY_SUFFIXES):
-        return _open_arrays(path)
-    return _open_parquet(path) if name.endswith(".parquet") else open_text(path)
 
 
 def write_table(columns: ArrayMap, path: Path) -> None:
@@ -114,7 +84,7 @@ def _csv_text(columns: ArrayMap, missing: str = "", form: Callable[[float], str]
     return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"
 
 
-def _open_arrays(path: Path) -> Table:
+def open_arrays(path: Path) -> Table:
     """Open the arrays of a file. Rows are as many as most arrays have; arrays of other lengths are
     left out, with a note.
     """
@@ -179,7 +149,7 @@ def _write_matlab(path: Path, data: BinaryIO, made: BinaryIO) -> None:
     made.seek(0)
 
 
-def _open_parquet(path: Path) -> Table:
+def open_parquet(path: Path) -> Table:
     """Open a Parquet file."""
     need("pyarrow", "parquet", path)
     import pyarrow

@@ -1,5 +1,6 @@
-"""Tables of numbers in texts, packed or not, of any layout: separator, decimal comma, lines before
-the header, a line of units behind it, lists in fields, whose items are columns ``name[0]`` ...
+"""Tables of numbers in files of any kind (``open_table``), and in texts, packed or not, of any
+layout: separator, decimal comma, lines before the header, a line of units behind it, lists in
+fields, whose items are columns ``name[0]`` ...
 
 The layout is found in the first lines. Each separator and each way to write decimals is tried. The
 right layout makes the most numbers of a line, in the longest run of lines with equally many fields.
@@ -29,7 +30,8 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.regular_files import open_regular
 from .column_names import is_unit
-from .table import WHAT, Array, Rows, Table
+from .table import ARRAY_SUFFIXES, SUFFIXES, TEXT_SUFFIXES, WHAT, Array, Rows, Table
+from .tables import open_arrays, open_parquet
 
 # people's words for a missing value
 MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
@@ -147,6 +149,32 @@ class TextLayout:
     def is_blank(self, line: str) -> bool:
         """Return whether all fields of a line are empty."""
         return not line.strip().strip(f'{self.separator} "')
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a file has a table's name: arrays, or a text, packed or not."""
+    name = path.name.lower()
+    return name.endswith((".parquet", *ARRAY_SUFFIXES)) or name.removesuffix(".gz").endswith(
+        TEXT_SUFFIXES
+    )
+
+
+def open_table(path: Path) -> Table:
+    """Open a table of any layout.
+
+    Raises:
+        InputError: unreadable, no table, no regular file, without rows, or more than
+            ``FileLimits`` allows.
+    """
+    if not is_table(path):
+        raise InputError(
+            f"{path}: unknown kind of file; expected a table whose name ends in "
+            f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES, *ARRAY_SUFFIXES)))}"
+        )
+    name = path.name.lower()
+    if name.endswith(ARRAY_SUFFIXES):
+        return open_arrays(path)
+    return open_parquet(path) if name.endswith(".parquet") else open_text(path)
 
 
 def open_text(path: Path) -> Table:

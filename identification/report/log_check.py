@@ -10,8 +10,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, UnreadLogError
 from ..diagnosis.settings import DIAGNOSIS
-from ..logs.commanded_speeds import flown_vehicle
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import FlightLog, flown_vehicle
 from ..logs.flight_phases import flew
 from ..logs.log_map import MAPS, map_names
 from ..logs.map_guess import Guess, guess_map

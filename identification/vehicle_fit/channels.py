@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
-from ..logs.flight_log import FlightLog, Logs
-from ..logs.streams import MOTOR_RATES
+from ..logs.flight_log import MOTOR_RATES, FlightLog, Logs
 from ..logs.table import Data, Pair, median_step
 from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken

@@ -46,9 +46,8 @@ from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.mapped_log import map_table
-from windwrench.identification.logs.readers import TABLES
-from windwrench.identification.logs.reading import finished, read_log
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.reading import TABLES, finished, read_log
+from windwrench.identification.logs.text_table import open_table
 from windwrench.identification.wrench_series import estimate_log
 
 Way = Callable[[bytes], st.SearchStrategy[bytes]]

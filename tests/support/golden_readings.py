@@ -24,7 +24,7 @@ from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.identification import read_log
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.screening import LEAST_SECONDS, screen_log
-from windwrench.identification.logs.tables import is_table, open_table
+from windwrench.identification.logs.text_table import is_table, open_table
 from windwrench.identification.report.log_check import check_log
 from windwrench.runtime.errors import InputError
 

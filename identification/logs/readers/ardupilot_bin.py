@@ -35,11 +35,10 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import ChannelGroup, in_order
+from ..channels import ChannelGroup, Stream, in_order
 from ..flight_log import FlightLog
 from ..log_map import LogMap, shipped_map, stated
-from ..mapped_log import recording_of
-from ..streams import MOST_VOLTS, Stream
+from ..mapped_log import MOST_VOLTS, log_of
 from ..table import Array
 from ..what_flew import (
     ORDERS,
@@ -115,14 +114,12 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
     notes += telemetry_notes
     columns = {*log_map.wanted, *_PLACE, *(f"{letter}{i + 1}" for i in range(_CHANNELS))}
-    groups = (_samples(name, rows, columns) for name, rows in messages.items())
-    recorded = [samples for samples in groups if samples is not None]
+    kept = (_samples(name, rows, columns) for name, rows in messages.items())
+    recorded = [samples for samples in kept if samples is not None]
     if skipped:
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
-    recording = recording_of(
-        path, [*recorded, *telemetry], log_map, "ardupilot_bin", notes, piece, flown
-    )
-    return recording.log(vehicle)
+    groups = [*recorded, *telemetry]
+    return log_of(path, groups, log_map, "ardupilot_bin", notes, vehicle, piece, flown)
 
 
 def _times(messages: Messages) -> Array:

@@ -38,8 +38,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup, check_piece
 from ..flight_log import FlightLog
 from ..log_map import shipped_map
-from ..mapped_log import motors_left_out, recording_of
-from ..streams import MOST_VOLTS
+from ..mapped_log import MOST_VOLTS, log_of, motors_left_out
 from ..table import Array, NamedArrays, Table
 
 Ints = NDArray[np.int64]
@@ -207,7 +206,7 @@ def _log(
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
     samples = [ChannelGroup(t, fields)]
-    return recording_of(path, samples, log_map, reader, said, piece).log(vehicle)
+    return log_of(path, samples, log_map, reader, said, vehicle, piece)
 
 
 def _gyro_scale(headers: Headers) -> float:

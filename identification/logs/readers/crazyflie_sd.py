@@ -32,7 +32,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..log_map import load_map
-from ..mapped_log import chosen, recording_of
+from ..mapped_log import chosen, log_of
 
 _FIRST = b"tick(I),"  # first column of a log before 2021
 BEGINS = rb"\xbc[\x01\x02]\0|[\x02-\xff]tick\(I\),"
@@ -92,7 +92,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
             "work, and nothing else"
         )
-    return recording_of(path, events, log_map, "crazyflie_sd", notes, piece).log(vehicle)
+    return log_of(path, events, log_map, "crazyflie_sd", notes, vehicle, piece)
 
 
 def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:

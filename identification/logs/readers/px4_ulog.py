@@ -35,8 +35,7 @@ from ....runtime.regular_files import check_regular, open_regular
 from ..channels import ChannelGroup
 from ..flight_log import FlightLog
 from ..log_map import shipped_map, stated
-from ..mapped_log import recording_of
-from ..streams import Recording
+from ..mapped_log import Sections, flight_log, sections_of
 from ..table import Array, ArrayMap, NamedArrays, NamedNumbers, Values, one_line
 from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
@@ -79,7 +78,8 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         InputError: pyulog is missing, the file is no ULog, or lacks four motors, or a pose and
             inertial sensors.
     """
-    return channels(path, vehicle, piece=piece).log(vehicle)
+    sections, flown = channels(path, vehicle, piece=piece)
+    return flight_log(path, "px4_ulog", sections, vehicle, flown)
 
 
 def channels(
@@ -87,8 +87,8 @@ def channels(
     vehicle: Vehicle | None = None,
     has_ranges: bool = True,
     piece: int | None = None,
-) -> Recording:
-    """Return a ULog's channels, each at its own rate.
+) -> tuple[Sections, WhatFlew]:
+    """Return a ULog's channels, each at its own rate, and its statements on its vehicle.
 
     Args:
         path: the file.
@@ -135,17 +135,17 @@ def channels(
         for fields in instances
         for samples in _samples(topic, fields, outputs)
     ]
-    recording = recording_of(path, recorded, log_map, "px4_ulog", notes, piece, flown)
-    position = recording.log_map.position
+    sections = sections_of(path, recorded, log_map, "px4_ulog", notes, piece, flown)
+    position, said = sections[0].position, sections[3]
     if position is not None and position.topic == _FILTER:
         fields = topics[_FILTER][0]
         counters = ("xy_reset_counter", "z_reset_counter")
         resets = [name for name in counters if name in fields and np.ptp(fields[name]) > 0.0]
         if resets:
-            recording.notes.append(
+            said.append(
                 f"the onboard position was reset in the log ({', '.join(resets)}): it jumps there"
             )
-    return recording
+    return sections, flown
 
 
 def read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, bool]:

@@ -50,7 +50,7 @@ from ....runtime.regular_files import check_regular, open_regular
 from ....runtime.yaml_file import read_yaml
 from ..channels import ChannelGroup
 from ..flight_log import FlightLog
-from ..mapped_log import recording_of
+from ..mapped_log import log_of
 from ..table import NamedArrays, one_line
 from .ros_topics import MessageFields, definitions, map_of, stamp
 
@@ -120,7 +120,7 @@ def read(
         ChannelGroup(_NANOSECOND * (times - origin).astype(float), columns, name)
         for times, columns, name in decoded
     ]
-    return recording_of(path, recorded, log_map, "rosbag", notes, piece).log(vehicle)
+    return log_of(path, recorded, log_map, "rosbag", notes, vehicle, piece)
 
 
 def _bag_in(path: Path) -> Path:

@@ -14,7 +14,7 @@ from tests.support.outcomes import refused
 from windwrench.cli import app
 from windwrench.identification.comparison.fault_channels import Channels, channels_of_log, sample
 from windwrench.identification.comparison.fault_detection import find_fault
-from windwrench.identification.logs.streams import Stream
+from windwrench.identification.logs.channels import Stream
 
 
 def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from tests.support.outcomes import refused
 from windwrench.identification.logs.log_map import parse_map
 from windwrench.identification.logs.mapped_log import map_table
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.text_table import open_table
 from windwrench.runtime.errors import InputError
 
 COUNT = 50

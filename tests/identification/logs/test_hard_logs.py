@@ -23,7 +23,7 @@ from windwrench.identification.logs.inertial import check_inertial
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.text_table import open_table
 from windwrench.identification.report.log_check import check_log
 
 

@@ -19,7 +19,7 @@ from windwrench.identification.logs.flight_log import with_rows, write_log
 from windwrench.identification.logs.log_map import load_map, map_names, parse_map
 from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.text_table import open_table
 
 GOOD = {
     "time": {"column": "t"},

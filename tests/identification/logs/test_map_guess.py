@@ -19,7 +19,7 @@ from windwrench.identification.logs.magnitudes import motor_unit
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.map_text import map_yaml
 from windwrench.identification.logs.mapped_log import map_table
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.text_table import open_table
 
 
 @pytest.fixture(scope="module")

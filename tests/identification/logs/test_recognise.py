@@ -10,13 +10,13 @@ from numpy.testing import assert_allclose
 from tests.support.data_paths import DATA
 from tests.support.outcomes import noted, refused
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.logs.readers import (
+from windwrench.identification.logs.reading import (
     READERS,
     find_reader,
+    read_log,
     reader_by_columns,
     reader_by_content,
 )
-from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.tables import write_csv
 
 BEGINNINGS = {

@@ -10,9 +10,8 @@ from tests.support.flown import VEHICLE, recorded
 from tests.support.outcomes import refused
 from tests.support.sizes import rms
 from windwrench.identification import diagnose, read_log
-from windwrench.identification.logs.flight_log import write_log
+from windwrench.identification.logs.flight_log import between_samples, source_rate, write_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.identification.logs.streams import between_samples, source_rate
 from windwrench.identification.wrench_series import estimate_log
 
 PERIOD = 0.005  # s

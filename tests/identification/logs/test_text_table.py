@@ -12,7 +12,7 @@ from numpy.testing import assert_array_equal
 
 from tests.support.programs import said
 from windwrench.identification.logs.flight_log import REQUIRED
-from windwrench.identification.logs.tables import open_table
+from windwrench.identification.logs.text_table import open_table
 from windwrench.runtime.file_limits import LIMITS
 
 
