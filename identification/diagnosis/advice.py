@@ -139,10 +139,7 @@ def advice(
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)
-            yield (
-                f"{' or '.join(group)}: these logs cannot tell them apart. To separate them, fly: "
-                f"{_excitations(group)}"
-            )
+            yield f"To separate {' from '.join(group)}, fly: {_excitations(group)}"
     if remainder == "structured":
         yield (
             "Fly one thing at a time (hover, climbs, level flight at several speeds, turns) to see "

@@ -19,6 +19,8 @@ _CLIMB = 0.1  # m/s: slower is not climbing or sinking
 _CLIMB_WINDOW = 0.25  # s, either side, of the mean climb rate
 _MOVES = 0.1  # m of way: a vehicle at rest moves by less, whatever the noise of its pose
 _DROVE = 2.0, 0.003  # m of way, and m of height: a flight over this way changes its height by more
+_FASTEST = 200.0  # m/s: no quadrotor flies faster
+_SLOWER = 0.95  # share of the flight that is slower; a leap of the pose is no speed
 _TURNS = 0.03  # rad/s, of means over _MEAN: a vehicle at rest turns by less, whatever its vibration
 _MEAN = 0.2  # s
 
@@ -47,7 +49,8 @@ def carrying(total: Array) -> Mask:
 
 def flew(log: FlightLog) -> tuple[str, str]:
     """Return whether a log's vehicle flew, and why: "no" where the motors never turn, "not shown"
-    where the vehicle may stand or drive on the ground, "unknown" without measured motion.
+    where the vehicle may stand or drive on the ground, or moves as no vehicle does, "unknown"
+    without measured motion.
     """
     if log.has_rotor_speeds:
         total = np.square(log.rotor_speeds).sum(axis=1)
@@ -59,8 +62,13 @@ def flew(log: FlightLog) -> tuple[str, str]:
         return "no", "the motors never turn"
     aloft = carrying(total)
     told = f"yes, {aloft.sum() * log.period:.3g} s"
-    place = log.position[aloft & finite_rows(log.position)]
+    rows = aloft & finite_rows(log.position)
+    place = log.position[rows]
     if len(place) > 1:
+        steps = np.linalg.norm(np.diff(place, axis=0), axis=1) / np.diff(log.t[rows])
+        if (speed := np.quantile(steps, _SLOWER)) > _FASTEST:
+            said = f"the position moves by {speed:.2g} m/s"
+            return "not shown", f"{said}: another unit, or a simulation that blew up"
         way = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
         far = np.linalg.norm(way)
         said = f"the motors turn, and the position spans {far:.3g} m, {way[2]:.3g} m of height"

@@ -129,23 +129,17 @@ def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
 
 def _wind(effect: NamedEffect) -> Amount:
     """Return the speed of a wind, and the side from which the wind blows."""
-    axes = {
-        place[3]: name
-        for name in effect.coefficients
-        if (place := _PLACE.search(coefficient_meaning(effect.name, name))) and place[2] == "world"
-    }
-    wind, std = (
-        np.nan_to_num([x.get(axes[axis], 0.0) for axis in axes])
-        for x in (effect.coefficients, effect.std)
-    )
+    names = [name for name in effect.coefficients if effect.units.get(name) == "m/s"]
+    wind = np.nan_to_num([effect.coefficients[name] for name in names])
+    std = np.array([effect.std.get(name, 0.0) for name in names])
     speed = float(np.linalg.norm(wind))
-    spread = float(np.linalg.norm(wind * std)) / speed if speed else float(np.linalg.norm(std))
-    sides = [
-        f"{'−' if x > 0.0 else '+'}{axis}"
-        for axis, x in zip(axes, wind, strict=True)
+    sides = (
+        f"{'−' if x > 0.0 else '+'}{coefficient_meaning(effect.name, name)[-1]}"
+        for name, x in zip(names, wind, strict=True)
         if abs(x) > _BESIDE * speed
-    ]
-    return Amount(speed, spread, "m/s", f"from {' '.join(sides)}" if sides else "", "")
+    )
+    spread = float(np.linalg.norm(wind * std)) / (speed or 1.0)
+    return Amount(speed, spread, "m/s", f"from {' '.join(sides)}", "")
 
 
 def steady_wrench(pieces: Sequence[Array], periods: Sequence[float], floors: Pair) -> str:

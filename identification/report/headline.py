@@ -2,10 +2,12 @@
 an estimated wrench.
 """
 
+import math
+
 import numpy as np
 
 from ..findings import Diagnosis, NamedEffect
-from ..logs.table import finite_rows
+from ..logs.table import finite_rows, median_step
 from ..wrench_series import WrenchSeries
 from .amounts import known, steady_residual, steady_wrench, title, with_amounts
 from .words import (
@@ -22,7 +24,6 @@ from .words import (
 )
 
 _NAMED = 4  # effects in the sentence; the table has the others
-_RIVALS = 3  # rivals of an effect in the sentence
 _UNDECIDED = 0.1  # share of its energy by which an undecided effect is ordered
 
 
@@ -91,24 +92,23 @@ def _told(effect: NamedEffect, diagnosis: Diagnosis, all_perhaps: bool) -> str:
     is_new = not effect.coefficients.keys() <= declared.get(effect.name, set())
     told = ("" if is_new else "the right ") + with_amounts(effect, diagnosis.declared)
     if rivals := [title(name) for name in effect.indistinguishable_from]:
-        some = [f"{len(rivals) - _RIVALS + 1} others"] if len(rivals) > _RIVALS else []
-        told = f"one of {in_words([told, *rivals[: _RIVALS - len(some)], *some], 'or')}"
+        told = f"one of {in_words([told, *rivals], 'or')}"
     return f"perhaps {told}" if effect.tentative and not all_perhaps else told
 
 
 def wrench_headline(series: WrenchSeries) -> str:
-    """Return the mean external force and torque, each if beyond chance and its stated deviation,
-    and the force's spread.
+    """Return the mean external force and torque, if beyond chance and its stated deviation, and the
+    force's spread.
     """
     rows = finite_rows(series.force)
-    force, name = series.force[rows], series.vehicle.name
-    spread = in_unit(float(np.sqrt(np.var(force, axis=0).sum())), "N")
-    stated = (np.nan_to_num(x[rows]) for x in (series.std_force, series.std_torque))
-    floor, least_torque = (float(np.median(x, axis=0).max()) for x in stated)
-    wrench = np.column_stack([force, np.nan_to_num(series.torque[rows])])
-    period = float(np.median(np.diff(series.t)))
-    if steady := steady_wrench([wrench], [period], (floor, least_torque)):
-        told = f"Beside the model of {name}, on average {steady} acts"
-    else:
-        told = f"No steady force above {in_unit(floor, 'N')} acts beside the model of {name}"
-    return f"{told}; the force is {spread} rms about its mean."
+    wrench = np.nan_to_num(np.column_stack([series.force, series.torque])[rows])
+    stated = np.nan_to_num(np.column_stack([series.std_force, series.std_torque])[rows])
+    std = np.median(stated, axis=0)
+    floors = float(std[:3].max()), float(std[3:].max())
+    steady = steady_wrench([wrench], [median_step(series.t)], floors)
+    told = steady or f"no steady force above {in_unit(floors[0], 'N')}"
+    spread = in_unit(math.sqrt(wrench[:, :3].var(axis=0).sum()), "N")
+    return (
+        f"Beside the model of {series.vehicle.name}, on average {told} acts; the force is {spread} "
+        "rms about its mean."
+    )

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -41,12 +42,12 @@ class LogCheck:
     def headline(self) -> str:
         """Return the gravest doubt, and what flew how long and how far."""
         answer, by = flew(self.log)
-        what = self.log.vehicle or self.log.flown.airframe.replace("a ", "A ", 1) or "The vehicle"
+        what = self.log.vehicle or self.log.flown.airframe or "a vehicle of four rotors"
         told = [f"Doubt: {self.doubts[0]}."] if self.doubts else []
         if answer.startswith("yes"):
-            told.append(f"{what} flew {answer[5:]}: {by}.")
+            told.append(f"Flight of {answer[5:]} by {what}: {by}.")
         elif answer == "unknown":
-            told.append(f"Whether {what} flew is not known: {by}.")
+            told.append(f"Nothing shows whether {what} flew: {by}.")
         return " ".join(told)
 
     def reading(self) -> str:
@@ -119,9 +120,9 @@ def check_log(
             log = read_log(path, reader, vehicle, piece=piece)
             named = re.search(r"\(reader ([^()]+)\)$", log.source)
             read_by = f"the reader {named[1]}" if named else "this kit's own format"
-    doubts = _doubts(log, flown_vehicle(vehicle, log.vehicle))
-    for r in guess.doubts if guess else ():
-        doubts.append(f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}")
+    guesses = guess.doubts if guess else ()
+    guessed = [f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}" for r in guesses]
+    doubts = _doubts(log, guessed, flown_vehicle(vehicle, log.vehicle))
     limits = [
         f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
         f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "
@@ -132,7 +133,7 @@ def check_log(
     if flown_vehicle(vehicle, log.vehicle) is None:
         limits.append("no vehicle is given: the rotor speeds were not checked against its weight")
     channels = log_channels(log)
-    return LogCheck(log, read_by, channels, tuple(doubts), tuple(limits), guess, text)
+    return LogCheck(log, read_by, channels, doubts, tuple(limits), guess, text)
 
 
 def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:
@@ -149,12 +150,13 @@ def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[
         raise UnreadLogError(str(refused), map_yaml(guess)) from refused
 
 
-def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
-    """Return the doubts of a log's reading, the gravest first: no flight, a refusal by a diagnosis,
-    warnings.
+def _doubts(log: FlightLog, guessed: Sequence[str], vehicle: Vehicle | None) -> Names:
+    """Return the doubts of a log's reading, the gravest first: no flight, what was guessed, a
+    refusal by a diagnosis, warnings.
     """
     answer, by = flew(log)
-    doubts = [f"the log does not show a flight: {by}"] if answer in ("no", "not shown") else []
+    grounded = [f"the log does not show a flight: {by}"] if answer in ("no", "not shown") else []
+    doubts = [*grounded, *guessed]
     told = [note for note in log.notes if note.startswith("warning")]
     if vehicle is None:
         told += filter(None, [convention_doubt(log, None)])
@@ -166,4 +168,4 @@ def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             refusal = str(error).removeprefix(f"{log.source}: ")
             doubts.append(f"diagnose refuses this log: {refusal}")
             told = [text for text in told if without_warning(text) != refusal]
-    return list(dict.fromkeys([*doubts, *map(without_warning, told)]))
+    return tuple(dict.fromkeys([*doubts, *map(without_warning, told)]))

@@ -48,7 +48,6 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         missing=words.MISSING,
         doubts=words.doubts(diagnosis),
         outside=words.is_outside(diagnosis),
-        alike=[words.confusion(e) for e in diagnosis.effects if e.indistinguishable_from],
         plots=plots,
         still=still_picture(drawn) if drawn else "",
         bars=bars,

@@ -9,7 +9,6 @@ from ..findings import CHANNELS, Diagnosis, NamedEffect
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
 SPACE = "\N{NO-BREAK SPACE}"
-_LONGEST = 190  # letters in a piece of advice on the first screen
 _CERTAIN = 0.001  # probability; closer to 0 or 1 no digit is meant
 _TELLING = 1.3  # times the floor: least error in the first sentence
 _LIKELIER = 0.5  # probability of a cause outside the library, from which this comes first
@@ -195,70 +194,11 @@ def disturbance_at(diagnosis: Diagnosis) -> str:
     return f"{size} in {largest.channel} at {rounded(largest.t)}{SPACE}s{where}"
 
 
-def ranking_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return the reasons not to name an effect ahead of a named one in the chart."""
-    named = [c for c in diagnosis.candidates if c.named]
-    lowest = min((c.gain for c in named), default=math.inf)
-    above = [c for c in diagnosis.candidates if not c.named and c.gain > lowest]
-    told, rest = [], []
-    for candidate in above:
-        mates = [e.name for e in diagnosis.effects if candidate.name in e.indistinguishable_from]
-        if not mates:
-            rest.append(candidate)
-            continue
-        below = [c.name for c in named if c.gain < candidate.gain]
-        told.append(
-            f"{candidate.name} alone explains more than {in_words(below)} alone. It may be the "
-            f"cause: these logs cannot tell {in_words(mates, 'or')} from it."
-        )
-    if rest:
-        last = min(named, key=lambda c: c.gain).name
-        one = len(rest) == 1
-        told.append(
-            f"{in_words([c.name for c in rest])} {'explains' if one else 'each explain'} more "
-            f"alone than {last} does, but {'was' if one else 'were'} not named: beside "
-            f"{in_words([c.name for c in named])} {'it adds' if one else 'they add'} too little to "
-            "be worth a name."
-        )
-    return told
-
-
 def name_in_words(effect: NamedEffect) -> str:
     """Return an effect's name with its alternatives, and a mark of a tentative one."""
     others = in_words(effect.indistinguishable_from, "or")
     tentative = " (tentative)" if effect.tentative else ""
     return f"{effect.name}{f' (or {others})' if others else ''}{tentative}"
-
-
-def confusion(effect: NamedEffect) -> str:
-    """Return the sentence on effects indistinguishable from this one."""
-    others = in_words(effect.indistinguishable_from, "or")
-    told = f"These logs cannot distinguish {effect.name} from {others}"
-    return f"{told}, which explain them equally well."
-
-
-def sureness_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return the certainty of each name, and the data behind the answer."""
-    sure = [e for e in diagnosis.effects if not e.tentative and not e.indistinguishable_from]
-    told = _probability(diagnosis)
-    if sure:
-        told.append(
-            f"{in_words([e.name for e in sure])}: no other effect of the library explains the "
-            "flight as well."
-        )
-    if not diagnosis.effects:
-        told.append(
-            "The residual was tested for random disturbances and for structure, and "
-            f"{len(diagnosis.candidates)} effects were tried."
-            if diagnosis.candidates
-            else "No effect was tried on it."
-        )
-    if diagnosis.held_out_segments:
-        told.append(
-            f"Errors are on {'test logs' if diagnosis.test_logs else 'held-out data'}: "
-            f"{held_out_sum(diagnosis)}, that no fit used."
-        )
-    return told
 
 
 def held_out_sum(diagnosis: Diagnosis) -> str:
@@ -268,27 +208,8 @@ def held_out_sum(diagnosis: Diagnosis) -> str:
     return f"{count} {'block' if count == 1 else 'blocks'}, {duration(total)}"
 
 
-def _probability(diagnosis: Diagnosis) -> list[str]:
-    """Return the probabilities of the names and of an unknown cause; nothing if not known."""
-    stated = diagnosis.probabilities
-    if math.isnan(stated.unknown):
-        return []
-    names = [f"{e.name} {chance(stated.names.get(e.name, 0.0))}" for e in diagnosis.effects]
-    acts = f"Probability that it acts: {in_words(names)}. " if names else ""
-    return [f"{acts}Probability of a cause outside the library: {chance(stated.unknown)}."]
-
-
 def next_step(diagnosis: Diagnosis) -> str:
-    """Return the one thing to do next, in a sentence or two."""
-    undecided = [e for e in diagnosis.effects if e.indistinguishable_from]
-    first = diagnosis.advice[0] if diagnosis.advice else ""
-    if undecided and not first.startswith("Log "):
-        effect = undecided[0]
-        others = in_words(effect.indistinguishable_from, "or")
-        if effect.name in library.names():
-            return _short(
-                f"To tell {effect.name} from {others}, fly: {library.get(effect.name).excitation}."
-            )
+    """Return the one thing to do next."""
     if diagnosis.verdict in ("explained", "nothing to explain"):
         use = (
             "Use vehicle.yaml, which holds the named effects, in place of the declared vehicle"
@@ -296,20 +217,8 @@ def next_step(diagnosis: Diagnosis) -> str:
             else "Keep the model as it is"
         )
         return f"{use}, and confirm it on another flight (--test)."
-    if first:
-        return _short(first)
+    if diagnosis.advice:
+        return diagnosis.advice[0]
     better = diagnosis.effects and "held out" not in diagnosis.doubts and not is_outside(diagnosis)
     use = "Use vehicle.yaml, which holds the named effects. " if better else ""
     return f"{use}To see whether the rest is wind, fly again in still air."
-
-
-def _short(text: str) -> str:
-    """Return the beginning of a text: whole sentences if possible, else whole clauses."""
-    if len(text) <= _LONGEST:
-        return text
-    kept = text[: _LONGEST + 1]
-    end = kept.rfind(". ")
-    if end > 0:
-        return kept[: end + 1]
-    end = max(kept.rfind(mark) for mark in (", ", "; ", ": "))
-    return kept[: end if end > _LONGEST // 3 else kept.rfind(" ")].rstrip(",:; ") + " …"

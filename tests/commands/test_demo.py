@@ -104,5 +104,5 @@ def test_a_log_of_an_unknown_vehicle_is_told_how_one_is_made(call, log, tmp_path
     code, out, _ = call("theirs.csv", "--out", "all", "--no-open")
     assert code == 0
     assert "windwrench identify theirs.csv --mass KG" in out
-    assert "nobodys flew 12 s" in " ".join(out.split())
+    assert "Flight of 12 s by nobodys" in " ".join(out.split())
     assert not Path("all/estimate").exists()

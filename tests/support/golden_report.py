@@ -92,8 +92,6 @@ def said():
             "headline": headline(found),
             "error": words.error_sentences(found),
             "remainder": words.remainder_sentence(found),
-            "sureness": words.sureness_sentences(found),
-            "ranking": words.ranking_sentences(found),
             "next": words.next_step(found),
         }
         for name, found in diagnoses()

@@ -237,6 +237,8 @@ def test_whether_anything_flew():
     assert answer(moving, 0.0 * hover) == "no"
     assert answer(1e-3 * noise) == "not shown"  # on a bench
     assert answer(way) == "not shown"  # it drove
+    blown = np.exp(2.0 * t)[:, None] * moving
+    assert answer(blown) == "not shown"  # a simulation that left all numbers
     missing = np.full((2000, 3), np.nan)
     assert answer(missing, gyro=moving) == "yes, 20 s"
     assert answer(missing, gyro=0.05 * noise) == "unknown"  # vibration alone
