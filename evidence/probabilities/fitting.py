@@ -13,8 +13,8 @@ from windwrench.identification.diagnosis.unknown import UnknownSettings, signs
 Array = NDArray[np.float64]
 
 _DECIMALS = 2  # of a weight
-# of each weight but that of the Bayes factor, before the flights
-_WEIGHT_STD = (1e3, 3.0, 3.0)
+# of each fitted weight, before the flights
+_WEIGHT_STD = (1e3, 3.0)
 
 
 def acts_unknown(flight: Mapping[str, Any]) -> bool:
@@ -57,8 +57,9 @@ def _misled(flight: dict[str, Any]) -> bool:
 
 
 def fit(flights: Sequence[dict[str, Any]]) -> UnknownSettings:
-    """Return the weights of signs at maximum posterior; a Bayes factor counts as what it is."""
-    x = np.array([signs(**flight["signs"]) for flight in flights])
+    """Return the weights of signs at maximum posterior; the Bayes factor counts as one."""
+    kept = (flight["signs"] for flight in flights)
+    x = np.array([signs(sign["structure"], sign["push"]) for sign in kept])
     y = np.array([acts_unknown(f) or _misled(f) for f in flights])
     given, x = x[:, 1], np.delete(x, 1, axis=1)
     scale = np.array(_WEIGHT_STD)

@@ -56,7 +56,7 @@ from .residuals import balance, beyond_calm, transient_disturbances
 from .row_nuisances import THRUST_STD
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .traces import carrying_channels, signature
-from .unknown import signs, unknown
+from .unknown import beside_unknown, unknown
 from .worth import BY_CHANCE, worth
 
 LEAST_STATED = 0.001  # probability of a reported alternative
@@ -215,20 +215,21 @@ class Judged:
         named = [e for e in fitted.setting if known.get(e, 1.0) >= rule.least_sure_probability]
         disturbed = beyond_calm(self.gusts, flights.vehicle)
         structure = fitted.ranking.structure
-        some = any(e not in known for e in named)
-        strange = unknown(signs(structure, disturbed, bool(self.pushes), some))
+        strange = unknown(structure, bool(self.pushes))
         rivals = {e: self._rivals(e) for e in named}
-        for e in named:  # an effect, or its rivals in these flights
+        for e in (e for e in named if e not in known):  # an effect, or its rivals in these flights
             alike = [x.probability for x in fitted.ranking.sets if {e, *rivals[e]} & {*x.effects}]
-            known.setdefault(e, min(sum(alike), 1.0))
+            factor = fitted.posterior.factor_in_set(e)
+            known[e] = beside_unknown(min(sum(alike), 1.0), factor, structure, strange)
         self.doubts = self._doubts(named, strange)
         unsure = bool(set(self.doubts) - {"assumed thrust"})
         sizes = worth(flights, given.fixed, given.first, fitted.setting)
         effects = [self._named(e, known[e], sizes[e], unsure, rivals[e]) for e in named]
-        names = {e: (1.0 - strange) * known[e] for e in named}
-        if given.late:
-            effects.append(replace(given.late, tentative="short" in self.doubts))
-            names[given.late.name] = 1.0
+        names = {e: known[e] for e in named}
+        if late := given.late:
+            names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
+            doubted = unsure or names[late.name] < rule.least_sure_probability
+            effects.append(replace(late, tentative=doubted))
         self.effects = tuple(effects)
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
@@ -254,9 +255,9 @@ class Judged:
             *delays_at_bound(self.setting),
         )
         stated = tuple(
-            Alternative(tuple(e for e in x.effects if e not in given.first), p)
+            Alternative(tuple(e for e in x.effects if e not in given.first), x.probability)
             for x in fitted.ranking.sets
-            if (p := x.probability * (1.0 - strange)) >= LEAST_STATED
+            if x.probability >= LEAST_STATED
         )
         self.probabilities = Probabilities(names, stated, strange)
 
@@ -286,7 +287,7 @@ class Judged:
             off, std = abs(value - own.get(name, 0.0)), stds.get(name, 0.0)
             least = LEAST_SIZE * typical_size((effect, name), flights.vehicle)
             if off > least and std:
-                most = max(most, math.erf(off / std / math.sqrt(2.0)))
+                most = max(most, _apart(off, std))
         return most
 
     def _rivals(self, effect: str) -> Names:
@@ -399,6 +400,11 @@ class Judged:
                 ~flights.fit_rows[rows],
                 {effect: part[rows] for effect, part in self.parts.items()},
             )
+
+
+def _apart(value: float, std: float) -> float:
+    """Return the probability of a value with a standard deviation to differ from zero."""
+    return math.erf(abs(value) / std / math.sqrt(2.0))
 
 
 def _segments(flights: RegressedFlights) -> list[tuple[int, float, float]]:

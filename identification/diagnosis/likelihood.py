@@ -26,7 +26,7 @@ from ..logs.flight_log import FlightLog
 from ..logs.table import Array, ArrayPair, Mask
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
-from ..motion.signals import Signals, log_signals
+from ..motion.signals import Signals, in_body, log_signals
 from ..motion.smoothing import continuous, turn_between
 from .causal_filter import Poses, Track, level, run
 from .discrepancy import Columns, changing_columns, discrepancy_columns, joined, variables
@@ -372,6 +372,7 @@ class Likelihood:
             bent.append(replace(s, rotor_speeds=u))
         self._acting["", BETWEEN] = self._change(self.setting, signals=bent)
         self._add_model_errors()
+        self._add_answers()
         moved = []
         for track in self.tracks:
             # the rate before the sample is read: the rate after holds the sample's noise
@@ -447,6 +448,33 @@ class Likelihood:
             self._acting |= {
                 ("", f"{MODEL_ERROR} of {name} {axis}"): x for name, x in errors.items()
             }
+
+    def _add_answers(self) -> None:
+        """Add the columns of a flight loop's answers to disturbances: along the torques, their
+        changes, and the state of each axis.
+
+        A loop on a gyro answers a disturbance before the pose shows any. This part of the torques
+        causes no motion, and is no sign of an effect. The loop is unknown: each of its signals may
+        have a share of the part, at most the disturbance's share of the torque's variance. (Unknown
+        linear feedback: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
+        """
+        whole, _ = joined(self.tracks)
+        body = in_body(whole.velocity, whole.rotation)
+        for i, axis in enumerate("xyz"):
+            torque = whole.rotors[:, 1 + i]
+            size = max(float(torque.std()), 1e-9)
+            answer = PRIORS.answer * min((self.noise.disturbance[3 + i] / size) ** 2, 1.0) * size
+            signals = {
+                "torque": torque,
+                "change of torque": np.diff(torque, prepend=torque[:1]),
+                "rate": whole.angular_velocity[:, i],
+            }
+            if i < 2:
+                signals |= {"tilt": whole.rotation[:, 2, 1 - i], "velocity": body[:, 1 - i]}
+            for name, x in signals.items():
+                column = np.zeros((len(x), 6))
+                column[:, 3 + i] = answer * x / max(float(x.std()), 1e-9)
+                self._acting["", f"answer with {name} {axis}"] = column
 
     def _jumps(self) -> list[Array]:
         """Return the jumps of the states (n, 6, e) of each piece for a unit of each gain of a pair

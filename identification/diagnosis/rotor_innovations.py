@@ -105,6 +105,7 @@ def _known_before(track: Track, rotors: Array) -> Array:
     known = [rotors[i : i + count] for i in reversed(range(LAGS))]
     before = slice(LAGS - 1, LAGS - 1 + count)
     body = in_body(track.velocity[before], track.rotation[before])
+    rate = track.angular_velocity[before]
     # along the heading and to its left, and about the body's axes
     back = track.heading * [1.0, -1.0]
     seen = np.hstack([level(back, x) for x in np.hsplit(track.innovations, 2)])
@@ -112,10 +113,17 @@ def _known_before(track: Track, rotors: Array) -> Array:
         track.rotation[before][:, 2, :2],
         body,
         track.position[before],
-        track.angular_velocity[before],
+        rate,
         track.acceleration[before] - track.model[before],
         seen[before],
         # the loop may have read this sample's pose before the rotors were logged
         seen[LAGS:],
+        _products(np.hstack([track.rotation[before][:, 2, :2], body, rate])),
     ]
     return np.column_stack(known)
+
+
+def _products(x: Array) -> Array:
+    """Return the products (n, k) of all pairs of columns."""
+    i, j = np.triu_indices(x.shape[1])
+    return np.asarray(x[:, i] * x[:, j])

@@ -273,6 +273,21 @@ class Posterior:
         lack = max((x for key, x in value.items() if effect not in key), default=-math.inf)
         return have - lack
 
+    def factor_in_set(self, effect: str) -> float:
+        """Return the logarithm of the Bayes factor of the likeliest set over the same without an
+        effect, with nothing in its place.
+        """
+        base, best = self._likeliest()
+        asked = base.at(base.asked)
+        m = base.marginal(asked, base.plain, power=self.power)
+        low, high = base.low[asked], base.high[asked]
+        place = {c: i for i, c in enumerate(base.asked)}
+        whole, rest = (
+            set_evidence(m, [place[c] for c in best.columns if c[0] != out], low, high)
+            for out in ("", effect)
+        )
+        return whole.log_evidence - rest.log_evidence
+
     def left(self) -> float:
         """Return the deviance left by the likeliest set, with the nuisances integrated out."""
         base, best = self._likeliest()

@@ -56,6 +56,8 @@ def test_one_effect_is_named_with_its_coefficients(name, trajectory, coefficient
     assert named(found) == [name]
     assert found.verdict == "explained"
     assert not found.effects[0].tentative
+    assert found.probabilities.names[name] > 0.99  # no ceiling
+    assert found.probabilities.unknown < 0.2
     for key, value in coefficients.items():
         assert found.effects[0].coefficients[key] == pytest.approx(value, rel=0.05)
     assert found.after.force_rms < 1.2 * found.floor_force_rms

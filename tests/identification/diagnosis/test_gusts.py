@@ -1,0 +1,71 @@
+"""A perfect model in gusts is believed: a flight loop on gyros answers gusts that no pose shows."""
+
+import numpy as np
+import pytest
+
+from tests.support.data_paths import data_file
+from windwrench.dynamics import load_vehicle
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.diagnosis.causal_filter import Poses, Track
+from windwrench.identification.diagnosis.rotor_innovations import LAGS, rotor_innovations
+from windwrench.identification.diagnosis.settings import DIAGNOSIS
+from windwrench.identification.diagnosis.unknown import beside_unknown, unknown
+from windwrench.identification.logs.reading import read_log
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "perfect_model_gusts_10mN",
+        pytest.param("perfect_model_gusts_10mN_imu", marks=pytest.mark.slow),
+    ],
+)
+def test_gusts_around_a_perfect_model_are_gusts(name):
+    vehicle = load_vehicle("ardrone2")
+    log = read_log(data_file(f"hard_logs/{name}.csv.gz"), vehicle=vehicle)
+    found = diagnose([log], vehicle)
+    assert found.effects == ()
+    assert found.remainder in ("none", "random")
+    assert found.probabilities.unknown < DIAGNOSIS.most_unknown
+    gust = {g.channel: g.rms for g in found.gusts}
+    assert 0.005 < gust["Fx"] < 0.02  # 10 mN
+    assert 0.5e-3 < gust["tau_x"] < 2e-3  # 1 mNm
+
+
+def test_rotors_that_answer_a_product_of_rates_have_no_innovation_by_it():
+    """A loop on a gyro answers gyroscopic torques, which are in the model and are no gust."""
+    rng = np.random.default_rng(0)
+    n = 3000
+    rate, noise = rng.standard_normal((n, 3)), rng.standard_normal((n, 4))
+    level, zeros = np.repeat(np.eye(3)[None], n, axis=0), np.zeros((n, 6))
+    speeds = 400.0 + 0.5 * noise
+    answered = np.zeros((n, 4))
+    answered[1:, 1] = rate[:-1, 1] * rate[:-1, 2]
+    rotors = speeds**2 * 1e-5
+    # a roll torque by four rotors that speed up and slow down in pairs
+    roll = np.array([1.0, 1.0, -1.0, -1.0])
+    speeds = np.sqrt((rotors + 0.02 * answered[:, 1:2] * roll) / 1e-5)
+    mix = 1e-5 * np.array([[1, 1, 1, 1], roll, [-1, 1, 1, -1], [1, -1, 1, -1]]).T
+    between = 0.5 * (speeds + np.vstack([speeds[1:], speeds[-1:]]))
+    heading = np.tile([1.0, 0.0], (n, 1))
+    t = 0.005 * np.arange(n)
+    poses = Poses(t, 0.005, zeros[:, :3], heading, speeds, zeros[:, 0], np.zeros(3), np.zeros(3))
+    track = Track(
+        t, zeros[:, :3], level, zeros[:, :3], rate, zeros, between**2 @ mix, zeros, zeros, heading,
+        zeros, zeros,
+    )  # fmt: skip
+    (found,) = rotor_innovations([(poses, track)])
+    roll_innovation, answer = found[LAGS:, 1], answered[LAGS:, 1]
+    assert abs(np.corrcoef(roll_innovation, answer)[0, 1]) < 0.01
+
+
+def test_a_name_has_no_ceiling_and_keeps_its_probability_beside_a_weak_structure():
+    quiet = unknown(-2.0, push=False)
+    assert 0.0 < quiet < 0.05
+    assert beside_unknown(1.0, 300.0, -2.0, quiet) == 1.0
+    strange = unknown(17.0, push=False)
+    assert strange > 0.999
+    weak, strong = (beside_unknown(1.0, factor, 17.0, strange) for factor in (20.0, 2000.0))
+    assert weak < 1e-4
+    assert 0.6 < strong < 0.7
+    assert beside_unknown(0.4, 2000.0, 0.0, strange) == pytest.approx(0.4)
