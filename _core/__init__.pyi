@@ -286,11 +286,14 @@ def predict_flight(
     ],
     period: float,
     keeps_velocity: bool,
+    reaction: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
     path: Annotated[NDArray[numpy.float64], dict(shape=(None, None, 13), order="C", device="cpu")],
 ) -> None:
     """Run a model along a flight of states (n, 13), and a copy of it from each start, a row;
     write the copy's states (starts, ahead, 13), a period (s) apart. With keeps_velocity no
-    force acts.
+    force acts. The reaction (9) of a flight loop turns the body, too; (0): none.
     """
 
 def choose_likeliest(

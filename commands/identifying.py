@@ -52,7 +52,7 @@ def identify(
     from ..identification.prediction import errors_of_models
     from ..identification.vehicle_fit.exports import EXPORTS
     from ..identification.vehicle_fit.geometry import parse_geometry
-    from ..identification.vehicle_fit.held_out import models_of
+    from ..identification.vehicle_fit.held_out import SIMPLEST, models_of
     from ..identification.vehicle_fit.identify import identify as fit
     from ..identification.vehicle_fit.report import (
         headline,
@@ -80,7 +80,7 @@ def identify(
     if unseen:
         with working("predicting"):
             parts_of = [[window] for window in windows[len(logs) :]]
-            models = identified.vehicle, models_of(identified.vehicle)[2]
+            models = identified.vehicle, models_of(identified.vehicle)[SIMPLEST]
             errors, simplest = errors_of_models(unseen, models, windows=parts_of)
         identified = replace(
             identified,

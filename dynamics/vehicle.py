@@ -166,6 +166,46 @@ class Uncertainty:
     command: Share = 0.0
 
 
+@dataclass(frozen=True)
+class ClosedLoop:
+    """How the flight loop of logged flights answers moments that nothing measures.
+
+    Rotor torques of such flights answer unmeasured moments, too, and this part of them turns
+    nothing. ``windwrench.identification.predict`` alone reads this section: a plant has its own
+    flight loop. About x and y the body turns by
+
+        share (gain m + flapping v' - stiffness tilt) + never_answered v' - (1 - share) damping w
+
+    with the model's angular acceleration ``m``, the angular velocity ``w`` and the velocity
+    ``v' = (v_y, -v_x)`` in body axes. The share is of measured moments in the mean square of all,
+    ``M^2 / (M^2 + unmeasured^2)``, M the RMS of ``m + flapping v'`` over the horizon. Yaw has a
+    gain and a damping.
+
+    Attributes:
+        roll_gain: of the model's angular acceleration about x.
+        pitch_gain: about y.
+        yaw_gain: about z.
+        unmeasured: rad/s2, standard deviation of unmeasured moments over inertia.
+        damping: 1/s, of roll and pitch.
+        stiffness: 1/s2, to level.
+        flapping: rad/s2/(m/s), moment of velocity, answered as the rotors' torque is.
+        never_answered: rad/s2/(m/s), the same, never answered.
+        yaw_damping: 1/s.
+    """
+
+    __pydantic_config__ = STRICT
+
+    roll_gain: NotNegative
+    pitch_gain: NotNegative
+    yaw_gain: NotNegative
+    unmeasured: NotNegative
+    damping: NotNegative
+    stiffness: NotNegative
+    flapping: Number
+    never_answered: Number
+    yaw_damping: NotNegative
+
+
 Standing = Literal["identified", "assumed", "refuted"]
 
 
@@ -232,6 +272,7 @@ class Vehicle:
         ceiling_z: m, world, height of the ceiling.
         uncertainty: how well these numbers are known.
         status: verdict of predictions of held-out flights on force, torque and single numbers.
+        closed_loop: the flight loop's reaction, for predictions alone; None: not known.
     """
 
     __pydantic_config__ = STRICT
@@ -258,6 +299,7 @@ class Vehicle:
     ceiling_z: Number = math.inf
     uncertainty: Uncertainty = Uncertainty()
     status: ModelStatus = ModelStatus()
+    closed_loop: ClosedLoop | None = None
 
     def __repr__(self) -> str:
         effects = ", ".join(effect.name for effect in self.effects) or "none"

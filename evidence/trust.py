@@ -4,14 +4,19 @@ from typing import Any
 
 from windwrench.evidence import measured_flights
 from windwrench.evidence.kept_results import kept
+from windwrench.evidence.nanodrone_benchmark import WAYS, mean
 from windwrench.evidence.probabilities import calibration
 
 
 def page() -> dict[str, Any]:
     """Return what the page shows."""
+    benchmark = kept("identify/nanodrone.json")
+    rows = [row for path in benchmark["paths"].values() for row in path]
     return {
-        "identified": kept("identify/flights.json"),
-        "benchmark": kept("identify/nanodrone.json"),
+        "benchmark": benchmark,
+        "predicted": {
+            way: [mean(rows, kind, way) for kind in ("after_half_a_second", "sums")] for way in WAYS
+        },
         "flights": measured_flights.shown(),
         "probabilities": calibration.shown(),
     }

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,7 @@ from ..estimator import UKFTuning
 from ..estimator.estimate import POSITION, QUATERNION, RATE, VELOCITY
 from ..estimator.innovations import innovations, pieces_of
 from ..estimator.ukf import default_covariance
+from ..runtime.arrays import Mask
 from ..runtime.errors import InputError
 from .causal_states import STATE, causal_states, scaled_tuning
 from .logs.commanded_speeds import with_commanded_speeds
@@ -78,7 +79,8 @@ def predict(
     are taken out of the log. No row after a start changes its state.
 
     A torque that held-out flights refuted (``vehicle.status``) leaves the body rate as at the
-    start. A refuted force leaves the velocity.
+    start, unless the vehicle states the flight loop's reaction (``closed_loop``): the body then
+    turns by this. A refuted force leaves the velocity.
 
     The start limits a prediction: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of angular
     velocity is 16 mm. See ``causal_states``.
@@ -154,7 +156,8 @@ def _flown(
     known = finite_rows(states)
     first = int(np.argmax(known))
     last_known = np.maximum.accumulate(np.where(known, np.arange(len(log.t)), 0))[first:]
-    if vehicle.status.torque == "refuted":
+    loop = vehicle.closed_loop
+    if vehicle.status.torque == "refuted" and loop is None:
         vehicle = replace(vehicle, inertia=_HEAVY * np.eye(3))
     models = loaded_model(vehicle)[0].copy()
     t = log.t[first:] - log.t[0]
@@ -163,7 +166,8 @@ def _flown(
     speeds, volts = (np.ascontiguousarray(x[first:]) for x in (log.rotor_speeds, voltage))
     keeps = vehicle.status.force == "refuted"
     flown = t, speeds, volts, states[last_known], starts - first
-    _core.predict_flight(models.ctypes.data, *flown, log.period, keeps, path)
+    reaction = np.array(() if loop is None else astuple(loop))
+    _core.predict_flight(models.ctypes.data, *flown, log.period, keeps, reaction, path)
     raise_errors()
     return path
 
@@ -183,10 +187,10 @@ def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float
         InputError: the vehicle has too many effects for a model.
     """
     try:
-        _, seen, (path,) = _predictions(log, [vehicle], segments, _HORIZON)
+        starts = logged_starts(log, vehicle, segments, _HORIZON)
     except InputError:
         return math.nan
-    off = path[:, -1, POSITION] - seen[:, -1, POSITION]
+    off = (starts.flown(vehicle) - starts.seen)[:, -1, POSITION]
     return math.sqrt(float(np.mean(np.sum(np.square(off), axis=1)))) if len(off) else math.nan
 
 
@@ -214,7 +218,10 @@ class PredictionErrors:
     def pooled(cls, parts: Sequence[PredictionErrors]) -> PredictionErrors:
         """Return the errors over all starts of several, at the samples of the slowest."""
         horizon = min((part.horizon for part in parts), key=len)
-        at = [np.searchsorted(part.horizon, horizon - 0.5 * part.horizon[0]) for part in parts]
+        at = [
+            np.minimum(np.searchsorted(of, horizon - 0.5 * of[0]), len(of) - 1)
+            for of in (part.horizon for part in parts)
+        ]
         of = [[part.model[:, i] for part, i in zip(parts, at, strict=True)]]
         of.append([part.still[:, i] for part, i in zip(parts, at, strict=True)])
         starts = [part.starts for part in parts]
@@ -227,7 +234,6 @@ def prediction_errors(
     vehicle: Vehicle,
     horizon_s: float = 0.5,
     windows: Sequence[Segments] | None = None,
-    start_by: Vehicle | None = None,
 ) -> PredictionErrors:
     """Return a model's prediction errors, beside the guess of an unchanged velocity.
 
@@ -240,13 +246,11 @@ def prediction_errors(
         vehicle: the predicting model, with its declared effects.
         horizon_s: s.
         windows: for each log, its parts: from and to in s after its start; None: all of it.
-        start_by: the vehicle of the filters for the starts, to compare models from the same ones;
-            None: the predicting one.
 
     Raises:
         InputError: no stretch of pose is long enough.
     """
-    return errors_of_models(logs, [vehicle], horizon_s, windows, start_by)[0]
+    return errors_of_models(logs, [vehicle], horizon_s, windows)[0]
 
 
 def errors_of_models(
@@ -254,30 +258,83 @@ def errors_of_models(
     vehicles: Sequence[Vehicle],
     horizon_s: float = 0.5,
     windows: Sequence[Segments] | None = None,
-    start_by: Vehicle | None = None,
 ) -> list[PredictionErrors]:
     """Return ``prediction_errors`` of several models of one vehicle, from the same starts: by the
-    first one's filters, where ``start_by`` names no other.
+    first one's filters.
 
     Raises:
         InputError: no stretch of pose is long enough.
     """
-    parts = []
     whole = [[(0.0, math.inf)]] * len(logs)
+    starts = []
     for log, spans in zip(logs, windows or whole, strict=True):
         first, last = log.t[[0, -1]].tolist()
         ends = [(first + begin, min(first + end, last)) for begin, end in spans]
-        flown = with_commanded_speeds(log, vehicles[0])
-        begun, seen, paths = _predictions(flown, vehicles, ends, horizon_s, start_by)
-        if len(begun):
-            horizon = log.period * np.arange(1, seen.shape[1] + 1)
-            still = _distances(_unchanged(begun, horizon), seen).mean(axis=0)
-            means = (_distances(path, seen).mean(axis=0) for path in paths)
-            parts.append([PredictionErrors(len(begun), horizon, mean, still) for mean in means])
-    if not parts:
+        starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
+    if not any(len(part.rows) for part in starts):
         names = ", ".join(log.name for log in logs)
         raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s")
+    return errors_at(starts, vehicles)
+
+
+def errors_at(
+    starts: Sequence[LoggedStarts], vehicles: Sequence[Vehicle]
+) -> list[PredictionErrors]:
+    """Return the errors of several models from the starts of flights, at least one of them."""
+    parts = []
+    for part in (part for part in starts if len(part.rows)):
+        horizon = part.log.period * np.arange(1, part.seen.shape[1] + 1)
+        still = _distances(part.unchanged, part.seen).mean(axis=0)
+        means = (_distances(part.flown(v), part.seen).mean(axis=0) for v in vehicles)
+        parts.append([PredictionErrors(len(part.rows), horizon, mean, still) for mean in means])
     return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class LoggedStarts:
+    """n starts of predictions in a log, and the flight at the m samples after each."""
+
+    log: FlightLog  # without declared sensing effects
+    states: Array  # (N, STATE) at each row of the log
+    rows: NDArray[np.intp]  # (n,) the starts'
+    seen: Array  # (n, m, STATE)
+
+    def those(self, keep: Mask | slice) -> LoggedStarts:
+        """Return some of the starts."""
+        return replace(self, rows=self.rows[keep], seen=self.seen[keep])
+
+    def flown(self, vehicle: Vehicle) -> Array:
+        """Return a model's states (n, m, STATE)."""
+        log = with_commanded_speeds(self.log, vehicle)
+        return _flown(log, vehicle, self.states, self.rows, self.seen.shape[1])
+
+    @property
+    def unchanged(self) -> Array:
+        """The states (n, m, STATE) with velocity and angular velocity as at the start."""
+        ahead = self.log.period * np.arange(1, self.seen.shape[1] + 1)
+        return _unchanged(self.states[self.rows], ahead)
+
+
+def logged_starts(
+    log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float
+) -> LoggedStarts:
+    """Return starts every 0.25 s whose horizon (s) lies in one of the segments, times (s) from and
+    to, by the filters of a vehicle.
+
+    Raises:
+        InputError: no stretch of pose is unbroken for 3 s.
+    """
+    log = undo_log_sensing(with_commanded_speeds(log, vehicle), vehicle)
+    ahead = max(1, round(horizon / log.period))
+    starts, seen = [], []
+    for piece in log_signals(log):
+        rows = _start_rows(log, piece, segments, horizon)
+        rows = rows[:: math.ceil(len(rows) / _MOST_STARTS) or 1]
+        starts.append(rows)
+        seen.append(_seen(piece, log.t[rows, None] + log.period * np.arange(1, ahead + 1)))
+    rows = np.concatenate(starts)
+    states = causal_states(log, vehicle) if rows.size else np.empty((len(log.t), STATE))
+    return LoggedStarts(log, states, rows, np.concatenate(seen))
 
 
 def _unchanged(begun: Array, ahead: Array) -> Array:
@@ -296,36 +353,18 @@ def _attitudes(states: Array) -> Rotation:
     return Rotation.from_quat(states[..., QUATERNION].reshape(-1, 4), scalar_first=True)
 
 
+def offsets(x: Array, y: Array) -> Array:
+    """Return the differences (..., 4, 3), in the order of ``QUANTITIES``, of states (..., STATE)
+    from others, an attitude's as a rotation vector.
+    """
+    turn = (_attitudes(y).inv() * _attitudes(x)).as_rotvec().reshape(*x.shape[:-1], 3)
+    off = x - y
+    return np.stack([off[..., POSITION], off[..., VELOCITY], turn, off[..., RATE]], axis=-2)
+
+
 def _distances(x: Array, y: Array) -> Array:
     """Return the distances (n, 4, m), in the order of ``QUANTITIES``, of states (n, m, STATE)."""
-    off = [np.linalg.norm(x[..., i] - y[..., i], axis=2) for i in (POSITION, VELOCITY, RATE)]
-    off.insert(2, (_attitudes(x).inv() * _attitudes(y)).magnitude().reshape(x.shape[:2]))
-    return np.stack(off, axis=1)
-
-
-def _predictions(
-    log: FlightLog,
-    vehicles: Sequence[Vehicle],
-    segments: Segments,
-    horizon: float,
-    start_by: Vehicle | None = None,
-) -> tuple[Array, Array, list[Array]]:
-    """Return the start states (n, STATE) of predictions, and the states (n, m, STATE) of flight and
-    of each model's prediction at the next m samples.
-    """
-    log = undo_log_sensing(log, vehicles[0])
-    ahead = max(1, round(horizon / log.period))
-    starts, seen = [], []
-    for piece in log_signals(log):
-        rows = _start_rows(log, piece, segments, horizon)
-        rows = rows[:: math.ceil(len(rows) / _MOST_STARTS) or 1]
-        starts.append(rows)
-        seen.append(_seen(piece, log.t[rows, None] + log.period * np.arange(1, ahead + 1)))
-    rows, target = np.concatenate(starts), np.concatenate(seen)
-    if not rows.size:
-        return np.empty((0, STATE)), target, [target for _ in vehicles]
-    states = causal_states(log, start_by or vehicles[0])
-    return states[rows], target, [_flown(log, v, states, rows, ahead) for v in vehicles]
+    return np.moveaxis(np.linalg.norm(offsets(x, y), axis=-1), 1, 2)
 
 
 def _start_rows(

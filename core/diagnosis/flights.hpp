@@ -69,17 +69,62 @@ constexpr double STEP_TOLERANCE = 0.1;  // of a period: a step so little too lon
 // of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
 constexpr int MOTION_STEPS = 4;
 constexpr int FLOWN = 13;  // numbers of a state: position, quaternion, velocity, rate
+constexpr double TINY = 1e-300;  // no share of nothing
 
 inline int rotor_steps(double length) {
   return std::max(1, int(std::ceil(length / LONGEST_ROTOR_STEP - STEP_TOLERANCE)));
 }
 
+// How a flight loop answers moments that nothing measures: angular accelerations for each unit of
+// velocity, tilt and rate. The reaction stands in for those moments, too, and is no part of a plant
+struct LoopReaction {
+  double gain[3];        // of the model's angular acceleration
+  double unmeasured;     // rad/s2, standard deviation of what nothing measures, about x or y
+  double damping;        // 1/s, of roll and pitch, where nothing is measured
+  double stiffness;      // 1/s2, to level, where all is measured
+  double flapping;       // rad/s2/(m/s), measured as the rotors' torque is
+  double never_answered; // rad/s2/(m/s)
+  double yaw_damping;    // 1/s
+};
+constexpr int REACTIONS = sizeof(LoopReaction) / sizeof(double);
+
+// Angular acceleration of a model, out (3), and the moment of velocity `across` (2) about x and y,
+// for each unit of its coefficient
+inline void measured_turning(const Model<double> &m, const double *x, const double R[3][3],
+                             double *out, double *across) {
+  const double none[3] = {}, *v = x + VELOCITY;
+  angular_acceleration(m.body, R, x + RATE, none, m.rotor_wrench, m.effect_wrench, out);
+  across[0] = R[0][1] * v[0] + R[1][1] * v[1] + R[2][1] * v[2];
+  across[1] = -(R[0][0] * v[0] + R[1][0] * v[1] + R[2][0] * v[2]);
+}
+
+// Put the torque of the loop's reaction into the model's effects; `shares` (2) of the moments about
+// x and y are measured
+inline void react(Model<double> &m, const LoopReaction &loop, const double *shares,
+                  const double *x, const double R[3][3]) {
+  const double *w = x + RATE, tilt[2] = {R[2][1], -R[2][0]};
+  double model[3], across[2], more[3];
+  measured_turning(m, x, R, model, across);
+  for (int i = 0; i < 2; i++) {
+    double measured = loop.gain[i] * model[i] + loop.flapping * across[i] - loop.stiffness * tilt[i];
+    more[i] = shares[i] * measured + loop.never_answered * across[i] -
+              (1 - shares[i]) * loop.damping * w[i] - model[i];
+  }
+  more[2] = (loop.gain[2] - 1) * model[2] - loop.yaw_damping * w[2];
+  for (int i = 0; i < 3; i++)
+    m.effect_wrench[3 + i] += row_times(m.body.inertia[i], more[0], more[1], more[2]);
+}
+
 // Move a state on by dt s; where `keeps_velocity`, no force acts
-inline void fly(Model<double> &m, double *x, double dt, bool keeps_velocity) {
-  double R[3][3], after[STATE];
+inline void fly(Model<double> &m, double *x, double dt, bool keeps_velocity,
+                const LoopReaction *loop, const double *shares) {
+  double R[3][3], after[STATE], effects[6];
   matrix_of(x + QUATERNION, R);
   apply_effects(m, x, R);
+  std::copy_n(m.effect_wrench, 6, effects);
+  if (loop) react(m, *loop, shares, x, R);
   move(m.body, x, R, m.rotor_wrench, m.effect_wrench, dt, after);
+  std::copy_n(effects, 6, m.effect_wrench);
   for (int i = 0; keeps_velocity && i < 3; i++) {
     after[VELOCITY + i] = x[VELOCITY + i];
     after[i] = x[i] + x[VELOCITY + i] * dt;
@@ -87,18 +132,41 @@ inline void fly(Model<double> &m, double *x, double dt, bool keeps_velocity) {
   std::copy_n(after, NIS, x);
 }
 
+// Drive a model's rotors over the periods after row k, each in `steps` steps of dt s; after each
+// step call `moved` with the period's number
+template <class Moved>
+void drive_ahead(Model<double> &m, const LoggedRotors &rotors, const double *t, int64_t k,
+                 double period, int64_t ahead, int steps, Moved moved) {
+  double between[4];
+  int64_t row = k;
+  for (int64_t i = 0; i < ahead; i++) {
+    double time = t[k] + double(i + 1) * period;
+    while (row < rotors.n - 2 && t[row + 1] < time) row++;
+    double share = std::min((time - t[row]) / (t[row + 1] - t[row]), 1.0);
+    for (int j = 0; j < 4; j++)
+      between[j] = (1 - share) * rotors.speeds[row][j] + share * rotors.speeds[row + 1][j];
+    double volts = (1 - share) * rotors.voltage[row] + share * rotors.voltage[row + 1];
+    for (int j = 0; j < steps; j++) {
+      drive(m, between, period / steps, volts);
+      moved(i);
+      m.time += period / steps;
+    }
+  }
+}
+
 // Run a model along a flight, for the memory of rotors and effects; let a copy of it go at each
-// start, a row, and write the copy's states path (starts, ahead, 13), a period apart
+// start, a row, and write the copy's states path (starts, ahead, 13), a period apart. The shares of
+// measured moments are of mean squares over the horizon, at the start's state
 inline void predict_flight(Model<double> &along, const LoggedRotors &rotors, const double *t,
                            const double (*states)[FLOWN], const int64_t *starts, int64_t count,
-                           double period, bool keeps_velocity, int64_t ahead,
-                           double (*path)[FLOWN]) {
+                           double period, bool keeps_velocity, const LoopReaction *loop,
+                           int64_t ahead, double (*path)[FLOWN]) {
   const int steps = rotor_steps(period);
-  const double dt = period / steps;
   int64_t at = 0;
   for (int64_t k = 0; k < rotors.n && at < count; k++) {
+    double R[3][3];
     if (k > 0) {
-      double R[3][3], length = t[k] - t[k - 1];
+      double length = t[k] - t[k - 1];
       int parts = rotor_steps(length);
       matrix_of(states[k - 1] + QUATERNION, R);
       for (int i = 0; i < parts; i++) {
@@ -108,25 +176,26 @@ inline void predict_flight(Model<double> &along, const LoggedRotors &rotors, con
       }
     }
     if (starts[at] != k) continue;
-    Model<double> m = along;
-    double x[STATE] = {}, between[4];
+    double x[STATE] = {}, shares[2] = {};
     std::copy_n(states[k], FLOWN, x);
-    int64_t row = k;
-    for (int64_t i = 0; i < ahead; i++) {
-      double time = t[k] + double(i + 1) * period;
-      while (row < rotors.n - 2 && t[row + 1] < time) row++;
-      double share = std::min((time - t[row]) / (t[row + 1] - t[row]), 1.0);
-      for (int j = 0; j < 4; j++)
-        between[j] = (1 - share) * rotors.speeds[row][j] + share * rotors.speeds[row + 1][j];
-      double volts = (1 - share) * rotors.voltage[row] + share * rotors.voltage[row + 1];
-      for (int j = 0; j < steps; j++) {
-        drive(m, between, dt, volts);
-        for (int part = 0; part < MOTION_STEPS; part++)
-          fly(m, x, dt / MOTION_STEPS, keeps_velocity);
-        m.time += dt;
-      }
-      std::copy_n(x, FLOWN, path[at * ahead + i]);
+    if (loop) {
+      Model<double> m = along;
+      double squares[2] = {}, least = double(ahead * steps) * std::pow(loop->unmeasured, 2) + TINY;
+      matrix_of(x + QUATERNION, R);
+      drive_ahead(m, rotors, t, k, period, ahead, steps, [&](int64_t) {
+        double model[3], across[2];
+        apply_effects(m, x, R);
+        measured_turning(m, x, R, model, across);
+        for (int i = 0; i < 2; i++) squares[i] += std::pow(model[i] + loop->flapping * across[i], 2);
+      });
+      for (int i = 0; i < 2; i++) shares[i] = squares[i] / (squares[i] + least);
     }
+    Model<double> m = along;
+    drive_ahead(m, rotors, t, k, period, ahead, steps, [&](int64_t i) {
+      for (int part = 0; part < MOTION_STEPS; part++)
+        fly(m, x, period / steps / MOTION_STEPS, keeps_velocity, loop, shares);
+      std::copy_n(x, FLOWN, path[at * ahead + i]);
+    });
     at++;
   }
 }

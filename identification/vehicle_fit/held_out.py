@@ -1,10 +1,15 @@
 """The test of a vehicle by data outside its fit.
 
 Coefficients are fitted anew without some segments of the flights, or without one flight, and
-predict the segments or flight left out. The set of parameters and the noise's spectrum stay. Four
-models predict: the vehicle; the vehicle with an unchanged body rate; thrust and drag with an
-unchanged body rate; and the vehicle's torques with an unchanged velocity. A part of the vehicle
-that predicts worse than no change is refuted.
+predict the segments or flight left out. The set of parameters and the noise's spectrum stay.
+Several models predict beside the guess that nothing changes: thrust and drag, the vehicle's force,
+its torque, both; and where torque is refuted, the flight loop's reaction in its place. A model
+stands if no quantity is worse than the better one of no change and of thrust and drag. The one with
+the least mean of these ratios is the vehicle.
+
+One flight shows no other one. Its blocks are predicted with a thrust off by the spread between days
+to either side, and it tells no reaction: on a slower or faster flight of a racer the reaction of one
+flight misses the body rate by up to 3 times the error of no change.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,11 +18,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...dynamics.effects import Role, get
-from ...dynamics.vehicle import ModelStatus, Standing, Vehicle
+from ...dynamics.vehicle import ClosedLoop, ModelStatus, Standing, Vehicle
 from ...runtime.arrays import Array, Index
 from ..logs.flight_log import Logs
-from ..prediction import QUANTITIES, PredictionErrors, errors_of_models
+from ..prediction import QUANTITIES, LoggedStarts, PredictionErrors, errors_at, logged_starts
 from .channels import MotionPiece
+from .closed_loop import LoopFit, fit_loop
+from .geometry import USUAL
 from .model import coefficients
 from .solve import VehicleFit, refitted
 from .spectra import Segment, edges_of
@@ -26,7 +33,11 @@ FOLDS = 3  # every third segment is held out at a time
 LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
 _ALIKE = 1.02  # ratio of errors: two models within it count as equal
 _DRAGS = (Role.ROTOR_DRAG, Role.BODY_DRAG, Role.LAG)
-_POSITION, _VELOCITY, _ATTITUDE, _RATE = range(len(QUANTITIES))
+_HORIZON = 0.5  # s
+OTHER_FLIGHTS = "flights_left_out"
+NO_CHANGE, SIMPLEST, WHOLE = "no change", "thrust and drag", "force and torque"
+# each model's errors of the parts held out, by where they are
+Errors = Mapping[str, Mapping[str, Sequence[PredictionErrors]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,67 +47,154 @@ class HeldOut:
     Attributes:
         errors: the vehicle's, by ``held_out_blocks`` and ``flights_left_out``.
         simplest: the same of thrust and drag with an unchanged body rate.
-        status: identified or refuted, of force and torque.
-        further: whether effects beside drag stand.
+        stands: the model of ``models_of`` that stands.
+        loop: the flight loop's reaction, where this stands in for the torque.
         why: figures of a refuted torque; else empty.
     """
 
     errors: Mapping[str, PredictionErrors]
     simplest: Mapping[str, PredictionErrors]
-    status: ModelStatus
-    further: bool = True
+    stands: str
+    loop: LoopFit | None = None
     why: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """Starts in the segments of a fit, and the parts held out in turn."""
+
+    starts: list[LoggedStarts]  # of each log
+    segment: list[Index]  # of each log's starts
+    folds: Mapping[str, Index]  # (s,) the part of each segment
+    refits: Mapping[str, list[VehicleFit]]  # without each part
+    spreads: tuple[float, ...]  # factors of the thrust
+
+    def errors(self, models: Callable[[VehicleFit, Index], Mapping[str, Vehicle]]) -> Errors:
+        """Return the errors of models made of each refit and the numbers of its segments."""
+        errors = {}
+        for where, fold in self.folds.items():
+            names: tuple[str, ...] = ()
+            parts: list[list[PredictionErrors]] = []
+            for held, part in zip(np.unique(fold), self.refits[where], strict=True):
+                starts = [
+                    of.those(fold[numbers] == held)
+                    for of, numbers in zip(self.starts, self.segment, strict=True)
+                ]
+                if any(len(of.rows) for of in starts):
+                    vehicles = models(part, np.flatnonzero(fold != held))
+                    names = tuple(vehicles)
+                    for share in self.spreads:
+                        of_day = [_with_thrust(v, share) for v in vehicles.values()]
+                        parts.append(errors_at(starts, of_day))
+            if parts:
+                errors[where] = dict(zip(names, zip(*parts, strict=True), strict=True))
+        return errors
+
+
+def _blocks(
+    pieces: Sequence[MotionPiece], logs: Logs, fit: VehicleFit, vehicle: Vehicle
+) -> _Blocks:
+    """Return the starts in the segments of a fit.
+
+    Raises:
+        InputError: too little would be left of the logs.
+    """
+    numbers: list[int] = []  # each segment's log
+    spans = []  # s, from and to
+    for piece in pieces:
+        edges = edges_of(len(piece.t), piece.period)
+        numbers += [piece.log] * (len(edges) - 1)
+        ends = piece.t[edges[:-1]].tolist(), piece.t[edges[1:] - 1].tolist()
+        spans += list(zip(*ends, strict=True))
+    number = np.array(numbers)
+    starts, segment = [], []
+    for i, log in enumerate(logs):
+        own = np.flatnonzero(number == i)
+        starts.append(logged_starts(log, vehicle, [spans[j] for j in own], _HORIZON))
+        begins = np.array([spans[j][0] for j in own])
+        at = np.searchsorted(begins, log.t[starts[-1].rows] + log.period, side="right")
+        segment.append(own[at - 1] if len(own) else np.empty(0, np.int64))
+    folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
+    folds = {where: fold for where, fold in folds.items() if len(np.unique(fold)) > 1}
+    refits = {w: refitted(fit, [fold != n for n in np.unique(fold)]) for w, fold in folds.items()}
+    spread = USUAL.command_spread if fit.drive.commands else USUAL.thrust_spread
+    spreads = (1.0,) if OTHER_FLIGHTS in folds else (1.0 - spread, 1.0 + spread)
+    return _Blocks(starts, segment, folds, refits, spreads)
+
+
+def _with_thrust(vehicle: Vehicle, share: float) -> Vehicle:
+    """Return a vehicle with a share of its thrust, by rotor speeds and by commands."""
+    curve = vehicle.motor_curve
+    if curve is not None:
+        curve = replace(curve, thrust=tuple(share * c for c in curve.thrust))
+    return replace(vehicle, k=share * vehicle.k, p=share * vehicle.p, motor_curve=curve)
 
 
 def held_out(
     pieces: Sequence[MotionPiece],
     logs: Logs,
     fit: VehicleFit,
-    vehicle_of: Callable[[VehicleFit], Vehicle],
+    vehicle_of: Callable[[VehicleFit, str], Vehicle],
 ) -> HeldOut:
     """Return the test by blocks of 5 s, and by several flights each predicted by the others; of
     logs without a pose, by the balance of forces and torques in the blocks alone.
 
+    Args:
+        pieces: of the logs.
+        logs: the flights.
+        fit: of all of them.
+        vehicle_of: the vehicle of a fit, with a reason to doubt its torque or an empty text.
+
     Raises:
         InputError: too little would be left of the logs.
     """
-    # each segment's log, and from and to, s after the log's start
-    number = []
-    spans = []
-    for piece in pieces:
-        t, edges = piece.t - logs[piece.log].t[0], edges_of(len(piece.t), piece.period)
-        number += [piece.log] * (len(edges) - 1)
-        spans += list(zip(t[edges[:-1]].tolist(), t[edges[1:] - 1].tolist(), strict=True))
-    turn = np.arange(len(number)) % FOLDS
     if not all(log.has_pose for log in logs):
-        return _by_balance(fit, turn)
-    errors = {}
-    for where, fold in {"held_out_blocks": turn, "flights_left_out": np.array(number)}.items():
-        names = np.unique(fold)
-        if len(names) < 2 and where == "flights_left_out":
-            continue
-        parts = []
-        for held, part in zip(names, refitted(fit, [fold != name for name in names]), strict=True):
-            windows: dict[int, list[tuple[float, float]]] = {}
-            for i in np.flatnonzero(fold == held):
-                windows.setdefault(number[i], []).append(spans[i])
-            of, models = [logs[i] for i in windows], models_of(vehicle_of(part))
-            parts.append(errors_of_models(of, models, windows=list(windows.values())))
-        errors[where] = [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
-    return judged(errors)
+        return _by_balance(fit, np.arange(len(fit.balance.segments)) % FOLDS)
+    blocks = _blocks(pieces, logs, fit, vehicle_of(fit, ""))
+    errors = blocks.errors(lambda part, _: models_of(vehicle_of(part, "")))
+    if not errors:
+        return HeldOut({}, {}, "")
+    stands, loop, why = standing(errors), None, ""
+    if models_of(vehicle_of(fit, ""))[stands].status.torque == "refuted":
+        why = _reason(errors)
+        if OTHER_FLIGHTS in errors:
+            loop = fit_loop(blocks.starts, blocks.segment, vehicle_of(fit, why))
+    if loop is not None:
+        fitted = loop
+
+        def reacting(part: VehicleFit, kept: Index) -> Mapping[str, Vehicle]:
+            return loops_of(vehicle_of(part, why), fitted.by(kept))
+
+        further = blocks.errors(reacting)
+        errors = {where: {**each, **further[where]} for where, each in errors.items()}
+        stands = standing(errors)
+    pooled = {
+        name: {where: PredictionErrors.pooled(each[name]) for where, each in errors.items()}
+        for name in (stands, SIMPLEST)
+    }
+    return HeldOut(pooled[stands], pooled[SIMPLEST], stands, loop, why)
 
 
-def models_of(vehicle: Vehicle) -> list[Vehicle]:
-    """Return the vehicle; with the body rate kept; thrust and drag with the body rate kept; and
-    with the velocity kept.
-    """
-    keeps_rate = replace(vehicle, status=ModelStatus(torque="refuted"))
-    return [
-        vehicle,
-        keeps_rate,
-        without_further(keeps_rate),
-        replace(vehicle, status=ModelStatus(force="refuted")),
-    ]
+def models_of(vehicle: Vehicle) -> dict[str, Vehicle]:
+    """Return models without a loop's reaction by their names, the simplest ones first."""
+    vehicle = replace(vehicle, closed_loop=None)
+    force = replace(vehicle, status=_status(True, False))
+    return {
+        NO_CHANGE: replace(vehicle, status=_status(False, False)),
+        SIMPLEST: without_further(force),
+        "force": force,
+        "torque": replace(vehicle, status=_status(False, True)),
+        WHOLE: replace(vehicle, status=_status(True, True)),
+    }
+
+
+def loops_of(vehicle: Vehicle, loop: ClosedLoop) -> dict[str, Vehicle]:
+    """Return the models with a loop's reaction in place of the torque, and the reaction alone."""
+    models = models_of(vehicle)
+    return {
+        f"{name}, closed loop": replace(models[name], closed_loop=loop)
+        for name in (NO_CHANGE, SIMPLEST, "force")
+    }
 
 
 def without_further(vehicle: Vehicle) -> Vehicle:
@@ -104,62 +202,48 @@ def without_further(vehicle: Vehicle) -> Vehicle:
     return vehicle.with_effects(*(e for e in vehicle.effects if get(e.name).role in _DRAGS))
 
 
-def judged(errors: Mapping[str, Sequence[PredictionErrors]]) -> HeldOut:
-    """Return what the errors of ``models_of`` say, each as in ``HeldOut.errors``.
+def standing(errors: Errors) -> str:
+    """Return the name of the model that stands by its errors at the horizon's end.
 
-    The simplest model that is not clearly worse stands. A torque that misses the body rate or the
-    attitude by more than no change is refuted, and so is one beside which thrust and drag alone
-    predict the motion better.
+    Blocks count by their mean, flights by the worst of them.
     """
-
-    def ends(model: int) -> Array:
-        return np.array([each[model].model[:, -1] for each in errors.values()])
-
-    still = np.array([each[0].still[:, -1] for each in errors.values()])
-    moving, turning = [_POSITION, _VELOCITY], [_ATTITUDE, _RATE]
-    simple = ends(2)
-    refuted = bool(
-        np.any(ends(0)[:, turning] > still[:, turning])
-        or np.any(ends(0)[:, moving] > _ALIKE * simple[:, moving])
-    )
-    chosen, further = 0, True
-    if refuted:
-        further = not np.any(ends(1)[:, moving] > _ALIKE * simple[:, moving])
-        chosen = 1 if further else 2
-    force = bool(np.any(ends(chosen)[:, moving] > still[:, moving]))
-    if force and not refuted:
-        chosen = 3
-    status = _status_of(force, refuted)
-    kept = {where: each[chosen] for where, each in errors.items()}
-    if force and refuted:
-        kept = {where: replace(of, model=of.still) for where, of in kept.items()}
-    simplest = {where: each[2] for where, each in errors.items()}
-    return HeldOut(kept, simplest, status, further, _reason(errors) if refuted else "")
+    worst, means = {}, {}
+    for name in next(iter(errors.values())):
+        bounds, ratios = [], []
+        for where, each in errors.items():
+            still, simple = _ends(each[SIMPLEST], still=True), _ends(each[SIMPLEST])
+            ratio = _ends(each[name]) / np.minimum(still, simple)
+            bounds.append(np.max(ratio if where == OTHER_FLIGHTS else ratio.mean(axis=0)))
+            ratios.append(np.log(ratio).mean())
+        worst[name], means[name] = float(max(bounds)), float(np.mean(ratios))
+    fine = [name for name, bound in worst.items() if bound <= _ALIKE]
+    return min(fine, key=means.__getitem__) if fine else min(worst, key=worst.__getitem__)
 
 
-def _status_of(force: bool, torque: bool) -> ModelStatus:
-    """Return the status of a vehicle whose force or torque is refuted."""
-    words: tuple[Standing, Standing] = ("identified", "refuted")
+def _ends(parts: Sequence[PredictionErrors], still: bool = False) -> Array:
+    """Return the errors (parts, 4) at the horizon's end, of a model or of no change."""
+    return np.array([(of.still if still else of.model)[:, -1] for of in parts])
+
+
+def _status(force: bool, torque: bool) -> ModelStatus:
+    words: tuple[Standing, Standing] = ("refuted", "identified")
     return ModelStatus(words[force], words[torque])
 
 
-def _reason(errors: Mapping[str, Sequence[PredictionErrors]]) -> str:
-    """Return the figures of the prediction with the largest ratio of body rates."""
-    where = max(errors, key=lambda w: errors[w][0].model[_RATE, -1] / errors[w][0].still[_RATE, -1])
-    of = errors[where][0]
-    what = where.replace("_", " ")
-    if of.model[_RATE, -1] > of.still[_RATE, -1]:
-        return (
-            f"not identifiable: torques predict the body rate of {what} worse than the guess that "
-            f"nothing changes ({of.model[_RATE, -1]:.2g} against {of.still[_RATE, -1]:.2g} rad/s "
-            f"after {of.horizon[-1]:.2g} s)"
-        )
-    without = errors[where][2].model[_POSITION, -1]
-    return (
-        f"not identifiable: torques predict the motion of {what} worse than thrust and drag with "
-        f"an unchanged body rate ({of.model[_POSITION, -1]:.2g} against {without:.2g} m after "
-        f"{of.horizon[-1]:.2g} s)"
-    )
+def _reason(errors: Errors) -> str:
+    """Return the figures of the torques' worst prediction."""
+    worst = 0.0
+    for where, each in errors.items():
+        whole, simple = (PredictionErrors.pooled(each[name]) for name in (WHOLE, SIMPLEST))
+        end, still, least = whole.model[:, -1], whole.still[:, -1], simple.model[:, -1]
+        for i, (what, unit) in enumerate(QUANTITIES.items()):
+            best = min(still[i], least[i])
+            if end[i] > worst * best:
+                worst = end[i] / best
+                other = "no change" if still[i] < least[i] else "thrust and drag alone"
+                figures = f"{what} of {where.replace('_', ' ')} worse than {other} "
+                figures += f"({end[i]:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
+    return f"not identifiable: torques predict the {figures}"
 
 
 def _by_balance(fit: VehicleFit, fold: Index) -> HeldOut:
@@ -176,7 +260,8 @@ def _by_balance(fit: VehicleFit, fold: Index) -> HeldOut:
         "not identifiable: torques leave more of the turning of held-out blocks than no model "
         f"({np.sum(left[3:]) / np.sum(total[3:]):.2g} times its power)"
     )
-    return HeldOut({}, {}, _status_of(force, torque), why=why if torque else "")
+    stands = (WHOLE, "torque", "force", NO_CHANGE)[force + 2 * torque]
+    return HeldOut({}, {}, stands, why=why if torque else "")
 
 
 def powers(
@@ -198,12 +283,14 @@ def powers(
     return left, total
 
 
-def warnings_of(tested: HeldOut) -> list[str]:
-    """Return a warning for a refuted force or torque: what predictions keep in its place."""
-    kept = {"force": "velocity", "torque": "body rate"}
+def warnings_of(vehicle: Vehicle) -> list[str]:
+    """Return a warning for a refuted force or torque: what predictions do in its place."""
+    kept = {"force": "keep the velocity", "torque": "keep the body rate"}
+    if vehicle.closed_loop is not None:
+        kept["torque"] = "follow the flight loop's reaction (closed_loop)"
     return [
-        f"warning: {part}: refuted by data outside the fit. Predictions keep the {kept[part]}; "
-        f"the file's numbers of it are assumptions"
-        for part in kept
-        if getattr(tested.status, part) == "refuted"
+        f"warning: {part}: refuted by data outside the fit. Predictions {instead}; the file's "
+        f"numbers of it are assumptions"
+        for part, instead in kept.items()
+        if getattr(vehicle.status, part) == "refuted"
     ]

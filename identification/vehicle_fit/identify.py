@@ -22,15 +22,16 @@ from ..logs.magnitudes import motor_doubts
 from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
 from .channels import MotionPiece, Pieces, Sources, pieces_of, rounding_step, speed_noise
+from .closed_loop import UNITS
 from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
 from .estimates import Estimates, thrust_of
 from .geometry import SPIN, Geometry
-from .held_out import HeldOut, held_out, warnings_of, without_further
+from .held_out import HeldOut, held_out, loops_of, models_of, warnings_of
 from .motors import motor_response
 from .parameters import FORCE_BIAS, FURTHER, first_model
 from .plausible import check_thrust
-from .result import IDENTIFIED, NOTHING, REFUTED, Estimate, Identified, told
+from .result import ASSUMED, IDENTIFIED, NOTHING, REFUTED, Estimate, Identified, told
 from .solve import Interval, VehicleFit, nearest_body, score_tests, solve
 from .spectra import BAND
 
@@ -47,6 +48,7 @@ _LEAST_VOLTAGE_RANGE = 0.03  # share: no exponent is fitted to a smaller range o
 _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
+LOOP = "predictions of half a second from states of the flight: no part of the vehicle"
 
 
 @one_thread()
@@ -118,15 +120,14 @@ def identify(
         )
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
 
-    def described(part: VehicleFit, doubt: str) -> tuple[dict[str, Estimate], Vehicle]:
+    def described(part: VehicleFit, why: str) -> tuple[dict[str, Estimate], Vehicle]:
         part, _ = nearest_body(part)
-        named = Estimates(part, sources, geometry, kept, hidden, doubt).say_all(pieces)
+        named = Estimates(part, sources, geometry, kept, hidden, doubt or why).say_all(pieces)
         return named, vehicle_of(name, part, named, geometry, logs, voltage, step, motors)
 
     report(0.9, "predicting what is held out")
-    tested = held_out(pieces, logs, fit, lambda part: described(part, doubt)[1])
-    notes += warnings_of(tested)
-    named, vehicle = described(fit, doubt or tested.why)
+    tested = held_out(pieces, logs, fit, lambda part, why: described(part, why)[1])
+    named, vehicle = described(fit, tested.why)
     if not commands:
         check_thrust(named["k"].value, vehicle.rotor_radius, logs[0].name)
     _, excess = nearest_body(fit)
@@ -136,6 +137,7 @@ def identify(
             "the sum of the other two, the most that a body has: something else turns the vehicle"
         )
     vehicle = _with_status(vehicle, named, tested)
+    notes += warnings_of(vehicle)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:
@@ -156,14 +158,29 @@ def identify(
 
 
 def _with_status(vehicle: Vehicle, named: dict[str, Estimate], tested: HeldOut) -> Vehicle:
-    """Return the vehicle with its status, and without refuted effects; mark these in ``named``."""
-    flown = vehicle if tested.further else without_further(vehicle)
+    """Return the vehicle that stands, with its status; mark what is refuted in ``named``, and add
+    the loop's coefficients.
+    """
+    models = models_of(vehicle)
+    if tested.loop is not None:
+        models |= loops_of(vehicle, tested.loop.loop)
+        stands = IDENTIFIED if "closed loop" in tested.stands else REFUTED
+        for size, (c, unit), value in zip(
+            tested.loop.deviations, UNITS.items(), tested.loop.theta, strict=True
+        ):
+            known = value, value - 1.96 * size, value + 1.96 * size
+            named[f"closed_loop {c}"] = Estimate(f"closed_loop {c}", *known, unit, stands, LOOP)
+    if not tested.stands:
+        for name, e in named.items():
+            if e.status == IDENTIFIED:
+                named[name] = replace(e, status=ASSUMED, how=f"{e.how}; nothing could be held out")
+    flown = models.get(tested.stands, vehicle)
     for effect in vehicle.effects:
         for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
             if effect not in flown.effects and name in named:
                 named[name] = replace(named[name], status=REFUTED, how=WITHOUT_EFFECTS)
     sources = {e.name: e.status for e in named.values() if e.status != NOTHING}
-    return replace(flown, status=replace(tested.status, coefficients=sources))
+    return replace(flown, status=replace(flown.status, coefficients=sources))
 
 
 def _lag_alone(pieces: Pieces, fit: VehicleFit) -> Estimate:

@@ -86,8 +86,16 @@ def headline(identified: Identified) -> str:
 
 def use_of(identified: Identified) -> str:
     """Return one sentence: the use of the vehicle's file for predictions."""
-    status = identified.vehicle.status
+    status, loop = identified.vehicle.status, identified.vehicle.closed_loop
     refuted = [part for part in ("force", "torque") if getattr(status, part) == "refuted"]
+    if status.force == "assumed":
+        return "Use: nothing could be held out, so that no number is confirmed. Fly longer."
+    if loop is not None:
+        kept = "an unchanged velocity" if "force" in refuted else "the vehicle for force"
+        return (
+            f"Use: {kept}, and the flight loop's reaction for the body rate (predict does both). "
+            "Plant and tasks fly assumed inertia and reaction torque."
+        )
     if len(refuted) == 2:
         return (
             "Use: assume an unchanged velocity and body rate; the vehicle predicts no better. Fly "

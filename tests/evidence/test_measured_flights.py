@@ -4,26 +4,13 @@ has, are diagnosed in ``tests/identification/test_measured_excerpts.py``.
 
 import numpy as np
 import pytest
-from numpy.random import default_rng
-from scipy.spatial.transform import Rotation
 
 from tests.support.data_paths import crazyswarm2_file, data_file
 from tests.support.parameters import mostly_slow
 from windwrench.dynamics import load_vehicle
 from windwrench.evidence.kept_results import DOCS, kept
 from windwrench.evidence.measured_flights import CARRIER, payload_vehicle, swing
-from windwrench.evidence.nanodrone_benchmark import (
-    BEGIN,
-    FITTED,
-    GRAVITY,
-    MASS,
-    STEPS,
-    Starts,
-    fit,
-    predicted,
-    section,
-    study,
-)
+from windwrench.evidence.nanodrone_benchmark import section, study
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import in_flight
 from windwrench.identification.logs.reading import read_log
@@ -59,37 +46,6 @@ def test_only_the_time_in_the_air_counts():
     assert 29 < flight.t[-1] - flight.t[0] < 33
     assert flight.position[:, 2].min() > 0.4
     assert len(flight.voltage) == len(flight.t) == len(flight.valid)
-
-
-def made_starts(count):
-    """Random states, and rotors that swing about hover; what follows is not known yet."""
-    rng = default_rng(1)
-    states = np.zeros((count, 13))
-    states[:, 6] = 1.0
-    speeds = np.full((count, STEPS + 1, 4), np.sqrt(MASS * GRAVITY / (4.0 * BEGIN.thrust)))
-    states[:, 3:6] = rng.normal(0.0, 1.0, (count, 3))
-    turn = Rotation.from_rotvec(rng.normal(0.0, 0.3, (count, 3)))
-    states[:, 6:10] = turn.as_quat(scalar_first=True)
-    states[:, 10:13] = rng.normal(0.0, 1.0, (count, 3))
-    speeds *= 1.0 + rng.normal(0.0, 0.05, (count, 1, 4))
-    speeds *= 1.0 + np.cumsum(rng.normal(0.0, 0.006, speeds.shape), axis=1)
-    flights = np.arange(count) % 4
-    return Starts(flights, states, speeds, np.zeros((count, STEPS, 13)), np.zeros((count, 6)))
-
-
-def test_known_coefficients_come_back():
-    rng = default_rng(2)
-    factors = rng.uniform(0.85, 1.15, len(FITTED))
-    true = BEGIN._replace(
-        **{n: f * getattr(BEGIN, n) for n, f in zip(FITTED, factors, strict=True)}
-    )
-    starts = made_starts(240)
-    truth = predicted(true, starts)
-    starts = starts._replace(truth=truth + rng.normal(0.0, 1e-3, truth.shape))
-    found, deviations = fit(starts, FITTED, BEGIN, each=1)
-    for name in FITTED:
-        assert getattr(found, name) == pytest.approx(getattr(true, name), rel=0.01), name
-        assert deviations[name] < 0.01 * abs(getattr(true, name))
 
 
 def test_the_page_shows_the_kept_results():

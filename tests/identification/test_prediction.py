@@ -24,6 +24,7 @@ from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
 from windwrench.identification.prediction import (
+    errors_of_models,
     nis_without_wrench_state,
     prediction_errors,
     rollout_error,
@@ -268,8 +269,7 @@ def test_a_turn_at_one_rate_is_no_change():
 def test_models_are_compared_from_the_same_starts(clean):
     """A vehicle with 1,000 kg m2 keeps the body rate of its start: of another's filters here."""
     heavy = replace(VEHICLE, inertia=1e3 * np.eye(3))
-    own = prediction_errors([clean], VEHICLE)
-    kept = prediction_errors([clean], heavy, start_by=VEHICLE)
+    own, kept = errors_of_models([clean], [VEHICLE, heavy])
     assert_array_equal(kept.still, own.still)
     assert kept.model[3] == pytest.approx(own.still[3], rel=1e-3)
     assert (own.model[:, -1] < kept.model[:, -1]).all()

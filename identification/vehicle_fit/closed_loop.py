@@ -1,0 +1,160 @@
+"""The flight loop's reaction, fitted to predictions of half a second.
+
+The loss is the mean distance of prediction and flight in ``QUANTITIES``, each against the distance
+where nothing changes. Gauss-Newton minimises the mean norm, with norms weighted by their inverse in
+turn.
+"""
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields, replace
+
+import numpy as np
+
+from ...dynamics.vehicle import ClosedLoop, Vehicle
+from ...runtime.arrays import Array, Index
+from ..prediction import LoggedStarts, offsets
+
+UNITS = dict(
+    zip(
+        (f.name for f in fields(ClosedLoop)),
+        ("1", "1", "1", "rad/s2", "1/s", "1/s2", "rad/s2/(m/s)", "rad/s2/(m/s)", "1/s"),
+        strict=True,
+    )
+)
+_EITHER_SIGN = np.array([name in ("flapping", "never_answered") for name in UNITS])
+# a loop that damps within .2 s; the unmeasured moments' start is the model's own turning
+_BEGIN = ClosedLoop(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
+_SIZES = np.array([0.5, 0.5, 0.5, 30.0, 10.0, 20.0, 10.0, 3.0, 5.0])  # of the coefficients
+# share of the loss: the prior's at three sizes from the start. Coefficients without excitation stay
+_PRIOR = 0.003
+_STARTS = 500  # predictions of a fit, spread over the flights
+_TIMES = 5  # compared in a horizon
+_ROUNDS = 15
+_SETTLED = 1e-4  # share of the loss: a smaller fall ends the search
+_LEAST = 1e-6  # of the errors where nothing changes: smaller ones count as this
+_STEP = 1e-3  # of a coefficient's size, of finite differences
+
+
+@dataclass(frozen=True, eq=False)
+class LoopFit:
+    """The likeliest coefficients, and the normal equations of g groups of starts, the prior's last.
+
+    Attributes:
+        theta: (9,) in the order of ``ClosedLoop``.
+        names: (g,) of the groups; -1: the prior.
+        grams: (g, 9, 9).
+        gradients: (g, 9).
+    """
+
+    theta: Array
+    names: Index
+    grams: Array
+    gradients: Array
+
+    def by(self, names: Index) -> ClosedLoop:
+        """Return the loop by some groups alone: one step of Gauss-Newton from here."""
+        kept = np.isin(self.names, names) | (self.names < 0)
+        gram, gradient = self.grams[kept].sum(axis=0), self.gradients[kept].sum(axis=0)
+        return _loop(_moved(self.theta, gram, gradient, 0.0))
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The loop by all starts."""
+        return _loop(self.theta)
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations (9,), by the scatter of the groups (a sandwich)."""
+        inverse = np.linalg.inv(self.grams.sum(axis=0))
+        return np.sqrt(np.diag(inverse @ self.gradients.T @ self.gradients @ inverse))
+
+
+def _loop(theta: Array) -> ClosedLoop:
+    return ClosedLoop(*theta.tolist())
+
+
+def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
+    """Return the coefficients after a damped step, those of one sign not beyond 0."""
+    damped = gram + damping * np.diag(np.diag(gram))
+    moved = theta - np.linalg.solve(damped, gradient)
+    return np.where(_EITHER_SIGN, moved, np.maximum(moved, 0.0))
+
+
+def fit_loop(
+    starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: Vehicle
+) -> LoopFit | None:
+    """Return the loop of flights with starts, each of a group; None without a start.
+
+    Args:
+        starts: of each flight.
+        groups: (n,) of each flight's starts.
+        vehicle: with the force, inertia and rotors that stay.
+    """
+    every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
+    thin = [part.those(slice(None, None, every)) for part in starts]
+    group = np.concatenate([numbers[::every] for numbers in groups])
+    if not len(group):
+        return None
+    still = _compared(thin, [part.unchanged for part in thin])
+    sizes = np.linalg.norm(still[:, -1], axis=-1).mean(axis=0)[:, None]
+
+    def off(theta: Array) -> Array:
+        model = replace(vehicle, closed_loop=_loop(theta))
+        return _compared(thin, [part.flown(model) for part in thin]) / sizes
+
+    begin = np.array(astuple(_BEGIN))
+    begin[list(UNITS).index("unmeasured")] = _turning(thin, vehicle)
+    theta, e, damping = begin, off(begin), 1e-3
+    for _ in range(_ROUNDS):
+        norms = np.linalg.norm(e, axis=-1)
+        least = np.maximum(0.5 * np.median(norms, axis=(0, 1)), _LEAST)
+        root = 1.0 / np.sqrt(np.maximum(norms, least))[..., None]
+        moves = _STEP * np.diag(_SIZES)
+        changes = [(root * (off(theta + move) - e)).reshape(len(e), -1) for move in moves]
+        slopes = np.stack(changes, axis=1) / (_STEP * _SIZES)[:, None]  # (n, 9, ..)
+        residual = (root * e).reshape(len(e), -1, 1)
+        strength = _PRIOR * float(np.sum(np.square(residual))) / np.square(3.0 * _SIZES)
+        grams = [slopes @ np.swapaxes(slopes, 1, 2), np.diag(strength)[None]]
+        gradients = [(slopes @ residual)[..., 0], (strength * (theta - begin))[None]]
+        gram, gradient = (np.concatenate(each).sum(axis=0) for each in (grams, gradients))
+        before = loss = _loss(e, theta - begin)
+        for _ in range(6):
+            tried = _moved(theta, gram, gradient, damping)
+            there = off(tried)
+            loss = _loss(there, tried - begin)
+            if loss < before:
+                theta, e, damping = tried, there, max(damping / 6.0, 1e-6)
+                break
+            damping *= 8.0
+        if before - loss < _SETTLED * before:
+            break
+    names = np.unique(group)
+    of = np.array([group == name for name in names], dtype=np.float64)
+    return LoopFit(
+        theta,
+        np.append(names, -1),
+        np.concatenate([np.tensordot(of, grams[0], 1), grams[1]]),
+        np.concatenate([of @ gradients[0], gradients[1]]),
+    )
+
+
+def _loss(e: Array, away: Array) -> float:
+    """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (9,)."""
+    prior = 1.0 + _PRIOR * float(np.sum(np.square(away / (3.0 * _SIZES))))
+    return prior * float(np.linalg.norm(e, axis=-1).mean())
+
+
+def _turning(starts: Sequence[LoggedStarts], vehicle: Vehicle) -> float:
+    """Return the model's angular acceleration (rad/s2) about x and y, RMS at the starts."""
+    speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in starts])
+    torque = vehicle.rotor_wrench(speeds)[:, 1:3]
+    return float(np.sqrt(np.mean(np.square(torque / np.diag(vehicle.inertia)[:2]))))
+
+
+def _compared(starts: Sequence[LoggedStarts], paths: Sequence[Array]) -> Array:
+    """Return the differences (n, _TIMES, 4, 3) of paths (.., m, STATE) from the flight."""
+    parts = []
+    for part, path in zip(starts, paths, strict=True):
+        at = np.rint(np.arange(1, _TIMES + 1) / _TIMES * path.shape[1]).astype(int) - 1
+        parts.append(offsets(path[:, at], part.seen[:, at]))
+    return np.concatenate(parts)

@@ -1,0 +1,76 @@
+"""The flight loop's reaction: in predictions, in a vehicle's file, and fitted."""
+
+from dataclasses import astuple, replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests.support.flown import recorded
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import ClosedLoop, ModelStatus
+from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
+from windwrench.identification import predict
+from windwrench.identification.prediction import logged_starts
+from windwrench.identification.vehicle_fit.closed_loop import UNITS, fit_loop
+
+CRAZYFLIE = load_vehicle("crazyflie")
+STATUS = ModelStatus("identified", "refuted")
+WHOLE = ClosedLoop(1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+DAMPED = replace(WHOLE, yaw_gain=0.0, unmeasured=1e6, damping=5.0, yaw_damping=3.0)
+LOOP = ClosedLoop(0.4, 0.6, 0.3, 25.0, 6.0, 15.0, 4.0, 1.5, 5.0)
+
+
+@pytest.fixture(scope="module")
+def log():
+    return recorded("excite", 15.0, vehicle=CRAZYFLIE)
+
+
+def with_loop(loop):
+    return replace(CRAZYFLIE, status=STATUS, closed_loop=loop)
+
+
+def test_a_loop_that_answers_nothing_is_the_vehicle(log):
+    plain, whole = (predict(log, v, every=50) for v in (CRAZYFLIE, with_loop(WHOLE)))
+    assert_allclose(whole.position, plain.position, atol=1e-9)
+    assert_allclose(whole.angular_velocity, plain.angular_velocity, atol=1e-9)
+
+
+def test_a_body_of_which_nothing_is_measured_is_damped(log):
+    path = predict(log, with_loop(DAMPED), every=50)
+    after = path.period * np.arange(1, path.velocity.shape[1] + 1)[:, None]
+    decay = np.exp(-after * [5.0, 5.0, 3.0])
+    first = path.angular_velocity[:, :1] / decay[0]
+    assert_allclose(path.angular_velocity, first * decay, atol=0.01 * abs(first).max())
+
+
+def test_tilt_and_velocity_turn_the_body_level(log):
+    """About x and y at rest: the stiffness against a tilt, and the moment of the velocity."""
+    loop = replace(WHOLE, roll_gain=0.0, pitch_gain=0.0, yaw_gain=0.0, stiffness=2.0, flapping=3.0)
+    state = np.zeros((len(log.t), 13))
+    state[:, 3] = np.cos(0.05)
+    state[:, 4] = np.sin(0.05)  # 0.1 rad about x
+    state[:, 7] = 1.0
+    path = predict(log, with_loop(loop), 0.02, 100, state)
+    first = path.angular_velocity[:, 0] / path.period
+    expected = np.array([-2.0 * np.sin(0.1), -3.0, 0.0])
+    assert_allclose(first, np.broadcast_to(expected, first.shape), rtol=0.05, atol=0.05)
+
+
+def test_a_file_keeps_the_loop():
+    again = parse_vehicle(dump_vehicle(with_loop(LOOP)))
+    assert again.closed_loop == LOOP
+    assert again.status.torque == "refuted"
+
+
+def test_a_known_loop_comes_back(log):
+    starts = logged_starts(log, CRAZYFLIE, [(log.t[0], log.t[-1])], 0.5)
+    made = replace(starts, seen=starts.flown(with_loop(LOOP)))
+    groups = np.arange(len(made.rows)) // 8
+    fit = fit_loop([made], [groups], with_loop(None))
+    found = dict(zip(UNITS, astuple(fit.loop), strict=True))
+    for name, value in zip(UNITS, astuple(LOOP), strict=True):
+        assert found[name] == pytest.approx(value, rel=0.1, abs=0.05), name
+    without = fit.by(np.unique(groups)[2:])
+    assert astuple(without) == pytest.approx(astuple(fit.loop), rel=0.1, abs=0.1)
+    assert (fit.deviations > 0.0).all()
