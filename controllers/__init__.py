@@ -1,4 +1,4 @@
-"""Acting: the inner flight loop, and controllers from the estimated wrench to a velocity."""
+"""The inner flight loop, and controllers that turn the estimated wrench into commands."""
 
 from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Ratio
 from .preview import Oracle

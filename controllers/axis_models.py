@@ -1,14 +1,14 @@
 """The flight loop and its vehicle near hover, one axis at a time, as linear systems.
 
-An acceleration ``u`` beside the flight loop's own, an external force ``f`` and an external torque
+An acceleration ``u`` added to the flight loop's, an external force ``f`` and an external torque
 ``tau`` move a horizontal axis as
 
     x'' = g tilt + f / m        tilt'' = alpha + tau / J        alpha' = (wanted - alpha) / lag
     wanted = k_attitude (a / g - tilt) - k_rate tilt'
     a = u + k_position e + k_velocity de/dt + k_integral (integral of e)
 
-``e`` is the reference less the place: the equations of ``controllers.flight`` for small angles,
-with motors of first order. Upwards the rotors make ``a`` itself, behind the same lag.
+``e`` is the reference less the place. These are the equations of ``controllers.flight`` for small
+angles, with first-order motors. Along the vertical the rotors produce ``a`` behind the same lag.
 """
 
 from dataclasses import dataclass

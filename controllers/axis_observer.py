@@ -34,8 +34,8 @@ class WrenchProcess:
 
 @dataclass(frozen=True, eq=False)
 class AxisFilter:
-    """The model of a decision and its Kalman gains. The states (n,) are those of the axis, wrench
-    (k,), estimated wrench (k,), and the bias where there is one.
+    """The model of a decision and its Kalman gains. The states (n,) are the axis's, the wrench
+    (k,), the estimated wrench (k,), and the bias, if any.
     """
 
     A: Array  # (n, n)
@@ -60,8 +60,8 @@ def axis_filter(
         wrench: the external wrench.
         model: m/s2 and rad/s2 that the model lacks, per root of a second.
         noise: standard deviations of the observed quantities: the first states of the axis, then
-            the estimated wrench (k,), then, where there is a bias, the accelerometer less the
-            rotors (m/s2).
+            the estimated wrench (k,), then, with a bias, the accelerometer less the rotors
+            (m/s2).
         bias: m/s2, standard deviation of the accelerometer's bias; 0: no accelerometer.
     """
     n, k = axis.D.shape
@@ -102,9 +102,9 @@ class AxisObserver:
         self.state, self._count = np.zeros(len(self.model.A)), 0
 
     def update(self, action: float, seen: Array, turned: float = 0.0) -> Array:
-        """Return the states (n,) after a decision at ``action`` and what is ``seen`` then.
+        """Return the states (n,) after a decision at ``action`` and the observation ``seen``.
 
-        The reference has ``turned`` by so much in the meantime: rad of its tilt, upwards m/s2.
+        ``turned`` is the reference's change since the last decision: tilt in rad, upwards m/s2.
         """
         model, x = self.model, self.state
         if self._count:

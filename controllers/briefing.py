@@ -1,5 +1,5 @@
-"""A designed controller's knowledge before its flight: its own vehicle, its own sensors, the kind
-of fan, and for some the fan's family of motions.
+"""A designed controller's knowledge before its flight: vehicle, sensors, kind of fan, and for some
+controllers the fan's family of motions.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def _along(value: ArrayLike, axis: int) -> float:
 
 @dataclass(frozen=True)
 class FilterNoise:
-    """The wrench filter's numbers of noise: standard deviations in one of its steps. They settle
-    how fast its estimate follows the truth.
+    """The wrench filter's noise: standard deviations in one step. They determine how fast the
+    estimate follows the truth.
     """
 
     torque: float = 0.03  # Nm about z, error of the rotor model, new each step
@@ -56,8 +56,8 @@ class FilterNoise:
 
 @dataclass(frozen=True)
 class Air:
-    """Uncertainty of the wrench beside the mean jet: the actuators' own unmodelled disturbance and
-    the gusts of the jet, as the standard scenarios have them.
+    """Uncertainty of the wrench beyond the mean jet, in the standard scenarios: the actuators'
+    unmodelled disturbance and the jet's gusts.
     """
 
     disturbance_force: float = 0.03  # N, standard deviation along each axis

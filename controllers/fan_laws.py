@@ -20,7 +20,7 @@ Array = NDArray[np.floating[Any]]
 
 
 class FanLaw:
-    """Shared by the laws: a command within its limits, and no memory unless a law says so."""
+    """Base of the laws: limits the command, without a memory."""
 
     def __post_init__(self) -> None:
         self.reset()
@@ -30,7 +30,7 @@ class FanLaw:
         self._last: float | None = None
 
     def _rate(self, x: float) -> float:
-        """Return the change of ``x`` since the last decision, a second; at first none."""
+        """Return the rate of ``x`` since the last decision, per second; zero at first."""
         last, self._last = self._last, x
         return 0.0 if last is None else (x - last) / DECISION_PERIOD
 
@@ -58,7 +58,7 @@ class Hover(FanLaw):
 @dataclass(eq=False)
 class Admittance(FanLaw):
     """The admittance controller of McKinnon and Schoellig (2016): velocity in proportion to the yaw
-    torque, and where a second axis is commanded, to the pitch torque.
+    torque and, with a second commanded axis, to the pitch torque.
 
     ``gain`` times the jet's largest torque is the largest speed of a fan followed by the law.
     """
@@ -75,8 +75,8 @@ class Admittance(FanLaw):
 
 @dataclass(eq=False)
 class Ratio(Admittance):
-    """Velocity in proportion to ``tau_z / f_x``: the ratio grows with the offset where ``tau_z``
-    alone falls off again.
+    """Velocity in proportion to ``tau_z / f_x``. The ratio grows with the offset, even far out
+    where ``tau_z`` falls again.
     """
 
     gain: float = 8.0  # m/s per m, as ``gain_z``
@@ -92,8 +92,8 @@ class Ratio(Admittance):
 class Lead(FanLaw):
     """Ratio with derivative: ``x = tau_z / max(f_x, least_force)``, ``u = -(gain x + lead dx/dt)``.
 
-    The rate is taken from one decision to the next. The rate makes good for part of the filter's
-    lag, and a vehicle behind turns round earlier.
+    The rate is the difference between decisions. It compensates a part of the filter's lag, so the
+    vehicle turns round earlier.
     """
 
     gain: float = 11.35  # 1/s
@@ -111,8 +111,8 @@ class AdmittancePID(FanLaw):
     """The admittance law with integral and lead: ``u = -(gain tau_z + integral S + lead
     dtau_z/dt)``, ``S`` the integral of ``tau_z``.
 
-    The integral follows an evenly moving fan without the steady offset of a proportional law. It
-    stops while the command is at its bound and would grow further (no windup).
+    The integral follows an evenly moving fan without the steady offset of a proportional law. The
+    integral stops while the command is at its bound (no windup).
     """
 
     gain: float = 20.0  # m/s per Nm

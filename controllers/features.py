@@ -49,7 +49,7 @@ QUANTITIES: dict[str, Quantity] = {
 
 @dataclass(frozen=True)
 class Features:
-    """The quantities of one frame, each with its scale, and how many frames a policy sees.
+    """The quantities of one frame with their scales, and the number of frames of a policy.
 
     Raises:
         InputError: an unknown or repeated quantity, no frame, a scale of zero or less.
@@ -79,7 +79,7 @@ class Features:
 
     @property
     def size(self) -> int:
-        """How many numbers a policy sees."""
+        """Number of a policy's inputs."""
         return self.history * len(self.frame)
 
     def frames(self, observations: ArrayLike) -> Array:

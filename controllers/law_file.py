@@ -28,7 +28,7 @@ class LawFile:
 
 
 def is_law_file(name: str) -> bool:
-    """Return whether a controller's name is that of a YAML file."""
+    """Return whether a controller's name is a YAML file."""
     return name.endswith((".yaml", ".yml"))
 
 
@@ -48,8 +48,8 @@ def read_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> La
         raise InputError(f"{name}: task: a law of {stated.task}; expected one of {task}")
     if stated.law not in laws:
         raise unknown_name("law", stated.law, laws, name)
-    known = inspect.signature(laws[stated.law]).parameters
+    gains = inspect.signature(laws[stated.law]).parameters
     for gain in stated.gains:
-        if gain not in known:
-            raise unknown_name("gain", gain, known, f"{name}: {stated.law}")
+        if gain not in gains:
+            raise unknown_name("gain", gain, gains, f"{name}: {stated.law}")
     return stated

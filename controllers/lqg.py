@@ -1,8 +1,8 @@
-"""The optimal law of the tasks in the wind, with the estimated wrench as its measure of wind: a
-linear-quadratic Gaussian regulator (LQG).
+"""A linear-quadratic Gaussian regulator (LQG) for the tasks in the wind, with the estimated wrench
+as a measurement of the wind.
 
-It commands the flight loop by the oracle's (``preview``) model of the loop (``axis_models``), and
-by the same weight of a position error. Only the two laws' knowledge differs.
+The regulator has the oracle's (``preview``) model of the flight loop (``axis_models``), and the
+same weight of a position error. The two laws differ in their knowledge alone.
 """
 
 from collections.abc import Mapping
@@ -51,8 +51,8 @@ class LQG:
 
     Everything but ``effort`` describes the wind, the filter and the sensors. The numbers were
     searched on six validation episodes each of WindHover's base and noisy and WindTrajectory's
-    base, for the RMSE after 3 s. The estimated force alone is worth nothing: rotors, pose and
-    accelerometer show what the filter knows (40 fresh episodes: +0.1 to +0.6 % without it).
+    base, for the RMSE after 3 s. The estimated force alone adds nothing: rotors, pose and
+    accelerometer have the same information (40 fresh episodes: +0.1 to +0.6 % without).
 
     Raises:
         InputError: a number is not above zero.

@@ -1,6 +1,6 @@
 """The observation of controllers, and their action.
 
-One frame is (8,): estimated external force x, y, z (N) and torque x, y, z (Nm), world. Then the own
+One frame is (8,): estimated external force x, y, z (N) and torque x, y, z (Nm), world. Then the
 estimated velocity along y (m/s), and the last command (m/s). The action is (1,): the commanded
 velocity along the world's y.
 """

@@ -1,4 +1,4 @@
-"""Controllers in files of a user's own: ``my_laws.py:Gentle``."""
+"""Controllers in a user's files: ``my_laws.py:Gentle``."""
 
 import inspect
 from typing import Any
@@ -10,8 +10,7 @@ _WHAT = "a Python file with a class whose objects have __call__(observation, inf
 
 
 def load_controller(name: str) -> Any:
-    """Return a new controller from ``FILE.py:CLASS``; the class may be left out where the file has
-    only one.
+    """Return a new controller from ``FILE.py:CLASS``, or from ``FILE.py`` with one class.
 
     Raises:
         InputError: no such file or class, an error while it runs, or no controller.

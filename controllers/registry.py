@@ -1,5 +1,5 @@
-"""The controllers of each task by their names: designed laws, their gains from a search (with
-scenario and command in ``tuned.yaml``), and the kit's trained policies.
+"""The controllers of each task by name: designed laws, tuned gains (``tuned.yaml``, with scenario
+and command), and the kit's trained policies.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ STANDARD_SCENARIO = "base"  # whose gains a law called no more than tuned has
 
 
 class Controller(Protocol):
-    """From an observation to a command; ``info`` is the environment's, for controllers that see the
-    truth.
+    """Turns an observation into a command; ``info`` is the environment's, for controllers that read
+    true values.
 
     A method ``brief(briefing)`` gets vehicle, sensors and fan (``controllers.briefing.Briefing``)
     before ``reset``. A controller without a memory needs no ``reset``.
@@ -121,7 +121,7 @@ _AS = {"WindTrajectory": "WindHover"}
 def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
     """Return a new ``Controller`` of a task by its name, by a law's YAML file, or of a
     Python file (``FILE.py:CLASS``). In tasks other than FanTracking a law has its tuned gains,
-    where there are some; those of a file come before.
+    if any; a file's gains replace them.
 
     Raises:
         InputError: no task or no controller has this name, or a file holds none.
@@ -151,5 +151,5 @@ def shipped_policies(task: str = STANDARD_TASK) -> dict[str, Path]:
     folder = Path(str(resources.files(__package__))).parent / "training" / "policies"
     start = "" if task == STANDARD_TASK else f"{task}-"
     files = (folder / "tasks" if start else folder).glob(f"{start}*.npz")
-    kept = (path for path in files if path.with_suffix(".json").exists())
-    return {path.stem.removeprefix(start): path for path in sorted(kept)}
+    weights = (path for path in files if path.with_suffix(".json").exists())
+    return {path.stem.removeprefix(start): path for path in sorted(weights)}

@@ -1,5 +1,5 @@
-"""A tracker's knowledge of its own sensing: the jet's map, the wrench filter's lag, the coloured
-noise, and its own yaw, in arrays for the core.
+"""A tracker's model of its sensing: the jet's map, the wrench filter's lag, the coloured noise, and
+the vehicle's yaw, as arrays for the core.
 """
 
 from functools import lru_cache
@@ -74,11 +74,11 @@ def sensor_model(briefing: Briefing) -> SensorModel:
 
 
 class Sensing:
-    """One vehicle's own motion through an episode, and the weights of places of the fan.
+    """A vehicle's motion through an episode, and the likelihoods of places of the fan.
 
-    Places are along y from where the vehicle was at the first observation: the vehicle's is the
-    integral of its estimated velocity, with a drift of millimetres. Its yaw rate, of the stations
-    against the jet, follows from the flight loop's yaw under the estimated torque.
+    Places are along y, from the vehicle's place at the first observation. The vehicle's place is
+    the integral of the estimated velocity, with a drift of millimetres. The yaw rate follows from
+    the flight loop's yaw under the estimated torque.
     """
 
     def __init__(self, model: SensorModel) -> None:
@@ -101,12 +101,12 @@ class Sensing:
         comes first.
         """
         axes = observation[TORQUE_Z], observation[FORCE_X], observation[FORCE_Y]
-        own = np.array([self.own, self.velocity, self._yaw[2]])
-        seen, known = np.array(axes, dtype=np.float64), self.model[:-1]
-        _core.weigh(place, level, memory, own, seen, *known, self.count - 1, out)
+        motion = np.array([self.own, self.velocity, self._yaw[2]])
+        seen, tables = np.array(axes, dtype=np.float64), self.model[:-1]
+        _core.weigh(place, level, memory, motion, seen, *tables, self.count - 1, out)
 
     def look(self, observation: NDArray[np.floating]) -> None:
-        """Carry the own motion on to this observation (8,)."""
+        """Integrate the vehicle's motion up to this observation (8,)."""
         torque, velocity = float(observation[TORQUE_Z]), float(observation[VELOCITY_Y])
         if self.count == 0:
             for _ in range(SETTLED):

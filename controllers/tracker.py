@@ -1,11 +1,11 @@
-"""Trackers: controllers with a belief of the fan's place and motion, flying along.
+"""Trackers: controllers that estimate the fan's place and motion, and follow the fan.
 
-Each is a particle filter. A particle is a path of the fan. Its expected estimate is the jet's mean
-at the vehicle's stations (effect ``fan_jet``) behind the filter's own lag. The difference to the
-estimate is coloured noise of known covariance (``sensor_model``). Nothing is known but the
-observation and the ``briefing``: the declared vehicle, the fan, the pose's noise and the filter's
-tuning, and how much a vehicle of this size is disturbed as a rule. The random numbers come from a
-generator of the controller's own, which begins anew with every episode.
+Each tracker is a particle filter. A particle is a path of the fan. Its expected estimate is the
+jet's mean at the vehicle's stations (effect ``fan_jet``) behind the filter's own lag. The
+difference to the estimate is coloured noise of known covariance (``sensor_model``). A tracker knows
+the observation and the ``briefing``: the declared vehicle, the fan, the pose's noise, the filter's
+tuning, and the usual disturbance of a vehicle of this size. The controller has its own random
+generator, with the same seed in each episode.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _SMALLEST = 1e-12  # variance of particles of a kind
 
 @dataclass(eq=False, kw_only=True)
 class _Belief(ABC):
-    """Shared by the trackers: particles with weights, and their command.
+    """Base of the trackers: particles with weights, and their command.
 
     After a decision ``mean`` holds the belief: the fan's place from the vehicle (m) and its
     velocity (m/s); ``deviation`` is the standard deviation of the place (m).
@@ -67,8 +67,8 @@ class _Belief(ABC):
         self.reset()
 
     def brief(self, briefing: Briefing) -> None:
-        """Take the knowledge of vehicle, sensors, fan and its motions, but not of its gusts, from
-        the next ``reset`` on.
+        """From the next ``reset`` on, use the briefing's vehicle, sensors, fan and motions, but not
+        its gusts.
         """
         self._briefing = nominal(briefing)
 
@@ -141,9 +141,9 @@ def velocity_after(
     jumps: float = 0.25,
     speed: float = 0.28,
 ) -> Array:
-    """Return velocities (n,) m/s a decision after ``before`` (n,) of unknown fans. Each rests, or
-    its velocity stays and drifts a little. Now and then the velocity changes at once, to none, to
-    the opposite, or to any other. Defaults and units as of ``Tracker``.
+    """Return velocities (n,) m/s of unknown fans, one decision after ``before`` (n,). A fan rests,
+    or its velocity drifts a little. Sometimes the velocity changes at once, to zero, to the
+    opposite, or to any other. Defaults and units as in ``Tracker``.
     """
     n = len(before)
     drift = acceleration * np.sqrt(DECISION_PERIOD) * (before != 0.0)
@@ -156,7 +156,7 @@ def velocity_after(
 
 @dataclass(eq=False, kw_only=True)
 class Tracker(_Belief):
-    """Knows nothing of how the fan moves: ``velocity_after``."""
+    """A tracker without knowledge of the fan's motion: ``velocity_after``."""
 
     gain: float = 2.5
     damping: float = 0.4
@@ -183,8 +183,8 @@ class InformedTracker(_Belief):
     """Knows the family of the fan's motions (``briefing.Motions``) and learns the motion: a
     particle is a motion with its speed, travel and place at the start.
 
-    Drawn anew, particles of a kind are shrunk towards their mean and spread again, at constant mean
-    and covariance. See Liu and West, *Combined parameter and state estimation in simulation-based
+    New particles of a kind shrink towards their mean and spread again, at constant mean and
+    covariance. See Liu and West, *Combined parameter and state estimation in simulation-based
     filtering*, 2001.
     """
 
@@ -197,13 +197,13 @@ class InformedTracker(_Belief):
     _arrays = (*_Belief._arrays, "_kind", "_sign", "_side", "_motion", "_free")
 
     def _begin(self) -> None:
-        rng, n, known = self._rng, self.particles, self._briefing.motions
-        names = np.array([list(PLACES).index(name) for name in known.motions])
+        rng, n, family = self._rng, self.particles, self._briefing.motions
+        names = np.array([list(PLACES).index(name) for name in family.motions])
         self._kind = names[rng.integers(len(names), size=n)]
         self._sign = rng.choice([-1.0, 1.0], n)
         self._side = rng.choice([-1.0, 1.0], n)
         # speed, travel and offset at the start of each, within their bounds
-        self._bounds = low, high = np.transpose([known.speed, known.travel, known.offset])
+        self._bounds = low, high = np.transpose([family.speed, family.travel, family.offset])
         self._motion = rng.uniform(low, high, (n, 3))
         self._free = np.zeros(n, dtype=bool)  # whether a particle left the family
         self._go(0.0)
@@ -221,7 +221,7 @@ class InformedTracker(_Belief):
         self._place[some] = place[some] + 0.5 * DECISION_PERIOD * (before + after)
 
     def _go(self, time: float) -> None:
-        """Put the particles where they are at a time (s), and see where they go."""
+        """Set the particles' places at a time (s), and their velocities."""
         self._place = self._place_at(time)
         self._velocity = (self._place_at(time + self.ahead) - self._place) / self.ahead
 
@@ -275,7 +275,7 @@ class _Regulated(_Belief):
 
     @abstractmethod
     def _ahead(self, seconds: float) -> Array:
-        """Return where the fan is expected to be after some time, (n,) m, a place a particle."""
+        """Return the fan's expected place after some time for each particle, (n,) m."""
 
     def _command(self, observation: NDArray[np.floating[Any]], shares: Array) -> float:
         sensing = self._sensing
@@ -319,13 +319,14 @@ def _own_motion(briefing: Briefing) -> AxisFilter:
 class TrackerLQG(_Regulated, Tracker):
     """The tracker without knowledge of the fan's motion, with the oracle's regulator.
 
-    At a sudden change the fan stops, turns round or moves anyhow, so its expected velocity decays.
+    A sudden change stops the fan, reverses it or gives another velocity, so the expected velocity
+    decays.
     """
 
     def _ahead(self, seconds: float) -> Array:
         rate = self.jumps * (1.0 + TURN)  # a stop costs a velocity, a turn two
-        kept = -float(np.expm1(-rate * seconds)) / rate  # s of its velocity
-        return np.asarray(self._place + self._velocity * kept)
+        effective_seconds = -float(np.expm1(-rate * seconds)) / rate  # s of its velocity
+        return np.asarray(self._place + self._velocity * effective_seconds)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -342,8 +343,8 @@ class Limit(_Regulated, InformedTracker):
     ``effort`` of 1e-4 by +2.5 %. One of 1e-3 changes fast by -1.7 % (-4.9 to 1.4), and base by
     -3.2 % (-5.4 to -1.2); on 40 more it changes base by +0.6 % (-1.8 to 3.0): no gain.
 
-    No entry, but the end of the scale for laws with the wrench alone. The draws of an episode of
-    ``varied``, and undeclared effects, are unknown here, too.
+    The law is no entry of a leaderboard, but the end of the scale for laws with the wrench alone.
+    It does not know the draws of ``varied`` or undeclared effects.
     """
 
     ahead: float = 0.12

@@ -1,7 +1,6 @@
 """Trained policies as files: weights in ``NAME.npz``, and beside them their card ``NAME.json``.
 
-Reading them runs no code, and a policy is flown in plain NumPy: scoring needs no deep-learning
-library.
+Loading runs no code. Policies fly in plain NumPy, without a deep-learning library.
 """
 
 import hashlib
@@ -34,7 +33,7 @@ _ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
 
 
 def layers_of(weights: Weights) -> int:
-    """Return how many dense layers there are."""
+    """Return the number of dense layers."""
     return sum(name.startswith("weight") for name in weights)
 
 
@@ -59,11 +58,11 @@ def _gru(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array,
     the unused ``cell``.
     """
     entered = weights["gru_input"] @ x + weights["gru_input_bias"]
-    kept = weights["gru_hidden"] @ hidden + weights["gru_hidden_bias"]
+    recurrent = weights["gru_hidden"] @ hidden + weights["gru_hidden_bias"]
     size = len(hidden)
-    gates = _sigmoid(entered[: 2 * size] + kept[: 2 * size])
+    gates = _sigmoid(entered[: 2 * size] + recurrent[: 2 * size])
     reset, update = gates[:size], gates[size:]
-    new = np.tanh(entered[2 * size :] + reset * kept[2 * size :])
+    new = np.tanh(entered[2 * size :] + reset * recurrent[2 * size :])
     after: Array = new + update * (hidden - new)
     return after, cell
 
@@ -83,10 +82,10 @@ def _sigmoid(x: Array) -> Array:
 
 
 class _Network:
-    """Shared by the policies: a recurrent cell where there is one, and dense layers.
+    """Base of the policies: a recurrent cell, if any, and dense layers.
 
-    The card says ``activation``, and ``squash``: the output goes through a tanh and is a share of
-    the largest action.
+    The card has ``activation``, and ``squash``: a tanh of the output is a share of the largest
+    action.
     """
 
     def __init__(
@@ -127,7 +126,7 @@ class _Network:
         self._hidden, self._kept = (np.zeros(size, dtype=np.float32) for _ in range(2))
 
     def act(self, x: Array) -> Array:
-        """Return the action for inputs (n,); a recurrent policy remembers earlier ones."""
+        """Return the action for inputs (n,); a recurrent policy has a memory of earlier inputs."""
         if self._cell is not None:
             _, step = _CELLS[self._cell]
             self._hidden, self._kept = step(self.weights, x, self._hidden, self._kept)
@@ -241,8 +240,8 @@ class TaskPolicy(_Network):
     ) -> Array:
         """Return the action of the task, in its units, for an observation in SI units."""
         seen = (np.asarray(observation) / self._scale).astype(np.float32)
-        kept = seen if self._remembered is None else self._remembered
-        self._remembered = kept + self._rates * (seen - kept)
+        before = seen if self._remembered is None else self._remembered
+        self._remembered = before + self._rates * (seen - before)
         return self.act(self._remembered.ravel())
 
 
@@ -262,8 +261,8 @@ def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:
 
 
 def load_policy(path: str | Path) -> Any:
-    """Return the policy of a ``.npz`` file or of its card: a ``TrainedPolicy``, or where the
-    card names another task, a ``TaskPolicy``.
+    """Return the policy of a ``.npz`` file or of its card: a ``TrainedPolicy``, or a
+    ``TaskPolicy`` if the card names another task.
 
     Raises:
         InputError: a file is missing, not readable, of another format, larger than ``FileLimits``

@@ -1,9 +1,9 @@
-"""Control laws of the tasks in the wind: from an observation (27,) to an acceleration (3,) m/s2
-beside the flight loop's own.
+"""Control laws of the tasks in the wind: an observation (27,) gives an acceleration (3,) m/s2,
+added to the flight loop's.
 
-All are their papers' laws for the position loop: attitude and rates stay with the flight loop. They
-add to its proportional, derivative and weak integral action. Laws with an answer to the torque ask
-the flight loop for the tilt of its attitude loop against the torque.
+Each law is its paper's law for the position loop; attitude and rates stay with the flight loop. The
+accelerations add to its proportional, derivative and weak integral action. Laws that cancel the
+torque ask the flight loop's attitude loop for a tilt against the torque.
 """
 
 import math
@@ -39,7 +39,7 @@ _ATTITUDE_LAG = FlightGains.rate / FlightGains.attitude * np.array([1.0, 1.0, 0.
 
 @dataclass(eq=False)
 class WindLaw:
-    """Shared by the laws: proportional, derivative and integral action on the position error.
+    """Base of the laws: proportional, derivative and integral action on the position error.
 
     ``a = kp e + kd de/dt + ki (integral of e)``, beside the flight loop's own; the integral stops
     where the action is limited.

@@ -64,8 +64,8 @@ def axis_lag(
     a, q = inverse @ A @ scale, inverse @ Q @ inverse
     P = scale @ solve_discrete_are(a.T, C.T, q, np.eye(1)) @ scale
     K = P @ C.T / (P[0, 0] + measured**2)
-    left = np.eye(3) - K @ C
-    F, b = left @ A, left[:, 2]
+    remainder = np.eye(3) - K @ C
+    F, b = remainder @ A, remainder[:, 2]
 
     def over(matrix: Array) -> Array:
         return np.asarray(np.linalg.matrix_power(matrix, steps))

@@ -63,8 +63,10 @@ class Story:
     @property
     def effect_words(self) -> str:
         """The effect as typed by a user."""
-        given = ",".join(f"{name}={value:g}" for name, value in self.effect.coefficients.items())
-        return f"{self.effect.name}:{given}"
+        coefficients = ",".join(
+            f"{name}={value:g}" for name, value in self.effect.coefficients.items()
+        )
+        return f"{self.effect.name}:{coefficients}"
 
     def fly_and_feel(self, report: Report) -> list[Step]:
         """Fly one episode in the jet with a true model; compare the estimated wrench with the true
@@ -140,12 +142,12 @@ class Story:
         )
         self.diagnosis = diagnose([self.log], self.vehicle, (), (), stage)
         self.reports = write_report(self.diagnosis, folder, command)
-        told = (
+        sentence = (
             "The diagnosis sees the log and the declared vehicle.",
             headline(self.diagnosis),
             f"True: {self.effect_words}.",
         )
-        return [Step("Diagnose it", told, command, report="diagnose/report.html")]
+        return [Step("Diagnose it", sentence, command, report="diagnose/report.html")]
 
     def fly_better(self, report: Report) -> list[Step]:
         """Fly the same episodes with the declared model and with the amended one."""

@@ -115,11 +115,11 @@ def dump_vehicle(vehicle: Vehicle, std: Deviations | None = None) -> str:
         data["inertia"] = np.diag(vehicle.inertia).tolist()
     if std is not None:
         shares = vehicle.uncertainty
-        known = {name: getattr(shares, name) for name in ("mass", "inertia", "arm_l")}
-        known["k"] = math.hypot(shares.thrust, shares.rotor)
-        known["p"] = math.hypot(shares.thrust, shares.torque)
-        known["uncertainty"] = 0.5
-        data = {key: _rounded(value, known.get(key, 0.0)) for key, value in data.items()}
+        accuracies = {name: getattr(shares, name) for name in ("mass", "inertia", "arm_l")}
+        accuracies["k"] = math.hypot(shares.thrust, shares.rotor)
+        accuracies["p"] = math.hypot(shares.thrust, shares.torque)
+        accuracies["uncertainty"] = 0.5
+        data = {key: _rounded(value, accuracies.get(key, 0.0)) for key, value in data.items()}
         for effect in data["effects"]:
             deviations = std.get(effect["name"], {})
             for name, value in effect["coefficients"].items():

@@ -55,7 +55,7 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
 
     # the legend: a wide pale arrow is the truth, a narrow dark one the estimate, as in the picture
     middle = margin + 2.0 * line
-    for label, stroke, mark, told in (
+    for label, stroke, mark, label_text in (
         ("true force", _WIDE, TRUE, _newtons(loop.external[:3])),
         ("estimated force", _NARROW, ESTIMATED, _newtons(loop.state[16:19])),
         ("true yaw torque", _WIDE, TURNING_TRUE, _millis(float(loop.external[5]))),
@@ -65,7 +65,7 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
         shown = margin, middle, margin + 34 * size, middle
         draw.line(shown, colour, max(1, round(stroke * size)))
         write(margin + 44 * size, middle, label, "lm")
-        write(margin + 305 * size, middle, told, "rm")
+        write(margin + 305 * size, middle, label_text, "rm")
         middle += line
     for row, text in enumerate(_scores(flown)):
         write(width - margin, margin + (2.0 + row) * line, text, "rm", _FONT)
@@ -77,8 +77,10 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
     for x in (margin, right):
         draw.line((x, below - 5 * size, x, below + 5 * size), _INK, max(1, round(2 * size)))
     newtons, millis = length / viewer.scales[0], 1e3 * length / viewer.scales[1]
-    told = f"this long: {length:g} m at the vehicle, {_short(newtons)} N, {_short(millis)} mNm"
-    write(margin, below - 8 * size, told, "lb")
+    label_text = (
+        f"this long: {length:g} m at the vehicle, {_short(newtons)} N, {_short(millis)} mNm"
+    )
+    write(margin, below - 8 * size, label_text, "lb")
     return np.asarray(image, dtype=np.uint8)
 
 

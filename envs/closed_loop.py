@@ -11,7 +11,7 @@ A tick takes 5 ms and is a pipeline of named stages, ``STAGES``:
 | `actuate`  | `command`, `air`, `applied`            | `external`, and MuJoCo's wrench            |
 | `move`     | MuJoCo's wrench                        | `position`, `quaternion`, `velocity`       |
 
-A user's own ``Stage`` stands before one of them.
+A user's ``Stage`` runs before one of these stages.
 """
 
 from __future__ import annotations
@@ -361,8 +361,8 @@ class ClosedLoop:
             InputError: something is no wind, or has another shape.
         """
         blowing = Sum(*winds, where="ClosedLoop")
-        given = np.zeros((0, REFERENCE_SIZE)) if reference is None else reference
-        rows = np.ascontiguousarray(given, dtype=np.float64)
+        samples = np.zeros((0, REFERENCE_SIZE)) if reference is None else reference
+        rows = np.ascontiguousarray(samples, dtype=np.float64)
         if rows.shape[1:] != (REFERENCE_SIZE,) or not np.all(np.isfinite(rows)):
             raise InputError(
                 f"ClosedLoop: reference must be finite numbers, shape (n, {REFERENCE_SIZE}), "

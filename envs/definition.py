@@ -108,14 +108,14 @@ class TaskDefinition:
         self.effects = tuple(check_setting(e, f"{name}: effects") for e in effects)
         self.settings, self.estimator, self.stages = settings, estimator, tuple(stages)
         self.render_mode, self.width, self.height = render_mode, width, height
-        given = {
+        fields = {
             "normalize": normalize,
             "action": action,
             "decision_hz": decision_hz,
             "episode_s": episode_s,
             "model_in_loop": model_in_loop,
         }
-        for field, value in given.items():
+        for field, value in fields.items():
             if value is not None:
                 setattr(self, field, value)
         sees = self._source("observe")
@@ -156,14 +156,14 @@ class TaskDefinition:
         with np.errstate(all="ignore"):
             size = np.shape(self.see(blank))[1]
         limits, scales = self.bounds()
-        kept = as_numbers([np.inf] * size if limits is None else limits)
+        largest_sizes = as_numbers([np.inf] * size if limits is None else limits)
         divisors = as_numbers([1.0] * size if scales is None or not self.normalize else scales)
-        if kept.shape != (size,) or divisors.shape != (size,):
+        if largest_sizes.shape != (size,) or divisors.shape != (size,):
             raise InputError(
                 f"{self.name}: limits and scales must be {size} numbers, as observe returns; got "
-                f"{len(kept)} and {len(divisors)}"
+                f"{len(largest_sizes)} and {len(divisors)}"
             )
-        self.kept, self.divisors, bound = kept, divisors, kept / divisors
+        self.kept, self.divisors, bound = largest_sizes, divisors, largest_sizes / divisors
         self.observation_space = gym.spaces.Box(-bound, bound, (size,), np.float32)
 
     def bounds(self) -> tuple[Sequence[float] | None, Sequence[float] | None]:
@@ -181,8 +181,8 @@ class TaskDefinition:
         return next(each for each in type(self).__mro__ if name in vars(each))
 
     def see(self, s: State) -> ArrayLike:
-        """Return what the agent observes, (n, k) in SI units: as ``observe`` has it, unless the
-        argument ``observation`` chose another.
+        """Return the agent's observation (n, k) in SI units: from ``observe``, or as chosen by the
+        argument ``observation``.
         """
         if self.chosen is None:
             return self.observe(s)
@@ -203,7 +203,7 @@ class TaskDefinition:
     def start(self, rng: np.random.Generator, n: int) -> Start | tuple[Any, ...]:
         """Return the starts of n episodes, drawn from ``rng``: a ``Start``, or its parts in order.
 
-        Each world has a generator of its own, so n is 1 in flight: an episode depends on its seed
+        Each world has its own generator, so n is 1 in flight, and an episode depends on its seed
         alone. Here: hover at one point in the scenario's winds.
         """
         poses = np.tile([*START, np.pi], (n, 1))
@@ -236,8 +236,8 @@ class TaskDefinition:
     def info(self, s: State) -> dict[str, Any]:
         """Return entries of ``info``, arrays (n, ...): the truth behind the observation.
 
-        Beside them stand the terms of the reward, ``lost``, ``observation`` and ``command`` in SI
-        units, and the name of what was drawn.
+        ``info`` also has the terms of the reward, ``lost``, ``observation`` and ``command`` in SI
+        units, and the name of the episode's draw.
         """
         return {
             "time": s.time,
@@ -274,14 +274,14 @@ class TaskDefinition:
         return Briefing(self.vehicle)
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
-        """Return the closed loop of a true vehicle and the undeclared effects; the filter knows the
+        """Return the closed loop of a true vehicle and the undeclared effects, with a filter of the
         declared vehicle.
         """
         declared = self.declared
         drawn: dict[str, Any] = {
             n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__
         }
-        own = {
+        defaults = {
             "accelerometer": ACCELEROMETER if self.observation in FELT else self.accelerometer,
             "gains": self.gains,
             "model_in_loop": bool(self.model_in_loop),
@@ -297,7 +297,7 @@ class TaskDefinition:
             kind=self.flown.kind,
             stages=self.stages,
             like=self._made,
-            **{**own, **given},
+            **{**defaults, **given},
         )
         return self._made
 
@@ -305,8 +305,8 @@ class TaskDefinition:
         return self.__dict__ | {"_made": None}
 
     def draw_loop(self, rng: np.random.Generator, kept: dict[Any, ClosedLoop]) -> ClosedLoop:
-        """Return the closed loop of a world's episode, drawn where the scenario varies; elsewhere
-        the one that the world has ``kept``.
+        """Return the closed loop of a world's episode. A scenario with a varied vehicle draws a new
+        loop; otherwise the world's ``kept`` loop flies again.
         """
         if not self.scenario.varied:
             self.drawn = {}
@@ -338,8 +338,8 @@ class TaskDefinition:
             row = np.zeros((1, REFERENCE_SIZE))
             row[0, :3], row[0, 9] = pose[:3], pose[3]
         else:
-            given = start.references
-            row = self._checked(given, (1, 0, REFERENCE_SIZE), (1, 0, 3), what="references")[0]
+            references = start.references
+            row = self._checked(references, (1, 0, REFERENCE_SIZE), (1, 0, 3), what="references")[0]
             row = along(row, float(pose[3])) if row.shape[1] == 3 else row
         path = np.array([[0.0, self.fan.height]])
         if start.paths is not None:
@@ -351,7 +351,7 @@ class TaskDefinition:
         values = np.asarray(given, dtype=np.float64)
         fits = any(
             values.ndim == len(shape)
-            and all(size in (0, own) for size, own in zip(shape, values.shape, strict=True))
+            and all(size in (0, actual) for size, actual in zip(shape, values.shape, strict=True))
             for shape in shapes
         )
         if not fits or not values.size or not np.all(np.isfinite(values)):

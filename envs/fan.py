@@ -1,5 +1,5 @@
 """The fan of the environment: numbers of its jet with gusts, and of the drag of a vehicle in the
-jet. The formulas are ``core/fan.hpp``; the mean jet: ``dynamics.mean_jet``.
+jet. ``core/fan.hpp`` has the formulas, ``dynamics.mean_jet`` the mean jet.
 """
 
 from __future__ import annotations

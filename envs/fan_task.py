@@ -72,8 +72,8 @@ class FanTask(Task):
     def observe(self, s: State) -> Array:
         """Return the task's own observation (n, 6 + 2 axes)."""
         e, axes = s.estimate, self.axes
-        own = e.velocity[:, axes[0] : axes[-1] + 1]
-        return np.concatenate([e.force, e.torque, own, s.command], axis=1)
+        velocity = e.velocity[:, axes[0] : axes[-1] + 1]
+        return np.concatenate([e.force, e.torque, velocity, s.command], axis=1)
 
     def reward_terms(self, s: State) -> dict[str, Any]:
         """Return ``tracking`` and ``change``."""
@@ -84,8 +84,8 @@ class FanTask(Task):
         }
 
     def briefing(self) -> Briefing:
-        """Return beside the declared vehicle the standard fan, the tuning of the filter, the
-        scenario's motions and its air.
+        """Return the declared vehicle, the standard fan, the tuning of the filter, the scenario's
+        motions and its air.
         """
         fan, scenario = self.fan, self.scenario
         plant = self.settings or PlantSettings.for_vehicle(self.vehicle)

@@ -31,15 +31,15 @@ _VIEWS = {
 
 
 class FanTrackingEnv(FanTask):
-    """A quadrotor in the jet of a moving fan must stay on the fan's axis by feeling the wind alone.
+    """A quadrotor in the jet of a moving fan must stay on the fan's axis, by the estimated wrench alone.
 
     ## Description
 
     A drum fan stands at the origin, blows along +x and moves along y. A quadrotor hovers 2.3 m in front of the fan, at
     the height of its axis, and faces the fan. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
     external force and torque, at 200 Hz. On the axis the jet pushes the vehicle back. Off the axis the
-    drag falls off across the vehicle's span and turns the vehicle, too. The agent sees the estimate, 12.5 times a second, and commands
-    a velocity along y; an inner flight loop does the rest. The task follows McKinnon and Schoellig, IROS 2016, V-C.
+    drag differs across the vehicle's span, so the jet also turns the vehicle. The agent observes the estimate, 12.5 times a second, and commands
+    a velocity along y; a flight loop stabilises the vehicle. The task follows McKinnon and Schoellig, IROS 2016, V-C.
 
     ## Action space
 
@@ -49,7 +49,7 @@ class FanTrackingEnv(FanTask):
     | --- | ------------------------------- | --- | --- | ---- |
     | 0   | commanded velocity along world y | -1  | 1   | m/s  |
 
-    A command out of range is clipped; one that is not finite raises ``InputError``.
+    A command out of range is clipped; a command that is not finite raises ``InputError``.
 
     ## Observation space
 
@@ -59,31 +59,30 @@ class FanTrackingEnv(FanTask):
     | --- | ---------------------------------------- | ----- | ---- |
     | 0-2 | estimated external force x, y, z (world)  | 10    | N    |
     | 3-5 | estimated external torque x, y, z (world) | 1     | Nm   |
-    | 6   | own estimated velocity along y            | 5     | m/s  |
+    | 6   | estimated velocity along y                | 5     | m/s  |
     | 7   | last command                              | 1     | m/s  |
 
-    The fan's place is not observed: ``info`` has it.
+    The fan's place is in ``info``, not in the observation.
 
     ``observe`` takes another view of the same flight, for ablations:
 
-    | `observe`             | Size | What is seen                                                       |
+    | `observe`             | Size | Observation                                                        |
     | --------------------- | ---- | ------------------------------------------------------------------ |
     | `"wrench"`            | 8    | the table above                                                    |
     | `"wrench-without-fx"` | 7    | the table above without the force x                                |
-    | `"pose"`              | 8    | no wrench: the pose, as the filter estimates it                    |
+    | `"pose"`              | 8    | no wrench: the estimated pose                                      |
     | `"history"`           | 200  | the table above at the last 25 decisions (2 s), oldest first       |
 
     The pose is the position since the start x, y, z (m) and the velocity along y (m/s). Next are the x and y of the
-    body's z axis (its tilt). Then come yaw less 180 degrees (rad) and the last command. Before the start the history is as at the
-    start.
+    body's z axis (its tilt), yaw less 180 degrees (rad) and the last command. Before the start the history repeats the first frame.
 
-    With ``normalize=True`` each number is divided by a fixed scale, and is about 1 in flight:
+    With ``normalize=True`` fixed scales divide all numbers, to about 1 in flight:
     force 0.5 N, torque 0.03 Nm, velocity 0.5 m/s, command 1 m/s, position 1 m, tilt 0.1, yaw 0.2 rad.
-    The action needs no scale: the limits are -1 and 1 as they are.
+    The action's limits are -1 and 1 without a scale.
 
     ## Rewards
 
-    ``reward = reward_tracking + reward_change``, each of them in ``info``:
+    ``reward = reward_tracking + reward_change``, both in ``info``:
 
     * ``reward_tracking = 1 / (1 + (offset / 0.3)^2)``, where ``offset`` is the true distance from the axis along
       y, in m;
@@ -91,8 +90,8 @@ class FanTrackingEnv(FanTask):
 
     ## Starting state
 
-    The vehicle hovers where the scenario says and the filter settles for 1.5 s in the standing jet. Fan path, offset
-    and all noise are drawn from the seed.
+    The vehicle hovers at the scenario's offset, and the filter settles for 1.5 s in the standing jet. The seed gives fan path, offset
+    and all noise.
 
     ## Episode end
 
@@ -110,10 +109,10 @@ class FanTrackingEnv(FanTask):
     | `scenario`    | `"base"`     | one of `windwrench.envs.SCENARIOS`, or a `Scenario`                        |
     | `fan`         | `None`       | a `Fan`, in place of the standard one                                      |
     | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
-    | `observe`     | `"wrench"`   | what is seen: `"wrench"`, `"wrench-without-fx"`, `"pose"` or `"history"`    |
+    | `observe`     | `"wrench"`   | the view: `"wrench"`, `"wrench-without-fx"`, `"pose"` or `"history"`    |
 
-    All arguments of ``windwrench.envs.Task`` come beside these.
-    ``metadata["render_modes"]`` of an environment names what this machine can show: without a display, no
+    The task takes all arguments of ``windwrench.envs.Task``, too.
+    ``metadata["render_modes"]`` of an environment lists the modes of this machine: without a display, no
     `"human"`. ``reset`` refuses any ``options``.
 
     ## Version history
@@ -191,11 +190,16 @@ class FanTrackingEnv(FanTask):
     def info(self, s: State) -> dict[str, Any]:
         """Return the fan's motion and the true offset, force and torque."""
         y, fan_y = s.position[:, 1], s.fan[:, 0]
-        told = {"fan_y": fan_y, "fan_velocity": s.fan_velocity[:, 0], "y": y, "offset": y - fan_y}
+        entries = {
+            "fan_y": fan_y,
+            "fan_velocity": s.fan_velocity[:, 0],
+            "y": y,
+            "offset": y - fan_y,
+        }
         if self.view != "wrench" and self.chosen is None:
             frame = np.clip(super().observe(s), -np.array(LIMITS), LIMITS)
-            told["observation"] = np.nan_to_num(frame).astype(np.float32)
-        return {"time": s.time, "force": s.force, "torque": s.torque, **told}
+            entries["observation"] = np.nan_to_num(frame).astype(np.float32)
+        return {"time": s.time, "force": s.force, "torque": s.torque, **entries}
 
 
 fan_tracking_vector = FanTrackingEnv.vector

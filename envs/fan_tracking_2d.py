@@ -100,9 +100,9 @@ class FanTracking2DEnv(FanTask):
 
     def info(self, s: State) -> dict[str, Any]:
         """Return the fan's motion and the true place, force and torque."""
-        told = {"fan": s.fan, "fan_velocity": s.fan_velocity, "position": s.position[:, 1:]}
+        entries = {"fan": s.fan, "fan_velocity": s.fan_velocity, "position": s.position[:, 1:]}
         error = np.hypot(*self.off_axis(s).T)
-        return {"time": s.time, "force": s.force, "torque": s.torque, "error": error, **told}
+        return {"time": s.time, "force": s.force, "torque": s.torque, "error": error, **entries}
 
 
 fan_tracking_2d_vector = FanTracking2DEnv.vector

@@ -144,8 +144,8 @@ def find_scenario(name: str, known: Mapping[str, AnyScenario]) -> AnyScenario:
     if is_file_name(name):
         form = type(next(iter(known.values())))
         what = f"a Python file with a {form.__name__}"
-        found = named_in_file(name, "scenario", what, lambda value: isinstance(value, form))
-        return cast(AnyScenario, found)
+        scenario = named_in_file(name, "scenario", what, lambda value: isinstance(value, form))
+        return cast(AnyScenario, scenario)
     path = name if name.endswith(_YAML) else name.rpartition(":")[0]
     if path.endswith(_YAML):
         listed = scenarios_in(path, known)

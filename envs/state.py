@@ -171,11 +171,11 @@ class State:
 
     def first(self, name: str, now: Array) -> Array:
         """Return values (n, ...) as they were at each episode's start, kept under a name."""
-        kept = self.memory.setdefault(name, np.zeros_like(now))
+        starts = self.memory.setdefault(name, np.zeros_like(now))
         begins = self.decision == 0
-        kept[begins] = now[begins]
-        found: Array = kept
-        return found
+        starts[begins] = now[begins]
+        starting_values: Array = starts
+        return starting_values
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: self.__dict__[name] for name in ("rows", "flying", "rng", "memory")}

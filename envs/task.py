@@ -1,4 +1,4 @@
-"""The base of all tasks: array functions over n worlds, flown alone or side by side."""
+"""The base of all tasks: array functions over n worlds, for one environment or a vector."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ PLANTS: dict[str, type[TaskVectorEnv]] = {"mujoco": TaskVectorEnv, "lanes": Task
 
 
 class Task(TaskDefinition, gym.Env[Frame, Frame]):
-    """A quadrotor in closed loop, whose agent commands the flight loop: to be subclassed.
+    """The base class of tasks: a quadrotor whose agent commands the flight loop.
 
-    A task is five functions of arrays with a row for each world: ``start``, ``observe``,
-    ``reward_terms``, ``is_lost`` and ``info``. ``s`` is a ``State``. An override of one, or of a
-    class attribute, holds in a single environment, side by side in MuJoCo, and in lanes:
+    A subclass overrides class attributes and up to five functions of arrays with a row for each
+    world: ``start``, ``observe``, ``reward_terms``, ``is_lost`` and ``info``. ``s`` is a ``State``.
+    Overrides hold in a single environment, in MuJoCo's vector and in lanes (a SIMD batch):
 
     ```python
     class Land(windwrench.envs.Task):
@@ -43,11 +43,11 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
     Args:
         scenario: a name, a YAML path, or a scenario of the task's kind.
         render_mode: ``"human"`` (needs a display), ``"rgb_array"`` or None.
-        vehicle: as filter and flight loop know it: preset, YAML path or ``Vehicle``.
-        effects: undeclared ones of the true vehicle.
+        vehicle: the declared vehicle of filter and flight loop: preset, YAML path or ``Vehicle``.
+        effects: undeclared effects of the true vehicle.
         truth: the true vehicle, before ``effects``; default: as declared.
         settings: motor lag, unmodelled disturbance, delays and losses of the plant.
-        estimator: ``"ukf"``, or ``"constant-gain"``: the filter's converged gain, which is faster.
+        estimator: ``"ukf"``, or the faster ``"constant-gain"``: the filter's converged gain.
         normalize: whether observations are divided by fixed scales, and velocities and
             accelerations by the largest.
         width: pixels of a picture.
@@ -55,7 +55,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         stages: a user's own ``windwrench.envs.Stage``, in the pipeline of a tick.
         action: one of ``windwrench.envs.ACTIONS``; see ``make_action``.
         observation: one of ``windwrench.envs.OBSERVATIONS``; see ``envs.observations.parts``.
-        decision_hz: Hz, of decisions: 200 over a whole number.
+        decision_hz: decisions a second, Hz: 200 over a whole number.
         episode_s: s, until an episode is truncated.
         winds: in place of the scenario's: any objects with ``velocity(points, time)``.
         model_in_loop: whether the flight loop counters the effects that ``vehicle`` declares.
@@ -96,7 +96,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
 
     @property
     def many(self) -> TaskVectorEnv:
-        """The vector of one that flies."""
+        """The vector of one environment."""
         if self._many is None:
             self._many = TaskVectorEnv(1, task=self)
         return self._many

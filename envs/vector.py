@@ -106,8 +106,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all but threads, windows and the core's parts, for a copy."""
-        left: dict[str, Any] = {"_pool": None, "_scene": None, "_streams": None, "viewers": {}}
-        return self.__dict__ | left
+        empty: dict[str, Any] = {"_pool": None, "_scene": None, "_streams": None, "viewers": {}}
+        return self.__dict__ | empty
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -317,13 +317,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         y, height = start.paths.T
         height = height if np.ptp(height) > 0.0 else height[:1]
         for name, rows in (("paths", y), ("heights", height), ("references", start.references)):
-            kept = getattr(self.episodes, name)
-            if len(rows) > kept.shape[1]:
-                more = ((0, 0), (0, len(rows) - kept.shape[1]), (0, 0))[: kept.ndim]
-                kept = np.pad(kept, more, mode="edge")
-                self.episodes = self.episodes._replace(**{name: kept})
+            stored = getattr(self.episodes, name)
+            if len(rows) > stored.shape[1]:
+                more = ((0, 0), (0, len(rows) - stored.shape[1]), (0, 0))[: stored.ndim]
+                stored = np.pad(stored, more, mode="edge")
+                self.episodes = self.episodes._replace(**{name: stored})
                 self._look()
-            kept[i, : len(rows)], kept[i, len(rows) :] = rows, rows[-1]
+            stored[i, : len(rows)], stored[i, len(rows) :] = rows, rows[-1]
         self._labels[i] = start.labels
 
     def _make_memory(self) -> None:
@@ -395,12 +395,12 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         """
         infos: Infos = {}
         for name, values in judged.values.items():
-            kept = np.array(values)
-            if kept.ndim == 0:
-                kept = np.full(self.num_envs, kept)
+            entries = np.array(values)
+            if entries.ndim == 0:
+                entries = np.full(self.num_envs, entries)
             if which is not self._all:
-                kept[~which] = None if kept.dtype == object else 0
-            infos[name], infos[f"_{name}"] = kept, which.copy()
+                entries[~which] = None if entries.dtype == object else 0
+            infos[name], infos[f"_{name}"] = entries, which.copy()
         return infos
 
     def render(self) -> tuple[Any, ...]:
@@ -417,8 +417,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         from .drawing import Viewer
 
         for i in range(self.num_envs - len(self.viewers)):
-            given = self.render_mode, self.task.width, self.task.height
-            self.viewers[i] = Viewer(*given)
+            arguments = self.render_mode, self.task.width, self.task.height
+            self.viewers[i] = Viewer(*arguments)
         goals = (
             self.state.reference[:, :3] if self.task.fan.speed == 0.0 else [None] * self.num_envs
         )
@@ -437,11 +437,11 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
 
 def _mode(given: AutoresetMode | str, task: str) -> AutoresetMode:
-    known = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP
-    for mode in known:
+    modes = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP
+    for mode in modes:
         if given in (mode, mode.value, mode.name):
             return mode
     raise InputError(
-        f"{task}: autoreset_mode must be {' or '.join(m.name for m in known)} of "
+        f"{task}: autoreset_mode must be {' or '.join(m.name for m in modes)} of "
         f"gymnasium.vector.AutoresetMode, got {given!r}"
     )

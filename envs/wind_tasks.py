@@ -22,17 +22,17 @@ CHANGE_COST = 0.032  # a change of an action from 0 to 1
 
 
 class WindHoverEnv(Task):
-    """A quadrotor must hold a point in turbulence and in front of a wall of fans that switch.
+    """A quadrotor must hold a point in turbulence and in front of a wall of switching fans.
 
     ## Description
 
-    A quadrotor must hold a place. The scenario puts it 2.3 m in front of a wall of 3 x 3 switching fans,
-    in a sheared mean wind with turbulence, in gusts, or below another vehicle. An unscented Kalman filter
+    By its scenario, the vehicle hovers 2.3 m in front of a wall of 3 x 3 switching fans, in a sheared
+    mean wind with turbulence, in gusts, or below another vehicle. An unscented Kalman filter
     turns rotor speeds and motion-capture pose into the external force and torque, at 200 Hz. A flight
     loop (position, velocity, a weak integral, attitude) flies to the reference by the estimated state.
-    The agent commands an acceleration beside the flight loop's own, 25 times a second: the command must
+    25 times a second the agent commands an acceleration, added to the flight loop's. The command must
     cancel the wind before the flight loop's error grows. The wind acts at 12 stations of the vehicle,
-    each in its own air.
+    each with its own airspeed.
 
     ## Action space
 
@@ -41,9 +41,9 @@ class WindHoverEnv(Task):
 
     | Num | Action                                           | Min | Max | Unit |
     | --- | ------------------------------------------------ | --- | --- | ---- |
-    | 0-2 | acceleration x, y, z (world) beside the flight loop's | -4  | 4   | m/s2 |
+    | 0-2 | acceleration x, y, z (world), added to the flight loop's | -4  | 4   | m/s2 |
 
-    An action out of range is clipped; one that is not finite raises ``InputError``. The flight loop
+    An action out of range is clipped; an action that is not finite raises ``InputError``. The flight loop
     limits its tilt to 0.5 rad.
 
     ## Observation space
@@ -64,12 +64,12 @@ class WindHoverEnv(Task):
     | 24-26 | last action                                              | 4     | 4     | m/s2 |
 
     The accelerometer sits in the centre of mass. Its noise is 0.15 m/s2 a tick (5 ms), and its bias
-    0.05 m/s2, drawn each episode. The estimated attitude turns its axes into the world. The filter does
-    not use the accelerometer. Wind and true force are not observed: ``info`` has them.
+    0.05 m/s2, drawn each episode. The estimated attitude turns the measurement into world axes. The
+    filter does not use the accelerometer. Wind and true force are in ``info``, not in the observation.
 
     ## Rewards
 
-    ``reward = reward_tracking + reward_change``, each of them in ``info``:
+    ``reward = reward_tracking + reward_change``, both in ``info``:
 
     * ``reward_tracking = 1 / (1 + (error / 0.1)^2)``, where ``error`` is the true distance from the
       reference, in m;
@@ -78,8 +78,8 @@ class WindHoverEnv(Task):
     ## Starting state
 
     The vehicle hovers at the start of the reference, 2.3 m in front of the wall and 1.5 m high, facing
-    the wall. For 1.5 s in the wind of time 0 the filter settles. Winds, reference and all noise are drawn
-    from the seed; winds are drawn anew where the vehicle is lost before the episode begins.
+    the wall. The filter settles for 1.5 s in the wind of time 0. The seed gives winds, reference and
+    all noise. If the vehicle is lost before the episode begins, new winds are drawn.
 
     ## Episode end
 
@@ -98,7 +98,7 @@ class WindHoverEnv(Task):
     | `action`      | `"acceleration"` | one of `windwrench.envs.ACTIONS`                                   |
     | `observation` | `"own"`      | one of `windwrench.envs.OBSERVATIONS`, or the table above; `"wrench"` in v2 |
 
-    All arguments of ``windwrench.envs.Task`` come beside these. ``reset`` refuses any ``options``.
+    The task takes all arguments of ``windwrench.envs.Task``, too. ``reset`` refuses any ``options``.
 
     ## Version history
 
@@ -153,15 +153,15 @@ class WindHoverEnv(Task):
 class WindTrajectoryEnv(WindHoverEnv):
     """A quadrotor must fly figures of eight and random splines through turbulence and jets.
 
-    Action, observation, reward, episode end, arguments and scenarios are those of ``WindHoverEnv``.
-    The reference differs.
+    Action, observation, reward, episode end, arguments and scenarios equal those of
+    ``WindHoverEnv``; the reference differs.
 
     ## Reference
 
     A lying figure of eight (1.0-1.4 m along, 0.4-0.6 m across, in 6-9 s, turned by any angle), or a
     spline. The spline has a random point of a box of 2.4 x 2.4 x 0.8 m every 1.5-2.2 s. The
-    reference gets up to speed in 1.5 s. The flight loop is given its position, velocity and
-    acceleration, and the agent sees its velocity and acceleration.
+    reference accelerates for 1.5 s. The flight loop gets position, velocity and acceleration of the
+    reference, the agent observes velocity and acceleration.
 
     ```python
     gym.make("windwrench/WindTrajectory-v1", scenario="base", normalize=True, render_mode=None)

@@ -66,8 +66,8 @@ class ConstantGainFilter(WrenchUKF):
         # with P after the correction: K = P H' / R, and the innovation's inverse covariance is (R -
         # H P H') within / R
         f["gain"] = P[:, list(_MEASURED)] * inverse
-        left = np.diag(f["noise"]) - P[np.ix_(_MEASURED, _MEASURED)]
-        f["information"] = inverse[:, None] * left * inverse
+        remainder = np.diag(f["noise"]) - P[np.ix_(_MEASURED, _MEASURED)]
+        f["information"] = inverse[:, None] * remainder * inverse
         f["P"] = f["converged"] = P
         walks = f["thrust"] / f["force_walk"], f["motor_torque"] / f["torque_walk"]
         f["settle"] = _SETTLE * self.period * math.sqrt(float(np.max(walks)))

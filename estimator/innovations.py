@@ -153,7 +153,7 @@ def innovations(
     """
     density = outlier_chance / ((2.0 * outlier_range) ** 3 * _MRP_VOLUME)
     outlier = math.log(density) if density > 0.0 else -math.inf
-    found = []
+    counted_poses = []
     for piece in pieces:
         ukf = WrenchUKF(vehicle, tuning, period)
         twist = {"velocity": piece.velocity, "angular_velocity": piece.angular_velocity}
@@ -163,8 +163,8 @@ def innovations(
         memory = piece.rows.view(np.uint8), out.view(np.uint8)
         _core.judge_rows(ukf.record.ctypes.data, memory[0], inlier, outlier, memory[1])
         raise_errors()
-        found.append(out[piece.rows["counted"]])
-    return np.concatenate(found).view(np.recarray)
+        counted_poses.append(out[piece.rows["counted"]])
+    return np.concatenate(counted_poses).view(np.recarray)
 
 
 def fisher_information(found: Innovations, moved: Sequence[Innovations], step: float) -> Array:
@@ -174,13 +174,13 @@ def fisher_information(found: Innovations, moved: Sequence[Innovations], step: f
     Normal innovations have ``sum(d_i y' S^-1 d_j y + tr(S^-1 d_i S S^-1 d_j S) / 2)`` (Schweppe
     1965); outliers have none.
     """
-    kept = ~np.logical_or.reduce([found.outlier, *(m.outlier for m in moved)])
-    inverse, mean = np.linalg.inv(found.root[kept]), found.innovation[kept]
+    regular = ~np.logical_or.reduce([found.outlier, *(m.outlier for m in moved)])
+    inverse, mean = np.linalg.inv(found.root[regular]), found.innovation[regular]
     slopes = []
     for each in moved:
-        change = inverse @ (each.innovation[kept] - mean)[:, :, np.newaxis]
+        change = inverse @ (each.innovation[regular] - mean)[:, :, np.newaxis]
         # L^-1 M is near 1: L^-1 (MM' - LL') L^-T = (L^-1 M)(L^-1 M)' - 1
-        D = inverse @ each.root[kept]
+        D = inverse @ each.root[regular]
         covariance = math.sqrt(0.5) * (D @ np.swapaxes(D, 1, 2) - np.eye(6))
         slopes.append(np.concatenate([change.ravel(), covariance.ravel()]))
     information: Array = np.array(slopes) @ np.array(slopes).T / (step * step)

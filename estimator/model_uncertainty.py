@@ -48,17 +48,17 @@ NAMES = {
 
 def factors_of(vehicle: Vehicle) -> Array:
     """Return the factors (FACTORS,) of a vehicle's stated uncertainty."""
-    known = vehicle.uncertainty
+    uncertainty = vehicle.uncertainty
     x, y = (vehicle.positions - vehicle.com)[:, :2].T / 4.0
-    rotor = known.rotor**2
+    rotor = uncertainty.rotor**2
     return np.array(
         [
-            known.mass**2,
-            known.thrust**2 + rotor / 4.0,
-            known.command**2 if vehicle.omega_source == "commanded" else 0.0,
-            known.thrust**2 + known.arm_l**2,
-            known.torque**2,
-            known.inertia**2,
+            uncertainty.mass**2,
+            uncertainty.thrust**2 + rotor / 4.0,
+            uncertainty.command**2 if vehicle.omega_source == "commanded" else 0.0,
+            uncertainty.thrust**2 + uncertainty.arm_l**2,
+            uncertainty.torque**2,
+            uncertainty.inertia**2,
             *(rotor * y @ y, rotor * x @ x, rotor * x @ y),
         ]
     )

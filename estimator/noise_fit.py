@@ -219,34 +219,34 @@ def fit_noise(
     columns = t, rotor_speeds, position, quaternion, voltage
     use = NoiseFitSettings() if settings is None else settings
     flight = _Flight(vehicle, columns, tuning, use)
-    period, given = flight.period, flight.given
+    period, start_tuning = flight.period, flight.given
     pieces = flight.whole if len(flight.columns[0]) <= use.rows else _excerpts(flight)
     if _poses(pieces) < use.fewest_poses:
         pieces = flight.whole
 
     def evaluate(x: Array) -> Innovations:
-        return flight.evaluate(_tuning(x, given, use), pieces)
+        return flight.evaluate(_tuning(x, start_tuning, use), pieces)
 
     bounds = np.log(_bounds(vehicle, period, use))
     starts = [np.clip(_numbers(made), *bounds.T) for made in _starts(flight)]
     try:
         with ThreadPoolExecutor(min(len(bounds), os.cpu_count() or 1)) as threads:
-            found, deviation = _likeliest(evaluate, starts, bounds, threads)
+            likeliest, deviation = _likeliest(evaluate, starts, bounds, threads)
             if use.gusts:
-                starts = [np.append(found, np.log(4 * [time])) for time in _GUSTS]
+                starts = [np.append(likeliest, np.log(4 * [time])) for time in _GUSTS]
                 wider = np.vstack([bounds, *4 * [np.log([use.correlation])]])
                 gusts = _likeliest(evaluate, starts, wider, threads)
-                totals = [evaluate(x).log_likelihood.sum() for x in (found, gusts[0])]
+                totals = [evaluate(x).log_likelihood.sum() for x in (likeliest, gusts[0])]
                 if totals[1] > totals[0] + _BY_CHANCE:
-                    found, deviation = gusts
-        fitted = _tuning(found, given, use)
-        rise, rise_after = (rise_times(vehicle, made, period) for made in (given, fitted))
+                    likeliest, deviation = gusts
+        fitted = _tuning(likeliest, start_tuning, use)
+        rise, rise_after = (rise_times(vehicle, made, period) for made in (start_tuning, fitted))
     except np.linalg.LinAlgError as error:
         raise InputError(f"fit_noise: no tuning suits these poses: {error}") from error
-    before, likelihood, _ = flight.judge(given)
+    before, likelihood, _ = flight.judge(start_tuning)
     after, likelihood_after, outliers = flight.judge(fitted)
     return NoiseFit(
-        *(fitted, given, before, after, likelihood, likelihood_after),
+        *(fitted, start_tuning, before, after, likelihood, likelihood_after),
         *(outliers, rise, rise_after, deviation),
     )
 
@@ -383,7 +383,7 @@ class _Flight:
         """Return consistency and log-likelihood of all poses under a tuning, and the count of
         outliers.
         """
-        found, consistency = self.evaluate(tuning, self.whole), Consistency()
-        for pose in found[~found.outlier]:
+        poses, consistency = self.evaluate(tuning, self.whole), Consistency()
+        for pose in poses[~poses.outlier]:
             consistency.add(pose.t, pose.white)
-        return consistency, float(found.log_likelihood.sum()), int(found.outlier.sum())
+        return consistency, float(poses.log_likelihood.sum()), int(poses.outlier.sum())

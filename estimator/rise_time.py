@@ -47,15 +47,16 @@ def _rise(dt: float, inertia: float, white: float, walk: float, time: float, noi
     C = np.array([[1.0, 0.0, 0.0]])
     P = solve_discrete_are(A.T, C.T, Q, np.eye(1))
     gain = P[:, 0] / (P[0, 0] + 1.0)
-    kept = np.eye(3) - np.outer(gain, C[0])
-    input_ = kept @ [0.0, 0.0, 1.0 - decay]  # the truth does not decay
-    rest = np.linalg.solve(np.eye(3) - kept @ A, input_)[2]  # share of a unit step that never shows
+    remainder = np.eye(3) - np.outer(gain, C[0])
+    input_ = remainder @ [0.0, 0.0, 1.0 - decay]  # the truth does not decay
+    # share of a unit step that never shows
+    rest = np.linalg.solve(np.eye(3) - remainder @ A, input_)[2]
     error = np.array([0.0, 0.0, 1.0])  # truth minus estimate
     response = [0.0]
     while response[-1] < 0.9:
         if len(response) > _LONGEST:
             return float("inf")
-        error = kept @ (A @ error) + input_
+        error = remainder @ (A @ error) + input_
         response.append((1.0 - float(error[2])) / (1.0 - rest))
     start, end = np.interp((0.1, 0.9), response, np.arange(len(response)))
     return float(end - start) * dt

@@ -4,12 +4,11 @@ quadrotor.
 McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quadrotors*, IROS 2016,
 (15)-(37). The filter is exact to the paper's 61 and 49 sigma points and cheaper:
 
-* The noise enters linearly, and so do the directions of the state that leave attitude and rate
-  alone. Their pairs of sigma points average out and add exactly ``A S S' A'`` and ``B Q B'`` to the
-  covariance. The 13 points of attitude and rate are left (25 where a declared effect depends on
-  position or velocity).
-* The root of the covariance is lower triangular: only its first 6 (or 12) columns are needed, and
-  the others enter through the Schur complement.
+* The model is linear in the noise and in all states but attitude and rate. Pairs of sigma points
+  along linear directions add exactly ``A S S' A'`` and ``B Q B'`` to the covariance. The 13 points
+  of attitude and rate remain (25 if a declared effect depends on position or velocity).
+* The root of the covariance is lower triangular: the filter needs its first 6 (or 12) columns, and
+  the others through the Schur complement.
 * The measurement is linear in the error state: the correction by 49 redrawn points is the Kalman
   update.
 
@@ -75,8 +74,8 @@ def make_calls(
     the diagonal of the root of their covariance. Return the number of calls up to a quaternion
     that is no rotation.
     """
-    given = np.ascontiguousarray(calls).view(np.uint8)
-    made = _core.make_calls(record.ctypes.data, given, rows, numbers, std, loads, innovations)
+    memory = np.ascontiguousarray(calls).view(np.uint8)
+    made = _core.make_calls(record.ctypes.data, memory, rows, numbers, std, loads, innovations)
     raise_errors()
     return made
 

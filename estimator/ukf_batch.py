@@ -115,20 +115,20 @@ class WrenchUKFBatch:
     ) -> None:
         if precision not in _BATCHES:
             raise unknown_name("precision", precision, _BATCHES, "WrenchUKFBatch")
-        given = [vehicles] if isinstance(vehicles, Vehicle) else list(vehicles)
-        self.count = len(given) if count is None else count
-        if self.count < 1 or len(given) not in (1, self.count):
+        listed = [vehicles] if isinstance(vehicles, Vehicle) else list(vehicles)
+        self.count = len(listed) if count is None else count
+        if self.count < 1 or len(listed) not in (1, self.count):
             raise InputError(
                 f"WrenchUKFBatch: expected one vehicle or one for each of {self.count}, got "
-                f"{len(given)}"
+                f"{len(listed)}"
             )
-        self._filters = [WrenchUKF(vehicle, tuning, period, gate, recovery) for vehicle in given]
+        self._filters = [WrenchUKF(vehicle, tuning, period, gate, recovery) for vehicle in listed]
         self.period = self._filters[0].period
         self._precision = precision
         self._memory = self._new_memory()
         # the estimates and the variances of the error states
         self._now = np.zeros((self.count, WITHOUT_COVARIANCE)), np.zeros((self.count, N))
-        self._voltage = np.resize([vehicle.voltage_ref for vehicle in given], self.count).astype(
+        self._voltage = np.resize([vehicle.voltage_ref for vehicle in listed], self.count).astype(
             np.float64
         )
         self._z = np.zeros((self.count, 11))
@@ -183,7 +183,7 @@ class WrenchUKFBatch:
             InputError: a shape is wrong, or what ``WrenchUKF.reset`` refuses; the filters stay as
                 they were.
         """
-        given = (
+        parts = (
             ("position", position, (3,)),
             ("quaternion", quaternion, (4,)),
             ("covariance", covariance, (N, N)),
@@ -192,7 +192,7 @@ class WrenchUKFBatch:
         )
         starts = [
             [None] * self.count if value is None else _rows(name, value, shape, self.count)
-            for name, value, shape in given
+            for name, value, shape in parts
         ]
         memory = self._new_memory()
         numbers, variances = np.empty((self.count, WITHOUT_COVARIANCE)), np.empty((self.count, N))

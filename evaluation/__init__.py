@@ -1,1 +1,1 @@
-"""Episodes flown and compared: the benchmark, its statistics, pictures and the leaderboard."""
+"""Flown episodes and their comparison: benchmark, statistics, pictures and leaderboard."""

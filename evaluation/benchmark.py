@@ -47,7 +47,7 @@ class Request:
             InputError: an unknown name, no episodes, or a seed out of range.
         """
         import_files(self.imports)
-        known = task_of(self.task)
+        flown_task = task_of(self.task)
         if self.episodes < 1:
             raise InputError(f"benchmark: --episodes must be at least 1, got {self.episodes}")
         if not 0 <= self.seed < _SEEDS:
@@ -56,10 +56,10 @@ class Request:
             )
         for name in self.controllers:
             make_pilot(name, self.task)
-        scenario_names(self.scenarios, known)
+        scenario_names(self.scenarios, flown_task)
         if self.reward is not None:
             find_reward(self.reward)
-        return known
+        return flown_task
 
     def flights(self) -> int:
         """Return the number of episodes, those of the reference laws among them."""

@@ -21,8 +21,8 @@ _AT_BOUND = 0.99  # share of the largest command
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """One flown episode, a row a decision; the arrays end where the vehicle was lost. An array that
-    a task does not state is not a number.
+    """One flown episode, a row a decision; the arrays of a lost vehicle end early. Quantities that
+    a task does not have are NaN.
     """
 
     seed: int
@@ -74,8 +74,8 @@ class Episode:
 
     @property
     def rmse_settled(self) -> float:
-        """Root-mean-square error after 3 s, m: the figure that ranks. In an episode of less than
-        6 s, of its second half.
+        """Root-mean-square error after 3 s, m: the ranking figure. In an episode of less than 6 s:
+        the error of the second half.
         """
         return self._rmse(slice(self._split, None))
 

@@ -90,17 +90,17 @@ def leaderboard(
     The kit's policies of one kind (``sac-0``, ``sac-1``) have a row each, and one as a kind
     (``sac``). The kind's intervals are for other training seeds, too.
     """
-    names, known = list(dict.fromkeys(controllers)), task_of(task)
+    names, flown_task = list(dict.fromkeys(controllers)), task_of(task)
     kinds: dict[str, list[str]] = {}
     for name in names:
-        if name in known.policies():
+        if name in flown_task.policies():
             kinds.setdefault(name.rpartition("-")[0], []).append(name)
     kinds = {kind: each for kind, each in kinds.items() if len(each) > 1}
     rows: list[Standing] = []
     for scenario in dict.fromkeys(s for _, s in results):
         flown = {
             name: [results[each, scenario] for each in kinds.get(name, [name])]
-            for name in [*known.references(names), *kinds]
+            for name in [*flown_task.references(names), *kinds]
             if name in kinds or (name, scenario) in results
         }
         some = [_row(task, scenario, seed, name, flown) for name in [*names, *kinds]]
@@ -114,37 +114,39 @@ Flown = Mapping[str, Sequence[Sequence[Episode]]]
 
 
 def figures(flown: Sequence[Sequence[Episode]], name: str) -> NDArray[np.float64]:
-    """Return a property of each episode, (policies, episodes)."""
+    """Return a property of all episodes (policies, episodes)."""
     return np.array([[getattr(e, name) for e in one] for one in flown], dtype=np.float64)
 
 
 def ranking_figures(flown: Flown) -> tuple[str, dict[str, NDArray[np.float64]]]:
-    """Return the name of the figure that ranks, and by controller this figure (policies, episodes):
+    """Return the name of the ranking figure, and its values by controller (policies, episodes);
     less is better.
     """
-    found = {name: figures(of, "rmse_settled") for name, of in flown.items()}
-    if all(np.isfinite(each).all() for each in found.values()):
-        return SETTLED, found
+    rmse = {name: figures(of, "rmse_settled") for name, of in flown.items()}
+    if all(np.isfinite(each).all() for each in rmse.values()):
+        return SETTLED, rmse
     return RETURN, {name: -figures(of, "total_reward") for name, of in flown.items()}
 
 
 def _row(task: str, scenario: str, seed: int, name: str, flown: Flown) -> Standing:
     """Return the row of a law, a policy or a kind; ``flown`` holds the episodes of each policy."""
-    known, own = task_of(task), flown[name]
+    flown_task, episodes = task_of(task), flown[name]
     by, ranked = ranking_figures(flown)
     means = {law: float(of.mean()) for law, of in ranked.items()}
-    ends = [law for law in known.laws if law in ranked and law not in ("hover", *known.bounds)]
-    rival, x = known.rival, ranked[name]
+    ends = [
+        law for law in flown_task.laws if law in ranked and law not in ("hover", *flown_task.bounds)
+    ]
+    rival, x = flown_task.rival, ranked[name]
     best = min(ends or [rival], key=means.__getitem__)
-    interval = known.interval if len(x) == 1 else hierarchical_bootstrap
+    interval = flown_task.interval if len(x) == 1 else hierarchical_bootstrap
     wins = float(paired_wins(x, ranked[rival]))
-    lost = figures(own, "lost")
+    lost = figures(episodes, "lost")
 
     def change(law: str) -> tuple[float, tuple[float, float], float | None]:
         if by == RETURN:
             return math.nan, _NONE, None
         draws = hierarchical_draws(relative_change, x, ranked[law], resamples=_RESAMPLES)
-        p = None if name in known.laws else sign_probability(draws)
+        p = None if name in flown_task.laws else sign_probability(draws)
         return float(relative_change(x, ranked[law])), interval_of(draws), p
 
     def in_metres(
@@ -157,7 +159,7 @@ def _row(task: str, scenario: str, seed: int, name: str, flown: Flown) -> Standi
     def improvement(a: Any, b: Any) -> Any:
         return probability_of_improvement(-a, -b)
 
-    rmse, returns = figures(own, "rmse"), figures(own, "total_reward")
+    rmse, returns = figures(episodes, "rmse"), figures(episodes, "total_reward")
     whole, whole_ci = in_metres(mean, rmse)
     settled, settled_ci = in_metres(mean, x)
     iqm, iqm_ci = in_metres(interquartile_mean, x)
@@ -190,16 +192,16 @@ def _row(task: str, scenario: str, seed: int, name: str, flown: Flown) -> Standi
         ranked_by=by,
         rmse_settled_m=settled,
         rmse_settled_ci95_m=settled_ci,
-        rmse_transient_m=float(figures(own, "rmse_transient").mean()),
+        rmse_transient_m=float(figures(episodes, "rmse_transient").mean()),
         iqm_rmse_m=iqm,
         iqm_ci95_m=iqm_ci,
         improvement_ci95=better,
         return_mean=float(returns.mean()),
         return_ci95=interval(mean, returns, resamples=_RESAMPLES),
-        command_activity=float(figures(own, "command_activity").mean()),
-        saturated_fraction=float(figures(own, "saturated_fraction").mean()),
+        command_activity=float(figures(episodes, "command_activity").mean()),
+        saturated_fraction=float(figures(episodes, "saturated_fraction").mean()),
         lost_episodes=int(lost.sum()),
-        uses_truth=bool(figures(own, "uses_truth").any()),
+        uses_truth=bool(figures(episodes, "uses_truth").any()),
     )
 
 

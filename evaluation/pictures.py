@@ -46,11 +46,11 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
     figure = new_figure(7.0)
     top, *others = figure.subplots(4, 1, sharex=True, height_ratios=[2, 1, 1, 1])
     end = "terminated" if episode.lost else "not terminated"
-    told = ", ".join(filter(None, (episode.motion, f"seed {episode.seed}")))
+    details = ", ".join(filter(None, (episode.motion, f"seed {episode.seed}")))
     figure_text = f"return {episode.total_reward:.4g}"
     if len(episode.error):
         figure_text = f"RMSE after 3 s {episode.rmse_settled:.3g} m"
-    top.set_title(f"{title}: {figure_text}, {end} ({told})")
+    top.set_title(f"{title}: {figure_text}, {end} ({details})")
     if episode.in_jet:
         fan, command = episode.fan_y, others.pop()
         top.fill_between(t, fan - 0.45, fan + 0.45, color=JET, label="width of the fan")
@@ -104,15 +104,15 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
         some = all_of_it[:MOST_ROWS]
         flights = {name: each for (name, world), each in results.items() if world == scenario}
         rival, by_error = flights[some[0].rival], some[0].ranked_by == SETTLED
-        kept = "rmse_settled" if by_error else "total_reward"
-        middle = int(np.argsort(figures([rival], kept)[0])[len(rival) // 2])
+        figure_name = "rmse_settled" if by_error else "total_reward"
+        middle = int(np.argsort(figures([rival], figure_name)[0])[len(rival) // 2])
         for i, row in enumerate(some):
             flown = [
                 each
                 for name, each in flights.items()
                 if (name if row.policies == 1 else name.rpartition("-")[0]) == row.controller
             ]
-            values = figures(flown, kept).ravel()
+            values = figures(flown, figure_name).ravel()
             shown_mean = row.rmse_settled_m if by_error else row.return_mean
             mean_text = f"{in_mm(shown_mean)} mm" if by_error else f"{shown_mean:.4g}"
             jitter = np.random.default_rng(0).uniform(-0.24, 0.24, len(values))
@@ -138,8 +138,8 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
         what, interval = ("RMSE after 3 s", ", 95 % interval") if by_error else ("return", "")
         left.set_title(f"{scenario}{of}: {what} of each episode, mean{interval}")
         left.set_xlabel(f"{what}{' (m)' * by_error}")
-        told = "y (m), fan dashed" if longest.in_jet else "error (m)"
+        y_label = "y (m), fan dashed" if longest.in_jet else "error (m)"
         right.set_title(f"median episode of {some[0].rival}")
         right.set_xlabel("time (s)")
-        right.set_ylabel(told)
+        right.set_ylabel(y_label)
     write_png(figure, path)

@@ -1,7 +1,7 @@
-"""Rewards of a user's own by name, as functions of ``info``.
+"""A user's rewards by name, as functions of ``info``.
 
-``info`` has a number, or an array with one row for each environment, in each entry. So one function
-serves a single environment and many.
+Entries of ``info`` are numbers, or arrays with a row for each environment, so one function serves a
+single environment and a vector.
 """
 
 from collections.abc import Callable, Mapping
@@ -43,8 +43,8 @@ def _term(name: str, info: Mapping[str, Any]) -> Any:
         return info[f"reward_{name}"]
     error = error_of(info)
     if name not in ("squared", "error") or error is None:
-        known = [key.removeprefix("reward_") for key in info if key.startswith("reward_")]
-        raise unknown_name("term", name, [*known, "squared", "error"], "reward")
+        terms = [key.removeprefix("reward_") for key in info if key.startswith("reward_")]
+        raise unknown_name("term", name, [*terms, "squared", "error"], "reward")
     limited = np.minimum(error, LOST_OFFSET)
     return -(limited**2) if name == "squared" else 1.0 - limited / LOST_OFFSET
 
@@ -61,8 +61,8 @@ def find_reward(name: str) -> Reward:
         InputError: no reward has this name, or a file holds none.
     """
     if is_file_name(name):
-        found: Reward = named_in_file(name, "reward", _WHAT, callable)
-        return found
+        reward: Reward = named_in_file(name, "reward", _WHAT, callable)
+        return reward
     if name.endswith((".yaml", ".yml")):
         weights = read_yaml(Path(name), "a reward's file")
         if not isinstance(weights, dict) or not all(
@@ -77,14 +77,14 @@ def find_reward(name: str) -> Reward:
 
 def total_of(reward: Reward, info: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
     """Return a reward and its named terms, as entries ``reward_NAME`` of ``info``."""
-    given = reward(info)
-    if not isinstance(given, Mapping):
-        return given, {}
-    return sum(given.values()), {f"reward_{name}": term for name, term in given.items()}
+    terms = reward(info)
+    if not isinstance(terms, Mapping):
+        return terms, {}
+    return sum(terms.values()), {f"reward_{name}": term for name, term in terms.items()}
 
 
 class OwnReward(gym.Wrapper[Any, Any, Any, Any]):
-    """An environment with a reward of one's own; its terms stand in ``info``."""
+    """An environment with a user's reward; ``info`` has the terms."""
 
     def __init__(self, env: Any, reward: Reward) -> None:
         super().__init__(env)

@@ -136,9 +136,9 @@ def hierarchical_draws(
     Raises:
         InputError: the matrices have different tasks.
     """
-    given = _same_tasks(*matrices)
-    rng, count = np.random.default_rng(seed), given[0].shape[1]
-    step = max(_AT_ONCE // max(m.size for m in given), 1)
+    scores = _same_tasks(*matrices)
+    rng, count = np.random.default_rng(seed), scores[0].shape[1]
+    step = max(_AT_ONCE // max(m.size for m in scores), 1)
     values = []
     for first in range(0, resamples, step):
         k = min(step, resamples - first)
@@ -149,7 +149,7 @@ def hierarchical_draws(
             ]
         )
         drawn = []
-        for m in given:
+        for m in scores:
             rows = rng.integers(len(m), size=(k, max(len(m) - 1, 1)))
             drawn.append(m[rows[:, :, None], columns[:, None, :]])
         values.append(np.asarray(statistic(*drawn), dtype=np.float64))
@@ -198,9 +198,9 @@ def holm(p_values: ArrayLike) -> Array:
 
 
 def _same_tasks(*matrices: ArrayLike) -> list[Array]:
-    given = [score_matrix(m) for m in matrices]
-    if len({m.shape[-1] for m in given}) > 1:
+    scores = [score_matrix(m) for m in matrices]
+    if len({m.shape[-1] for m in scores}) > 1:
         raise InputError(
-            f"scores: expected the same tasks, got {' and '.join(str(m.shape[-1]) for m in given)}"
+            f"scores: expected the same tasks, got {' and '.join(str(m.shape[-1]) for m in scores)}"
         )
-    return given
+    return scores

@@ -38,20 +38,20 @@ def over_all(rows: Sequence[Standing], results: Results) -> list[dict[str, Any]]
     A score is 0 at the mean of ``hover`` in its scenario, and 1 at the oracle's. Definitions are
     rliable's; the bootstrap is stratified by scenario, over policies and episodes.
     """
-    known, found = task_of(rows[0].task), []
+    flown_task, over_all_rows = task_of(rows[0].task), []
     policies = {row.controller: row.policies for row in rows}
     worlds = list(dict.fromkeys(row.scenario for row in rows))
     for name in policies:
         kin = [one for one, _ in results if one.rpartition("-")[0] == name]
-        own = list(dict.fromkeys(kin)) if policies[name] > 1 else [name]
+        policies_of_kind = list(dict.fromkeys(kin)) if policies[name] > 1 else [name]
         scores, better = [], []
         for world in worlds:
-            laws = {name: own} | {law: [law] for law in known.references(())}
+            laws = {name: policies_of_kind} | {law: [law] for law in flown_task.references(())}
             flown = {law: [results[each, world] for each in some] for law, some in laws.items()}
             by, ranked = ranking_figures(flown)
             start, end = ranked["hover"].mean(), ranked.get("oracle", np.array(np.nan)).mean()
             scores.append((start - ranked[name]) / (start - end))
-            better.append((-ranked[name], -ranked[known.rival]))
+            better.append((-ranked[name], -ranked[flown_task.rival]))
         strata = [each.shape[1] for each in scores]
         x, y = (np.hstack(part) for part in zip(*better, strict=True))
         draws = hierarchical_draws(probability_of_improvement, x, y, strata=strata)
@@ -64,14 +64,14 @@ def over_all(rows: Sequence[Standing], results: Results) -> list[dict[str, Any]]
             score = np.hstack(scores)
             draws = hierarchical_draws(interquartile_mean, score, strata=strata)
             row |= {"iqm_score": float(interquartile_mean(score)), "iqm_ci95": interval_of(draws)}
-        found.append(row)
-    return found
+        over_all_rows.append(row)
+    return over_all_rows
 
 
 def results_hash(data: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a submission's request, rows and flights, as canonical JSON."""
-    kept = {key: data[key] for key in ("request", "rows", "over_all", "flights")}
-    text = json.dumps(kept, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    hashed = {key: data[key] for key in ("request", "rows", "over_all", "flights")}
+    text = json.dumps(hashed, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -45,14 +45,14 @@ def summary(rows: Sequence[Standing]) -> str:
         lost: dict[str, list[str]] = {}
         for row in sorted(some, key=lambda row: -row.lost_fraction):
             lost.setdefault(_lost(row), []).append(f"`{row.controller}`")
-        told = "; ".join(f"{', '.join(names)} {count}" for count, names in lost.items())
+        losses = "; ".join(f"{', '.join(names)} {count}" for count, names in lost.items())
         if not any(row.lost_episodes for row in some):
-            told = "nothing"
+            losses = "nothing"
         judged = [row for row in some if row.p_over_best is not None and row.p_over_best < _CLEAR]
         better = [row for row in judged if row.change_over_best < 0]
         worse = [row for row in judged if row.change_over_best > 0]
         truth = ", ".join(f"`{row.controller}`" for row in some if row.uses_truth)
-        line = f"* **{scenario}**, {some[0].episodes} episodes each. Terminated: {told}."
+        line = f"* **{scenario}**, {some[0].episodes} episodes each. Terminated: {losses}."
         means = [
             f"`{row.controller}` {row.rmse_settled_m:.3f} m, interquartile mean "
             f"{row.iqm_rmse_m:.3f} m"
@@ -85,10 +85,10 @@ def _listed(rows: Sequence[Standing]) -> str:
 
 
 def _lost(row: Standing) -> str:
-    told = f"{row.lost_episodes} of {row.policies * row.episodes}"
+    losses = f"{row.lost_episodes} of {row.policies * row.episodes}"
     if row.most_lost_fraction > row.lost_fraction:
-        told += f", most {round(row.most_lost_fraction * row.episodes)} of {row.episodes}"
-    return told
+        losses += f", most {round(row.most_lost_fraction * row.episodes)} of {row.episodes}"
+    return losses
 
 
 # titles of the columns: figures of a controller, comparisons, and those of a page alone
@@ -160,15 +160,15 @@ def markdown(rows: Sequence[Standing]) -> str:
 
 
 def _markdown(columns: dict[str, list[str]]) -> str:
-    left = ("scenario", "law", "RMSE", "return, ", "against", "whole")
-    rule = ["-" if title.startswith(left) else "-:" for title in columns]
+    left_aligned = ("scenario", "law", "RMSE", "return, ", "against", "whole")
+    rule = ["-" if title.startswith(left_aligned) else "-:" for title in columns]
     lines = [list(columns), rule, *zip(*columns.values(), strict=True)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def legend(task: str, rows: Sequence[Standing]) -> str:
     """Return the words below the tables of a leaderboard."""
-    known, first = task_of(task), rows[0]
+    flown_task, first = task_of(task), rows[0]
     by_error = first.ranked_by == SETTLED
     ranked = "RMSE after 3 s" if by_error else "return: the task states no error"
     sentences = {
@@ -176,8 +176,8 @@ def legend(task: str, rows: Sequence[Standing]) -> str:
         f"Ranked by {ranked}.": True,
         "IQM: interquartile mean.": by_error,
         "Activity: mean squared change of the command, of its largest.": True,
-        f"P: probability of improvement over {known.rival}.": True,
-        "Score: 0 = hover, 1 = oracle.": "oracle" in known.laws,
+        f"P: probability of improvement over {flown_task.rival}.": True,
+        "Score: 0 = hover, 1 = oracle.": "oracle" in flown_task.laws,
         "A terminated episode's rest counts 2.5 m.": any(row.lost_episodes for row in rows),
         "*: reads the truth or a preview.": any(row.uses_truth for row in rows),
     }

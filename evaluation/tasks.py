@@ -1,7 +1,7 @@
-"""Tasks by name, with their scenarios, laws and rivals: the kit's four, and a user's own.
+"""Tasks by name, with their scenarios, laws and rivals: the kit's four, and a user's.
 
-A task of a user's own is an id registered with Gymnasium, or ``FILE.py:NAME`` with the class of an
-environment. Its ``info`` states ``error`` (m); without one the leaderboard ranks by return.
+A user's task is an id registered with Gymnasium, or ``FILE.py:NAME`` with the class of an
+environment. ``info`` has ``error`` (m); without an error the leaderboard ranks by return.
 """
 
 import inspect
@@ -60,8 +60,8 @@ class BenchmarkTask:
     @property
     def scenarios(self) -> Mapping[str, Any]:
         """All of its worlds, by name; none where its class has no ``scenarios``."""
-        known: Mapping[str, Any] = getattr(self.environment, "scenarios", {})
-        return known
+        by_name: Mapping[str, Any] = getattr(self.environment, "scenarios", {})
+        return by_name
 
     @property
     def laws(self) -> Mapping[str, Callable[..., Any]]:
@@ -86,8 +86,8 @@ class BenchmarkTask:
 
     def policies(self) -> Mapping[str, Path]:
         """Return the kit's own policies, by name."""
-        kept = self.kin or self.name
-        return shipped_policies(kept) if kept in TASK_LAWS else {}
+        kit_task = self.kin or self.name
+        return shipped_policies(kit_task) if kit_task in TASK_LAWS else {}
 
     def references(self, names: Sequence[str]) -> list[str]:
         """Return ``names`` and the reference laws of scores, wins and shares."""
@@ -132,8 +132,8 @@ class BenchmarkTask:
         return env if reward is None else OwnReward(env, find_reward(reward))
 
     def make_many(self, count: int, scenario: str, **given: Any) -> gym.vector.VectorEnv:
-        """Return ``count`` environments side by side, for learners: normalised where the task is
-        the kit's or extends it.
+        """Return a vector of ``count`` environments for learners, normalised if the task is the
+        kit's or extends one of the kit's.
 
         Args:
             count: number of environments.
@@ -243,8 +243,8 @@ def task_of(name: str) -> BenchmarkTask:
     kin = next((n for n, t in TASKS.items() if _is_kin(kind, spec.kwargs, t.environment)), "")
     if kin:
         return replace(TASKS[kin], environment=kind, spec=spec, kin=kin)
-    known = tuple(getattr(kind, "scenarios", ())) or (ALONE,)
-    worlds = ("base",) if "base" in known else known[:1]
+    scenarios = tuple(getattr(kind, "scenarios", ())) or (ALONE,)
+    worlds = ("base",) if "base" in scenarios else scenarios[:1]
     return BenchmarkTask(kind, "hover", "hover", worlds, spec=spec)
 
 
@@ -282,27 +282,27 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
 
     Args:
         name: a law, one of the kit's policies, the path of a trained policy, a YAML file of a law,
-            or FILE.py:CLASS, which runs the file. In a task of a user's own ``hover`` is the
-            middle of the action space.
+            or FILE.py:CLASS, which runs the file. In a user's task ``hover`` is the middle of
+            the action space.
         task: as of ``task_of``.
 
     Raises:
         InputError: no controller has this name, a file holds none, or a policy of another task.
     """
-    known = task_of(task)
-    shipped = known.policies()
+    flown_task = task_of(task)
+    shipped = flown_task.policies()
     if name in shipped or is_policy_path(name):
         policy = load_policy(shipped.get(name, name))
-        if policy.task not in (known.name, known.kin):
+        if policy.task not in (flown_task.name, flown_task.kin):
             raise InputError(f"{name}: a policy of {policy.task}, not of {task}")
         return policy
-    if known.kin or known.spec is None or is_file_name(name):
-        return make_controller(name, known.kin or known.name)
+    if flown_task.kin or flown_task.spec is None or is_file_name(name):
+        return make_controller(name, flown_task.kin or flown_task.name)
     if name in OWN_LAWS:
         return OWN_LAWS[name]()
-    if name not in known.laws:
-        raise unknown_name("controller", name, [*known.laws, *OWN_LAWS])
-    space = known.make(known.defaults[0]).action_space
+    if name not in flown_task.laws:
+        raise unknown_name("controller", name, [*flown_task.laws, *OWN_LAWS])
+    space = flown_task.make(flown_task.defaults[0]).action_space
     return lambda observation, info=None: 0.5 * (space.low + space.high)
 
 
@@ -315,10 +315,12 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
         for name in names
     }
     shown = {}
-    for name, own in parts.items():
+    for name, folders in parts.items():
         others = [other for key, other in parts.items() if key != name]
         length = 1
-        while length < len(own) and any(other[-length:] == own[-length:] for other in others):
+        while length < len(folders) and any(
+            other[-length:] == folders[-length:] for other in others
+        ):
             length += 1
-        shown[name] = "/".join(own[-length:])
+        shown[name] = "/".join(folders[-length:])
     return shown

@@ -76,8 +76,8 @@ class Clocks:
     @property
     def line(self) -> ClockLine | None:
         """The reference's line against this machine's clock; None: unknown."""
-        known = self._clocks and self._paced and not self._ours
-        return self._clocks[0].line if known else None
+        has_line = self._clocks and self._paced and not self._ours
+        return self._clocks[0].line if has_line else None
 
     @property
     def drift(self) -> float | None:

@@ -107,8 +107,8 @@ class LiveFilter:
 
     def _start(self, period: float) -> None:
         self.period = period
-        given = self.settings.tuning
-        tuning = None if given is None else given.scaled(PERIOD, period)
+        stated_tuning = self.settings.tuning
+        tuning = None if stated_tuning is None else stated_tuning.scaled(PERIOD, period)
         ukf = WrenchUKF(self.vehicle, tuning, period, self.settings.gate)
         self._white = ukf.record["innovation"][0]  # the last pose's, whitened
         commanded = WrenchUKF(replace(self.vehicle, omega_source="commanded"), tuning, period)

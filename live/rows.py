@@ -63,11 +63,11 @@ class Joiner:
         if not moving and not sample.has_motors:
             return None
         self._last_row = max(self._last_row, t)
-        known = sample.measured | {"command": self._command, "voltage": self._voltage}
-        known["rotor_speeds"] = self._at(t)
+        fields = sample.measured | {"command": self._command, "voltage": self._voltage}
+        fields["rotor_speeds"] = self._at(t)
         if not sample.has_pose:
-            known |= {"position": None, "quaternion": None}
-        return Row(t, sample.arrival, commanded=commanded, stamp=sample.stamp, **known)
+            fields |= {"position": None, "quaternion": None}
+        return Row(t, sample.arrival, commanded=commanded, stamp=sample.stamp, **fields)
 
     def _take_motors(self, sample: Measurement, t: float) -> bool:
         """Keep rotor speeds; return whether commands gave them."""
@@ -93,19 +93,19 @@ class Joiner:
         return not self._measured
 
     def _keep(self, t: float, speeds: Array) -> None:
-        kept = self._speeds
-        at = bisect_right(kept, t, key=_time)
-        if not (at and kept[at - 1][0] == t):
-            kept.insert(at, (t, speeds))
-        while len(kept) > 2 and kept[0][0] < kept[-1][0] - _KEPT:
-            del kept[0]
+        history = self._speeds
+        at = bisect_right(history, t, key=_time)
+        if not (at and history[at - 1][0] == t):
+            history.insert(at, (t, speeds))
+        while len(history) > 2 and history[0][0] < history[-1][0] - _KEPT:
+            del history[0]
 
     def _at(self, t: float) -> Array:
         """Return the rotor speeds at a time, s."""
-        kept = self._speeds
-        after = bisect_right(kept, t, key=_time)
-        if after in (0, len(kept)):
-            return kept[max(after - 1, 0)][1]
-        t0, a = kept[after - 1]
-        t1, b = kept[after]
+        history = self._speeds
+        after = bisect_right(history, t, key=_time)
+        if after in (0, len(history)):
+            return history[max(after - 1, 0)][1]
+        t0, a = history[after - 1]
+        t1, b = history[after]
         return np.asarray(a + (b - a) * ((t - t0) / (t1 - t0)))

@@ -131,5 +131,7 @@ class Tallies:
 def reason_of(error: Exception) -> str:
     """Return the reason of a failure, on a line."""
     error = error.__cause__ if isinstance(error.__cause__, OSError) else error
-    said = " ".join(str(getattr(error, "strerror", None) or error).split())[:200]
-    return said if isinstance(error, InputError | OSError) else f"{type(error).__name__}: {said}"
+    reason = " ".join(str(getattr(error, "strerror", None) or error).split())[:200]
+    return (
+        reason if isinstance(error, InputError | OSError) else f"{type(error).__name__}: {reason}"
+    )

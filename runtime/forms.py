@@ -59,9 +59,9 @@ def checked(form: type[T], data: object, where: str, sample: str = "") -> T:
         InputError: no mapping; an unknown or missing key, or a value of another kind.
     """
     if not isinstance(data, Mapping):
-        known = sample or ", ".join(_names(form))
+        examples = sample or ", ".join(_names(form))
         raise InputError(
-            f"{where}: expected a mapping of fields such as {known}, got {type(data).__name__}"
+            f"{where}: expected a mapping of fields such as {examples}, got {type(data).__name__}"
         )
     try:
         filled: T = _adapter(cast(Any, form)).validate_python(data)

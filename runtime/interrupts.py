@@ -89,7 +89,7 @@ def noted() -> Iterator[Callable[[], bool]]:
     An interrupt within the import of a module in C may end as an import error.
     """
     came: list[int] = []
-    told = sys.unraisablehook
+    hook_before = sys.unraisablehook
 
     def note(number: int, frame: FrameType | None) -> None:
         came.append(number)
@@ -101,12 +101,12 @@ def noted() -> Iterator[Callable[[], bool]]:
 
     with _answering(signal.SIGINT, signal.default_int_handler, note) as ours:
         if ours:
-            sys.unraisablehook = lambda lost: lost.exc_type is _Interrupt or told(lost)
+            sys.unraisablehook = lambda lost: lost.exc_type is _Interrupt or hook_before(lost)
         try:
             yield answer
         finally:
             taken()
-            sys.unraisablehook = told
+            sys.unraisablehook = hook_before
 
 
 @contextmanager

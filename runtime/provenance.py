@@ -78,6 +78,6 @@ def made_by(command: str, commits: Iterable[str | None], version: str = __versio
         commits: the commits of the code behind the page's results, as ``commit`` returned them.
         version: version of the code; default: this one's.
     """
-    known = list(dict.fromkeys(name for name in commits if name))
-    words = f", commit{'s' * (len(known) > 1)} {', '.join(known)}" if known else ""
+    stated = list(dict.fromkeys(name for name in commits if name))
+    words = f", commit{'s' * (len(stated) > 1)} {', '.join(stated)}" if stated else ""
     return f"Made by `{command}`, windwrench {version}{words}."

@@ -38,21 +38,21 @@ def named_in_file(name: str, kind: str, what: str, fits: Callable[[Any], bool]) 
         made = inspect.isclass(value) or inspect.isroutine(value)
         return fits(value) and (not made or value.__module__ == module.__name__)
 
-    known = {key: value for key, value in vars(module).items() if is_own(value)}
-    if wanted in known:
-        return known[wanted]
-    if not known:
+    objects = {key: value for key, value in vars(module).items() if is_own(value)}
+    if wanted in objects:
+        return objects[wanted]
+    if not objects:
         raise InputError(f"{path}: holds no {kind}; expected {what}")
     if wanted:
         if wanted in vars(module):
             raise InputError(f"{path}: {wanted} is no {kind}; expected {what}")
-        raise unknown_name(kind, wanted, known, path)
-    if len(known) > 1:
+        raise unknown_name(kind, wanted, objects, path)
+    if len(objects) > 1:
         raise InputError(
-            f"{path}: holds {', '.join(known)}; expected one of them behind the name, "
-            f"{path}:{next(iter(known))}"
+            f"{path}: holds {', '.join(objects)}; expected one of them behind the name, "
+            f"{path}:{next(iter(objects))}"
         )
-    return next(iter(known.values()))
+    return next(iter(objects.values()))
 
 
 def import_file(path: str | Path, what: str) -> ModuleType:

@@ -86,10 +86,10 @@ def _keep(path: Path) -> None:
 def _sweep(path: Path) -> None:
     """Remove the temporary files of ``path`` left by processes now gone."""
     with suppress(OSError):
-        for left in path.parent.glob(f"{escape(_hidden(path))}.*.tmp"):
-            number = left.name.removesuffix(".tmp").rpartition(".")[2]
+        for temporary in path.parent.glob(f"{escape(_hidden(path))}.*.tmp"):
+            number = temporary.name.removesuffix(".tmp").rpartition(".")[2]
             if number.isdigit() and not _lives(int(number)):
-                left.unlink()
+                temporary.unlink()
 
 
 def _lives(pid: int) -> bool:

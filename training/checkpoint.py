@@ -1,8 +1,9 @@
-"""Checkpoints to resume a run without a trace.
+"""Checkpoints: a resumed run equals an undisturbed one.
 
 A checkpoint holds every input of the rest of a run: networks, optimisers, replay memory, the state
-of every random generator, and the number of each environment's episode. Killed there or not, a run
-begins the next episodes. A checkpoint is one file of tensors and text, and reading it runs no code.
+of every random generator, and the number of each environment's episode. After a checkpoint a run,
+killed or not, begins new episodes. A checkpoint is one file of tensors and text; loading runs no
+code.
 """
 
 import json
@@ -23,7 +24,7 @@ _NORMALS = ("_n_updates", "_episode_num", "num_timesteps")
 
 
 def save_checkpoint(learner: Any, env: FeatureVecEnv, extra: dict[str, Any], path: Path) -> None:
-    """Write the state of a run, between two calls of ``learn``; the next one begins new episodes.
+    """Write the state of a run between two calls of ``learn``; the next call begins new episodes.
     ``extra`` is text, numbers and lists of the run's own.
     """
     kind, keys, *rest = np.random.get_state()  # noqa: NPY002  the generator that SB3 draws from

@@ -105,9 +105,9 @@ def _check(config: Config) -> None:
     if not all(isinstance(n, int) and n > 0 for n in config["net"]):
         raise InputError(f"{name}: net must list sizes of hidden layers, got {config['net']}")
     words = {"activation": ("relu", "tanh"), "estimator": ("ukf", "constant-gain", "ukf-lanes")}
-    for key, known in words.items():
-        if config[key] not in known:
-            raise unknown_name(key, config[key], known, name)
+    for key, choices in words.items():
+        if config[key] not in choices:
+            raise unknown_name(key, config[key], choices, name)
     features_of(config)
 
 

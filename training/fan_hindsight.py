@@ -1,10 +1,10 @@
 """The commands of a law with knowledge of the future: the teacher of ``FanTracking``.
 
-Once flown, the fan's motion is known. The oracle's regulator with preview (``controllers.preview``)
-gives the best command of each decision in view of the fan's coming places. The mean of these
-commands, given the observations so far, is the best causal command (certainty equivalence): a
-recurrent network fitted to them learns this mean. Two more quantities are taught, for the network's
-memory alone: the fan's offset and its velocity.
+After a flight the fan's motion is known. The oracle's regulator with preview
+(``controllers.preview``) gives the best command of each decision for the fan's future places. The
+mean of these commands, given the observations so far, is the best causal command (certainty
+equivalence): a recurrent network fitted to them learns this mean. The network also learns the fan's
+offset and velocity, for its memory alone.
 """
 
 from typing import Any
@@ -46,7 +46,7 @@ def fan_lanes(episodes: int) -> list[TaskLanes]:
 
 
 class FanHindsight:
-    """FanTracking: scaled frames, and the command that hindsight holds best.
+    """FanTracking: scaled frames, and the best command in hindsight.
 
     A law with sight of the fan flies the first round.
     """
@@ -81,10 +81,10 @@ class FanHindsight:
             remember(self._features.frames(observations))
             seen = self._history.flat()
         fan = infos["fan_y"]
-        own = infos["y"]
-        self._set_point = _moved(self._set_point, own, infos["command"][:, 0])
+        places = infos["y"]
+        self._set_point = _moved(self._set_point, places, infos["command"][:, 0])
         self._flown.append((self._own(infos), _felt(infos), fan.copy()))
-        wanted = infos["fan_velocity"] + _LEAD * (fan - own)
+        wanted = infos["fan_velocity"] + _LEAD * (fan - places)
         return seen, wanted[:, None]
 
     def _own(self, infos: dict[str, Any]) -> Array:
@@ -102,10 +102,10 @@ class FanHindsight:
         """Return the best command, the fan's offset (m) and its velocity (m/s), (decisions, n, 3),
         and weights (decisions, n).
         """
-        own, felt, fan = (np.array(each) for each in zip(*self._flown, strict=True))
+        places, felt, fan = (np.array(each) for each in zip(*self._flown, strict=True))
         now = np.arange(self.decisions)
         later = np.minimum(now[:, None] + np.arange(AHEAD + 1), self.decisions)
-        off = own[:-1].copy()
+        off = places[:-1].copy()
         off[..., [PLACE, SET_POINT]] -= fan[:-1, :, None]
         moves = np.diff(fan[later], axis=1)  # (decisions, AHEAD, n)
         rests = lasting(np.ones(1), AHEAD, self.period)[:, 0] @ self._ahead[:, :-1]

@@ -24,8 +24,8 @@ class FastLstmPolicy(RecurrentActorCriticPolicy):  # type: ignore[misc]
         count = lstm_states[0].shape[1]
         starts = episode_starts.reshape(count, -1)
         if starts.shape[1] > 1 and not torch.any(starts[:, 1:]):
-            kept = (1.0 - starts[:, 0]).view(1, count, 1)
-            lstm_states = (kept * lstm_states[0], kept * lstm_states[1])
+            continues = (1.0 - starts[:, 0]).view(1, count, 1)
+            lstm_states = (continues * lstm_states[0], continues * lstm_states[1])
             episode_starts = torch.zeros_like(episode_starts)
         result: tuple[torch.Tensor, States] = RecurrentActorCriticPolicy._process_sequence(
             features, lstm_states, episode_starts, lstm

@@ -76,7 +76,7 @@ class Flights:
         off = size * self._rng.standard_normal(shape)
         flying = np.ones(n, dtype=np.bool_)
         seen = []
-        kept = [flying]
+        in_flight = [flying]
         seeds = [training_seed(self._seed, 0, self.episodes + i) for i in range(n)]
         observation, infos = env.reset(seed=seeds)
         lesson.begin(env, network is None)
@@ -85,13 +85,15 @@ class Flights:
             seen.append(frames)
             if network is not None:
                 with torch.no_grad():
-                    said, _, state = network(torch.from_numpy(frames)[None], state)
-                command = said[0].numpy() @ shares.T
+                    output, _, state = network(torch.from_numpy(frames)[None], state)
+                command = output[0].numpy() @ shares.T
             off = keep * off + np.sqrt(1.0 - keep**2) * size * self._rng.standard_normal(shape)
-            given = np.clip(command + off, -lesson.largest, lesson.largest).astype(np.float32)
-            observation, _, lost, _, infos = env.step(given)
+            flown_command = np.clip(command + off, -lesson.largest, lesson.largest).astype(
+                np.float32
+            )
+            observation, _, lost, _, infos = env.step(flown_command)
             flying = flying & ~lost
-            kept.append(flying)
+            in_flight.append(flying)
         lesson.look(observation, infos)
-        truth, counts = lesson.taught(np.array(kept))
+        truth, counts = lesson.taught(np.array(in_flight))
         return Sequences(np.array(seen), truth.astype(np.float32), counts.astype(np.float32))

@@ -2,12 +2,12 @@
 
 The model of the flight loop and its vehicle is linear (``controllers.axis_models``). A flight's
 difference to the model, from one decision to the next, is a disturbance of any origin: wind, a
-vehicle other than the declared one, errors of the flight loop's estimate, a turning reference. Once
-flown, disturbances are known. The linear-quadratic regulator with preview (``controllers.preview``)
-gives the best command of each decision in view of all later ones. Late commands or poses make the
-model's motors late: the result of a late command is no disturbance, and would be answered twice.
-The mean of the best command, given the observations so far, is the best causal command (certainty
-equivalence). A network fitted to the best commands learns this mean.
+vehicle other than the declared one, errors of the flight loop's estimate, a turning reference.
+After a flight all disturbances are known. The linear-quadratic regulator with preview
+(``controllers.preview``) gives the best command of each decision for all later disturbances. Delays
+of commands or poses enter the model's motors; otherwise the effect of a late command would count as
+a disturbance, too. The mean of the best command, given the observations so far, is the best causal
+command (certainty equivalence). A network fitted to the best commands learns this mean.
 """
 
 from dataclasses import replace
@@ -61,9 +61,9 @@ def lanes_of(
     ``observation``: one of ``OBSERVATIONS`` in place of the task's own.
     """
     kind = TASKS[task].environment
-    own = {LATE: _LATE}
+    scenarios = {LATE: _LATE}
     return [
-        TaskLanes(count, task=kind, scenario=own.get(name, name), observation=observation)
+        TaskLanes(count, task=kind, scenario=scenarios.get(name, name), observation=observation)
         for name, count in mix_of(scenario, episodes).items()
     ]
 
@@ -81,10 +81,10 @@ def _models(oracle: WindOracle, late: float) -> list[tuple[Array, ...]]:
 
 
 class WindLesson:
-    """A task in the wind: scaled observations, and the command that hindsight holds best.
+    """A task in the wind: scaled observations, and the best command in hindsight.
 
-    The environment has any observation: the teacher and ``lqg`` see the task's own. ``lqg`` flies
-    the first round. An episode of a lesson is the first half of one of the task.
+    The environment has any observation; the teacher and ``lqg`` get the task's. ``lqg`` flies the
+    first round. An episode of a lesson is the first half of the task's.
     """
 
     decisions = 250
@@ -115,24 +115,24 @@ class WindLesson:
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Any]:
         """Return scaled observations (n, k), and the commands (n, 3) of ``lqg`` in flight."""
-        own = as_numbers(self._envs.task.observe(self._envs.state))
-        seen = own.astype(np.float64)
+        raw = as_numbers(self._envs.task.observe(self._envs.state))
+        seen = raw.astype(np.float64)
         self._states.append(self._oracle.states(seen, infos | self._envs.truth()))
         self._commands.append(seen[:, LAST_ACTION:])
-        wanted = [law(each) for law, each in zip(self._laws, own, strict=False)]
+        wanted = [law(each) for law, each in zip(self._laws, raw, strict=False)]
         return observations / self._scale, np.array(wanted)
 
     def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the best commands (decisions, n, 3), and weights (decisions, n): the vehicle flew
         on for at least ``AHEAD`` further decisions.
         """
-        given = np.array(self._commands[1:])
-        best = np.empty_like(given)
+        commands = np.array(self._commands[1:])
+        best = np.empty_like(commands)
         for late in np.unique(self._late):
             some = self._late == late
             for i, (A, B, gain, ahead) in enumerate(_models(self._oracle, late)):
                 x = np.array([states[i][some] for states in self._states])
-                came = x[1:] - x[:-1] @ A.T - given[:, some, i, None] * B
+                came = x[1:] - x[:-1] @ A.T - commands[:, some, i, None] * B
                 wanted = x[:-1] @ gain
                 for k, share in enumerate(ahead):
                     wanted[: len(came) - k] += came[k:] @ share

@@ -19,7 +19,7 @@ ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 
 
 def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
-    """Return the SB3 algorithm of a configuration."""
+    """Return the SB3 learner of a configuration."""
     torch.set_num_threads(1)  # the networks are small: threads would only wait for each other
     algorithm = config["algorithm"]
     policy: dict[str, Any] = {
@@ -38,7 +38,7 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
         done = 0 if learner is None else learner.num_timesteps
         return float(start + (end - start) * min(done / config["steps"], 1.0))
 
-    given: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         **config["learner"],
         "learning_rate": rate,
         "seed": seed,
@@ -49,7 +49,9 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
     network: Any = "MlpPolicy"
     if algorithm == "td3":
         size = env.action_space.shape
-        given["action_noise"] = NormalActionNoise(np.zeros(size), np.full(size, config["noise"]))
+        arguments["action_noise"] = NormalActionNoise(
+            np.zeros(size), np.full(size, config["noise"])
+        )
     elif algorithm == "recurrent-ppo":
         from sb3_contrib import RecurrentPPO
 
@@ -61,7 +63,7 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
     if algorithm in ("ppo", "recurrent-ppo"):
         policy["log_std_init"] = config["log_std_init"]
         policy["net_arch"] = {"pi": config["net"], "vf": config["net"]}
-    learner = kind(network, env, policy_kwargs=policy, **given)
+    learner = kind(network, env, policy_kwargs=policy, **arguments)
     return learner
 
 

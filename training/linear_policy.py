@@ -1,8 +1,8 @@
 """A linear law of any task, fitted to the best commands in hindsight: a baseline.
 
 Each quantity of the observation passes through first-order low-passes of several times; a command
-is a weighted sum of all of them. No sum suits two levels of noise: taught in
-``hindsight.MIX`` the law has 2.7 times the error on WindTrajectory's base after 3 s (24 validation
+is a weighted sum of all of them. No sum suits two levels of noise: fitted to
+``hindsight.MIX``, the law has 2.7 times the error on WindTrajectory's base after 3 s (24 validation
 episodes). The weights are a ridge regression (Hoerl and
 Kennard, Technometrics 12(1), 1970) on all flights so far, in rounds as of ``task_policies``.
 """
@@ -40,16 +40,16 @@ class LinearLaw:
         quantities).
         """
         state = self._remember(state, frames[0].numpy())
-        said = state.reshape(len(state), -1) @ self._weight.T + self._bias
-        return torch.from_numpy(said[None]), None, state
+        output = state.reshape(len(state), -1) @ self._weight.T + self._bias
+        return torch.from_numpy(output[None]), None, state
 
     def fit(self, flown: Sequences) -> None:
         """Fit the weights to all counting decisions."""
-        kept = None
+        memory = None
         all_kept = []
         for frames in flown.seen:
-            kept = self._remember(kept, frames)
-            all_kept.append(kept)
+            memory = self._remember(memory, frames)
+            all_kept.append(memory)
         some = flown.counts > 0.0
         seen = np.array(all_kept)[some].reshape(int(some.sum()), -1).astype(np.float64)
         mean = seen.mean(axis=0)
@@ -58,9 +58,9 @@ class LinearLaw:
         wanted = flown.truth[some].astype(np.float64)
         middle = wanted.mean(axis=0)
         square = seen.T @ seen / len(seen) + RIDGE * np.eye(len(mean))
-        found = np.linalg.solve(square, seen.T @ (wanted - middle) / len(seen)).T / deviation
-        self._weight = found.astype(np.float32)
-        self._bias = (middle - found @ mean).astype(np.float32)
+        weight = np.linalg.solve(square, seen.T @ (wanted - middle) / len(seen)).T / deviation
+        self._weight = weight.astype(np.float32)
+        self._bias = (middle - weight @ mean).astype(np.float32)
 
     def weights(self, shares: Array) -> Weights:
         """Return the weights of the policy that commands ``shares`` (axes, taught)."""

@@ -28,7 +28,7 @@ _SQUASHED = ("sac", "td3")  # algorithms with a tanh behind the policy's output
 
 @dataclass
 class Progress:
-    """How a run has gone so far; ``progress.json`` in its folder."""
+    """Progress of a run; ``progress.json`` in its folder."""
 
     __pydantic_config__ = STRICT
 
@@ -71,7 +71,7 @@ def progress_from(data: Any, path: Path) -> Progress:
 
 
 def read_progress(folder: Path) -> Progress | None:
-    """Return how a run in ``folder`` has gone; None where there is none.
+    """Return the progress of the run in ``folder``; None without a run.
 
     Raises:
         InputError: the file cannot be read, or holds something else.
@@ -166,8 +166,8 @@ class Run:
         self.scenario = scenario
         self.seed = seed
         self.folder = folder
-        own = {"reward": reward, "observation": observation}
-        self.own = {name: value for name, value in own.items() if value is not None}
+        chosen = {"reward": reward, "observation": observation}
+        self.own = {name: value for name, value in chosen.items() if value is not None}
         if task != STANDARD_TASK or observation:
             self.own["task"] = task_of(task).name
         self._claim()
@@ -182,13 +182,13 @@ class Run:
         path = self.folder / "training.json"
         run = {"config": self.config, "scenario": self.scenario, "seed": self.seed, **self.own}
         if path.exists():
-            kept = read_json(path, "what a training in this folder is")
-            if not isinstance(kept, dict):
+            earlier_run = read_json(path, "what a training in this folder is")
+            if not isinstance(earlier_run, dict):
                 raise InputError(
                     f"{path}: does not say what the training in its folder is ({', '.join(run)}); "
                     f"give another --out, or delete {self.folder}"
                 )
-            if {k: kept.get(k) for k in run} != run:
+            if {k: earlier_run.get(k) for k in run} != run:
                 raise InputError(
                     f"{self.folder}: holds a run with another configuration, scenario or seed; "
                     "give another --out, or delete it"
@@ -196,7 +196,7 @@ class Run:
         write_json({**run, "versions": versions()}, path)
 
     def resume(self, progress: Progress) -> None:
-        """Go on from the progress of an earlier part of the run."""
+        """Continue from the progress of an earlier part of the run."""
         self.progress = progress
         self._began -= progress.seconds
 
@@ -213,7 +213,7 @@ class Run:
         return {key: value for key, value in card.items() if key not in unseen}
 
     def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
-        """Validate a policy, save the policy as the last one, and as the best where no earlier one
+        """Validate a policy, and save the policy as the last, and as the best if no earlier policy
         is better.
 
         Returns:
@@ -237,6 +237,6 @@ class Run:
         return rmse, lost
 
     def write_progress(self) -> None:
-        """Write how the run goes to ``progress.json``."""
+        """Write the run's progress to ``progress.json``."""
         self.progress.seconds = time.perf_counter() - self._began
         write_json(asdict(self.progress), self.folder / "progress.json")

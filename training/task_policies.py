@@ -135,27 +135,27 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
         seed: for flights and network.
         **changed: entries of ``_FIT`` in place of the task's: ``rounds``, ``episodes``, ``epochs``.
     """
-    given = _fit_of(task) | changed
-    lesson, envs, quantities, mirrored = _lesson(task, scenario, given["episodes"])
+    settings = _fit_of(task) | changed
+    lesson, envs, quantities, mirrored = _lesson(task, scenario, settings["episodes"])
     shares = _shares(task)
     torch.manual_seed(seed)
-    shape = given["cell"], given["state"], given["net"], _ACTIVATION
+    shape = settings["cell"], settings["state"], settings["net"], _ACTIVATION
     network = TaughtNetwork(quantities, shares.shape[1], *shape)
-    flights = Flights(envs, lesson, given["wander"], seed)
+    flights = Flights(envs, lesson, settings["wander"], seed)
     order = torch.Generator().manual_seed(seed)
-    for number in range(given["rounds"]):
+    for number in range(settings["rounds"]):
         flights.fly(network if number else None, shares)
         flown = flights.sequences()
-        last = number == given["rounds"] - 1
+        last = number == settings["rounds"] - 1
         if number == 0 and task != FAN_PLANE:
             network.whiten(flown.seen)
-        epochs = given["epochs"] * (3 if last else 1)
-        rate = given["learning_rate"]
+        epochs = settings["epochs"] * (3 if last else 1)
+        rate = settings["learning_rate"]
         rates = rate, 0.0 if last else _LEAST_RATE * rate
-        fit(network, flown, epochs, given["batch_size"], rates, order, mirrored)
+        fit(network, flown, epochs, settings["batch_size"], rates, order, mirrored)
         print(f"{flights.episodes} episodes, {time.process_time():.0f} s", flush=True)
-    card = _card(task, given["cell"], scenario, seed, flights.episodes * lesson.decisions)
-    card |= {"fit": {name: value for name, value in given.items() if name != "cell"}}
+    card = _card(task, settings["cell"], scenario, seed, flights.episodes * lesson.decisions)
+    card |= {"fit": {name: value for name, value in settings.items() if name != "cell"}}
     return _chosen(card, network.policy_weights)
 
 
@@ -180,17 +180,17 @@ def linear(
     """Return a linear law of a task; ``observation``: one of ``OBSERVATIONS`` in place of the
     task's own; other arguments as of ``teach``.
     """
-    given = _LINEAR | changed
+    settings = _LINEAR | changed
     lesson: Any = FanHindsight(features=None) if task == FAN else _lesson_of(task)
-    envs = lanes_of(task, scenario, given["episodes"], observation)
+    envs = lanes_of(task, scenario, settings["episodes"], observation)
     law = LinearLaw()
     flights = Flights(envs, lesson, _fit_of(task)["wander"], seed)
-    for number in range(given["rounds"]):
+    for number in range(settings["rounds"]):
         flights.fly(law if number else None, _shares(task))
         law.fit(flights.sequences())
     flown = flights.episodes * lesson.decisions
     card = _card(task, LINEAR, scenario, seed, flown, observation)
-    return _chosen(card | {"fit": given, "memory": list(MEMORY)}, law.weights)
+    return _chosen(card | {"fit": settings, "memory": list(MEMORY)}, law.weights)
 
 
 def main() -> None:
@@ -205,35 +205,35 @@ def main() -> None:
     parser.add_argument(
         "--scenario", help=f"of the wind; default: {BASE} for a linear law, else a mix: {MIX}"
     )
-    for name, said in (
+    for name, help_text in (
         ("rounds", "of DAgger"),
         ("episodes", "of each round"),
         ("epochs", "of each round; the last, thrice"),
     ):
-        parser.add_argument(f"--{name}", type=int, help=f"{said}; default: the task's")
+        parser.add_argument(f"--{name}", type=int, help=f"{help_text}; default: the task's")
     parser.add_argument("--out", type=Path, help="folder; default: that of the kit's policies")
-    given = parser.parse_args()
-    taught = given.kind != LINEAR
-    asked = vars(given)
-    if taught and given.observation:
+    options = parser.parse_args()
+    taught = options.kind != LINEAR
+    asked = vars(options)
+    if taught and options.observation:
         parser.error("--observation: expected --kind linear")
     torch.set_num_threads(1)
     began = time.process_time()
-    task = given.task
+    task = options.task
     changed = {name: asked[name] for name in ("rounds", "episodes", "epochs") if asked[name]}
     usual = MIX if taught and task not in (FAN, FAN_PLANE) else BASE
-    scenario = "wide" if taught and task == FAN else given.scenario or usual
+    scenario = "wide" if taught and task == FAN else options.scenario or usual
     if not taught:
-        changed |= {"observation": given.observation}
-    policy = (teach if taught else linear)(task, scenario, given.seed, **changed)
+        changed |= {"observation": options.observation}
+    policy = (teach if taught else linear)(task, scenario, options.seed, **changed)
     policies = Path("training/policies")
     kind = policy.card["algorithm"]
-    own = isinstance(policy, TrainedPolicy)
-    out, start = (policies, "") if own else (policies / "tasks", f"{task}-")
-    out = given.out or out
+    is_fan_policy = isinstance(policy, TrainedPolicy)
+    out, start = (policies, "") if is_fan_policy else (policies / "tasks", f"{task}-")
+    out = options.out or out
     out.mkdir(parents=True, exist_ok=True)
-    path = out / f"{start}{kind}-{given.seed}.npz"
-    env = TASKS[task].make(BASE, observation=given.observation)
+    path = out / f"{start}{kind}-{options.seed}.npz"
+    env = TASKS[task].make(BASE, observation=options.observation)
     rmse, lost, _ = validate(policy, env, VALIDATION)
     policy.card |= {
         "validation": {"episodes": VALIDATION, "rmse_m": round(rmse, 5), "lost": lost},

@@ -65,14 +65,14 @@ class TaughtNetwork(torch.nn.Module):
             turn, mean = self._white
             frames = (frames - mean) @ turn
         remembered, state = self.cell(frames, state)
-        said = self.dense(remembered)
-        deviations = said[..., self.taught :].clamp(_SURE, _UNSURE)
-        return said[..., : self.taught], deviations, state
+        output = self.dense(remembered)
+        deviations = output[..., self.taught :].clamp(_SURE, _UNSURE)
+        return output[..., : self.taught], deviations, state
 
     def whiten(self, seen: Array) -> None:
-        """Let the cell see frames whose quantities are not correlated and of size 1, as they are in
-        ``seen`` (decisions, episodes, quantities): a small difference of two of them counts as much
-        as their sum. The policy has this change in the weights of its cell.
+        """Whiten the cell's input by the frames ``seen`` (decisions, episodes, quantities): a small
+        difference of two quantities then counts as much as their sum. The policy has the whitening
+        in the weights of its cell.
         """
         flat = seen.reshape(-1, seen.shape[-1]).astype(np.float64)
         sizes, axes = np.linalg.eigh(np.cov(flat.T))

@@ -31,9 +31,9 @@ def train(
 ) -> Path:
     """Train a policy; return the path of the best one on the validation episodes.
 
-    ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``,
+    ``folder`` holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``,
     ``training.json``, TensorBoard's events, and ``checkpoint.pt``. A killed run resumes from its
-    last checkpoint at the next call. Its policies are, bit for bit, the ones of an undisturbed run.
+    last checkpoint at the next call. Its policies equal those of an undisturbed run, bit for bit.
 
     Args:
         config: as of ``load_config``.
@@ -66,8 +66,10 @@ def train(
     envs = make_training_envs(
         scenario, config["environments"], config["estimator"], task, observation
     )
-    own = find_reward(reward) if reward else WeightedTerms(config["reward"]) if standard else None
-    env = FeatureVecEnv(envs, features, partial(training_seed, seed), own)
+    chosen_reward = (
+        find_reward(reward) if reward else WeightedTerms(config["reward"]) if standard else None
+    )
+    env = FeatureVecEnv(envs, features, partial(training_seed, seed), chosen_reward)
     seen = {} if standard else task_of(task).units(envs, run.judge)
     learner = make_learner(config, env, seed)
     learner.set_logger(_logger(folder))

@@ -110,17 +110,17 @@ def make_training_envs(
         InputError: an unknown name, or ``ukf-lanes`` with a tier.
     """
     check_training_env(name, task)
-    given: dict[str, Any] = {"observation": observation} if observation else {}
+    arguments: dict[str, Any] = {"observation": observation} if observation else {}
     if task != STANDARD_TASK:
         if estimator != "ukf":
-            given |= {"plant": "lanes"} if estimator == LANES else {"estimator": estimator}
-        return task_of(task).make_many(count, name, **given)
-    given |= {"normalize": observation is not None}
+            arguments |= {"plant": "lanes"} if estimator == LANES else {"estimator": estimator}
+        return task_of(task).make_many(count, name, **arguments)
+    arguments |= {"normalize": observation is not None}
     if estimator == LANES:
         if name in TIERS:
             raise InputError(f"training: {LANES} flies one scenario, got {name!r}")
-        return TaskLanes(count, DECISIONS, task=FanTrackingEnv, scenario=name, **given)
+        return TaskLanes(count, DECISIONS, task=FanTrackingEnv, scenario=name, **arguments)
     kind = MixedFanTracking if name in TIERS else FanTrackingEnv
     world = TIERS.get(name, name)
-    given |= {"scenario": world, "estimator": estimator}
-    return TaskVectorEnv(count, DECISIONS, task=kind, **given)
+    arguments |= {"scenario": world, "estimator": estimator}
+    return TaskVectorEnv(count, DECISIONS, task=kind, **arguments)

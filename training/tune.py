@@ -85,10 +85,10 @@ def tune(
     import optuna
 
     check_request(task, law, scenario, trials, episodes)
-    known = task_of(task)
+    tuned_task = task_of(task)
     ranges = RANGES[task][law]
     seeds = validation_seeds(episodes)
-    env: Any = (make_training_env if task == STANDARD_TASK else known.environment)(scenario)
+    env: Any = (make_training_env if task == STANDARD_TASK else tuned_task.environment)(scenario)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
     def objective(trial: Any) -> float:
@@ -96,7 +96,7 @@ def tune(
             name: trial.suggest_float(name, low, high, log=True)
             for name, (low, high) in ranges.items()
         }
-        controller = known.laws[law](**gains)
+        controller = tuned_task.laws[law](**gains)
         rmse = []
         lost = 0
         for k, one in enumerate(seeds):
@@ -139,18 +139,18 @@ def keep_gains(result: dict[str, Any], path: Path, command: str) -> None:
     Raises:
         InputError: the file is there but holds no gains.
     """
-    kept: Any = {}
+    tuned: Any = {}
     if path.exists():
-        kept = read_yaml(path, "tuned gains") or {}
-        if not isinstance(kept, dict) or not all(isinstance(v, dict) for v in kept.values()):
+        tuned = read_yaml(path, "tuned gains") or {}
+        if not isinstance(tuned, dict) or not all(isinstance(v, dict) for v in tuned.values()):
             raise InputError(
                 f"{path}: expected laws, scenarios and their gains, as in controllers/tuned.yaml"
             )
     places = ("law", "scenario") if result["task"] == STANDARD_TASK else ("task", "law")
     rounded = {name: float(f"{value:.4g}") for name, value in result["gains"].items()}
-    kept.setdefault(result[places[0]], {})[result[places[1]]] = {
+    tuned.setdefault(result[places[0]], {})[result[places[1]]] = {
         "gains": rounded,
         **{k: v for k, v in result.items() if k not in ("gains", "task", "law", places[1])},
         "command": command,
     }
-    write_text(yaml.safe_dump(kept, sort_keys=False, width=120), path)
+    write_text(yaml.safe_dump(tuned, sort_keys=False, width=120), path)

@@ -104,18 +104,18 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         self._length += 1
         last = self._look(observations)
         dones = lost | over
-        told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        learner_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if dones.any():
             for i in np.flatnonzero(dones).tolist():
                 length = int(self._length[i])
-                told[i] = {
+                learner_infos[i] = {
                     "terminal_observation": last[i],
                     "TimeLimit.truncated": bool(over[i] and not lost[i]),
                     "episode": {"r": float(self._returns[i]), "l": length, "t": 0.0},
                     "rmse": float(np.sqrt(self._squares[i] / length)),
                 }
             last = self._begin(dones)
-        return last, rewards, dones, told
+        return last, rewards, dones, learner_infos
 
     def close(self) -> None:
         """Close the environments."""

@@ -139,8 +139,8 @@ def playing(*roles: Role, among: Iterable[str] | None = None) -> tuple[str, ...]
     """
     if among is None:
         among = sorted(names(), key=lambda name: not _is_own(name))
-    given = tuple(among)
-    return tuple(name for role in roles for name in given if get(name).role == role)
+    candidates = tuple(among)
+    return tuple(name for role in roles for name in candidates if get(name).role == role)
 
 
 def of_family(*families: Family, among: Iterable[str] | None = None) -> frozenset[str]:
@@ -179,15 +179,15 @@ def check_setting(setting: EffectSetting, where: str = "effect") -> EffectSettin
     """
     if setting.name not in names():
         raise unknown_name("effect", setting.name, names(), where)
-    known = {c.name: c for c in get(setting.name).coefficients}
+    coefficients = {c.name: c for c in get(setting.name).coefficients}
     for name, value in setting.coefficients.items():
-        if name not in known:
-            raise unknown_name("coefficient", name, known, f"{where}: effect {setting.name}")
-        if not known[name].minimum <= value <= known[name].maximum:
+        if name not in coefficients:
+            raise unknown_name("coefficient", name, coefficients, f"{where}: effect {setting.name}")
+        if not coefficients[name].minimum <= value <= coefficients[name].maximum:
             raise InputError(
-                f"{where}: effect {setting.name}: {name} must lie between {known[name].minimum:g} "
-                f"and "
-                f"{known[name].maximum:g} {known[name].unit}, got {value:g}"
+                f"{where}: effect {setting.name}: {name} must lie between "
+                f"{coefficients[name].minimum:g} and "
+                f"{coefficients[name].maximum:g} {coefficients[name].unit}, got {value:g}"
             )
     return setting
 

@@ -1,8 +1,7 @@
-"""Attitude gain: the reported tilt is the true one times 1 + g, as that of an onboard estimate may
-be.
+"""Attitude gain: the reported tilt is the true tilt times 1 + g, as in some onboard estimates.
 
 An attitude is a turn about the vertical and a tilt about a horizontal axis. The reported
-tilt angle is (1 + g) times the true angle; its axis and the turn are right.
+tilt angle is (1 + g) times the true angle; axis and turn are right.
 """
 
 from .base import Coefficient, Effect

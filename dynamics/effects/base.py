@@ -11,19 +11,19 @@ a Python function in the effect's file. There are four kinds:
     ``rotors.speed``, once a step, in the order in which the vehicle lists the effects.
 ``wrench``
     adds force (world frame) and torque (body frame, about the centre of mass). Model
-    ``(c, vehicle, state, wrench)``: adds to ``wrench.force`` and ``wrench.torque``. It is called
-    many times a step. A state of its own lies in ``c[HIDDEN:]``, all zero at the start.
-    ``advance(c, vehicle, state, rotors)`` carries the state on, once a step before the first call
+    ``(c, vehicle, state, wrench)``: adds to ``wrench.force`` and ``wrench.torque``, many times a
+    step. ``c[HIDDEN:]`` holds the effect's state, all zero at the start.
+    ``advance(c, vehicle, state, rotors)`` integrates the state, once a step before the first call
     of the model; ``rotors.step`` is the step's length.
 ``body``
     changes the rigid body itself. ``amend(vehicle, coefficients)`` returns the changed vehicle.
 ``sensing``
     changes the logged values. Model ``(c, vehicle, sample, memory)``: rewrites the given parts of
-    ``sample``. With ``sample.direction`` +1 (the plant) it turns truth into report, with -1 (an
-    estimator with the effect in its model) report into truth.
+    ``sample``. ``sample.direction`` +1 (the plant) turns truth into report, -1 (an estimator with
+    the effect in its model) report into truth.
 
-``c`` holds the coefficients in their declared order, and ``memory`` (MEMORY,) what a model keeps
-from step to step, all zero at first. The records below lay out ``vehicle``, ``state``, ``rotors``,
+``c`` holds the coefficients in their declared order, ``memory`` (MEMORY,) a model's numbers from
+step to step, all zero at first. The records below lay out ``vehicle``, ``state``, ``rotors``,
 ``sample`` and ``wrench``. A Python function gets their fields as attributes: arrays, and arrays of
 shape () of single numbers, all of them views of the core's memory.
 """

@@ -1,8 +1,8 @@
 """Battery sag: at a given logged rotor speed the rotors deliver less as the battery voltage falls.
 
 Thrust and reaction torque scale by (V / voltage_ref)^n: the delivered rotor speed is W (V /
-voltage_ref)^(n/2). It applies where the rotor speeds are commands, or worked out from commands at
-the reference voltage. Nothing changes where the voltage is not known.
+voltage_ref)^(n/2). The effect applies to commands, and to rotor speeds computed from
+commands at the reference voltage. Without a voltage nothing changes.
 """
 
 from .base import Coefficient, Effect

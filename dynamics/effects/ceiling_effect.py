@@ -1,9 +1,8 @@
 """Ceiling effect: a rotor near the ceiling delivers more thrust at the same rotor speed.
 
-Thrust of a rotor at distance d below ``ceiling_z`` is multiplied by 1 / (1 - rho (R / (4 d))^2),
-the mirror image of the ``ground_effect``. Applied rotor by rotor, so a tilted vehicle feels a
-torque. The distance is taken as no less than where the factor reaches 2. Nothing changes where the
-vehicle states no ceiling.
+Thrust of a rotor at distance d below ``ceiling_z`` grows by the factor 1 / (1 - rho (R / (4 d))^2),
+as in the ``ground_effect``. Each rotor has its own distance, so a tilted vehicle feels a torque.
+The factor is at most 2. Without a ceiling in the vehicle file nothing changes.
 """
 
 from .base import CENTRAL, Coefficient, Effect

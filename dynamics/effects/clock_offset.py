@@ -1,4 +1,4 @@
-"""Clock offset: pose and rotor speeds of one row of the log are not of the same instant.
+"""Clock offset: pose and rotor speeds in one row of the log belong to different instants.
 
 With dt > 0 the pose is dt older than the rotor speeds; with dt < 0 the rotor speeds are -dt older
 than the pose. A cubic interpolates between samples. An estimator with this effect delays the other

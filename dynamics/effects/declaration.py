@@ -1,9 +1,8 @@
 """The words of an effect's declaration: its family, its role, its needs of a flight, and joint
 bounds of its coefficients.
 
-They are physics, and say nothing of how a diagnosis uses them. A diagnosis knows no effect by its
-name and searches the library by these words. So a user's own effect with the same words takes the
-same part.
+The words are physics, independent of a diagnosis. A diagnosis searches the library by these words,
+not by names of effects. So a user's effect with the same words takes the same part.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -134,10 +133,10 @@ def check_words(effect: str, family: str, role: str | None, needs: Sequence[str]
         ("role", Role, [] if role is None else [role]),
         ("need", Need, needs),
     )
-    for what, known, given in words:
-        for word in given:
-            if word not in list(known):
-                raise unknown_name(what, word, known, f"effect {effect}")
+    for what, choices, stated in words:
+        for word in stated:
+            if word not in list(choices):
+                raise unknown_name(what, word, choices, f"effect {effect}")
 
 
 def check_role(effect: str, role: Role, units: Sequence[str]) -> None:

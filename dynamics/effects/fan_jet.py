@@ -29,13 +29,13 @@ _DISTANCES, _ACROSS = (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     """Return fans all around the flight: from far beside its jet a fit does not find it."""
-    centre, found = flights.centre, []
+    centre, points = flights.centre, []
     for heading, distance, across in itertools.product(_HEADINGS, _DISTANCES, _ACROSS):
         along = np.array([math.cos(heading), math.sin(heading)])
         x, y = centre[:2] - distance * along + across * np.array([-along[1], along[0]])
         place = {"x": float(x), "y": float(y), "z": float(centre[2]), "heading": heading}
-        found.append({**flights.typical, **place})
-    return found
+        points.append({**flights.typical, **place})
+    return points
 
 
 def implausible(found: Found) -> str:

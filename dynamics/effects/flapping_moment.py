@@ -2,7 +2,7 @@
 motion.
 
 At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: the torque -kflap W_i (u_i x e_z) in
-body axes. It is the k_flap of RotorPy. The force that goes with flapping is ``rotor_drag``.
+body axes. RotorPy calls kflap k_flap. ``rotor_drag`` is the force of flapping.
 """
 
 from .base import Coefficient, Effect

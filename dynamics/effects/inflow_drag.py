@@ -1,4 +1,4 @@
-"""Inflow drag: the part of a rotor's drag in its plane that grows with the air through its disc.
+"""Inflow drag: the part of a rotor's in-plane drag in proportion to the air through its disc.
 
 At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kl u_iz (u_ix, u_iy, 0),
 applied at the rotor. A climbing rotor drags more, a sinking rotor less. The part

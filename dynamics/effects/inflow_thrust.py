@@ -1,7 +1,7 @@
 """Inflow thrust: a climbing rotor delivers less thrust, a sinking rotor more.
 
 At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kz W_i u_iz along body z,
-applied at the rotor. Roll and pitch so feel a damping torque. It is the k_z of RotorPy.
+applied at the rotor. This damps roll and pitch. RotorPy calls kz k_z.
 """
 
 from .base import CENTRAL, Coefficient, Effect

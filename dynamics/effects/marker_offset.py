@@ -1,7 +1,7 @@
 """Marker offset: the reported position belongs to a point beside the geometric centre.
 
-p' = p + R m with m = (mx, my, mz) in body axes. To undo it takes the attitude, measured or, where
-none was, estimated.
+p' = p + R m with m = (mx, my, mz) in body axes. A correction needs the attitude,
+measured or estimated.
 """
 
 from .base import Effect, along

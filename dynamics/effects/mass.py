@@ -1,5 +1,5 @@
-"""Mass: the vehicle is heavier (dm > 0) or lighter than declared; inertia and centre of mass stay
-as they are.
+"""Mass: the vehicle is heavier (dm > 0) or lighter than declared, with the same inertia and centre
+of mass.
 """
 
 from dataclasses import replace

@@ -1,8 +1,8 @@
 """Effects in Python: a user's functions of arrays, as C functions for the core.
 
-A function is wrapped once in a process and called by its address, on the core's own memory: the
-arrays are views, and nothing is copied. An error cannot leave the core's step. The first one is
-kept, no function runs from then on, and ``raise_errors`` raises it after the step.
+A process wraps a function once. The core calls the function by its address, with views of the
+core's memory; nothing is copied. An error cannot leave the core's step. So the first error is kept,
+no further function runs, and ``raise_errors`` raises the error after the step.
 """
 
 import ctypes
@@ -55,12 +55,12 @@ def addresses(effect: Effect) -> tuple[int, int]:
         InputError: the core has no equation of the model's name and the effect's kind.
     """
     if isinstance(effect.model, str):
-        known = _core.effect_addresses(effect.model, effect.kind)
-        if not known[0]:
+        in_core = _core.effect_addresses(effect.model, effect.kind)
+        if not in_core[0]:
             raise InputError(
                 f"effect {effect.name}: model {effect.model!r} is no {effect.kind} of the core"
             )
-        return known
+        return in_core
     third, fourth, size = {
         "wrench": (STATE, WRENCH, ROW_SIZE),
         "rotor input": (ROTORS, MEMORY, PARAMETERS),

@@ -1,11 +1,11 @@
 """Slung payload: a load that hangs from the geometric centre by a cable and swings.
 
-The load is a point mass m on a massless cable of length l that stays taut. With n the unit vector
-from vehicle to load, f = (sum of thrusts) R e_z / M the specific force of the rotors and a =
-damping (v + l n' - wind) the load's drag in the air by its mass, the cable's tension is T = (l
-|n'|^2 - n (f + a)) / (1/m + 1/M), no less than zero. It pulls the vehicle with T n, and the load
-swings by l n'' = -f - a - T n (1/m + 1/M). n and n' are the effect's own state, carried on once a
-step; they start at rest, straight down. In hover it pulls with the load's weight.
+The load is a point mass m on a taut, massless cable of length l. The unit vector n points from
+vehicle to load. The rotors' specific force is f = (sum of thrusts) R e_z / M, and the load's drag
+by its mass is a = damping (v + l n' - wind). The cable's tension is T = (l |n'|^2 - n (f + a)) /
+(1/m + 1/M), at least zero. The cable pulls the vehicle with T n, and the load swings by l n'' = -f
+- a - T n (1/m + 1/M). The effect integrates n and n' once a step, from rest, straight down. In
+hover the cable pulls with the load's weight.
 
 The equation holds for a taut cable. The swing neglects forces on the vehicle other than thrust and
 weight, such as drag. No measurement corrects the swing. Errors of its start and phase decay at half

@@ -1,5 +1,5 @@
-"""Thrust axis tilt: the frame of the rotors is turned against the body's axes, so that thrust does
-not point along body z.
+"""Thrust axis tilt: the rotors' frame is turned against the body's axes, so thrust does not point
+along body z.
 
 Q is the turn by the rotation vector (ax, ay, 0) rad. The rotors' thrust T e_z and torque tau about
 the geometric centre act as T Q e_z and Q tau; the effect adds the differences to T e_z and tau.

@@ -1,9 +1,8 @@
 """Thrust fade: thrust at a given rotor speed falls steadily with flight time, as motors and battery
 warm up.
 
-Thrust and reaction torque scale by 1 - rate * t, no less than a tenth: the delivered rotor speed is
-W times the root of that. The time t runs from the start of the flight; in an estimator from its
-``reset``.
+Thrust and reaction torque scale by 1 - rate * t, at least a tenth. The delivered rotor speed is W
+times the root of this factor. The time t starts with the flight; in an estimator, with ``reset``.
 """
 
 from .base import Coefficient, Effect

@@ -1,7 +1,7 @@
-"""Translational lift: a rotor that moves through the air edgewise delivers more thrust.
+"""Translational lift: a rotor in edgewise motion delivers more thrust.
 
 At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = kh (u_ix^2 + u_iy^2) along body
-z, applied at the rotor. It is the k_h of RotorPy.
+z, applied at the rotor. RotorPy calls kh k_h.
 """
 
 from .base import CENTRAL, Coefficient, Effect

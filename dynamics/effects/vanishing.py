@@ -1,9 +1,8 @@
-"""Whether a law does nothing while all its coefficients but one are zero.
+"""Whether an effect does nothing while all its coefficients but one are zero.
 
-A diagnosis adds an effect by the change from each of its coefficients beside a model without the
-effect. A wind and its drag, or a load's mass and its cable, do nothing alone: no such column leads
-to them, and they would never be proposed. Such a law must say where a fit starts
-(``starting_points``).
+A diagnosis proposes an effect by the change due to each coefficient, in a model without the effect.
+A wind without its drag, or a load without its cable, changes nothing, so the diagnosis would never
+propose these effects. Such an effect states starting points of a fit (``starting_points``).
 """
 
 import numpy as np

@@ -1,10 +1,9 @@
 """Wind: a steady wind, fixed in the world frame.
 
-The wind acts through each declared effect with an airspeed (rotor_drag, body_drag, ...).
-``cd`` is a drag for a vehicle that declares none. With w the wind and u = w - v, the force at the
-centre of mass is F = cd |u| u + cd |v| v: the change against the same drag in still air. So
-nothing happens without wind. Unlike a constant force, the force changes with
-the velocity.
+The wind acts through each declared effect with an airspeed (rotor_drag, body_drag, ...). ``cd`` is
+a drag for a vehicle that declares none. With w the wind and u = w - v, the force at the centre of
+mass is F = cd |u| u + cd |v| v: the change against the same drag in still air. So nothing happens
+without wind. Unlike a constant force, this force changes with the velocity.
 """
 
 import math
@@ -39,12 +38,12 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     slope = np.linalg.lstsq(
         np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None
     )[0][:2]
-    own = [(scale * speed, drag) for scale in (0.5, 1.0, 2.0)]
+    along_force = [(scale * speed, drag) for scale in (0.5, 1.0, 2.0)]
     other = [(speed, 0.0)] if Family.DRAG in flights.beside else []
     return [
         {"wx": size * math.cos(heading), "wy": size * math.sin(heading), "wz": 0.0, "cd": cd}
         for heading in (math.atan2(y, x) for x, y in (force.mean(axis=0), slope))
-        for size, cd in (*own, *other)
+        for size, cd in (*along_force, *other)
     ]
 
 

@@ -1,7 +1,7 @@
-"""World tilt: the vertical of the motion capture's frame is not the true one.
+"""World tilt: the motion capture's vertical is tilted.
 
-Position and attitude are reported in a frame in which they appear turned about the world's axes by
-the rotation vector (ax, ay, 0) rad: p' = Q p, R' = Q R.
+Reported position and attitude are turned about the world's axes by the rotation vector (ax, ay, 0)
+rad: p' = Q p, R' = Q R.
 """
 
 from .base import Effect, along

@@ -84,8 +84,8 @@ class TaskLanes(TaskVectorEnv):
         """Return an oracle's true motion and the flight loop's integral, a row an environment."""
         vehicle, names = self.task.vehicle, ("qpos", "qvel", "speeds", "sum")
         rows = zip(*(self._rows(self._flying.view(name)) for name in names), strict=True)
-        known = [true_motion(vehicle, *row) for row in rows]
-        return {name: np.array([one[name] for one in known]) for name in known[0]}
+        motions = [true_motion(vehicle, *row) for row in rows]
+        return {name: np.array([one[name] for one in motions]) for name in motions[0]}
 
     def _rows(self, values: Array) -> Array:
         """Return values (rows, size, lanes) of the vehicles as (num_envs, size)."""
@@ -116,11 +116,11 @@ class TaskLanes(TaskVectorEnv):
         vehicle's normals are drawn from its own generator.
         """
         parts = 1 if self.threads == 1 else len(blocks)
-        given = slots, self._scene, kind, ticks, self._like.noise_size, self._streams
+        arguments = slots, self._scene, kind, ticks, self._like.noise_size, self._streams
 
         def fly(part: int) -> None:
             first, last = part * len(blocks) // parts, (part + 1) * len(blocks) // parts
-            blocks.fly(first, last, *given, self._calls, self._winds)
+            blocks.fly(first, last, *arguments, self._calls, self._winds)
 
         self._spread(fly, range(parts))
 

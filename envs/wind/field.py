@@ -122,14 +122,14 @@ def _check_points(points: ArrayLike, time: float) -> Array:
     Raises:
         InputError: the shape is another, or numbers are not finite.
     """
-    given = np.asarray(points, dtype=np.float64)
-    if given.ndim != 2 or given.shape[1] != 3 or not np.all(np.isfinite(given)):
+    array = np.asarray(points, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3 or not np.all(np.isfinite(array)):
         raise InputError(
-            f"wind: points must be finite numbers in m, shape (n, 3), got shape {given.shape}"
+            f"wind: points must be finite numbers in m, shape (n, 3), got shape {array.shape}"
         )
     if not math.isfinite(time):
         raise InputError(f"wind: time must be a finite number of seconds, got {time!r}")
-    return np.ascontiguousarray(given.T)
+    return np.ascontiguousarray(array.T)
 
 
 def vector(value: ArrayLike, name: str) -> Array:
@@ -138,10 +138,10 @@ def vector(value: ArrayLike, name: str) -> Array:
     Raises:
         InputError: something else.
     """
-    given = np.asarray(value, dtype=np.float64)
-    if given.shape != (3,) or not np.all(np.isfinite(given)):
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
         raise InputError(f"wind: {name} must be three finite numbers, got {value!r}")
-    return given
+    return array
 
 
 def number(value: float, name: str, above: float = -math.inf, least: float = -math.inf) -> float:
@@ -150,8 +150,8 @@ def number(value: float, name: str, above: float = -math.inf, least: float = -ma
     Raises:
         InputError: something else.
     """
-    known = isinstance(value, int | float | np.number) and math.isfinite(value)
-    if not (known and value > above and value >= least):
+    is_number = isinstance(value, int | float | np.number) and math.isfinite(value)
+    if not (is_number and value > above and value >= least):
         limit = f" above {above:g}" * (above > -math.inf) + f" from {least:g} on" * (
             least > -math.inf
         )

@@ -142,15 +142,15 @@ def _read_npz(file: Path) -> tuple[list[Array], Array]:
     data = io.BytesIO(read_bytes(file, "a wind", _LARGEST))
     check_archive(file, data, _LARGEST, "a wind")
     with np.load(data, allow_pickle=False) as arrays:
-        given = {name: np.asarray(arrays[name], dtype=np.float64) for name in arrays.files}
-    given.setdefault("t", np.zeros(1))
+        fields = {name: np.asarray(arrays[name], dtype=np.float64) for name in arrays.files}
+    fields.setdefault("t", np.zeros(1))
     for name in (*AXES, "wind"):
-        if name not in given:
+        if name not in fields:
             raise InputError(
                 f"{file}: lacks {name!r}; expected t (s), x, y, z (m) and wind (t, x, y, z, 3) m/s"
             )
-    wind = given["wind"]
-    return [given[name] for name in AXES], wind[None] if wind.ndim == 4 else wind
+    wind = fields["wind"]
+    return [fields[name] for name in AXES], wind[None] if wind.ndim == 4 else wind
 
 
 def _xarray() -> Any:

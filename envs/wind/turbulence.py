@@ -100,15 +100,15 @@ def waves(
         other = _directions(rng, count)
         normal = np.cross(direction, other)
         normal *= (amplitude / np.linalg.norm(normal, axis=1))[:, None]
-        kept = sigma if alike else np.where(np.arange(3) == axis, sigma, 0.0)
+        deviation = sigma if alike else np.where(np.arange(3) == axis, sigma, 0.0)
         number_of_waves = direction * k[:, None] / (2.0 * math.pi)
-        parts.append(np.column_stack([number_of_waves, rng.random(count), normal * kept]))
+        parts.append(np.column_stack([number_of_waves, rng.random(count), normal * deviation]))
     return np.concatenate(parts)
 
 
 def _directions(rng: np.random.Generator, count: int) -> Array:
-    given = rng.standard_normal((count, 3))
-    directions: Array = given / np.linalg.norm(given, axis=1, keepdims=True)
+    normals = rng.standard_normal((count, 3))
+    directions: Array = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return directions
 
 
@@ -161,8 +161,8 @@ class Turbulence(CompiledWind):
 
 
 def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:
-    given = np.asarray(value, dtype=np.float64)
-    whole = np.full(3, float(given)) if given.ndim == 0 else given
+    array = np.asarray(value, dtype=np.float64)
+    whole = np.full(3, float(array)) if array.ndim == 0 else array
     good = whole.shape == (3,) and np.all(np.isfinite(whole))
     if not good or whole.min() < 0.0 or (whole.min() == 0.0 and not at_least_zero):
         raise InputError(

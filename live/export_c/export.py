@@ -151,7 +151,7 @@ def _effects(vehicle: Vehicle) -> dict[str, list[Effect]]:
         InputError: an effect is a user's own.
     """
     kinds = {"wrench": "wrench", "rotor input": "rotor", "sensing": "sensing"}
-    found: dict[str, list[Effect]] = {kind: [] for kind in kinds.values()}
+    by_kind: dict[str, list[Effect]] = {kind: [] for kind in kinds.values()}
     for setting in vehicle.effects:
         effect = get(setting.name)
         if effect.kind == "body":  # its numbers are the vehicle's
@@ -161,9 +161,9 @@ def _effects(vehicle: Vehicle) -> dict[str, list[Effect]]:
                 f"{vehicle.name}: effects: {effect.name} is your own, in Python, and cannot be "
                 "exported; expected effects of the kit, or --effects none"
             )
-        found[kinds[effect.kind]].append(effect)
-    found["wrench"].sort(key=lambda effect: not effect.sets_wind)
-    return found
+        by_kind[kinds[effect.kind]].append(effect)
+    by_kind["wrench"].sort(key=lambda effect: not effect.sets_wind)
+    return by_kind
 
 
 def _room(effects: Mapping[str, list[Effect]]) -> tuple[int, int, int, int]:
@@ -242,5 +242,5 @@ def _fields(dtype: np.dtype[Any]) -> Iterator[tuple[str, np.dtype[Any]]]:
 
 def _one_line(text: str) -> str:
     """Return a text for one line of a C comment, without the comment's end."""
-    kept = "".join(c if c.isprintable() else " " for c in text)
-    return kept.replace("*/", "* /").replace("\\", "/")
+    printable = "".join(c if c.isprintable() else " " for c in text)
+    return printable.replace("*/", "* /").replace("\\", "/")

@@ -210,10 +210,10 @@ def read_address(text: str, kind: str, options: tuple[str, ...]) -> Address:
     try:
         split = urlsplit(rest)
         port = split.port
-        given = parse_qsl(split.query, keep_blank_values=True, strict_parsing=bool(split.query))
+        pairs = parse_qsl(split.query, keep_blank_values=True, strict_parsing=bool(split.query))
     except ValueError as error:
         raise InputError(f"{text}: no address: {error}") from error
-    names = [name for name, _ in given]
+    names = [name for name, _ in pairs]
     for name in names:
         if name not in options:
             expected = ", ".join(options) if options else "none"
@@ -221,4 +221,4 @@ def read_address(text: str, kind: str, options: tuple[str, ...]) -> Address:
     repeated = [name for name in names if names.count(name) > 1]
     if repeated:
         raise InputError(f"{text}: option {repeated[0]} stands there more than once")
-    return Address(text, split.scheme, split.hostname or "", port, split.path, dict(given))
+    return Address(text, split.scheme, split.hostname or "", port, split.path, dict(pairs))

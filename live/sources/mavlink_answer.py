@@ -56,8 +56,8 @@ def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
     """Return the horizontal wind (2,) in m/s, world, and its standard deviation (2,), with no
     vertical wind assumed; None: the vehicle declares no ``rotor_drag``.
     """
-    given = next((e.coefficients for e in vehicle.effects if e.name == "rotor_drag"), {})
-    still = np.array([given.get("kdx", 0.0), given.get("kdy", 0.0), 0.0])
+    coefficients = next((e.coefficients for e in vehicle.effects if e.name == "rotor_drag"), {})
+    still = np.array([coefficients.get("kdx", 0.0), coefficients.get("kdy", 0.0), 0.0])
     if not np.all(still[:2] > 0.0):
         return None
     R = matrix_of(output.estimate.quaternion)
