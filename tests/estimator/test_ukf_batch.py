@@ -101,41 +101,6 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate, tuning):
         assert_array_equal(getattr(together, name)[-1], getattr(last, name))
 
 
-TURNS = np.array([[0.0, 0, 1], [0, 0, 60], [0, 0, -2]])
-UNKNOWN_ATTITUDES = [np.diag(np.r_[np.full(3, x), np.full(15, 1e-4)]) for x in (1e-4, 0.4, 1e-3)]
-
-
-@pytest.mark.parametrize(
-    ("common", "each"),
-    [
-        ({}, {}),
-        ({"velocity": [1, 0, 0]}, {"covariance": 1e-4 * np.eye(18) * np.ones((3, 1, 1))}),
-        ({}, {"angular_velocity": TURNS}),
-        ({}, {"covariance": np.stack(UNKNOWN_ATTITUDES)}),
-    ],
-    ids=["a pose alone", "velocity and covariance", "too fast for a series", "attitude unknown"],
-)
-def test_it_starts_from_what_is_given_and_coasts_as_single_filters_do(common, each):
-    """One may spin too fast for the series of sine and cosine; the attitude's variance is held
-    where nobody measures an attitude, which only some of those side by side need.
-    """
-    batch = WrenchUKFBatch(VEHICLE, 3)
-    single = WrenchUKF(VEHICLE)
-    q = [1, 0, 0, 0]
-    places = [[0, 0, n + 1] for n in range(3)]
-    speeds = np.full((3, 4), 1.05 * VEHICLE.hover_rate)
-    batch.reset(places, q, **common, **each)
-    together = [batch.estimate, *(batch.step(speeds) for _ in range(5))]
-    for n in range(3):
-        single.reset(places[n], q, **common, **{name: values[n] for name, values in each.items()})
-        alone = [single.estimate, *(single.step(speeds[n]) for _ in range(5))]
-        for a, b in zip(together, alone, strict=True):  # an estimate stays what it was
-            assert_array_equal(a.state[n], b.state)
-        assert_array_equal(batch.covariance[n], single.covariance)
-    assert len(batch) == 3
-    assert np.isnan(together[-1].nis).all()
-
-
 QUATERNION = np.array([0.5, 0.1, -0.2, 0.8]) / norm([0.5, 0.1, -0.2, 0.8])
 ARGUMENTS = np.array([380.0, 390.0, 400.0, 410.0]), np.array([0.01, 0.0, 1.0]), QUATERNION
 

@@ -25,7 +25,7 @@ from tests.support.exported_c.compiled import (
     take,
     write,
 )
-from tests.support.exported_c.flights import FLIGHTS, flight, vehicle_of
+from tests.support.exported_c.flights import flight, vehicle_of
 from tests.support.exported_c.hostile import PERIOD, hostile
 from tests.support.own_effects import HOSE, joined
 from tests.support.paths import ROOT
@@ -37,7 +37,6 @@ from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names, parse_setting
 from windwrench.estimator import UKFTuning
-from windwrench.evidence.recovery import QUIET_NOISES, exact_flight, measured
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.policies import PARTICLES, briefing_of
 from windwrench.runtime.errors import InputError
@@ -60,35 +59,6 @@ def assert_same(worst):
     assert worst["status"] == 0.0
     for name, value in worst.items():
         assert name == "restarts" or value < LARGEST, (name, worst)
-
-
-FLOWN = [
-    *((e, n) for e in ESTIMATORS for n in FLIGHTS if e == "ukf" or "brisk" in n or "effects" in n),
-    ("constant-gain", "crazyflie, 50 poses a second"),
-]
-
-
-@pytest.mark.parametrize(
-    ("estimator", "name", "gate", "imu"),
-    [
-        *((estimator, name, 0.9999, False) for estimator, name in FLOWN),
-        ("ukf", "crazyflie, brisk", None, False),
-        ("ukf", TURNING, 0.9999, True),
-    ],
-)
-def test_c_and_python_agree_along_a_flight_with_faults(estimator, name, gate, imu, tmp_path):
-    exported = export_c(vehicle_of(name), estimator, gate=gate)
-    c = CompiledFilter(exported, tmp_path)
-    python = exported.filter
-    worst = compare(c, python, flight(name, QUICK, imu=imu), 4)
-    assert worst["restarts"] > (0 if gate else 2) or "brisk" not in name
-    assert_same(worst)
-    if imu:
-        e = c.estimate
-        for name in ("gyro_bias", "accelerometer_bias"):
-            difference = abs(np.array(getattr(e, name)) - getattr(python, name))
-            assert (difference < LARGEST * getattr(python, f"{name}_std")).all()
-        assert e.imu_refused == python.imu_refused > 0
 
 
 SUFFERED = ("world_tilt:ax=0.03,ay=-0.05", "marker_offset:mx=0.03,mz=0.05", "attitude_gain:g=0.1")
@@ -162,26 +132,6 @@ def test_c_and_python_agree_along_hostile_sequences(
     # without a gate a single filter that follows poses upside down may restart steps later
     assert len(parted) <= (precision == "single" and gate is None and len(seeds) > 50), parted
     assert restarts > 0
-
-
-@pytest.mark.parametrize("gate", [None, 0.9999])
-@pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_good_poses_restart_c_as_rarely_as_python(estimator, gate, tmp_path):
-    """However much noisier than declared they are."""
-    good = exact_flight("ardrone2@200", 20.0)
-    exported = export_c(good.vehicle, estimator, good.rate, gate=gate)
-    c = CompiledFilter(exported, tmp_path)
-    for noise, errors in QUIET_NOISES.items():
-        position, attitude = measured(good, errors, default_rng(0))
-        flown = {
-            "dt": np.full(len(position), 1.0 / good.rate),
-            "rotor_speeds": good.rotor_speeds,
-            "position": position,
-            "quaternion": attitude.as_quat(scalar_first=True),
-        }
-        flown = {name: x.astype(np.float32).astype(float) for name, x in flown.items()}
-        worst = compare(c, exported.filter, flown, 20)
-        assert worst["status"] == worst["restarts"] == c.estimate.restarts == 0, noise
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
