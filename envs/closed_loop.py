@@ -293,11 +293,11 @@ class ClosedLoop:
         self._look_at_world()
 
     @staticmethod
-    def _pipeline(own: Sequence[Stage]) -> dict[str, Callable[[ClosedLoop], object]]:
+    def _pipeline(user_stages: Sequence[Stage]) -> dict[str, Callable[[ClosedLoop], object]]:
         """Return the stages of a tick by their names, in running order."""
         stages = {}
         for name, run in STAGES.items():
-            for stage in own:
+            for stage in user_stages:
                 if stage.before == name:
                     if stage.name in STAGES or stage.name in stages:
                         raise InputError(f"stage {stage.name!r}: there is one of this name")

@@ -347,8 +347,8 @@ class TaskDefinition:
         winds = self.winds if self.winds is not None else [*start.winds, ()][0]
         return Start(pose, row, winds, path, [*start.labels, ""][0])
 
-    def _checked(self, given: Any, *shapes: tuple[int, ...], what: str) -> Array:
-        values = np.asarray(given, dtype=np.float64)
+    def _checked(self, numbers: Any, *shapes: tuple[int, ...], what: str) -> Array:
+        values = np.asarray(numbers, dtype=np.float64)
         fits = any(
             values.ndim == len(shape)
             and all(size in (0, actual) for size, actual in zip(shape, values.shape, strict=True))

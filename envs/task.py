@@ -127,7 +127,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
             )
         super().reset(seed=seed)
         judged = self.many.begin(self.np_random)
-        return judged.observations[0].copy(), self._told(judged)
+        return judged.observations[0].copy(), self._info_with_truth(judged)
 
     def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
         """Fly a decision with an action of ``action_space``, clipped to its range.
@@ -138,9 +138,9 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         many = self.many
         judged = many.go_on(action, self.np_random)
         seen, lost, over = judged.observations[0].copy(), bool(judged.lost[0]), many.truncated[0]
-        return seen, float(judged.rewards[0]), lost, bool(over), self._told(judged)
+        return seen, float(judged.rewards[0]), lost, bool(over), self._info_with_truth(judged)
 
-    def _told(self, judged: JudgedStep) -> dict[str, Any]:
+    def _info_with_truth(self, judged: JudgedStep) -> dict[str, Any]:
         """Return ``info``, with the truth for a controller with foresight."""
         info = {}
         for name, values in judged.values.items():

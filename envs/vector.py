@@ -436,12 +436,12 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self.viewers = {}
 
 
-def _mode(given: AutoresetMode | str, task: str) -> AutoresetMode:
+def _mode(wanted_mode: AutoresetMode | str, task: str) -> AutoresetMode:
     modes = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP
     for mode in modes:
-        if given in (mode, mode.value, mode.name):
+        if wanted_mode in (mode, mode.value, mode.name):
             return mode
     raise InputError(
         f"{task}: autoreset_mode must be {' or '.join(m.name for m in modes)} of "
-        f"gymnasium.vector.AutoresetMode, got {given!r}"
+        f"gymnasium.vector.AutoresetMode, got {wanted_mode!r}"
     )

@@ -167,15 +167,15 @@ def innovations(
     return np.concatenate(counted_poses).view(np.recarray)
 
 
-def fisher_information(found: Innovations, moved: Sequence[Innovations], step: float) -> Array:
+def fisher_information(poses: Innovations, moved: Sequence[Innovations], step: float) -> Array:
     """Return the expected information (n, n) on n parameters; each of ``moved`` has one parameter
     moved by ``step``.
 
     Normal innovations have ``sum(d_i y' S^-1 d_j y + tr(S^-1 d_i S S^-1 d_j S) / 2)`` (Schweppe
     1965); outliers have none.
     """
-    regular = ~np.logical_or.reduce([found.outlier, *(m.outlier for m in moved)])
-    inverse, mean = np.linalg.inv(found.root[regular]), found.innovation[regular]
+    regular = ~np.logical_or.reduce([poses.outlier, *(m.outlier for m in moved)])
+    inverse, mean = np.linalg.inv(poses.root[regular]), poses.innovation[regular]
     slopes = []
     for each in moved:
         change = inverse @ (each.innovation[regular] - mean)[:, :, np.newaxis]

@@ -264,7 +264,7 @@ def _likeliest(
     return climb(evaluate, starts[int(np.argmax(likelihoods))], bounds, threads)
 
 
-def _tuning(x: Array, given: UKFTuning, use: NoiseFitSettings) -> UKFTuning:
+def _tuning(x: Array, start_tuning: UKFTuning, use: NoiseFitSettings) -> UKFTuning:
     """Return the tuning with logarithms ``x`` (8 or 12,) of the fitted numbers."""
     parameters = _parameters(len(x))
     values: dict[str, Any] = {name: np.empty(3) for name, _ in parameters}
@@ -272,7 +272,7 @@ def _tuning(x: Array, given: UKFTuning, use: NoiseFitSettings) -> UKFTuning:
         values[name][list(axes)] = value
     for name in values.keys() & {"force_time", "torque_time"}:  # on the upper bound: a walk
         values[name][values[name] > 0.99 * use.correlation[1]] = math.inf
-    return replace(given, **values)
+    return replace(start_tuning, **values)
 
 
 def _numbers(tuning: UKFTuning) -> Array:

@@ -145,40 +145,42 @@ def largest_nis(gate: float, *numbers: int) -> Array:
     return np.asarray(2.0 * gammaincinv(0.5 * np.array(numbers), gate))
 
 
-def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: Recovery) -> None:
+def load_recovery(
+    record: np.void, vehicle: Vehicle, gate: float | None, recovery: Recovery
+) -> None:
     """Write a filter's gate (a probability or None) and recovery into its record; the record has
     period and kappa.
     """
     weight = vehicle.weight
     # largest NIS without a check, three numbers and six
-    record["alarm"] = given.jump_at**2
+    record["alarm"] = recovery.jump_at**2
     if gate is not None:
         record["alarm"] = largest_nis(gate, 3, 6)
     record["gated"] = gate is not None
-    record["restart_at"] = given.restart_at**2
-    record["patience"], record["give_up"] = given.patience, given.give_up
-    torque = given.torque_std * weight * vehicle.arm_l
+    record["restart_at"] = recovery.restart_at**2
+    record["patience"], record["give_up"] = recovery.patience, recovery.give_up
+    torque = recovery.torque_std * weight * vehicle.arm_l
     # attitudes a period apart do not tell a rate from a rate one turn faster. Sigma points beyond
     # half a turn would find such rates, and the torques behind them
     period, inertia = float(record["period"]), float(np.linalg.eigvalsh(vehicle.inertia)[0])
     rate = math.pi / (math.sqrt(N + NOISE + float(record["kappa"])) * period)
     largest_torque = rate / period * inertia
     record["reason"] = np.repeat(
-        np.square((min(4.0 * torque, largest_torque), 4.0 * given.force_std * weight)), 3
+        np.square((min(4.0 * torque, largest_torque), 4.0 * recovery.force_std * weight)), 3
     )
     torque = min(torque, largest_torque)
     deviations = (
         math.sqrt(LARGEST_MRP_VARIANCE),
-        min(given.angular_velocity_std, rate),
-        given.position_std,
-        given.velocity_std,
+        min(recovery.angular_velocity_std, rate),
+        recovery.position_std,
+        recovery.velocity_std,
         torque,
-        given.force_std * weight,
+        recovery.force_std * weight,
     )
     record["prior"] = np.repeat(np.square(deviations), 3)
     record["lost"] = _LOST * record["prior"]
-    record["lost"][:3] = (given.attitude_std / 4.0) ** 2  # (16)
+    record["lost"][:3] = (recovery.attitude_std / 4.0) ** 2  # (16)
     # accelerations of a push of two weights, and of the same about the arm
     push = 2.0 * weight
     record["push"] = push * vehicle.arm_l / inertia, push / vehicle.mass
-    record["response"] = given.response
+    record["response"] = recovery.response

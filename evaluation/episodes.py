@@ -165,7 +165,7 @@ def fly_episode(
     for k in range(whole):
         seen = WatchedInfo(info)
         action = np.asarray(controller(observation, seen), dtype=np.float32)
-        uses_truth = uses_truth or seen.told
+        uses_truth = uses_truth or seen.read_truth
         observation, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
         time = info.get("time", (k + 1) / rate)

@@ -77,7 +77,7 @@ def summary(rows: Sequence[Standing]) -> str:
 def _listed(rows: Sequence[Standing]) -> str:
     return (
         ", ".join(
-            f"`{row.controller}` {_told(row.change_over_best, row.change_over_best_ci95)}"
+            f"`{row.controller}` {_change_text(row.change_over_best, row.change_over_best_ci95)}"
             for row in rows
         )
         or "none"
@@ -133,8 +133,8 @@ def _by_error(row: Standing) -> dict[str, str]:
         "IQM": in_mm(row.iqm_rmse_m),
         "first 3 s": in_mm(row.rmse_transient_m),
         "return": f"{row.return_mean:.1f}",
-        f"against {row.rival}, 95 %": _told(row.change_over_rival, row.change_ci95),
-        "against the best, 95 %": _told(row.change_over_best, row.change_over_best_ci95),
+        f"against {row.rival}, 95 %": _change_text(row.change_over_rival, row.change_ci95),
+        "against the best, 95 %": _change_text(row.change_over_best, row.change_over_best_ci95),
         "p": "-" if p is None else f"{p:.3f}",
         "whole (mm), 95 %": in_mm(row.rmse_m, row.rmse_ci95_m),
     }
@@ -195,5 +195,5 @@ def _digits(metres: float) -> str:
     return f"{size:.{max(0, min(2, 2 - math.floor(math.log10(max(size, 1e-9)))))}f}"
 
 
-def _told(change: float, interval: tuple[float, float]) -> str:
+def _change_text(change: float, interval: tuple[float, float]) -> str:
     return f"{100 * change:+.0f} % ({100 * interval[0]:+.0f} to {100 * interval[1]:+.0f})"

@@ -248,11 +248,11 @@ def task_of(name: str) -> BenchmarkTask:
     return BenchmarkTask(kind, "hover", "hover", worlds, spec=spec)
 
 
-def _is_kin(kind: Any, given: Mapping[str, Any], kit: Any) -> bool:
+def _is_kin(kind: Any, arguments: Mapping[str, Any], kit: Any) -> bool:
     """Return whether a class extends the kit's, with the action and observation of its laws."""
     fields = ("action", "observation", "decision_hz", "observe")
     return kit in getattr(kind, "__mro__", ()) and all(
-        given.get(name, getattr(kind, name)) == getattr(kit, name) for name in fields
+        arguments.get(name, getattr(kind, name)) == getattr(kit, name) for name in fields
     )
 
 

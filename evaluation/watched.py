@@ -8,17 +8,17 @@ OBSERVED = frozenset({"observation", "command", "time"})
 
 
 class WatchedInfo(Mapping[str, Any]):
-    """The ``info`` of an environment, read-only; ``told`` is True once a true value was read.
+    """The ``info`` of an environment, read-only; ``read_truth`` is True after a read of the truth.
 
     Asking for a name alone (``"error" in info``) reads no value.
     """
 
     def __init__(self, info: Mapping[str, Any]) -> None:
-        self._info, self.told = info, False
+        self._info, self.read_truth = info, False
 
     def __getitem__(self, name: str) -> Any:
         value = self._info[name]
-        self.told = self.told or name not in OBSERVED
+        self.read_truth = self.read_truth or name not in OBSERVED
         return value
 
     def __contains__(self, name: object) -> bool:

@@ -80,17 +80,17 @@ def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, A
         ) from error
 
 
-def _check_tensors(value: Any, known: set[int]) -> None:
-    """Raise ValueError where a tensor has more numbers than its memory, and a copy would grow;
-    ``known`` are the visited containers.
+def _check_tensors(value: Any, visited: set[int]) -> None:
+    """Raise ValueError if a tensor has more numbers than its memory, so that a copy would grow;
+    ``visited`` holds the containers so far.
     """
     if isinstance(value, torch.Tensor):
         if value.numel() * value.element_size() > value.untyped_storage().nbytes():
             raise ValueError(f"a tensor of shape {tuple(value.shape)} without that many numbers")
-    elif isinstance(value, dict | list | tuple) and id(value) not in known:
-        known.add(id(value))
+    elif isinstance(value, dict | list | tuple) and id(value) not in visited:
+        visited.add(id(value))
         for part in value.values() if isinstance(value, dict) else value:
-            _check_tensors(part, known)
+            _check_tensors(part, visited)
 
 
 def _restore(learner: Any, env: FeatureVecEnv, state: dict[str, Any]) -> dict[str, Any]:

@@ -98,7 +98,7 @@ class FanHindsight:
         middle = up[:, y] / up[:, 2], turning, turned, truth["integral"][:, y]
         return np.column_stack([infos["y"], truth["velocity"][:, y], *middle, self._set_point])
 
-    def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the best command, the fan's offset (m) and its velocity (m/s), (decisions, n, 3),
         and weights (decisions, n).
         """
@@ -114,7 +114,7 @@ class FanHindsight:
         velocity = moves[:, :_VELOCITY].mean(axis=1) / self.period
         best = np.clip(best, -self._limit, self._limit)
         truth = np.stack([best, -off[..., PLACE], velocity], axis=-1)
-        return truth, kept[np.minimum(now + _COUNTS, self.decisions)] & (
+        return truth, in_flight[np.minimum(now + _COUNTS, self.decisions)] & (
             now + _COUNTS <= self.decisions
         )[:, None]
 
@@ -124,14 +124,14 @@ def _felt(infos: dict[str, Any]) -> Array:
     return np.column_stack([infos["force"][:, _ALONG_Y], tilting(infos["torque"])[_ALONG_Y]])
 
 
-def _moved(set_point: Array | None, own: Array, commands: Array) -> Array:
+def _moved(set_point: Array | None, places: Array, commands: Array) -> Array:
     """Return the set points (n,) m after a decision at ``commands`` (n,) m/s. A set point too far
     ahead of its vehicle waits (``core/flight_loop.hpp``).
     """
     if set_point is None:
-        return own.copy()
+        return places.copy()
     step = DECISION_PERIOD * commands
-    ahead = set_point + step - own
+    ahead = set_point + step - places
     return np.where((np.abs(ahead) <= FlightGains.leash) | (ahead * step <= 0.0), step, 0.0) + (
         set_point
     )

@@ -122,7 +122,7 @@ class WindLesson:
         wanted = [law(each) for law, each in zip(self._laws, raw, strict=False)]
         return observations / self._scale, np.array(wanted)
 
-    def taught(self, kept: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the best commands (decisions, n, 3), and weights (decisions, n): the vehicle flew
         on for at least ``AHEAD`` further decisions.
         """
@@ -137,6 +137,6 @@ class WindLesson:
                 for k, share in enumerate(ahead):
                     wanted[: len(came) - k] += came[k:] @ share
                 best[:, some, i] = -wanted
-        counts = np.zeros_like(kept[1:])
-        counts[: 1 - AHEAD] = kept[AHEAD:]
+        counts = np.zeros_like(in_flight[1:])
+        counts[: 1 - AHEAD] = in_flight[AHEAD:]
         return np.clip(best, -self._limit, self._limit), counts

@@ -29,11 +29,11 @@ class LinearLaw:
     def __init__(self) -> None:
         self._rates: Array = (1.0 / np.array(MEMORY, dtype=np.float32))[:, None]
 
-    def _remember(self, kept: Array | None, frames: Array) -> Array:
+    def _remember(self, memory: Array | None, frames: Array) -> Array:
         """Return the low-passes (n, memory, quantities) after frames (n, quantities)."""
-        if kept is None:
+        if memory is None:
             return np.repeat(frames[:, None], len(MEMORY), axis=1)
-        return kept + self._rates * (frames[:, None] - kept)
+        return memory + self._rates * (frames[:, None] - memory)
 
     def __call__(self, frames: torch.Tensor, state: Any = None) -> tuple[Any, None, Array]:
         """Return what is taught (1, n, taught), no deviations, and the state for frames (1, n,

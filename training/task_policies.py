@@ -97,9 +97,9 @@ class FanPlaneLesson:
         self._truth.append(truth)
         return observations / self._scale, truth @ _shares(FAN_PLANE).T
 
-    def taught(self, kept: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
+    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
         """Return the taught quantities (decisions, n, 4), and weights (decisions, n)."""
-        return np.array(self._truth[:-1]), kept[:-1]
+        return np.array(self._truth[:-1]), in_flight[:-1]
 
 
 def _shares(task: str, gain: float = _GAINS[1]) -> Array:
