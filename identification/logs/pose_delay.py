@@ -43,7 +43,8 @@ SURE = 4.0  # standard deviations
 HONEST = 0.04
 # s: rotor speeds that pass a filter of their own act by up to so much earlier
 AHEAD = 0.03
-_LAGS = 0.01 * np.arange(11)  # s, of motors behind a command that was logged for a speed
+# s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
+_LAGS = 0.01 * np.arange(11)
 _STEP = 0.002  # s, of the search
 _BAND_HZ = (0.8, 10.0)
 _SHARE_OF_RATE = 0.4  # of the poses' rate, the highest frequency
@@ -51,6 +52,7 @@ _SEGMENT = 2.0  # s, of a spectrum
 _PERIOD = 0.01  # s, the shortest of the spectra's clock
 _INDEPENDENT = 0.55  # of half overlapping segments
 _GAP = 0.1  # s (or 3.5 periods) without a pose end a piece
+_ROUNDS = 10  # of the search, each around the delay of the last
 _PARTS = 5  # of the flight; the scatter of their delays is the uncertainty
 _FEWEST = 10  # segments
 _VISIBLE = 40.0  # deviance explained by the moments, at least
@@ -150,7 +152,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
     """
     log = excerpt([log])[0]
     late = 0.0
-    for _ in range(3):  # a window over delayed signals cuts the two of them differently
+    for _ in range(_ROUNDS):  # a window over delayed signals cuts the two of them differently
         segments = _segments(log, vehicle, late)
         if segments is None or len(segments.moment) < _FEWEST:
             return None
@@ -167,8 +169,10 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
     parts = np.array_split(np.arange(len(segments.moment)), _PARTS)
     scatter = float(np.std([segments.response(part).likeliest() for part in parts]))
     std = float(np.hypot(scatter / np.sqrt(_PARTS), response.misfit(here)))
-    honest = np.arange(-AHEAD, HONEST + _STEP, _STEP) - late
-    least = min(float(np.min(response.deviance(honest, lag))) for lag in _LAGS)
+    least = np.inf
+    for lag in _LAGS:
+        honest = np.arange(-AHEAD, min(HONEST, _LAGS[-1] - lag) + _STEP, _STEP) - late
+        least = min(least, float(np.min(response.deviance(honest, lag))))
     beyond = bool(not -AHEAD < late < HONEST and least - here > _BEYOND * scale)
     return PoseDelay(late, std, beyond)
 
