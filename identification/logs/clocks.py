@@ -122,7 +122,8 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
             if ahead > _SMEAR * width:
                 why = "and the rotor speeds answer the pose's noise ahead of its rows"
                 delay = replace(delay, beyond_honest=True)
-    if not (delay.is_clear and delay.beyond_honest):
+    # rotor speeds that are held from one measurement to the next are late by as long, at most
+    if not (delay.is_clear and delay.beyond_honest) or abs(late) < 1.0 / log.motor_rate:
         return log, ()
     if abs(late) > FARTHEST - LEAST:
         return log, (

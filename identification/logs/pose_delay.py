@@ -43,14 +43,16 @@ SURE = 4.0  # standard deviations
 HONEST = 0.04
 # s: rotor speeds that pass a filter of their own act by up to so much earlier
 AHEAD = 0.03
-_LAGS = 0.01 * np.arange(11)  # s, of motors behind a command that was logged for a speed
-_STEP = 0.002  # s, of the search
+# s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
+_LAGS = 0.01 * np.arange(11)
+_STEP = 0.001  # s, of the search
 _BAND_HZ = (0.8, 10.0)
 _SHARE_OF_RATE = 0.4  # of the poses' rate, the highest frequency
 _SEGMENT = 2.0  # s, of a spectrum
 _PERIOD = 0.01  # s, the shortest of the spectra's clock
 _INDEPENDENT = 0.55  # of half overlapping segments
 _GAP = 0.1  # s (or 3.5 periods) without a pose end a piece
+_ROUNDS = 10  # of the search, each around the delay of the last
 _PARTS = 5  # of the flight; the scatter of their delays is the uncertainty
 _FEWEST = 10  # segments
 _VISIBLE = 40.0  # deviance explained by the moments, at least
@@ -103,20 +105,14 @@ class _Response:
         """Return the error in s of a delay by the deviance left at the best one: gusts answered by
         the loop leave a response of another shape, and turn its phase by as much.
         """
-        weight = self.weight * np.square(np.abs(self.gain))
-        return float(np.sqrt(left / np.sum(weight * np.square(self.omega))))
+        turn = np.square(np.abs(self.omega * self.gain))
+        return float(np.sqrt(left / np.sum(self.weight * turn)))
 
     def likeliest(self) -> float:
         """Return the likeliest delay, s."""
         count = round(FARTHEST / _STEP)
-        tried = _STEP * np.arange(-count, count + 1)
-        cost = self.deviance(tried)
-        at = int(np.argmin(cost))
-        if at in (0, len(tried) - 1):
-            return float(tried[at])
-        before, least, after = cost[at - 1 : at + 2]
-        bend = before - 2.0 * least + after
-        return float(tried[at] + (0.5 * _STEP * (before - after) / bend if bend > 0.0 else 0.0))
+        tried = _STEP * np.arange(-count, count + 1, dtype=np.float64)
+        return float(tried[np.argmin(self.deviance(tried))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,15 +146,16 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
     """
     log = excerpt([log])[0]
     late = 0.0
-    for _ in range(3):  # a window over delayed signals cuts the two of them differently
+    for _ in range(_ROUNDS):  # a window over delayed signals cuts the two of them differently
         segments = _segments(log, vehicle, late)
         if segments is None or len(segments.moment) < _FEWEST:
             return None
         response = segments.response()
         step = response.likeliest()
         late = min(max(late + step, -FARTHEST), FARTHEST)
-        if abs(step) < 0.5 * _STEP:
+        if step == 0.0:
             break
+    assert segments is not None
     here = response.deviance(np.zeros(1))[0]
     free = 2.0 * response.gain.size - 3.0
     scale = max(1.0, here / free)  # beyond what noise leaves
@@ -167,8 +164,10 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
     parts = np.array_split(np.arange(len(segments.moment)), _PARTS)
     scatter = float(np.std([segments.response(part).likeliest() for part in parts]))
     std = float(np.hypot(scatter / np.sqrt(_PARTS), response.misfit(here)))
-    honest = np.arange(-AHEAD, HONEST + _STEP, _STEP) - late
-    least = min(float(np.min(response.deviance(honest, lag))) for lag in _LAGS)
+    honest = np.arange(-AHEAD, HONEST + _STEP, _STEP)
+    least = min(
+        np.min(response.deviance(honest[honest <= _LAGS[-1] - lag] - late, lag)) for lag in _LAGS
+    )
     beyond = bool(not -AHEAD < late < HONEST and least - here > _BEYOND * scale)
     return PoseDelay(late, std, beyond)
 
@@ -182,10 +181,9 @@ def _segments(log: FlightLog, vehicle: Vehicle | None, late: float) -> _Segments
     period = max(_PERIOD, log.period)
     count = round(_SEGMENT / period)
     inertia = np.eye(3) if vehicle is None else vehicle.inertia
-    mixing = _mixing(vehicle)
     window = np.hanning(count)[:, None]
-    squares = _Integral(log.t, np.square(log.rotor_speeds))
-    transforms: list[tuple[NDArray[np.complex128], NDArray[np.complex128]]] = []
+    moments = np.square(log.rotor_speeds) @ _mixing(vehicle).T
+    transforms: list[list[NDArray[np.complex128]]] = []
     noises = []
     for piece in unbroken(log.t, rows, max(_GAP, 3.5 * step), 60, _SEGMENT):
         t, angles = _turns(log, piece)
@@ -193,38 +191,33 @@ def _segments(log: FlightLog, vehicle: Vehicle | None, late: float) -> _Segments
         first = max(t[0], log.t[0] + late) + period
         last = min(t[-1], log.t[-1] + late) - period
         at = np.arange(first, last, period)
-        turn = _Integral(t, angles).mean(at, period)
-        moment = squares.mean(at - late, period) @ mixing.T
         if len(at) <= count + 2:
             continue
+        turn = _means(at, period, t, angles)
+        moment = _means(at[1:-1] - late, period, log.t, moments)
         w = (turn[2:] - turn[:-2]) / (2.0 * period)
         alpha = (turn[2:] - 2.0 * turn[1:-1] + turn[:-2]) / period**2
         needed = (alpha @ inertia + np.cross(w, w @ inertia))[:, :2]
         for begin in range(0, len(needed) - count + 1, count // 2):
-            x, y = moment[1:-1][begin : begin + count], needed[begin : begin + count]
-            each = [np.fft.rfft(window * (z - z.mean(axis=0)), axis=0) for z in (x, y)]
-            transforms.append((each[0], each[1]))
+            both = (z[begin : begin + count] for z in (moment, needed))
+            transforms.append([np.fft.rfft(window * (z - z.mean(axis=0)), axis=0) for z in both])
     if not transforms:
         return None
-    frequency = np.fft.rfftfreq(count, period)
+    frequency = np.asarray(np.fft.rfftfreq(count, period), dtype=np.float64)
     # white noise of the angles, through the mean over a period and two differences
     passed = np.sinc(frequency * period) * np.square(2.0 * np.sin(np.pi * frequency * period))
     noise = np.square(np.outer(passed / period**2, np.mean(noises) * np.diag(inertia)[:2]))
     noise *= step / period * np.sum(np.square(window))
-    moments, turns = (np.array(x) for x in zip(*transforms, strict=True))
-    return _Segments(frequency, moments, turns, noise, min(_BAND_HZ[1], _SHARE_OF_RATE / step))
+    moving, turning = np.moveaxis(np.array(transforms), 1, 0)
+    return _Segments(frequency, moving, turning, noise, min(_BAND_HZ[1], _SHARE_OF_RATE / step))
 
 
-class _Integral:
-    """The integral of columns (n, k), linear between times (n,)."""
-
-    def __init__(self, t: Array, x: Array) -> None:
-        self._t, self._sum = t, cumulative_trapezoid(x, t, axis=0, initial=0.0)
-
-    def mean(self, at: Array, width: float) -> Array:
-        """Return means (m, k) over ``width`` s around times (m,)."""
-        after, before = (resampled(at + k * width, self._t, self._sum) for k in (0.5, -0.5))
-        return (after - before) / width
+def _means(at: Array, width: float, t: Array, x: Array) -> Array:
+    """Return means (m, k) over ``width`` s around times (m,) of columns (n, k), linear between
+    times (n,).
+    """
+    sums = cumulative_trapezoid(x, t, axis=0, initial=0.0)
+    return (resampled(at + 0.5 * width, t, sums) - resampled(at - 0.5 * width, t, sums)) / width
 
 
 def _mixing(vehicle: Vehicle | None) -> Array:

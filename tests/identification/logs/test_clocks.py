@@ -172,6 +172,14 @@ def test_a_vehicle_s_own_delay_is_no_clock(flight):
         assert on_one_clock(log, vehicle) == (log, ())
 
 
+def test_seldom_measured_rotor_speeds_are_no_clock(flight):
+    vehicle, log = flight
+    held = np.arange(len(log.t)) // 20 * 20
+    log = replace(log, rotor_speeds=log.rotor_speeds[held], rates={"rotors": 10.0})
+    assert pose_delay(log, vehicle).seconds == pytest.approx(-0.05, abs=0.01)
+    assert on_one_clock(log, vehicle) == (log, ())
+
+
 @pytest.mark.parametrize("late", [-0.3, 0.3])
 def test_an_offset_at_the_bound_of_the_search_is_said(flight, late):
     vehicle, log = flight
