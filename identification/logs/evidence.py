@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...dynamics.vehicle import Vehicle
+from ..motion.signals import LONGEST_GAP, SHORTEST_PIECE
 from ..motion.smoothing import (
     CUTOFFS,
     continuous,
@@ -58,8 +59,6 @@ _RATE_HZ = 20.0  # rate of the samples compared
 _MOST = 2000  # samples; of longer flights every second one, or third ...
 _PERIOD = 0.005  # s, the shortest of the filters' clock
 _EDGE = 0.3  # s at either end of a run, for the filters' start
-_GAP = 0.1  # s (or 3.5 periods) without a sample end a run
-_SHORTEST = 3.0  # s of a run
 _PAUSE = 2.0  # s, between two runs on the even clock: longer than the filters remember
 _FEWEST = 60  # samples in flight for a decision
 
@@ -188,7 +187,7 @@ class Evidence:
             return np.empty(0, np.intp)
         step = median_step(self._t[rows])
         self._period = period = max(step, _PERIOD)
-        runs = unbroken(self._t, rows, max(_GAP, 3.5 * step), 8, _SHORTEST)
+        runs = unbroken(self._t, rows, max(LONGEST_GAP, 3.5 * step), 8, SHORTEST_PIECE)
         known = np.flatnonzero(finite_rows(self._thrusts))
         runs = [run for run in runs if np.any((known >= run[0]) & (known <= run[-1]))]
         if not runs:

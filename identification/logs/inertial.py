@@ -91,12 +91,7 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
         if values is None or not (read := np.isfinite(values[:, 0])).any():
             continue
         t, measured = log.t[read], values[read]
-        shares: list[float] | None = None
-        if is_stuck(measured):
-            doubt = f"never change: the {field} was not read"
-        elif field == "accelerometer" and (doubt := _blown_up(measured)):
-            pass
-        elif field == "gyro":
+        if field == "gyro":
             turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
             shares = gyro_shares(t, measured, *pose, turns)
             doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
@@ -114,7 +109,10 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
                 )
             otherwise = "contradict the position's acceleration and gravity"
             doubt = _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
+            doubt = _blown_up(measured) or doubt
             alone = gravity_doubt(measured, gravity, is_flight=False)
+        if is_stuck(measured):
+            doubt = f"never change: the {field} was not read"
         if doubt:
             notes.append(f"{columns} {doubt}. They were left out")
             left_out: Data = {field: None}
