@@ -242,7 +242,9 @@ def _blown_up(force: Array) -> str:
     size = np.linalg.norm(force, axis=1, keepdims=True)
     far = size[:, 0] > MAGNITUDES.strongest
     share = np.mean(far)
-    if share <= _FAR_SHARE or np.linalg.norm(np.mean((force / size)[far], axis=0)) > _ONE_WAY:
+    if len(force) < LEAST_SAMPLES or share <= _FAR_SHARE:
+        return ""
+    if np.linalg.norm(np.mean(force[far] / size[far], axis=0)) > _ONE_WAY:
         return ""
     return (
         f"are beyond {MAGNITUDES.strongest:g} m/s2, in changing directions, in {share:.0%} of the "
