@@ -33,7 +33,6 @@ _MOST_ROWS = 20_000  # at most, from the middle of the flight
 _MOST_SAMPLES = 4000  # at most, of the rows compared
 _LEVELS = 10  # of a switch, at most
 _FEWEST = 30  # for a decision
-_FOLLOWS = 0.7  # correlation of a signal with its driver
 _ALIKE = 1.6  # ratio of medians of four rotors
 _FELT = 0.5  # correlation of rotors with the specific force
 SHOWN = 4  # candidates in a map
@@ -61,7 +60,6 @@ class Numbers:
         self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
         self._rows: dict[Names, ArrayPair] = {}
-        self.attitude: Names = ()  # a quaternion, whose tilt drives the position
         self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
 
     def rows(self, columns: Names) -> ArrayPair:
@@ -108,24 +106,6 @@ class Numbers:
         if not is_gravity or np.std(length) < 1e-6 * size or middle.max() < 0.8 * size:
             return 0.0, ""  # another size, a direction, or a turning vector
         return (1.0 if middle.argmax() == 2 else 0.8), f"their size is gravity's, in {unit}"
-
-    def follows_tilt(self, columns: Names) -> Verdict:
-        """Return the correlation of two of three columns' second differences with the tilt; 0 where
-        there is little.
-        """
-        if not self.attitude:
-            return 0.0, ""
-        every = slice(None, None, max(1, len(self.rows(self.attitude)[0]) // _MOST_SAMPLES))
-        times, attitude = (x[every] for x in self.rows(self.attitude))
-        if min(len(times), len(self.rows(columns)[0])) < _FEWEST:
-            return 0.0, ""
-        force, best = second_difference(times, _WINDOW, *self.rows(columns)).T, 0.0
-        for w, x, y, z in (attitude.T, attitude[:, [3, 0, 1, 2]].T):
-            for sign in (1.0, -1.0):
-                tilt = x * z + sign * w * y, y * z - sign * w * x
-                correlations = [abs(correlation(f, d)) for f, d in zip(force, tilt, strict=False)]
-                best = max(best, min(correlations))
-        return (best if best > _FOLLOWS else 0.0), "their acceleration follows the tilt"
 
     def moves_together(self, columns: Names) -> Verdict:
         """Return 1 where four columns are of one size and move with the specific force."""
@@ -236,16 +216,14 @@ def candidates(
         )
         for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
-    likeliest: dict[Names, ColumnCandidate] = {}
+    found = []
     for group, score, why in ways:
-        there = len(numbers.rows(group.columns)[0]) > 0
-        strength, told = judge(group.columns) if there else (0.0, "")
-        whole = ColumnCandidate(
-            group,
-            score + _NUMBERS * strength,
-            "; ".join(filter(None, (why, told if strength else ""))),
-        )
-        before = likeliest.get(group.columns)
-        if whole.why and strength >= 0.0 and (before is None or before.score < whole.score):
-            likeliest[group.columns] = whole
-    return sorted(likeliest.values(), key=lambda candidate: -candidate.score)
+        strength, told = 0.0, ""
+        if len(numbers.rows(group.columns)[0]):
+            strength, told = judge(group.columns)
+        words = "; ".join(filter(None, (why, told if strength else "")))
+        if words and strength >= 0.0:
+            found.append(ColumnCandidate(group, score + _NUMBERS * strength, words))
+    found.sort(key=lambda candidate: -candidate.score)
+    likeliest = {candidate.group.columns: candidate for candidate in reversed(found)}
+    return [candidate for candidate in found if likeliest[candidate.group.columns] is candidate]

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...dynamics.vehicle import Vehicle
+from ..motion.signals import LONGEST_GAP, SHORTEST_PIECE
 from ..motion.smoothing import (
     CUTOFFS,
     continuous,
@@ -46,7 +47,6 @@ from .readings import (
     applied,
     as_written,
     log_readings,
-    turned,
 )
 from .table import Array, ArrayPair, Rows, finite_rows, median_step
 
@@ -58,8 +58,6 @@ _RATE_HZ = 20.0  # rate of the samples compared
 _MOST = 2000  # samples; of longer flights every second one, or third ...
 _PERIOD = 0.005  # s, the shortest of the filters' clock
 _EDGE = 0.3  # s at either end of a run, for the filters' start
-_GAP = 0.1  # s (or 3.5 periods) without a sample end a run
-_SHORTEST = 3.0  # s of a run
 _PAUSE = 2.0  # s, between two runs on the even clock: longer than the filters remember
 _FEWEST = 60  # samples in flight for a decision
 
@@ -188,7 +186,7 @@ class Evidence:
             return np.empty(0, np.intp)
         step = median_step(self._t[rows])
         self._period = period = max(step, _PERIOD)
-        runs = unbroken(self._t, rows, max(_GAP, 3.5 * step), 8, _SHORTEST)
+        runs = unbroken(self._t, rows, max(LONGEST_GAP, 3.5 * step), 8, SHORTEST_PIECE)
         known = np.flatnonzero(finite_rows(self._thrusts))
         runs = [run for run in runs if np.any((known >= run[0]) & (known <= run[-1]))]
         if not runs:
@@ -336,36 +334,26 @@ class Evidence:
         self, reading: Convention, mixing: Array, delays: tuple[float, ...]
     ) -> tuple[Fit, float]:
         """Return the fit of a reading at the likeliest delay in s, and the delay."""
-        mixing = mixing[:, [rotor - 1 for rotor in reading.rotors]]
-        left, horizontal, cost = self._left(mixing, reading, delays)
-        best = np.argmax(likelihood(left))
-        score = likelihood([horizontal, horizontal, *left[best]]) - cost - reading.unlikely
-        torques = tuple(left[best, 1:].tolist())
-        return Fit(reading, horizontal, torques, float(score)), delays[best]
-
-    def _left(
-        self, mixing: Array, reading: Convention, delays: tuple[float, ...]
-    ) -> tuple[Array, float, float]:
-        """Return the shares (d, 1 + torques) of vertical force and torques left at each delay of
-        the rotors, and the horizontal share and the penalty on the flight's place.
-        """
         rows = np.zeros((1 + len(mixing), 9))  # what drives: all together along, and each torque
-        rows[0, 8], rows[1:3, :4], rows[3:, 4:8] = 1.0, mixing[:2], mixing[2:]
-        if reading.mirrored:
-            rows[3:] *= -1.0
+        rows[0, 8] = 1.0
+        torques = mixing[:, [rotor - 1 for rotor in reading.rotors]]
+        rows[1:3, :4] = torques[:2]
+        rows[3:, 4:8] = -torques[2:] if reading.mirrored else torques[2:]
         gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
         horizontal, cost, motion = self._moved(*reading.moves)
         needed = motion[: len(rows)]
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
-        left = shares(
+        left = shares(  # (d, 1 + torques)
             there @ np.square(needed).T,
             np.sum(given * given, axis=2),
             np.sum(given * needed, axis=2),
             np.transpose(gains),
         )
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
-        return left, horizontal, cost
+        best = np.argmax(likelihood(left))
+        score = likelihood([horizontal, horizontal, *left[best]]) - cost - reading.unlikely
+        return Fit(reading, horizontal, tuple(left[best, 1:].tolist()), float(score)), delays[best]
 
     def turns(self, reading: Convention) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
@@ -472,7 +460,17 @@ def remedies(
         if not one.late:
             fits.append(evidence.late(one))
         if one.rotors == ROTORS and not one.mirrored:
-            fits += [evidence.fit(turned(one, rotors)) for rotors in ROTOR_READINGS]
+            fits += [
+                evidence.fit(
+                    replace(
+                        one,
+                        rotors=other.rotors,
+                        mirrored=other.mirrored,
+                        unlikely=one.unlikely + other.unlikely,
+                    )
+                )
+                for other in ROTOR_READINGS
+            ]
     alike = RankedFits.sorted(fits).departures(by_imu)[:3] or ranking.departures(by_imu)[:1]
     mending = [reading for reading in alike if mends(reading)]
     return mending or alike[:1], bool(mending)

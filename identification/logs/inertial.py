@@ -76,12 +76,7 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
         if values is None or not (read := np.isfinite(values[:, 0])).any():
             continue
         t, measured = log.t[read], values[read]
-        shares: list[float] | None = None
-        if is_stuck(measured):
-            doubt = f"never change: the {field} was not read"
-        elif field == "accelerometer" and (doubt := _blown_up(measured)):
-            pass
-        elif field == "gyro":
+        if field == "gyro":
             turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
             shares = gyro_shares(t, measured, *pose, turns)
             doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
@@ -99,7 +94,10 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
                 )
             otherwise = "contradict the position's acceleration and gravity"
             doubt = _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
+            doubt = _blown_up(measured) or doubt
             alone = gravity_doubt(measured, gravity, is_flight=False)
+        if is_stuck(measured):
+            doubt = f"never change: the {field} was not read"
         if doubt:
             notes.append(f"{columns} {doubt}. They were left out")
             left_out: Data = {field: None}
@@ -230,7 +228,9 @@ def _blown_up(force: Array) -> str:
     size = np.linalg.norm(force, axis=1, keepdims=True)
     far = size[:, 0] > MAGNITUDES.strongest
     share = np.mean(far)
-    if share <= _FAR_SHARE or np.linalg.norm(np.mean((force / size)[far], axis=0)) > _ONE_WAY:
+    if len(force) < LEAST_SAMPLES or share <= _FAR_SHARE:
+        return ""
+    if np.linalg.norm(np.mean(force[far] / size[far], axis=0)) > _ONE_WAY:
         return ""
     return (
         f"are beyond {MAGNITUDES.strongest:g} m/s2, in changing directions, in {share:.0%} of the "

@@ -55,12 +55,8 @@ from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
-_TURNS = (
-    "world",
-    "body",
-    *(f"attitude.{x}" for x in ("sense", "order", "unit")),
-    "pitch_sign",
-)  # readings of a body's turns
+# fields of a body's turns
+_TURNS = ("world", "body", "attitude.sense", "attitude.order", "attitude.unit", "pitch_sign")
 _MOTORS = ("motors", "commands")
 _GYROS = [
     SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
@@ -188,9 +184,7 @@ class _Guessing:
         self.battery()
         attitude = self.choose("attitude", numbers.quaternion)
         force = self.choose("accelerometer", numbers.gravity)
-        if attitude and len(attitude.columns) == 4:
-            numbers.attitude = attitude.columns
-        place = self.choose("position", numbers.follows_tilt)
+        place = self.choose("position", self.follows_tilt)
         numbers.feel(force.columns if force else (), place.columns if place else ())
         motors = [part for part in _MOTORS if self.choose(part, numbers.moves_together)]
         if attitude and place:
@@ -310,9 +304,9 @@ class _Guessing:
         self.time_columns = column.named
         return t
 
-    def pose(self, place: Group, group: Group) -> None:
-        """Find frames, units, order and sense of the pose."""
-        attitude, is_quaternion = self.values("attitude"), len(group.columns) == 4
+    def pose_fits(self, place: Group, group: Group) -> RankedFits:
+        """Return the fits of a pose in each of a map's frames, units, orders and senses."""
+        attitude = self.values("attitude")
         units: Names = ("deg", "rad")
         if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
@@ -320,23 +314,38 @@ class _Guessing:
             units = (group.unit,)
         orders = ("wxyz", "xyzw") if group.numbered else ("wxyz",)
         readings = table_readings(
-            orders if is_quaternion else (),
+            orders if len(group.columns) == 4 else (),
             units,
             place.unit,
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
         motors = [self.values(part) for part in _MOTORS if part in self.parts]
         thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
-        evidence = Evidence(self.t, thrusts, self.values("position"), attitude)
-        self.ranking = ranking = RankedFits.of(evidence, readings, torques=False)
+        position = np.column_stack([self.data[name] for name in place.columns])
+        evidence = Evidence(self.t, thrusts, position, attitude)
+        return RankedFits.of(evidence, readings, torques=False)
+
+    def follows_tilt(self, columns: Names) -> Verdict:
+        """Return the share of three columns' horizontal acceleration by a quaternion's tilt; 0
+        where the tilt drives less than half.
+        """
+        attitude = self.parts.get("attitude")
+        if attitude is None or len(attitude.columns) == 3:
+            return 0.0, ""
+        left = self.pose_fits(Group(columns, ""), attitude).fit.horizontal
+        return (1.0 - left if left <= GOOD else 0.0), "their acceleration follows the tilt"
+
+    def pose(self, place: Group, group: Group) -> None:
+        """Find frames, units, order and sense of the pose."""
+        self.ranking = ranking = self.pose_fits(place, group)
         best = ranking.best
         length = self.unit("position", place.unit, ranking.says("length"))
-        fields = [("world", "", "world"), ("body", "", "body")]
-        fields.append(("attitude", "sense", "attitude.sense"))
-        if not is_quaternion:
+        turned = ("attitude", "sense", "attitude.sense")
+        fields = [("world", "", "world"), ("body", "", "body"), turned]
+        if best.attitude.euler:
             guessed = ranking.says("attitude.unit")
-            if len(units) == 1:
-                guessed = units[0], units[0] != group.unit, "angles beyond pi"
+            if len({fit.reading.attitude.unit for fit in ranking.ranked}) == 1:
+                guessed = guessed[0], guessed[0] != group.unit, "angles beyond pi"
             self.unit("attitude", group.unit, guessed)
             fields += [("attitude", "euler", "attitude.euler"), ("attitude", "signs", "pitch_sign")]
         elif group.numbered:
@@ -345,9 +354,9 @@ class _Guessing:
             self.say("attitude", "order", True, "by the columns' names")
         for section, name, prop in fields:
             self.take(section, name, ranking.says(prop))
-        position, turned = Columns(place.columns, length), best.attitude
         self.sections |= {"world": best.world, "body": best.body}
-        self.sections |= {"position": position, "attitude": replace(turned, columns=group.columns)}
+        self.sections["position"] = Columns(place.columns, length)
+        self.sections["attitude"] = replace(best.attitude, columns=group.columns)
 
     def accelerometer(self, group: Group) -> None:
         """Find unit and axes of the accelerometer by gravity."""

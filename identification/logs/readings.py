@@ -302,12 +302,6 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
     return _weighed(named, hint or "enu")
 
 
-def turned(reading: Convention, rotors: Convention) -> Convention:
-    """Return a reading with the rotors of another, as unlikely as both."""
-    unlikely = reading.unlikely + rotors.unlikely
-    return replace(reading, rotors=rotors.rotors, mirrored=rotors.mirrored, unlikely=unlikely)
-
-
 def applied(log: FlightLog, reading: Convention) -> FlightLog:
     """Return a log with the advice of a reading taken; the vehicle's spin is no part of a log."""
     speeds, parts = np.empty_like(log.rotor_speeds), Data()
