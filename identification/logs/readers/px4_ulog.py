@@ -135,6 +135,8 @@ def channels(
         for fields in instances
         for samples in _samples(topic, fields, outputs)
     ]
+    empty = {s.topic for s in recorded if not s.columns} - {s.topic for s in recorded if s.columns}
+    notes += [f"{topic}: not of four motors that turn; left out" for topic in sorted(empty)]
     sections = sections_of(path, recorded, log_map, "px4_ulog", notes, piece, flown)
     position, said = sections[0].position, sections[3]
     if position is not None and position.topic == _FILTER:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
+from ..column_names import WORDS
 from ..log_map import LogMap, parse_map, stated
 from ..table import Array, Data, NamedArrays
 from .px4_ulog import unified
@@ -26,6 +27,7 @@ _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
 _SHOWN = 30  # fields in an error
+_MOTORS = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])))
 _PX4 = "px4_msgs/msg/"
 
 
@@ -82,6 +84,16 @@ def map_of(
         why = refused.get(section) or f"{section}: {_missing(types, section, where)}"
         raise InputError(f"{source}: {why}")
     is_ned = types.get(_topic_of(sections.get("position")) or "") in stated("ros")["ned"]
+    used = {_topic_of(section) for section in sections.values()}
+    motors = {kind for name in MOTORS for kind in stated("ros")[name]}
+    left = [
+        topic
+        for topic, kind in sorted(types.items())
+        if topic not in used
+        and (kind in motors or (kind in stated("ros")["arrays"] and _MOTORS.search(topic.lower())))
+    ]
+    if left:
+        notes.append(f"topics that may hold motors were left out: {', '.join(left)}")
     clock: Data = {"time": {"column": "stamp", "unit": "ns"}}
     clock |= {"world": "ned", "body": "frd"} if is_ned else {}
     log_map = parse_map({**clock, **given, **sections}, where)

@@ -163,6 +163,13 @@ def test_relative_thrust_is_scaled_to_the_weight(read):
     assert_allclose(alone.command[100], SHARES, rtol=1e-6)
 
 
+def test_motors_that_are_left_out_are_said(read):
+    stopped = control(WIDE, np.zeros((len(WIDE), 12)))
+    log = read(FLIGHT | {"actuator_motors": stopped})
+    assert log.command is None
+    assert noted(log, "actuator_motors: not of four motors that turn; left out")
+
+
 @pytest.mark.parametrize("topic", ["sensor_combined", "vehicle_imu"])
 def test_without_a_pose_the_inertial_sensors_are_read(read, topic):
     fields = sensor_combined(WIDE)

@@ -266,6 +266,13 @@ def test_each_field_of_a_message_is_read_for_itself(write):
     assert noted(log, "no commands: /motors has no normalized[0] ...")
 
 
+def test_topics_that_may_hold_motors_are_said_where_they_are_left_out(write):
+    more = {"/esc/rpm": numbers(OURS), "/battery": battery(), "/counts": numbers(OURS)}
+    log = read_log(write({"/pose": pose(), "/motors": actuators()} | more))
+    assert noted(log, "topics that may hold motors were left out: /esc/rpm")
+    assert not noted(log, "/counts")
+
+
 def test_without_a_pose_an_imu_will_do(write):
     log = read_log(write({"/imu": imu(), "/motors": actuators()}))
     assert not log.has_pose
