@@ -58,7 +58,11 @@ def check(
     for text in (*checked.doubts, *checked.limits):
         note(f"warning: {text}")
     console.print(checked.headline())
-    console.print(f"{flight.name}: {checked.reading()}")
+    result = checked.as_dict()
+    console.print(
+        f"{flight.name}: {result['samples']} rows, {result['seconds']:.1f} s, read by "
+        f"{checked.read_by}"
+    )
     show_table(("what flew", "", "by"), checked.what_flew())
     show_table(
         ("channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit"),
@@ -91,7 +95,7 @@ def check(
     if said:
         note(said)
     say(*(path for path in (write, picture, write_map) if path is not None))
-    return checked.as_dict()
+    return result
 
 
 def _write(flight: "FlightLog", log: Path, path: Path) -> str:

@@ -132,11 +132,11 @@ def _show(diagnosis: "Diagnosis") -> None:
     """Print the tables of effects and of the error before and after."""
     from ..identification.report.amounts import amount
     from ..identification.report.page import error_table
-    from ..identification.report.words import chance, name_in_words
+    from ..identification.report.words import by_energy, chance, name_in_words
 
     stated = diagnosis.probabilities.names
     rows: list[tuple[str, ...]] = []
-    for effect in diagnosis.effects:
+    for effect in by_energy(diagnosis):
         head = [name_in_words(effect), *([chance(stated[effect.name])] if stated else [])]
         for name in effect.coefficients:
             acts = amount(effect, name, diagnosis.declared)

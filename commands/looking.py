@@ -91,7 +91,7 @@ def look(
                 steps.append(Step(title, said, command, picture, report))
             _tell(steps[-1])
     page = folder / "log.html"
-    write_page(checked["log"], sentence, steps, then, command_line(), page)
+    write_page(checked["log"], sentence, steps, then, command_line(), page, checked["doubts"])
     run.record = folder / "run.json"
     for line in then.splitlines():
         console.print(line, soft_wrap=True)
@@ -132,9 +132,7 @@ def _what_it_holds(checked: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the result of ``check`` as sentences."""
     read = f"{checked['samples']} rows, {checked['seconds']:.1f} s, read by {checked['read_by']}."
     rates = (f"{name} {c['rate_hz']:.3g} Hz" for name, c in checked["channels"].items())
-    first = checked["headline"]
-    doubts = (f"Doubt: {text}." for text in checked["doubts"] if f"{text}." not in first)
-    return (first, *doubts, read, f"Channels: {', '.join(rates)}.")
+    return (checked["headline"], read, f"Channels: {', '.join(rates)}.")
 
 
 def _what_lacks(result: Mapping[str, Any]) -> tuple[str, ...]:

@@ -32,7 +32,13 @@ class Step:
 
 
 def write_page(
-    title: str, lead: str, steps: Sequence[Step], then: str, command: str, path: Path
+    title: str,
+    lead: str,
+    steps: Sequence[Step],
+    then: str,
+    command: str,
+    path: Path,
+    doubts: Sequence[str] = (),
 ) -> None:
     """Write steps as one page without a need of a network.
 
@@ -44,6 +50,7 @@ def write_page(
             nothing.
         command: behind the page.
         path: the page's.
+        doubts: above the lead.
 
     Raises:
         InputError: the page cannot be written.
@@ -55,6 +62,7 @@ def write_page(
     text = page_template(__package__, "page.html.j2").render(
         title=title,
         lead=lead,
+        doubts=doubts,
         steps=list(zip(steps, pictures, strict=True)),
         then=then.splitlines(),
         command=command,

@@ -55,13 +55,13 @@ def flew(log: FlightLog) -> tuple[str, str]:
     if log.has_rotor_speeds:
         total = np.square(log.rotor_speeds).sum(axis=1)
     elif log.command is not None:
-        total = np.square(np.nan_to_num(log.command)).sum(axis=1)
+        total = np.nan_to_num(log.command).sum(axis=1)
     else:
         return "unknown", "neither rotor speeds nor motor commands"
     if not np.any(total > 0.0):
         return "no", "the motors never turn"
     aloft = carrying(total)
-    told = f"yes, {aloft.sum() * log.period:.3g} s"
+    told = f"yes, {np.diff(log.t)[aloft[:-1]].sum():.3g} s"
     rows = aloft & finite_rows(log.position)
     place = log.position[rows]
     if len(place) > 1:

@@ -11,6 +11,7 @@ from ..logs.table import finite_rows, median_step
 from ..wrench_series import WrenchSeries
 from .amounts import known, steady_residual, steady_wrench, title, with_amounts
 from .words import (
+    by_energy,
     chance,
     disturbance_at,
     doubts,
@@ -47,11 +48,10 @@ def headline(diagnosis: Diagnosis) -> str:
         perhaps = "perhaps " if all(e.tentative for e in diagnosis.effects) else ""
         return f"The model {perhaps}lacks {lacking}."
     looks = "looks random" if diagnosis.remainder == "random" else "has structure"
-    unexplained = f"H{error[1:]}; the rest {looks}, and no effect {tried(diagnosis)} explains it."
-    steady = steady_residual(diagnosis)
-    return (
-        f"On average {steady} acts that the model lacks. {unexplained}" if steady else unexplained
-    )
+    if steady := steady_residual(diagnosis):
+        steady = f"On average {steady} acts that the model lacks. "
+    told = f"the residual {looks}, and no effect {tried(diagnosis)} explains it"
+    return f"{steady}H{error[1:]}; {told}."
 
 
 def _sign(diagnosis: Diagnosis) -> str:
@@ -62,7 +62,9 @@ def _sign(diagnosis: Diagnosis) -> str:
         return f". First suspect: {without_warning(suspects[0])}"
     if diagnosis.structure:
         clearest = diagnosis.structure[0]
-        return f"; its clearest sign is in {clearest.where}, {percent(clearest.gain)} of the rest"
+        return (
+            f"; its clearest sign is in {clearest.where}, {percent(clearest.gain)} of the residual"
+        )
     return f"; its clearest sign is {disturbance_at(diagnosis)}" if diagnosis.pushes else ""
 
 
@@ -71,14 +73,11 @@ def _lacking(diagnosis: Diagnosis) -> str:
     decided ones with a tenth of their energy, and last the ones of unknown amount.
     """
 
-    def energy(effect: NamedEffect) -> float:
-        return effect.evidence.get("energy_explained", 0.0)
-
     def place(effect: NamedEffect) -> tuple[bool, float]:
         share = _UNDECIDED if effect.indistinguishable_from else 1.0
-        return not known(effect), -share * energy(effect)
+        return not known(effect), -share * effect.evidence.get("energy_explained", 0.0)
 
-    largest = sorted(diagnosis.effects, key=energy, reverse=True)[:_NAMED]
+    largest = by_energy(diagnosis)[:_NAMED]
     all_perhaps = is_outside(diagnosis) or all(e.tentative for e in diagnosis.effects)
     told = [_told(e, diagnosis, all_perhaps) for e in sorted(largest, key=place)]
     if more := len(diagnosis.effects) - len(told):

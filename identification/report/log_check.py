@@ -50,11 +50,6 @@ class LogCheck:
             told.append(f"Nothing shows whether {what} flew: {by}.")
         return " ".join(told)
 
-    def reading(self) -> str:
-        """Return the log's length and reader."""
-        seconds = float(self.log.t[-1] - self.log.t[0])
-        return f"{len(self.log.t)} rows, {seconds:.1f} s, read by {self.read_by}"
-
     def what_flew(self) -> list[tuple[str, str, str]]:
         """Return facts of the vehicle and its flight: name, value, source."""
         return [*self.log.flown.rows(), ("flew", *flew(self.log))]

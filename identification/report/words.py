@@ -120,6 +120,11 @@ def without_warning(text: str) -> str:
     return text.rpartition(_WARNING)[2]
 
 
+def by_energy(diagnosis: Diagnosis) -> list[NamedEffect]:
+    """Return the named effects, the one that explains most of the residual's energy first."""
+    return sorted(diagnosis.effects, key=lambda e: -e.evidence.get("energy_explained", 0.0))
+
+
 def doubts(diagnosis: Diagnosis) -> list[str]:
     """Return the reasons to doubt the logs, and then the names."""
     names = {text for some in diagnosis.doubts.values() for text in some}

@@ -106,3 +106,21 @@ def test_a_log_of_an_unknown_vehicle_is_told_how_one_is_made(call, log, tmp_path
     assert "windwrench identify theirs.csv --mass KG" in out
     assert "Flight of 12 s by nobodys" in " ".join(out.split())
     assert not Path("all/estimate").exists()
+
+
+def test_no_command_is_proposed_that_refuses_the_log(call, log, tmp_path):
+    header, *rows = log.read_text().replace("ardrone2", "nobodys").splitlines()
+    columns = [header.split(",").index(f"omega{i}") for i in range(1, 5)]
+    for i, row in enumerate(rows):
+        cells = row.split(",")
+        for column in columns:
+            cells[column] = cells[columns[0]]
+        rows[i] = ",".join(cells)
+    (tmp_path / "theirs.csv").write_text("\n".join([header, *rows]))
+    code, out, _ = call("theirs.csv", "--out", "all", "--no-open")
+    assert code == 0
+    assert "--mass KG" not in out
+    told = "identify refuses this log: theirs: rotor speeds of motors 1 and 2 are equal"
+    assert told in " ".join(out.split())
+    page = Path("all/log.html").read_text(encoding="utf-8")
+    assert page.index("Doubt: rotor speeds of motors 1 and 2") < page.index("What the log holds")

@@ -246,3 +246,6 @@ def test_whether_anything_flew():
     lost = 0.0 * hover + np.nan
     assert answer(moving, lost, command=np.full((2000, 4), 0.4)) == "yes, 20 s"
     assert answer(moving, lost) == "unknown"
+    crash = np.full((2000, 4), 0.27)
+    crash[1800:] = [0.5, 0.2, 0.3, 0.9]
+    assert answer(moving, lost, command=crash) == "yes, 20 s"

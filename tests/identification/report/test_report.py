@@ -232,6 +232,15 @@ def test_the_page_says_it(reports):
         assert words in page.text
 
 
+def test_doubts_stand_before_all_else(diagnosis, tmp_path):
+    notes = ("flight: warning: pz stands still for 0.8 s", "flight: 2 gaps", "5 s are too few")
+    made = replace(diagnosis, notes=notes, doubts={"short": notes[2:]})
+    text = write_report(made, tmp_path)[1].read_text("utf-8")
+    first, _, rest = text.partition('id="sure"')
+    assert all(first.count(doubt) == 1 for doubt in (notes[0], notes[2]))
+    assert [rest.count(note) for note in notes] == [0, 1, 0]
+
+
 def test_nothing_to_draw(diagnosis, tmp_path):
     empty = ("effects", "traces", "signatures", "candidates", "advice", "notes")
     nothing = dict.fromkeys((*empty, "held_out_segments"), ())

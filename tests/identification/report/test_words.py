@@ -82,7 +82,9 @@ def test_a_steady_force_is_told_before_what_looks_random():
     trace.after[:, 0] -= 0.6
     assert steady_residual(found) == ""
     assert headline(found).startswith("Held-out force error: ")
-    assert "; the rest looks random, and no effect in the library explains it" in headline(found)
+    assert "; the residual looks random, and no effect in the library explains it" in headline(
+        found
+    )
 
 
 def said(*effects, unknown=0.1, **more):
