@@ -450,31 +450,35 @@ class Likelihood:
             }
 
     def _add_answers(self) -> None:
-        """Add the columns of a flight loop's answers to disturbances: along the torques, their
-        changes, and the state of each axis.
+        """Add the columns of a flight loop's answers to disturbances: along thrust and torques,
+        their changes, and the state of each axis.
 
-        A loop on a gyro answers a disturbance before the pose shows any. This part of the torques
-        causes no motion, and is no sign of an effect. The loop is unknown: each of its signals may
-        have a share of the part, at most the disturbance's share of the torque's variance. (Unknown
-        linear feedback: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
+        A loop on a gyro answers a disturbance before the pose shows any. This part of the rotors'
+        wrench causes no motion, and is no sign of an effect. The loop is unknown: each of its
+        signals may have a share of the part, at most the disturbance's share of the variance.
+        (Unknown linear feedback: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
         """
         whole, _ = joined(self.tracks)
-        body = in_body(whole.velocity, whole.rotation)
-        for i, axis in enumerate("xyz"):
-            torque = whole.rotors[:, 1 + i]
-            size = max(float(torque.std()), 1e-9)
-            answer = PRIORS.answer * min((self.noise.disturbance[3 + i] / size) ** 2, 1.0) * size
-            signals = {
-                "torque": torque,
-                "change of torque": np.diff(torque, prepend=torque[:1]),
-                "rate": whole.angular_velocity[:, i],
-            }
-            if i < 2:
-                signals |= {"tilt": whole.rotation[:, 2, 1 - i], "velocity": body[:, 1 - i]}
-            for name, x in signals.items():
-                column = np.zeros((len(x), 6))
-                column[:, 3 + i] = answer * x / max(float(x.std()), 1e-9)
-                self._acting["", f"answer with {name} {axis}"] = column
+        rate, body = whole.angular_velocity, in_body(whole.velocity, whole.rotation)
+        tilt = whole.rotation[:, 2]
+        states = (
+            (body[:, 2],),
+            (rate[:, 0], rate[:, 1] * rate[:, 2], tilt[:, 1], body[:, 1]),
+            (rate[:, 1], rate[:, 2] * rate[:, 0], tilt[:, 0], body[:, 0]),
+            (rate[:, 2], rate[:, 0] * rate[:, 1]),
+        )
+        disturbed = np.array([gust.rms for gust in self.gusts()]) / self.flights.inertias
+        for axis, rotors, own in zip(DRIVEN, whole.rotors.T, states, strict=True):
+            size = max(float(rotors.std()), 1e-9)
+            answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
+            change = np.diff(rotors, prepend=rotors[:1])
+            for i, x in enumerate((rotors - rotors.mean(), change, *own)):
+                column, along = np.zeros((len(x), 6)), answer * x / max(float(x.std()), 1e-9)
+                if axis == DRIVEN[0]:
+                    column[:, :3] = along[:, None] * whole.rotation[:, :, 2]
+                else:
+                    column[:, axis] = along
+                self._acting["", f"answer {i} of axis {axis}"] = column
 
     def _jumps(self) -> list[Array]:
         """Return the jumps of the states (n, 6, e) of each piece for a unit of each gain of a pair

@@ -51,7 +51,7 @@ class PriorSettings:
     # error of any model as a share of an axis' force or torque: of thrust along its axis and across
     # it, and of the torques. Propellers and bearings are not stable to less
     model_error: float = 0.003
-    # of a torque which answers disturbances alone: share without motion, with each signal of a loop
+    # of a thrust or torque which answers disturbances alone: share along each signal of the loop
     answer: float = 1.0
     # standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
     # units of one period of such an acceleration. They leave the gains free: a loop that shows the
