@@ -16,7 +16,7 @@ from .commanded_speeds import flown_vehicle
 from .flight_log import ACCELEROMETER, COMMANDS, GYRO, POSE, REQUIRED, ROTORS, FlightLog
 from .inertial import check_inertial, on_one_clock
 from .log_map import OWN_MAP, load_map
-from .magnitudes import unit_doubts
+from .magnitudes import unit_doubts, without_broken_speeds
 from .mapped_log import map_table
 from .table import Table
 from .tables import is_table, open_table
@@ -67,10 +67,11 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
         InputError: a number is beyond any flight's.
     """
     vehicle = flown_vehicle(vehicle, log.vehicle)
+    log, broken = without_broken_speeds(log)
     of_units = unit_doubts(log, vehicle)
     log, moved = on_one_clock(log, vehicle)
     log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
-    doubts = [*moved, *wrong, *of_units]
+    doubts = [*broken, *moved, *wrong, *of_units]
     for doubt in doubts:
         warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
