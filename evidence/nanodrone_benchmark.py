@@ -8,7 +8,6 @@ causal filters. Beside it stand its thrust and drag with an unchanged body rate,
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -41,20 +40,9 @@ from windwrench.runtime.provenance import commit, made_by
 MAP = Path(__file__).with_name("nanodrone_map.yaml")
 MASS, ARM = 0.045, 0.0353  # kg, m: as the benchmark states them
 _ALOFT = 0.3  # m
-_FASTEST = 4000.0  # rad/s: broken samples are 8 to 26 times as fast
 _HORIZON = 0.5  # s
 VEHICLE, FORCE = "identified vehicle", "its thrust and drag"
 WAYS = (VEHICLE, FORCE, NO_CHANGE)
-
-
-def read_flight(path: Path) -> FlightLog:
-    """Return a flight with broken rotor speeds interpolated: five samples of two flights."""
-    log = read_log(path, map=MAP)
-    speeds, rows = log.rotor_speeds.copy(), np.arange(len(log.t))
-    for column in speeds.T:
-        sound = column < _FASTEST
-        column[:] = np.interp(rows, rows[sound], column[sound])
-    return replace(log, rotor_speeds=speeds)
 
 
 def identified(logs: Sequence[FlightLog]) -> Identified:
@@ -148,24 +136,31 @@ def study(
     test: Annotated[
         list[Path] | None, typer.Option(help="Flights to predict, in place of the paths held out.")
     ] = None,
+    paths: Annotated[
+        list[str] | None, typer.Option(help="Paths to hold out; default: each of them.")
+    ] = None,
+    runs: Annotated[int, typer.Option(help="Flights of each path, the first ones.")] = 4,
     out: Annotated[
         Path | None,
         typer.Option(help="Results file; default: the page's, if no flights are given."),
     ] = None,
 ) -> None:
-    """Identify a vehicle from all paths but one, and predict that one."""
-    files = sorted(data.glob("*.parquet"))
+    """Identify a vehicle from all paths but one, and predict that one. Results are written after
+    each path.
+    """
+    files = [path for path in sorted(data.glob("*.parquet")) if int(path.stem[-1]) <= runs]
     if not files:
         print(f"{data}: no flights (*.parquet); skipped")
         return
     code = commit()
-    logs = {path: read_flight(path) for path in files}
-    result: dict[str, Any] = {"version": __version__, "commit": code, "paths": {}}
+    logs = {path: read_log(path, map=MAP) for path in files}
+    result: dict[str, Any] = {"version": __version__, "commit": code, "runs": runs, "paths": {}}
     result["closed_loop"] = {}
-    for name in ["none"] if test else dict.fromkeys(path.stem.split("_")[0] for path in files):
+    every = dict.fromkeys(path.stem.split("_")[0] for path in files)
+    for name in ["none"] if test else paths or every:
         unseen = {path: log for path, log in logs.items() if path.stem.startswith(name)}
         found = identified([log for path, log in logs.items() if path not in unseen])
-        held = {path: read_flight(path) for path in test} if test else unseen
+        held = {path: read_log(path, map=MAP) for path in test} if test else unseen
         result["paths"][name] = judged(found, held)
         result["closed_loop"][name] = {
             c: (e.value, 0.5 * (e.high - e.low))
@@ -174,9 +169,9 @@ def study(
         }
         for way in WAYS:
             print(name, way, np.round(mean(result["paths"][name], "sums", way), 2), flush=True)
+        if out is not None or not test:
+            write_json(result, out or DOCS / "identify" / "nanodrone.json")
     print(section(result))
-    if out is not None or not test:
-        write_json(result, out or DOCS / "identify" / "nanodrone.json")
 
 
 if __name__ == "__main__":
