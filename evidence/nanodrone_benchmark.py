@@ -33,7 +33,7 @@ from windwrench.identification.vehicle_fit.closed_loop import UNITS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.held_out import NO_CHANGE, SIMPLEST, models_of
 from windwrench.identification.vehicle_fit.identify import identify
-from windwrench.identification.vehicle_fit.result import Identified
+from windwrench.identification.vehicle_fit.result import IDENTIFIED, Identified
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit, made_by
 
@@ -112,9 +112,13 @@ def section(result: Mapping[str, Any]) -> str:
         for way in WAYS:
             cells = " | ".join(f"{x:.3g}" for x in mean(rows, "sums", way))
             lines.append(f"| {path} | {way} | {cells} |")
-    lines += ["", "| closed loop, of all flights | value, 95 % | unit |", "| --- " * 3 + "|"]
-    for name, value, width, unit in result["closed_loop"]:
-        lines.append(f"| {name} | {value:.3g} ± {width:.2g} | {unit} |")
+    loops = result["closed_loop"]
+    lines += ["", f"| closed loop without | {' | '.join(loops)} | unit |"]
+    lines.append("| --- " * (2 + len(loops)) + "|")
+    for name, unit in UNITS.items():
+        known = (loop.get(name) for loop in loops.values())
+        cells = " | ".join("–" if x is None else f"{x[0]:.3g} ± {x[1]:.2g}" for x in known)
+        lines.append(f"| {name} | {cells} | {unit} |")
     made = made_by("python -m evidence.nanodrone_benchmark", [result["commit"]], result["version"])
     return "\n".join([made, "", *lines, ""])
 
@@ -132,37 +136,42 @@ def study(
     test: Annotated[
         list[Path] | None, typer.Option(help="Flights to predict, in place of the paths held out.")
     ] = None,
+    paths: Annotated[
+        list[str] | None, typer.Option(help="Paths to hold out; default: each of them.")
+    ] = None,
+    runs: Annotated[int, typer.Option(help="Flights of each path, the first ones.")] = 4,
     out: Annotated[
         Path | None,
         typer.Option(help="Results file; default: the page's, if no flights are given."),
     ] = None,
 ) -> None:
-    """Identify a vehicle from all paths but one, and predict that one."""
-    files = sorted(data.glob("*.parquet"))
+    """Identify a vehicle from all paths but one, and predict that one. Results are written after
+    each path.
+    """
+    files = [path for path in sorted(data.glob("*.parquet")) if int(path.stem[-1]) <= runs]
     if not files:
         print(f"{data}: no flights (*.parquet); skipped")
         return
     code = commit()
     logs = {path: read_log(path, map=MAP) for path in files}
-    result: dict[str, Any] = {"version": __version__, "commit": code, "paths": {}}
-    held = {} if test else {path.stem.split("_")[0]: path for path in files}
-    for name in held:
+    result: dict[str, Any] = {"version": __version__, "commit": code, "runs": runs, "paths": {}}
+    result["closed_loop"] = {}
+    every = dict.fromkeys(path.stem.split("_")[0] for path in files)
+    for name in ["none"] if test else paths or every:
         unseen = {path: log for path, log in logs.items() if path.stem.startswith(name)}
         found = identified([log for path, log in logs.items() if path not in unseen])
-        result["paths"][name] = judged(found, unseen)
+        held = {path: read_log(path, map=MAP) for path in test} if test else unseen
+        result["paths"][name] = judged(found, held)
+        result["closed_loop"][name] = {
+            c: (e.value, 0.5 * (e.high - e.low))
+            for c in UNITS
+            if (e := found.estimates.get(f"closed_loop {c}")) and e.status == IDENTIFIED
+        }
         for way in WAYS:
             print(name, way, np.round(mean(result["paths"][name], "sums", way), 2), flush=True)
-    whole = identified(list(logs.values()))
-    if test:
-        result["paths"]["test"] = judged(whole, {path: read_log(path, map=MAP) for path in test})
-    known = (whole.estimates[f"closed_loop {name}"] for name in UNITS)
-    result["closed_loop"] = [
-        (name, e.value, 0.5 * (e.high - e.low), e.unit)
-        for name, e in zip(UNITS, known, strict=True)
-    ]
+        if out is not None or not test:
+            write_json(result, out or DOCS / "identify" / "nanodrone.json")
     print(section(result))
-    if out is not None or not test:
-        write_json(result, out or DOCS / "identify" / "nanodrone.json")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ The guess of a map, the reading of a log and its screening decide here, with the
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import ClassVar
 
@@ -290,3 +290,29 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
     if vehicle is not None and log.has_rotor_speeds:
         doubts.append(rotor_doubt(thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
     return [doubt for doubt in doubts if doubt]
+
+
+_BROKEN = 3.0  # times the speed that 99 % of a rotor's samples stay below: 9 times their thrust
+
+
+def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
+    """Return a log without broken rotor speeds, and a doubt where there are some: no rotor triples
+    its speed in a sample or two and falls back. Neighbours are interpolated.
+    """
+    if not log.has_rotor_speeds or log.commanded:
+        return log, []
+    high = np.nanquantile(log.rotor_speeds, 0.99, axis=0)
+    fast = log.rotor_speeds > _BROKEN * np.where(high > 0.0, high, np.inf)
+    # a sample counts if the third before it and the third behind it are sound
+    far = np.pad(fast, ((3, 3), (0, 0)))
+    broken = fast & ~far[:-6] & ~far[6:]
+    if not broken.any():
+        return log, []
+    speeds, rows = log.rotor_speeds.copy(), np.arange(len(log.t))
+    for column, wrong in zip(speeds.T, broken.T, strict=True):
+        column[wrong] = np.interp(rows[wrong], rows[~wrong], column[~wrong])
+    highest = np.max(log.rotor_speeds[broken])
+    return replace(log, rotor_speeds=speeds), [
+        f"{np.count_nonzero(broken)} rotor speeds are broken, up to {highest:.0f} rad/s where "
+        f"99 % are below {high.max():.0f}: they were interpolated"
+    ]

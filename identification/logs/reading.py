@@ -29,7 +29,7 @@ from .flight_log import (
 )
 from .inertial import check_inertial
 from .log_map import OWN_MAP, load_map
-from .magnitudes import unit_doubts
+from .magnitudes import unit_doubts, without_broken_speeds
 from .mapped_log import map_table
 from .readers import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
 from .table import SUFFIXES, Names, Table
@@ -118,10 +118,11 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
         InputError: a number is beyond any flight's.
     """
     vehicle = flown_vehicle(vehicle, log.vehicle)
+    log, broken = without_broken_speeds(log)
     of_units = unit_doubts(log, vehicle)
     log, moved = on_one_clock(log, vehicle)
     log, wrong = check_inertial(log, vehicle)
-    doubts = [*moved, *wrong, *of_units]
+    doubts = [*broken, *moved, *wrong, *of_units]
     for doubt in doubts:
         warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))

@@ -8,8 +8,8 @@ stands if no quantity is worse than the better one of no change and of thrust an
 the least mean of these ratios is the vehicle.
 
 One flight shows no other one. Its blocks are predicted with a thrust off by the spread between days
-to either side, and it tells no reaction: on a slower or faster flight of a racer the reaction of one
-flight misses the body rate by up to 3 times the error of no change.
+to either side. It tells no reaction: from one flight of a racer to a slower one the body rate was
+off by 3 times the error of no change.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -25,6 +25,7 @@ from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.evidence.trials.practice_flights import practise
 from windwrench.identification.logs.evidence import Evidence, log_ranking
 from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
+from windwrench.identification.logs.magnitudes import without_broken_speeds
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
 from windwrench.identification.logs.screening import screen_log, stuck_channels
@@ -343,3 +344,18 @@ def test_commands_that_run_seconds_late_are_named_by_the_thrust_alone():
     late = np.interp(log.t - 2.25, log.t, collective)
     with refused(r"flight\.csv: .* come 2\.2\d s too late .* commands"):
         screen_log(replace(on_time, rotor_speeds=np.tile(late[:, None], 4)), VEHICLE)
+
+
+def test_broken_rotor_speeds_are_interpolated_and_said():
+    """Two samples of 33,036 rad/s in a minute made k 4 % too small."""
+    log = recorded("excite", 12.0)
+    speeds = log.rotor_speeds.copy()
+    speeds[700, 1] = speeds[701, 1] = 33036.0
+    speeds[900, 2] = 104720.0
+    mended, (line,) = without_broken_speeds(replace(log, rotor_speeds=speeds))
+    assert "3 rotor speeds are broken, up to 104720 rad/s" in line
+    assert_array_equal(mended.rotor_speeds[:, 0], log.rotor_speeds[:, 0])
+    assert abs(mended.rotor_speeds - log.rotor_speeds).max() < 0.1 * log.rotor_speeds.mean()
+    same, none = without_broken_speeds(log)
+    assert same is log
+    assert none == []

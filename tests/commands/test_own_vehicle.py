@@ -1,0 +1,90 @@
+"""A vehicle file that ``identify`` writes from measured flights, through every command that takes a
+vehicle.
+"""
+
+import json
+import shutil
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import windwrench  # noqa: F401 (registers the tasks)
+from tests.support.data_paths import excerpt
+from windwrench.dynamics import load_vehicle
+
+FLIGHTS = ("B2_circle_fast_rep3", "B5_helix_fast_rep2")
+TASK = """
+from windwrench.envs import WindHoverEnv
+
+class Mine(WindHoverEnv):
+    vehicle, action, observation = "mine.yaml", "rates", "wrench"
+"""
+STEPS = 64  # of a training: one batch
+
+pytestmark = pytest.mark.measured
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Return the folder of the vehicle file and its flights."""
+    folder = tmp_path_factory.mktemp("mine")
+    for name in FLIGHTS:
+        shutil.copy(excerpt(f"nanobench/{name}.csv.gz"), folder)
+    return folder
+
+
+@pytest.fixture
+def mine(written, call, tmp_path):
+    """Return the path of the vehicle file in the test's folder, identified once."""
+    kept = written / "mine.yaml"
+    if not kept.exists():
+        logs = [written / f"{name}.csv.gz" for name in FLIGHTS]
+        words = ("--mass", 0.034, "--geometry", 0.0325, "--reader", "nanobench")
+        code, text, err = call("identify", *logs, *words, "--out", kept)
+        assert code == 0, err
+        assert "thrust and drag" in text
+        assert "Use: " in text
+    return shutil.copy(kept, tmp_path / "mine.yaml")
+
+
+def test_it_says_what_stands(mine):
+    vehicle = load_vehicle(mine)
+    assert {vehicle.status.force, vehicle.status.torque} <= {"identified", "refuted"}
+    x, y, z = np.linalg.eigvalsh(vehicle.inertia)
+    assert z < x + y
+    disc = 1.225 * np.pi * vehicle.rotor_radius**4
+    assert (vehicle.k / disc < 0.1).all()
+
+
+def test_its_flights_are_estimated_and_diagnosed(mine, written, call):
+    log = written / f"{FLIGHTS[0]}.csv.gz"
+    words = ("--reader", "nanobench", "--vehicle", mine)
+    assert call("estimate", log, *words, "--out", "estimate")[0] == 0
+    code, text, err = call("diagnose", log, *words, "--out", "found", "--json")
+    assert code == 0, err
+    assert json.loads(text)["result"]["verdict"]
+
+
+def test_it_flies_every_task(mine, call):
+    for task in ("WindHover-v2", "WindTrajectory-v2", "FanTracking-v2"):
+        with gym.make(f"windwrench/{task}", vehicle=str(mine), action="rates") as env:
+            env.reset(seed=1)
+            assert np.isfinite(env.step(np.zeros(4))[1])
+    words = ("--vehicle", mine, "--task", "WindHover", "--controller", "lqg")
+    code, _, err = call("fly", *words, "--out", "flight")
+    assert code == 0, err
+
+
+def test_it_is_trained(mine, call, tmp_path):
+    pytest.importorskip("stable_baselines3", reason="torch and SB3 are an extra")
+    (tmp_path / "mine.py").write_text(TASK)
+    words = ("--task", "mine.py:Mine", "--steps", STEPS, "--out", "trained")
+    code, _, err = call("train", "ppo", *words)
+    assert code == 0, err
+
+
+def test_it_is_exported(mine, call, tmp_path):
+    code, _, err = call("export-c", "--vehicle", mine, "--out", "c")
+    assert code == 0, err
+    assert (tmp_path / "c" / "windwrench_numbers.hpp").exists()
