@@ -59,10 +59,7 @@ def check(
         note(f"warning: {text}")
     console.print(checked.headline())
     result = checked.as_dict()
-    console.print(
-        f"{flight.name}: {result['samples']} rows, {result['seconds']:.1f} s, read by "
-        f"{checked.read_by}"
-    )
+    console.print(f"{flight.name}: {result['samples']} rows, read by {checked.read_by}")
     show_table(("what flew", "", "by"), checked.what_flew())
     show_table(
         ("channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit"),

@@ -139,6 +139,5 @@ def _what_lacks(result: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the first sentence of a diagnosis, and its error on held-out flight."""
     error = result["error"]
     before, after = (1e3 * error[when]["force_rms_N"] for when in ("before", "after"))
-    change = f"{before:.3g} mN before, {after:.3g} mN after" if result["effects"] else ""
-    told = (f"Held-out force error: {change}.",) if change else ()
-    return (result["headline"], *told)
+    told = f"Held-out force error: {before:.3g} mN before, {after:.3g} mN after."
+    return (result["headline"], told)

@@ -128,7 +128,7 @@ def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
 
 
 def _wind(effect: NamedEffect) -> Amount:
-    """Return the speed of a wind, and the side from which the wind blows."""
+    """Return the speed of a wind, and its side."""
     names = [name for name in effect.coefficients if effect.units.get(name) == "m/s"]
     wind = np.nan_to_num([effect.coefficients[name] for name in names])
     std = np.array([effect.std.get(name, 0.0) for name in names])

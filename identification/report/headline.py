@@ -1,5 +1,5 @@
-"""First sentences: the causes that a model lacks, by the energy that each explains, and the mean of
-an estimated wrench.
+"""First sentences: causes missing in a model, by the energy of each, and the mean of an estimated
+wrench.
 """
 
 import math
@@ -69,8 +69,8 @@ def _sign(diagnosis: Diagnosis) -> str:
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
-    """Return the effects with their amounts: those that explain most first, undecided ones after
-    decided ones with a tenth of their energy, and last the ones of unknown amount.
+    """Return the effects with their amounts: the largest energy first, undecided ones after decided
+    ones with a tenth of their energy, and unknown amounts last.
     """
 
     def place(effect: NamedEffect) -> tuple[bool, float]:

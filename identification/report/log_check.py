@@ -35,7 +35,7 @@ class LogCheck:
     read_by: str
     channels: list[Channel]
     doubts: Names  # of the reading; the gravest first
-    limits: Names = ()  # what the log does not show
+    limits: Names = ()  # not shown by the log
     guess: Guess | None = None
     map_text: str = ""  # the log's map as a YAML file; empty without one
 
@@ -146,8 +146,8 @@ def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[
 
 
 def _doubts(log: FlightLog, guessed: Sequence[str], vehicle: Vehicle | None) -> Names:
-    """Return the doubts of a log's reading, the gravest first: no flight, what was guessed, a
-    refusal by a diagnosis, warnings.
+    """Return the doubts of a log's reading, the gravest first: no flight, guesses, a refusal by
+    a diagnosis, warnings.
     """
     answer, by = flew(log)
     grounded = [f"the log does not show a flight: {by}"] if answer in ("no", "not shown") else []

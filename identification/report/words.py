@@ -121,7 +121,7 @@ def without_warning(text: str) -> str:
 
 
 def by_energy(diagnosis: Diagnosis) -> list[NamedEffect]:
-    """Return the named effects, the one that explains most of the residual's energy first."""
+    """Return the named effects by their share of the residual's energy, the largest first."""
     return sorted(diagnosis.effects, key=lambda e: -e.evidence.get("energy_explained", 0.0))
 
 

@@ -93,13 +93,11 @@ def sources_of(logs: Logs) -> Sources:
     ]
     if not all(speeds) and not all(commands):
         log = logs[speeds.index(False)]
-        names = {"rotors": "rotor speeds", "commands": "motor commands"}
-        found = [f"{what} {log.rates[x]:.3g}" for x, what in names.items() if x in log.rates]
+        rates = [f"{x} {log.rates[x]:.3g}" for x in ("rotors", "commands") if x in log.rates]
         raise InputError(
             f"{log.source or logs[0].name}: expected rotor speeds (omega1..omega4) in every log, "
             "or motor commands (cmd1..cmd4) in every log, "
-            f"{MOTOR_RATES.torque_hz:g} times a second{', found ' if found else ''}"
-            f"{' and '.join(found)}"
+            f"{MOTOR_RATES.torque_hz:g} times a second; found {' and '.join(rates) or 'neither'}"
         )
     accelerometer = all(log.accelerometer is not None for log in logs)
     gyro = all(log.gyro is not None for log in logs)

@@ -66,22 +66,23 @@ def identified_data(identified: Identified) -> Data:
 
 
 def headline(identified: Identified) -> str:
-    """Return one sentence: the parts that held-out flight refutes, the identified quantities with
-    half of their 95 % interval, and the assumed ones.
+    """Return one sentence: parts refuted by held-out flight, identified quantities with half of
+    their 95 % interval, and assumed ones.
     """
     status = identified.vehicle.status
     parts = [part for part in ("force", "torque") if getattr(status, part) == REFUTED]
     refuted = f"held-out flight refutes the {' and the '.join(parts)}; " if parts else ""
     thrust = "thrust(0.5)" if identified.fit.drive.commands else "k"
-    essential = [identified.estimates[n] for n in (thrust, "Jxx", "Jyy", "Jzz", "p/k")]
-    told = (
-        f"{e.name} {e.value:.3g} ± {0.5 * (e.high - e.low):.2g} {e.unit}"
-        for e in essential
-        if e.status not in (ASSUMED, NOTHING)
-    )
-    open_ones = ", ".join(e.name for e in essential if e.status in (ASSUMED, NOTHING))
-    assumed = f"; assumed, since these logs do not tell: {open_ones}" if open_ones else ""
-    return f"{refuted}identified: {', '.join(told)}{assumed}"
+    told, assumed = [], []
+    for name in (thrust, "Jxx", "Jyy", "Jzz", "p/k"):
+        e = identified.estimates[name]
+        size = f"{name} {e.value:.3g} ± {0.5 * (e.high - e.low):.2g} {e.unit}"
+        if e.status in (ASSUMED, NOTHING):
+            assumed.append(name)
+        else:
+            told.append(size)
+    rest = f"; assumed, since these logs do not tell: {', '.join(assumed)}" if assumed else ""
+    return f"{refuted}identified: {', '.join(told)}{rest}"
 
 
 def use_of(identified: Identified) -> str:
