@@ -64,7 +64,7 @@ def logged_states(path: Path, log: FlightLog) -> Array:
     table = open_table(path).read(["t", *columns])
     t = table["t"] - table["t"][0]
     rows = np.clip(np.searchsorted(t, log.t - log.t[0] - 0.5 * log.period), 0, len(t) - 1)
-    states = np.column_stack([table[name] for name in columns])[rows]
+    states: Array = np.column_stack([table[name] for name in columns])[rows]
     states[:, 3:7] /= np.linalg.norm(states[:, 3:7], axis=1, keepdims=True)
     first, last = max(runs_of(states[:, 2] > _ALOFT), key=lambda run: run[1] - run[0])
     states[:first], states[last:] = np.nan, np.nan

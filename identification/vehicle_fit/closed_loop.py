@@ -100,7 +100,8 @@ def fit_loop(
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
-        return _compared(thin, [part.flown(model) for part in thin]) / sizes
+        left: Array = _compared(thin, [part.flown(model) for part in thin]) / sizes
+        return left
 
     begin = np.array(astuple(_BEGIN))
     begin[list(UNITS).index("unmeasured")] = _turning(thin, vehicle)
