@@ -58,4 +58,4 @@ def beside_unknown(probability: float, factor: float, structure: float, strange:
         strange: probability of a cause outside.
     """
     least = 1.0 / (1.0 + max(structure, 0.0) / max(factor, 1e-9))
-    return probability * (1.0 - strange * (1.0 - least**UNKNOWN.absorbed))
+    return probability * (1.0 - strange * (1.0 - math.pow(least, UNKNOWN.absorbed)))
