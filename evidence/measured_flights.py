@@ -496,6 +496,7 @@ def study(
         "nanobench": nanobench(data / "nanobench", (DOCS / RESULTS).with_name("nanobench.png")),
         "slung_payload": slung_payload(data / "crazyswarm2_payload" / "csv"),
         "fan_wall": fan_wall(wall) if wall else kept(RESULTS)["fan_wall"],
+        "fan_wall_commit": code if wall else kept(RESULTS)["fan_wall_commit"],
         "crazypad": crazypad(data / "crazypad"),
         "crazypad_cards": crazypad_cards(pad) if pad else kept(RESULTS)["crazypad_cards"],
         "motor_faults": motor_faults(data / "motor_faults"),

@@ -14,7 +14,12 @@ from windwrench.evidence.runner import Jobs, Task, code_stamp, run_tasks, start
 from windwrench.runtime.errors import unknown_name
 from windwrench.runtime.page_files import write_json
 
-_FIRST = {"first": (800_000, 3000), "later": (850_000, 5000), "other logs": (910_000, 170_000)}
+_FIRST = {
+    "first": (800_000, 3000),
+    "later": (850_000, 5000),
+    "other logs": (910_000, 170_000),
+    "latest": (960_000, 7000),
+}
 _MODULES = "logged_poses", "outsiders", "practice_flights"
 # the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
 _STRIDE, _CATALOGUE = 7, 33

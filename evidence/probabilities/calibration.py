@@ -22,6 +22,7 @@ RESULTS = {  # kept flights, below docs/
     "first": "probabilities/results.json.gz",
     "later": "probabilities/later.json.gz",
     "other logs": "probabilities/other-logs.json.gz",
+    "latest": "probabilities/latest.json.gz",
 }
 TITLES = {
     "no pose": "an IMU alone",
@@ -203,16 +204,21 @@ def counts(flights: Sequence[Flight]) -> dict[str, str]:
 def shown() -> dict[str, Any]:
     """Return what the page shows of the kept results."""
     records, later = kept(RESULTS["first"]), kept(RESULTS["later"])
-    others = kept(RESULTS["other logs"])
+    others, latest = kept(RESULTS["other logs"]), flights_of(kept(RESULTS["latest"]))
     earlier, after = flights_of(records), flights_of(later)
     rows = [
         summary("this project's plant", flights_of(records, simulator="own")),
         summary("the other simulator", flights_of(records, simulator="other")),
         summary("both, later", after),
+        summary("both, latest", latest),
         *(summary(title, flights_of(others, way=way)) for way, title in TITLES.items()),
     ]
     return {
         "rows": rows,
-        "counts": {"earlier": counts(earlier), "later": counts(after)},
-        "reliability": {"earlier": reliability(earlier), "later": reliability(after)},
+        "counts": {"earlier": counts(earlier), "later": counts(after), "latest": counts(latest)},
+        "reliability": {
+            "earlier": reliability(earlier),
+            "later": reliability(after),
+            "latest": reliability(latest),
+        },
     }

@@ -96,6 +96,13 @@ def test_the_rule_of_a_sure_name_is_that_of_the_code():
     assert f"in the mean {UNKNOWN.absorbed / (UNKNOWN.absorbed + 1.0):.0%}" in rule
 
 
+def test_a_sure_name_is_printed_with_what_the_page_says_and_without_a_ceiling():
+    named = [e for flight in flights_of(kept(RESULTS["latest"])) for e in flight["named"]]
+    sure = [e["probability"] for e in named if not e["tentative"]]
+    assert min(sure) >= DIAGNOSIS.least_sure_probability
+    assert max(sure) > 0.999
+
+
 def test_the_weights_in_use_are_those_of_the_kept_flights():
     found = fit(flights_of(kept(RESULTS["first"])))
     for name in ("nothing", "push"):
