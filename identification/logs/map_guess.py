@@ -395,7 +395,7 @@ class _Guessing:
         turns = [way.turn for way in _GYROS]
         shares = gyro_shares(t, values, times[good], rotation, turns) or []
         fits = [
-            Fit(way, left, (), likelihood([left] * 3) - OTHER * (unit not in ("", way.unit)))
+            Fit(way, left, (), float(likelihood([left] * 3)) - OTHER * (unit not in ("", way.unit)))
             for way, left in zip(_GYROS, shares, strict=False)
         ]
         ranked = sorted(fits, key=lambda fit: -fit.score)
