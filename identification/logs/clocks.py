@@ -111,7 +111,7 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
     if delay is None:
         return log, ()
     late, std, why = delay.seconds, delay.std, "beyond a vehicle's own delay"
-    answer = answer_to_noise(log, vehicle) if abs(late) > LEAST else None
+    answer = answer_to_noise(log, vehicle, late) if abs(late) > LEAST else None
     if answer is not None:
         ahead, width = answer
         unsure = _REACTION * width

@@ -230,7 +230,7 @@ def _turns(log: FlightLog, piece: Rows) -> tuple[Array, Array]:
     return log.t[piece], np.vstack([np.zeros(3), turned(log.quaternion[piece])])
 
 
-def answer_to_noise(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
+def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pair | None:
     """Return by how much (s) the rotor speeds answer the pose's noise ahead of its rows, and the
     width (s) of the differences. None: there is no answer, or the pose shows no white noise.
 
@@ -240,6 +240,8 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
     Args:
         log: the flight, with rotor speeds.
         vehicle: as declared; None: rotors on one side turn the body to the other.
+        late: s, of the pose behind the rotor speeds. Turns by moments of so much earlier, a row
+            more or less, are no noise.
     """
     log = excerpt([log])[0]
     rows = np.flatnonzero(log.valid)
@@ -249,6 +251,10 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
     most = round(FARTHEST / fine)
     lags = fine * np.arange(-most, most + 1)
     products, count = np.zeros(len(lags)), 0
+    moments = np.square(log.rotor_speeds) @ _mixing(vehicle).T
+    turns = moments - moments.mean(axis=0)
+    for _ in range(2):
+        turns = cumulative_trapezoid(turns, log.t, axis=0, initial=0.0)
     for piece in unbroken(log.t, rows, 1.5 * step, _FEWEST_POSES):
         t, angles = _turns(log, piece)
         at, angles = t[apart:-apart], angles[:, :2]
@@ -257,8 +263,11 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None) -> Pair | None:
         inside = (at > t[0] + lags[-1] + width) & (at < t[-1] - lags[-1] - width)
         if after > _WHITE or not inside.any():
             continue
-        at, noise = at[inside], _without_size(noise[inside])
-        moments = np.square(log.rotor_speeds) @ _mixing(vehicle).T
+        at, noise = at[inside], noise[inside]
+        near = [second_difference(at - late - k * fine, width, log.t, turns) for k in (-1, 0, 1)]
+        for axis, driven in enumerate(np.transpose(near, (2, 1, 0))):
+            noise[:, axis] -= driven @ np.linalg.lstsq(driven, noise[:, axis], rcond=None)[0]
+        noise = _without_size(noise)
         for i, lag in enumerate(lags):
             answer = second_difference(at - lag, width, log.t, moments)
             products[i] += np.sum(noise * _without_size(answer))

@@ -7,17 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.ndimage import gaussian_filter1d
 
 from tests.support.dataflash_writer import dataflash, imu, parm, rcou
 from tests.support.flown import recorded, without_pose
+from tests.support.model_flights import simulate_model
 from tests.support.outcomes import noted, refused
 from windwrench.dynamics import load_vehicle
+from windwrench.estimator import UKFTuning
 from windwrench.identification import diagnose
 from windwrench.identification.logs import channels
 from windwrench.identification.logs.channels import ROLLOVER, ChannelGroup, in_order
 from windwrench.identification.logs.clocks import on_one_clock
 from windwrench.identification.logs.flight_log import FlightLog, with_rows
-from windwrench.identification.logs.pose_delay import pose_delay
+from windwrench.identification.logs.pose_delay import answer_to_noise, pose_delay
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.smoothing import resampled
 
@@ -169,6 +172,21 @@ def test_a_vehicle_s_own_delay_is_no_clock(flight):
         {"clock_offset": {"dt": -0.02}},
     ):
         log = recorded(seconds=40.0, seed=5, vehicle=vehicle, **effects)
+        assert on_one_clock(log, vehicle) == (log, ())
+
+
+def test_turns_by_rough_rotors_are_no_answer_to_noise():
+    vehicle, rng = load_vehicle("ardrone2"), np.random.default_rng(0)
+    slow = gaussian_filter1d(rng.standard_normal((6000, 4)), 16.0, axis=0)
+    speeds = vehicle.hover_rate + 12.0 * slow / slow.std() + 5.0 * rng.standard_normal(slow.shape)
+    quiet = UKFTuning(1e-4, 1e-6, 1e-3, 1e-5, position_noise=0.001, attitude_noise=0.0005)
+    t, speeds, position, quaternion = simulate_model(vehicle, quiet, speeds).log()
+    flown = FlightLog(t, position, quaternion, speeds)
+    for late in (0.0, 0.035):  # of a vehicle with a latency
+        log = with_late_pose(flown, late)
+        delay = pose_delay(log, vehicle).seconds
+        assert delay == pytest.approx(late, abs=0.003)
+        assert answer_to_noise(log, vehicle, delay) is None
         assert on_one_clock(log, vehicle) == (log, ())
 
 
