@@ -71,7 +71,7 @@ class _Blocks:
 
     def errors(self, models: Callable[[VehicleFit, Index], Mapping[str, Vehicle]]) -> Errors:
         """Return the errors of models made of each refit and the numbers of its segments."""
-        errors = {}
+        errors: dict[str, dict[str, Sequence[PredictionErrors]]] = {}
         for where, fold in self.folds.items():
             names: tuple[str, ...] = ()
             parts: list[list[PredictionErrors]] = []
@@ -154,7 +154,8 @@ def held_out(
     errors = blocks.errors(lambda part, _: models_of(vehicle_of(part, "")))
     if not errors:
         return HeldOut({}, {}, "")
-    stands, loop, why = standing(errors), None, ""
+    stands, why = standing(errors), ""
+    loop: LoopFit | None = None
     if models_of(vehicle_of(fit, ""))[stands].status.torque == "refuted":
         why = _reason(errors)
         if OTHER_FLIGHTS in errors:
