@@ -7,9 +7,9 @@ its torque, both; and where torque is refuted, the flight loop's reaction in its
 stands if no quantity is worse than the better one of no change and of thrust and drag. The one with
 the least mean of these ratios is the vehicle.
 
-One flight shows no other one. Its blocks are predicted with a thrust off by the spread between days
-to either side. It tells no reaction: from one flight of a racer to a slower one the body rate was
-off by 3 times the error of no change.
+One flight, or flights of commands on one day, show no other day. They are predicted with a thrust
+off by the spread between days to either side. One flight tells no reaction: on a slower flight of
+a racer the body rate was off by 3 times the error of no change.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -71,7 +71,7 @@ class _Blocks:
 
     def errors(self, models: Callable[[VehicleFit, Index], Mapping[str, Vehicle]]) -> Errors:
         """Return the errors of models made of each refit and the numbers of its segments."""
-        errors = {}
+        errors: dict[str, dict[str, Sequence[PredictionErrors]]] = {}
         for where, fold in self.folds.items():
             names: tuple[str, ...] = ()
             parts: list[list[PredictionErrors]] = []
@@ -117,8 +117,10 @@ def _blocks(
     folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
     folds = {where: fold for where, fold in folds.items() if len(np.unique(fold)) > 1}
     refits = {w: refitted(fit, [fold != n for n in np.unique(fold)]) for w, fold in folds.items()}
-    spread = USUAL.command_spread if fit.drive.commands else USUAL.thrust_spread
-    spreads = (1.0,) if OTHER_FLIGHTS in folds else (1.0 - spread, 1.0 + spread)
+    commands = fit.drive.commands
+    spread = USUAL.command_spread if commands else USUAL.thrust_spread
+    one_day = commands or OTHER_FLIGHTS not in folds
+    spreads = (1.0 - spread, 1.0 + spread) if one_day else (1.0,)
     return _Blocks(starts, segment, folds, refits, spreads)
 
 
@@ -154,7 +156,8 @@ def held_out(
     errors = blocks.errors(lambda part, _: models_of(vehicle_of(part, "")))
     if not errors:
         return HeldOut({}, {}, "")
-    stands, loop, why = standing(errors), None, ""
+    stands, why = standing(errors), ""
+    loop: LoopFit | None = None
     if models_of(vehicle_of(fit, ""))[stands].status.torque == "refuted":
         why = _reason(errors)
         if OTHER_FLIGHTS in errors:
