@@ -30,7 +30,6 @@ from windwrench.identification.motion.noise_spectrum import (
     pose_was_filtered,
 )
 from windwrench.identification.motion.residual import residual_wrench
-from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.sensor_noise import noisy_logs
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import high_pass, lagged, low_pass, robust_std
@@ -113,15 +112,6 @@ def test_at_20_hz_two_lost_samples_are_bridged_and_four_are_a_gap(lost, pieces):
     log = still_log(20.0)
     log.valid[200 : 200 + lost] = False
     assert len(log_signals(log)) == pieces
-
-
-def test_a_declared_clock_offset_delays_the_voltage_and_takes_the_first_poses_after_a_break():
-    log = still_log(200.0, voltage=np.linspace(12.0, 11.0, 4000))
-    log.valid[1000:1100] = False
-    late = VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": -0.02}))
-    undone = undo_log_sensing(log, late)
-    assert_allclose(undone.voltage[4:], log.voltage[:-4], rtol=1e-9)
-    assert_array_equal(np.flatnonzero(~undone.valid), [*range(4), *range(1000, 1104)])
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,6 @@ from tests.identification.vehicle_fit.flown import (
     inertial_flights,
 )
 from tests.support.alike import assert_alike
-from tests.support.data_paths import data_file
 from tests.support.flown import recorded
 from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, vehicles
 from tests.support.outcomes import refused
@@ -33,7 +32,6 @@ from windwrench.dynamics.vehicle import EffectSetting, ModelStatus, MotorCurve
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
 from windwrench.identification.causal_states import causal_states
 from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
-from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
@@ -308,22 +306,6 @@ def test_an_inertia_that_no_body_has_moves_to_the_nearest(commanded):
     same, none = nearest_body(body)
     assert none == 0.0
     assert same.values == values
-
-
-@pytest.mark.parametrize(
-    ("name", "line"),
-    [
-        ("same_motor_four_times.csv.gz", "motors 1 and 2 are equal in every row"),
-        ("ardupilot_rpm_tenth.bin", r"speeds in flight are 39, 39.5, 39.3, 39.3 rad/s; .* 100"),
-        ("px4_one_esc_low.ulg", "rotor speeds in flight are 390, 395, 393, 70.7 rad/s"),
-    ],
-)
-def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):
-    log = data_file(f"hard_logs/{name}")
-    with pytest.warns(UserWarning, match=line):
-        flight = read_log(log)
-    with refused(line):
-        identify([flight], 1.5, parse_geometry("0.17"))
 
 
 def test_rotors_in_another_order_are_refused(inertial):
