@@ -447,6 +447,18 @@ def test_the_declared_noise_holds_until_poses_refute_it():
             assert variances.max() < VEHICLES["crazyflie"].mocap.sigma_pos_m ** 2
 
 
+@pytest.mark.parametrize("gate", [None, 0.99, 0.9999])
+@pytest.mark.parametrize("kind", FILTERS)
+def test_a_restart_does_not_bring_the_next(kind, gate):
+    """A gap in poses that are twice as noisy as declared: in 1.1.0 each restart after it brought
+    the next, 16 to 44 a second.
+    """
+    said = list(noisy_hover(kind, "crazyflie", 0.005, gate, (2.0, 2.0), 7.0, lost=(2.0, 3.0)))
+    assert said[-1].restarts <= 2
+    force = np.array([e.force for e in said[1000:]])
+    assert np.sqrt(np.mean(np.square(force).sum(axis=1))) < 0.05 * VEHICLES["crazyflie"].weight
+
+
 def test_a_gust_is_no_noise():
     """Half a weight that sets in at once moves the innovations for a second, and hardly what poses
     add to each other.

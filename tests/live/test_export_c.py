@@ -163,8 +163,8 @@ def test_every_effect_works_as_in_python_to_the_bit(estimator, half, tmp_path):
     model = declaring(replace(vehicle_of(TURNING), ceiling_z=3.0), *names()[half::2])
     exported = export_c(model, estimator, precision="double")
     c = CompiledFilter(exported, tmp_path)
-    flown = flight(TURNING, 200, faults=False)
-    flown["voltage"] = 12.4 - 0.003 * np.arange(200.0)  # a battery that runs down
+    flown = flight(TURNING, 400)  # with faults
+    flown["voltage"] = 12.4 - 0.003 * np.arange(400.0)  # a battery that runs down
     flown["voltage"][150:180] = np.nan
     worst = compare(c, exported.filter, flown, 5)
     assert worst["status"] == 0.0
