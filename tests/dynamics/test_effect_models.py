@@ -372,18 +372,11 @@ def test_latency_takes_nothing_from_what_falls_between_samples(d):
     )  # a line between two samples would be off by up to 0.08
 
 
-def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
+def test_latency_stays_within_the_samples_where_they_leap():
     rotors = Rotors(setting("latency", d=0.0125))
     out = [rotors([600.0 * (k > 20)] * 4)[0] for k in range(40)]
     assert min(out) == 0.0
     assert max(out) == 600.0
-    rotors = Rotors(setting("latency", d=0.0125))
-    t = 0.0
-    for k in range(60):
-        dt = 0.03 if k % 4 == 0 else PERIOD
-        t += dt
-        out = rotors(400.0 + 10.0 * t * np.ones(4), dt=dt)
-    assert_allclose(out, 400.0 + 10.0 * (t - 0.0125), rtol=1e-12)
 
 
 def test_latency_draws_a_line_where_samples_are_six_times_as_far_apart_as_others():

@@ -1,6 +1,5 @@
 """Five actions and four observations on four tasks: their meaning, and what checkers say."""
 
-import pickle
 import warnings
 from dataclasses import replace
 
@@ -170,19 +169,15 @@ def numbers(envs, decisions, seed=3):
 @pytest.mark.parametrize("action", ACTIONS)
 @pytest.mark.parametrize("observation", OBSERVATIONS)
 def test_five_actions_and_four_observations_on_four_tasks(task, action, observation):
-    """Gymnasium's and SB3's checkers, a copy in flight, and both vector modes."""
+    """Gymnasium's and SB3's checkers, and all ways to fly many, in drawn vehicles and winds."""
     given = {"action": action, "observation": observation, "decision_hz": 100, "episode_s": 0.2}
+    given |= {"scenario": "varied"}
     name = f"windwrench/{task}-v2"
     env = gym.make(name, **given)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped, skip_render_check=True)
         pytest.importorskip("stable_baselines3.common.env_checker").check_env(env)
-    env.reset(seed=3)
-    step = np.full(env.action_space.shape, 0.1, np.float32)
-    env.step(step)
-    twin = pickle.loads(pickle.dumps(env.unwrapped))
-    assert_array_equal(twin.step(step)[0], env.step(step)[0])
     ways = {"vectorization_mode": "sync"}, {}, {"plant": "lanes"}
     made = (gym.make_vec(name, num_envs=2, **way, **given) for way in ways)
     sync, mujoco, lanes = (numbers(envs, 3) for envs in made)

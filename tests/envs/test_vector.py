@@ -4,7 +4,6 @@ import copy
 from dataclasses import replace
 from math import nan
 
-import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
-from tests.support.vector_flights import TASKS, fly, make, make_single
+from tests.support.vector_flights import fly, make
 from windwrench import _core
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names
@@ -127,18 +126,6 @@ def test_mujoco_s_clock_is_a_user_s_again_after_a_flight():
         mujoco.set_mjcb_time(None)
 
 
-@pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("scenario", ["base", "varied"])
-def test_side_by_side_is_single_bit_for_bit_and_lanes_to_rounding(task, scenario):
-    many = fly(make(3, "mujoco", task, scenario=scenario), 6)
-    alone = [lambda: make_single(task, scenario=scenario)] * 3
-    assert_array_equal(fly(gym.vector.SyncVectorEnv(alone), 6), many)
-    difference = abs(fly(make(3, "lanes", task, scenario=scenario), 6) - many)
-    size = alone[0]().observation_space.shape[0]  # of a frame, which is of single precision
-    assert difference[..., :size].max() < 2e-5
-    assert difference[..., size:].max() < 1e-6
-
-
 @pytest.mark.parametrize(("task", "plant"), [("WindHover", "mujoco"), ("WindTrajectory", "lanes")])
 def test_a_copy_of_many_goes_on_as_they_do(task, plant):
     envs = make(3, plant, task, max_episode_steps=3)  # and begins the same episodes
@@ -202,24 +189,32 @@ def test_a_body_that_tumbles_moves_as_in_mujoco():
 CLOSE = {"position": 5e-4, "velocity": 3e-3, "angular_velocity": 3e-2, "force": 5e-3}
 
 
+def small(name):
+    """An effect of a third of its typical size."""
+    known = {c.name: (0.3 * c.typical[0], c.minimum, c.maximum) for c in get(name).coefficients}
+    return EffectSetting(name, {n: float(np.clip(*range_)) for n, range_ in known.items()})
+
+
+UNDECLARED = [small(name) for name in ("rotor_drag", "motor_lag", "slung_payload", "clock_offset")]
+
+
 @pytest.mark.parametrize(
-    "given", [{"task": "FanTracking"}, {"task": "WindTrajectory", "scenario": "varied"}]
+    "given",
+    [
+        {"task": "FanTracking"},
+        {"task": "WindTrajectory", "scenario": "varied"},
+        {"effects": UNDECLARED},
+    ],
 )
 def test_lanes_of_32_bits_fly_close_to_those_of_64(given):
     """Two seconds: the noise of the estimate is ten times as large."""
     states = []
     for precision in ("double", "single"):
         envs = make(WIDTH + 1, "lanes", precision=precision, **given)
-        fly(envs, 25)
+        fly(envs, 12 if "effects" in given else 25)
         states.append(envs.state)
     for name, apart in CLOSE.items():
         assert_allclose(*(getattr(state, name) for state in states), atol=apart)
-
-
-def small(name):
-    """An effect of a third of its typical size."""
-    known = {c.name: (0.3 * c.typical[0], c.minimum, c.maximum) for c in get(name).coefficients}
-    return EffectSetting(name, {n: float(np.clip(*range_)) for n, range_ in known.items()})
 
 
 @pytest.mark.parametrize("name", names())
@@ -259,14 +254,3 @@ def test_a_callback_of_mujoco_is_called_in_a_flight_and_its_error_raised():
             envs.step(np.zeros((2, 1)))
     finally:
         mujoco.set_mjcb_control(None)
-
-
-def test_undeclared_effects_fly_in_lanes_of_32_bits():
-    effects = [small(name) for name in ("rotor_drag", "motor_lag", "slung_payload", "clock_offset")]
-    states = []
-    for precision in ("double", "single"):
-        envs = make(2, "lanes", precision=precision, effects=effects)
-        fly(envs, 12)
-        states.append(envs.state)
-    for name, apart in CLOSE.items():
-        assert_allclose(*(getattr(state, name) for state in states), atol=apart)

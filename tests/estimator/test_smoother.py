@@ -1,29 +1,25 @@
-"""The fixed-interval smoother: as good as it says, across gaps, restarts and blocks.
+"""The fixed-interval smoother across gaps, blocks and unlikely poses.
 
-``test_ukf.py`` holds the smoother to the literal one.
+``test_ukf.py`` holds the smoother to the literal one, ``test_wrench_series.py`` a smoothed log to
+its parts before and after a restart.
 """
 
 from math import nan
 
 import numpy as np
 import pytest
-from numpy.linalg import eigvalsh, inv, solve
+from numpy.linalg import eigvalsh, inv
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.model_flights import (
-    ANISOTROPIC,
-    GUSTS,
-    WITH_EFFECTS,
     YAWED,
     simulate_model,
 )
-from tests.support.sizes import rms
 from tests.support.vehicles import VEHICLE
 from windwrench import _core
 from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning, smoother
-from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.row_steps import steps_between
 from windwrench.estimator.smoother import RecordingUKF
 
@@ -34,73 +30,17 @@ def model_log(steps, seed=1):
     return simulate_model(VEHICLE, UKFTuning(), hover, seed=seed, **YAWED).log()
 
 
-def smooth(t, speeds, x, q, restarted=(), covariance=False):
-    """Return the smoothed estimate at the rows of a log, the filter started at the first and the
-    ``restarted`` ones.
-    """
+def smooth(t, speeds, x, q):
+    """Return the smoothed estimate at the rows of a log, with its covariance."""
     ukf = RecordingUKF(VEHICLE, None, float(np.median(np.diff(t))))
-    events = []
-    for k in range(len(t)):
-        if k == 0 or k in restarted:
-            ukf.reset(x[k], q[k])
-        else:
-            for step in steps_between(t[k] - t[k - 1], ukf.period):
-                ukf.predict(0.5 * (speeds[k - 1] + speeds[k]), step)
-            ukf.correct(x[k], q[k])
+    ukf.reset(x[0], q[0])
+    events = [ukf.events - 1]
+    for k in range(1, len(t)):
+        for step in steps_between(t[k] - t[k - 1], ukf.period):
+            ukf.predict(0.5 * (speeds[k - 1] + speeds[k]), step)
+        ukf.correct(x[k], q[k])
         events.append(ukf.events - 1)
-    return ukf.smooth(events, covariance)
-
-
-@pytest.mark.parametrize(
-    ("vehicle", "tuning", "runs", "steps", "missing"),
-    [
-        pytest.param(VEHICLE, UKFTuning(), 100, 800, range(400, 440), marks=pytest.mark.slow),
-        (WITH_EFFECTS, ANISOTROPIC, 20, 150, ()),
-        (VEHICLE, GUSTS, 20, 150, ()),
-    ],
-    ids=["with a gap", "effects and anisotropic noise", "gusts"],
-)
-def test_the_smoother_is_consistent(vehicle, tuning, runs, steps, missing):
-    """Truth drawn from the filter's own model: NEES of the whole state, of torque and of force."""
-    parts = {18: slice(0, 18), 3: slice(12, 15), -3: slice(15, 18)}
-    nees = np.empty((3, runs, steps))
-    for r in range(runs):
-        speeds = np.full((steps, 4), vehicle.hover_rate)
-        run = simulate_model(vehicle, tuning, speeds, seed=r, **YAWED)
-        ukf = RecordingUKF(vehicle, tuning)
-        run.fly(ukf, missing)
-        found = ukf.smooth(covariance=True)
-        for k in range(steps):
-            e = found.at(1 + k)
-            error = state_error(e, run.state[k])
-            P = e.covariance
-            for n, part in enumerate(parts.values()):
-                nees[n, r, k] = error[part] @ solve(P[part, part], error[part])
-    for dof, values in zip(parts, nees, strict=True):
-        low, high = chi2_band(abs(dof), runs, 0.999)
-        assert low <= values.mean() <= high
-        assert np.mean((values.mean(axis=0) >= low) & (values.mean(axis=0) <= high)) >= 0.85
-
-
-def test_nothing_is_smoothed_across_a_restart():
-    t, speeds, x, q = model_log(600)
-    whole = smooth(t, speeds, x, q, restarted=[250])
-    before = smooth(t[:250], speeds[:250], x[:250], q[:250])
-    after = smooth(t[250:], speeds[250:], x[250:], q[250:])
-    for found, part in ((before, slice(0, 250)), (after, slice(250, None))):
-        # times are rounded, and so are their differences
-        assert np.allclose(whole.state[part, :19], found.state[:, :19], rtol=0, atol=1e-9)
-        assert np.allclose(whole.std[part], found.std, rtol=1e-9)
-    moved = x.copy()
-    moved[250:] += [100.0, 0, 0]
-    jump = smooth(t, speeds, moved, q, restarted=[250])
-    assert np.array_equal(jump.state[:250], whole.state[:250], equal_nan=True)
-    assert rms(jump.force - whole.force) < 1e-9
-    # of itself, without a gate, the filter restarts at a pose that jumps
-    alone = smooth(t, speeds, moved, q)
-    assert np.array_equal(np.flatnonzero(np.diff(alone.restarts)), [249])
-    assert np.allclose(alone.state[:250, :19], before.state[:, :19], rtol=0, atol=1e-9)
-    assert np.allclose(alone.std[:250], before.std, rtol=1e-9)
+    return ukf.smooth(events, True)
 
 
 def test_a_link_is_cut_where_there_is_no_joint_distribution():
@@ -128,9 +68,9 @@ def test_a_link_is_cut_where_there_is_no_joint_distribution():
 def test_blocks_change_nothing(block, monkeypatch):
     log = model_log(300)
     log[2][100:120] = nan
-    whole = smooth(*log, covariance=True)
+    whole = smooth(*log)
     monkeypatch.setattr(smoother, "_BLOCK", block)
-    pieces = smooth(*log, covariance=True)
+    pieces = smooth(*log)
     assert np.array_equal(whole.state, pieces.state, equal_nan=True)
     assert np.array_equal(whole.covariance, pieces.covariance)
 
@@ -163,7 +103,7 @@ def test_covariances_stay_positive_definite_whatever_was_flown(seed):
     x[lost] = nan
     q[lost] = nan
     t = np.cumsum(rng.choice([0.001, 0.005, 0.02], 400))
-    found = smooth(t, speeds, x, q, covariance=True)
+    found = smooth(t, speeds, x, q)
     assert np.isfinite(found.state[:, :19]).all()
     scale = 1.0 / found.std
     assert eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :]).min() > 0

@@ -106,23 +106,6 @@ def test_poses_as_noisy_as_declared_are_within_the_limits(kind, event):
     assert fly_combination(words, seed=1) != verdict
 
 
-# in these, one restart once brought the next for ever
-ENDLESS = [
-    (kind, *words)
-    for kind in FILTERS
-    for words in (
-        ("crazyflie@100", "x2", "gap", "gate=.9999"),
-        ("hummingbird@100", "x1.5", "jump", "gate=.99"),
-        ("ardrone2@200", "x3", "nothing", "no-gate"),
-    )
-]
-
-
-@pytest.mark.parametrize("words", ENDLESS, ids=" ".join)
-def test_noisier_poses_than_declared_are_within_the_limits(words):
-    assert fly_combination(words).failures == []
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", FILTERS)
 def test_all_combinations_are_within_the_limits(kind):

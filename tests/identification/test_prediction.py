@@ -18,7 +18,6 @@ from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.plant import PlantSettings
 from windwrench.identification import predict
 from windwrench.identification.causal_states import causal_states
-from windwrench.identification.logs.flight_log import with_rows
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import log_signals
@@ -84,6 +83,7 @@ def test_a_delayed_pose_is_not_made_up_after_a_gap():
     # the pose of a row is the log's of 6 rows before, and the turn rates are the row's own
     assert_allclose(corrected.position[906:], log.position[900:-6], atol=1e-12)
     assert_array_equal(corrected.rotor_speeds, log.rotor_speeds)
+    assert_allclose(corrected.voltage[6:], log.voltage[:-6], rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -165,14 +165,6 @@ def test_nothing_after_a_start_changes_its_prediction(kind):
             y = getattr(after, name)
             assert_allclose(x[known], y[known], rtol=0.0, atol=1e-9)
             assert abs(x[~known] - y[~known]).max() > 0.1
-
-
-def test_a_log_that_ends_after_a_horizon_has_the_same_predictions():
-    log = fly(seconds=8.0)
-    whole, part = (predict(x, VEHICLE, 0.3, 10) for x in (log, with_rows(log, log.t < 5.0)))
-    count = len(part.start)
-    assert count == 94
-    assert_allclose(whole.position[:count], part.position, rtol=0.0, atol=1e-9)
 
 
 def test_a_state_is_taken_as_it_is():

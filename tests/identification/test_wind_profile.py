@@ -71,12 +71,6 @@ def test_the_law_follows_slower_fans_and_loses_faster_ones(swept):
     assert faster <= 2
 
 
-def test_a_flight_in_still_air_has_no_law():
-    still = profile_log(recorded(Fan(speed=1e-6), DISTANCE, "sweep", 6802, seconds=60.0), VEHICLE)
-    assert still.law is None
-    assert "not distinguishable from zero" in still.why
-
-
 def test_intervals_of_correlated_errors_hold_95_percent_of_the_places():
     inside = []
     for seed in range(40):
@@ -113,15 +107,6 @@ def test_what_is_no_jet_is_told(torque, why):
     told = no_jet(PLACE, torque, np.full(len(PLACE), 0.001))
     assert why in told
     assert bool(why) == bool(told)
-
-
-def test_a_jet_has_its_places():
-    shape = shape_of(PLACE, JET)
-    assert shape.axis == pytest.approx(0.0, abs=1e-6)
-    assert_allclose(shape.peaks, (-0.46, 0.46), atol=0.011)
-    assert shape.weaker == pytest.approx(0.03, rel=1e-3)
-    assert_allclose(np.interp(np.abs(shape.edges), PLACE, JET) / 0.03, 0.2, atol=0.02)
-    assert shape.slope == pytest.approx(0.1, rel=0.1)
 
 
 def test_in_calm_air_the_bound_is_the_fastest_fan():

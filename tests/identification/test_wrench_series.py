@@ -72,19 +72,6 @@ def finite(series):
     return np.isfinite(series.state[:, :19]).all() and np.isfinite(series.std).all()
 
 
-def test_a_constant_force_is_found():
-    log = held_flight(0.005 * np.arange(2000))
-    series = estimate_log(log, VEHICLE)
-    assert finite(series)
-    assert_allclose(series.force[1000:].mean(axis=0), [0, 0, 0.3], atol=0.02)
-    assert_allclose(series.torque[1000:].mean(axis=0), 0.0, atol=2e-3)
-    force, torque = truth_rmse(series, log)
-    assert force.max() < 0.1
-    assert torque.max() < 0.01
-    assert np.isnan(series.nis[0])
-    assert 4.0 < np.mean(series.nis[200:]) < 8.0
-
-
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), jitter=st.floats(0.0, 0.9), share=st.floats(0.0, 0.9))
 def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):

@@ -1,10 +1,9 @@
 """Flights for the tests, drawn from equations of motion that share no code with the package."""
 
-from math import pi
-
 import numpy as np
 from numpy.linalg import inv, norm
 from numpy.random import default_rng
+from scipy.spatial.transform import Rotation
 
 PERIOD = 0.005
 
@@ -14,11 +13,6 @@ def cross(a, b):
     ax, ay, az = a
     bx, by, bz = b
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
-
-
-def multiply(a, b):
-    vector = a[0] * b[1:] + b[0] * a[1:] + cross(a[1:], b[1:])
-    return np.array([a[0] * b[0] - a[1:] @ b[1:], *vector])
 
 
 def matrix(q):
@@ -31,12 +25,6 @@ def matrix(q):
             [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
         ]
     )
-
-
-def turn_by(vector):
-    """The quaternion (4,) of a rotation vector (3,) in rad."""
-    half = 0.5 * np.sqrt(vector @ vector)
-    return np.array([np.cos(half), *(0.5 * np.sinc(half / pi) * vector)])
 
 
 def yawing_flight(
@@ -60,7 +48,7 @@ def yawing_flight(
     torque = np.asarray(torque, float)
     x = np.array([0.0, 0.0, 1.5])
     v = np.zeros(3)
-    q = np.array([np.cos(pi / 3), 0, 0, np.sin(pi / 3)])
+    turned = Rotation.from_euler("z", 120.0, degrees=True)
     w = np.array([0.0, 0.0, yaw_rate])
     turns = vehicle.arm_l * vehicle.k * [[1, 1, -1, -1], [-1, 1, 1, -1]]
     mixing = np.array([vehicle.k, *turns, vehicle.p * [1, -1, 1, -1]])
@@ -73,7 +61,7 @@ def yawing_flight(
         target = np.array([np.sin(1.3 * t), 0.8 * np.sin(0.9 * t + 1), 1.5 + 0.2 * np.sin(0.7 * t)])
         speed = [1.3 * np.cos(1.3 * t), 0.72 * np.cos(0.9 * t + 1), 0.14 * np.cos(0.7 * t)]
         a = 4 * (target - x) + 3.5 * (speed - v) + [0, 0, vehicle.gravity] - force / vehicle.mass
-        R = matrix(q)
+        R = turned.as_matrix()
         up = a / norm(a)
         tilt = R.T @ cross(R[:, 2], up)
         rate = np.array([0, 0, yaw_rate * (1 + 0.5 * np.sin(1.1 * t))])
@@ -82,20 +70,19 @@ def yawing_flight(
         squares = np.maximum(unmixing @ np.array([vehicle.mass * a @ R[:, 2], *moment]), 1e3)
         (thrust, *moment), h = mixing @ squares, PERIOD / substeps
         for _ in range(substeps):
-            R = matrix(q)
+            R = turned.as_matrix()
             acc = (R @ [0, 0, thrust] + force) / vehicle.mass - [0, 0, vehicle.gravity]
             alpha = inverse @ (moment + R.T @ torque - cross(w, vehicle.inertia @ w))
             x = x + h * v + h * h / 2 * acc
             v = v + h * acc
-            q = multiply(q, turn_by(h * (w + h / 2 * alpha)))
+            turned = turned * Rotation.from_rotvec(h * (w + h / 2 * alpha))
             w = w + h * alpha
-            q = q / np.sqrt(q @ q)
-        error = turn_by(sigma_attitude * rng.standard_normal(3))
+        error = Rotation.from_rotvec(sigma_attitude * rng.standard_normal(3))
         out["rotors"].append(np.sqrt(squares))
         out["true_x"].append(x)
-        out["true_q"].append(q)
+        out["true_q"].append(turned.as_quat(scalar_first=True))
         out["position"].append(x + sigma_position * rng.standard_normal(3))
-        out["quaternion"].append(multiply(error, q))
+        out["quaternion"].append((error * turned).as_quat(scalar_first=True))
         out["velocity"].append(v)
         out["omega"].append(w)
     return {name: np.array(values) for name, values in out.items()}

@@ -11,14 +11,13 @@ from numpy.random import default_rng
 
 from tests.identification.comparison.test_change import drawn
 from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
-from tests.support.flown import recorded, settings
+from tests.support.flown import recorded
 from tests.support.paths import ROOT
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.comparison.change import compare
 from windwrench.identification.comparison.fault_channels import channels_of_log
 from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.words import change_data, fault_data
-from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
@@ -81,17 +80,7 @@ def made():
         "none": find_fault(channels_of_log(one)),
         "rotor": find_fault(channels_of_log(failing_flight())),
     }
-    blocks = [(2.0, 6.0), (7.0, 11.0)]
-    models = {"plain": CRAZYFLIE, "with its effects": CRAZYFLIE.with_effects(*settings(LAG))}
     return {
-        "prediction": {
-            name: [
-                f(log, model, blocks)
-                for log in posed()
-                for f in (rollout_error, nis_without_wrench_state)
-            ]
-            for name, model in models.items()
-        },
         "identified": {name: said(v) for name, v in vehicles().items()},
         "exports": {n: {k: f(v) for k, f in EXPORTS.items()} for n, v in vehicles().items()},
         "changes": {name: change_data(change) for name, change in changes.items()},

@@ -1,10 +1,9 @@
-"""Training runs and flights on a Ray cluster: the same numbers as here, and a lost worker costs
+"""Tasks and flights on a Ray cluster: the same numbers as here, and a lost worker costs
 nothing.
 """
 
 import os
 import signal
-import threading
 import time
 
 import pytest
@@ -12,12 +11,8 @@ from numpy.testing import assert_array_equal
 
 from tests.runtime.test_workers import work
 from tests.support.outcomes import refused
-from tests.training.tiny import TINY
 from windwrench.evaluation.benchmark import Request, fly_all
 from windwrench.runtime.workers import each, every
-from windwrench.training.configuration import load_config
-from windwrench.training.run import read_progress
-from windwrench.training.train import train
 
 
 @pytest.fixture(scope="module")
@@ -27,37 +22,6 @@ def cluster():
     ray.init("local", num_cpus=2, include_dashboard=False, log_to_driver=False)
     yield "local"  # the one that is connected already
     ray.shutdown()
-
-
-@pytest.mark.slow  # a task that is done again, and a run that goes on where it stopped, are quick
-def test_a_run_on_a_cluster_is_the_local_one_though_its_worker_is_killed(cluster, tmp_path):
-    pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
-    config = load_config("sac", TINY)
-    process = tmp_path / "process"
-    killed = []
-
-    def run_noted(folder):
-        process.write_text(str(os.getpid()))
-        return train(config, "base", 0, folder)
-
-    def kill_one():
-        deadline = time.monotonic() + 300
-        while not killed and time.monotonic() < deadline:
-            if (tmp_path / "there" / "checkpoint.pt").exists():
-                killed.append(int(process.read_text()))
-                os.kill(killed[0], signal.SIGKILL)
-            time.sleep(0.02)
-
-    killer = threading.Thread(target=kill_one)
-    killer.start()
-    ((there, _),) = every(run_noted, [tmp_path / "there"], cluster=cluster)
-    killer.join()
-    assert killed
-    assert int(process.read_text()) != killed[0]  # another process went on
-    here = train(config, "base", 0, tmp_path / "here").parent
-    assert read_progress(here).rmse_m == read_progress(there).rmse_m
-    for name in ("best.npz", "last.npz"):
-        assert (here / name).read_bytes() == (there / name).read_bytes()
 
 
 def refuse(task):

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from numpy.random import default_rng
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from tests.support.sizes import rms
 from windwrench.controllers.preview import Oracle
-from windwrench.controllers.trained_policy import TrainedPolicy
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.lanes.vector import TaskLanes
 
@@ -18,7 +17,6 @@ import torch
 from windwrench.training.fan_hindsight import FEATURES, MIX, FanHindsight, fan_lanes
 from windwrench.training.flown_sequences import Flights
 from windwrench.training.seeds import training_seed
-from windwrench.training.task_policies import FAN, _card, teach
 from windwrench.training.taught_network import Sequences, TaughtNetwork, fit
 
 
@@ -69,19 +67,6 @@ def test_a_round_has_all_scenarios_of_the_mix():
     assert [envs.num_envs for envs in fan_lanes(2 * total)] == [2 * n for n in MIX.values()]
 
 
-@pytest.mark.parametrize("cell", ["lstm", "gru"])
-def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
-    torch.manual_seed(1)
-    network = TaughtNetwork(FEATURES.size, 3, cell, 5, [7], "tanh")
-    shares = np.array([[0.4, 1.0, 0.3]], dtype=np.float32)
-    policy = TrainedPolicy(_card(FAN, cell, "wide", 0, 0), network.policy_weights(shares))
-    frames = default_rng(0).normal(size=(9, FEATURES.size)).astype(np.float32)
-    with torch.no_grad():
-        means, _, _ = network(torch.from_numpy(frames)[:, None])
-    expected = np.clip(means[:, 0].numpy() @ shares[0], -1.0, 1.0)
-    assert_allclose([policy.act(x)[0] for x in frames], expected, atol=1e-5)
-
-
 def test_the_mean_of_what_is_hidden_is_learned():
     """A random walk seen through noise: the network must come to the error of the Kalman filter."""
     rng = default_rng(0)
@@ -112,11 +97,3 @@ def test_the_left_is_learned_from_the_right():
     with torch.no_grad():
         mean, _, _ = network(torch.from_numpy(seen * mirrored))
     assert abs(mean.numpy() + hidden)[5:].mean() < 0.05
-
-
-@pytest.mark.slow
-def test_a_taught_network_follows_the_fan_and_is_the_same_again():
-    one, other = (teach(FAN, "wide", 0, rounds=2, episodes=38, epochs=2) for _ in range(2))
-    for name, array in one.weights.items():
-        assert_array_equal(array, other.weights[name])
-    assert one.card["steps"] == 19_000

@@ -75,9 +75,10 @@ def test_hindsight_knows_what_came_beside_the_model(late):
     assert counts.sum(axis=0).tolist() == [count - AHEAD + 1] * 2
 
 
-def test_a_policy_sees_what_its_network_saw_whitened():
+@pytest.mark.parametrize("cell", ["lstm", "gru"])
+def test_a_policy_commands_its_shares_of_what_its_network_says_of_what_it_saw_whitened(cell):
     torch.manual_seed(0)
-    network = TaughtNetwork(27, 3, "gru", 8, [5], "tanh")
+    network = TaughtNetwork(27, 3, cell, 8, [5], "tanh")
     rng = default_rng(0)
     mixed = np.diag(np.full(27, 0.01)) + 0.1 * rng.standard_normal((1, 27))
     seen = (rng.standard_normal((40, 6, 27)) @ mixed + 1.0).astype(np.float32)
@@ -87,11 +88,10 @@ def test_a_policy_sees_what_its_network_saw_whitened():
     assert_allclose(np.cov(white.T), np.eye(27), atol=0.1)
     with torch.no_grad():
         said = network(torch.from_numpy(seen))[0].numpy()
-    policy = TaskPolicy(
-        _card("WindHover", "gru", MIX, 0, 0), network.policy_weights(np.eye(3, dtype=np.float32))
-    )
+    shares = np.float32([[0.4, 1.0, 0.3], [0.0, 0.5, 0.2], [-0.6, 0.0, 1.0]])
+    policy = TaskPolicy(_card("WindHover", cell, MIX, 0, 0), network.policy_weights(shares))
     flown = [policy(frame * np.float32(HOVER.scales)) for frame in seen[:, 2]]
-    assert_allclose(flown, said[:, 2], atol=1e-4)
+    assert_allclose(flown, said[:, 2] @ shares.T, atol=1e-4)
 
 
 def test_a_linear_policy_learns_a_lagging_answer_and_flies_as_it_was_fitted():
@@ -125,10 +125,16 @@ def test_a_mix_has_all_of_its_scenarios():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", ["WindHover", "FanTracking2D"])
-def test_a_taught_network_is_the_same_again(task):
-    scenario = MIX if task == "WindHover" else "base"
-    one, other = (teach(task, scenario, 0, rounds=2, episodes=16, epochs=1) for _ in range(2))
+@pytest.mark.parametrize(
+    ("task", "scenario", "episodes", "steps"),
+    [
+        ("WindHover", MIX, 16, 8000),
+        ("FanTracking2D", "base", 16, 8000),
+        ("FanTracking", "wide", 38, 19_000),
+    ],
+)
+def test_a_taught_network_is_the_same_again(task, scenario, episodes, steps):
+    one, other = (teach(task, scenario, 0, rounds=2, episodes=episodes, epochs=1) for _ in range(2))
     for name, array in one.weights.items():
         assert_array_equal(array, other.weights[name])
-    assert one.card["steps"] == 8000
+    assert one.card["steps"] == steps

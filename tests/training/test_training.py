@@ -263,54 +263,45 @@ def away(seed):
 
 
 def lone_flight(seed, commands):
-    """Features, rewards and losses of a single environment, computed by itself."""
+    """Features and rewards of a single environment, computed by itself."""
     env = FanTrackingEnv("static")
     history = History(FEATURES, 1)
-    observation, info = env.reset(seed=seed)
+    observation, _ = env.reset(seed=seed)
     history.restart(FEATURES.frames(observation[None]))
     seen = [history.flat()[0]]
     rewards = []
     for command in commands:
-        observation, reward, lost, _, info = env.step(np.array([command], dtype=np.float32))
+        observation, reward, lost, *_ = env.step(np.array([command], dtype=np.float32))
         history.push(FEATURES.frames(observation[None]))
         seen.append(history.flat()[0])
         rewards.append(reward)
         if lost:
             break
-    return np.array(seen), np.array(rewards), info["lost"]
+    return np.array(seen), np.array(rewards)
 
 
 def test_each_environment_ends_by_itself_with_its_own_last_observation():
+    """The first runs out of time and the second is lost; their next episodes begin at once."""
     limit = 30
-    env = make(3, limit)
+    env = make(2, limit)
     direction = away(seed_of(1, 0))
-    first, _, lost = lone_flight(seed_of(1, 0), [direction] * limit)
-    assert lost
-    gone = len(first) - 1
-    assert 5 < gone < limit
-    seen = env.reset()
-    assert_array_equal(seen[1], first[0])
-    still, _, _ = lone_flight(seed_of(0, 0), [0.0] * limit)
+    flights = [lone_flight(seed_of(i, 0), [c] * limit)[0] for i, c in enumerate((0.0, direction))]
+    ends = [len(seen) - 1 for seen in flights]
+    assert 5 < ends[1] < ends[0] == limit
+    env.reset()
     for k in range(1, limit + 1):
-        seen, _, dones, infos = env.step(
-            np.array([[0.0], [direction if k <= gone else 0.0], [0.0]])
-        )
-        assert dones.tolist() == [k == limit, k == gone, k == limit]
+        command = direction if k <= ends[1] else 0.0
+        seen, _, dones, infos = env.step(np.array([[0.0], [command]]))
+        assert dones.tolist() == [k == end for end in ends]
         assert ["terminal_observation" in info for info in infos] == dones.tolist()
-        if k == gone:
-            assert_array_equal(infos[1]["terminal_observation"], first[-1])
-            assert infos[1]["TimeLimit.truncated"] is False
-            assert infos[1]["episode"]["l"] == gone
-            assert_array_equal(
-                seen[1], lone_flight(seed_of(1, 1), [])[0][0]
-            )  # its next episode's first
-            assert_array_equal(seen[0], still[k])  # nobody else's changed
-        if k == limit:
-            for i in (0, 2):
-                assert infos[i]["TimeLimit.truncated"] is True
-            assert_array_equal(infos[0]["terminal_observation"], still[-1])
-            assert_array_equal(seen[0], lone_flight(seed_of(0, 1), [])[0][0])
-    assert not np.array_equal(infos[0]["terminal_observation"], infos[2]["terminal_observation"])
+        for i, (alone, end) in enumerate(zip(flights, ends, strict=True)):
+            if k < end:
+                assert_array_equal(seen[i], alone[k])
+            if k == end:
+                assert_array_equal(infos[i]["terminal_observation"], alone[-1])
+                assert infos[i]["TimeLimit.truncated"] is (i == 0)
+                assert infos[i]["episode"]["l"] == end
+                assert_array_equal(seen[i], lone_flight(seed_of(i, 1), [])[0][0])
 
 
 def test_a_vehicle_lost_at_the_last_moment_was_lost_not_out_of_time():
@@ -326,7 +317,7 @@ def test_a_vehicle_lost_at_the_last_moment_was_lost_not_out_of_time():
 
 def test_rewards_are_weighted_terms():
     commands = [0.5, -0.5, 0.2]
-    _, rewards, _ = lone_flight(seed_of(0, 0), commands)
+    _, rewards = lone_flight(seed_of(0, 0), commands)
     env = make(1, 50)
     env.reset()
     assert_allclose([env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6)

@@ -20,10 +20,8 @@ from windwrench.identification import diagnose
 from windwrench.identification.logs.clocks import on_one_clock
 from windwrench.identification.logs.flight_log import with_rows
 from windwrench.identification.logs.inertial import check_inertial
-from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
-from windwrench.identification.logs.text_table import open_table
 from windwrench.identification.report.log_check import check_log
 
 
@@ -44,31 +42,6 @@ def test_rounded_times_are_even():
 def test_rounded_rotor_speeds_of_a_smooth_flight_come_with_each_row():
     log = read_log(data_file("hard_logs/perfect_model_smooth_rounded.csv.gz"))
     assert log.motor_rate == pytest.approx(1.0 / log.period)
-
-
-@pytest.mark.parametrize(
-    ("name", "line"),
-    [
-        ("excel_time.csv.gz", "column time is 1.7e+09 in nearly every row"),
-        ("asctec_plus.csv.gz", "a plus, motors 1 front, 2 rear, 3 left, 4 right"),
-    ],
-)
-def test_a_guess_says_why(name, line):
-    guess = guess_map(open_table(data_file(f"hard_logs/{name}")))
-    assert line in f"{guess.lacks} {[reason.why for reason in guess.reasons]}"
-
-
-@pytest.mark.parametrize("name", ["motive_take", "vicon_nexus"])
-def test_motion_capture_alone_is_named(name):
-    with refused("motion capture alone, without motors"):
-        open_table(data_file(f"hard_logs/{name}.csv.gz"))
-
-
-def test_body_axes_turned_about_z_are_named():
-    vehicle = load_vehicle("ardrone2")
-    log = read_log(data_file("hard_logs/ned_quaternion_swapped.csv.gz"), vehicle=vehicle)
-    with refused(r"right, forward, up.* take 0\.7071 \(qw - qz, qx \+ qy"):
-        screen_log(log, vehicle)
 
 
 @pytest.mark.parametrize("rows", [-30, -16, -3, 3, 6, 30])

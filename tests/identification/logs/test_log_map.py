@@ -113,18 +113,6 @@ def apart(first, empty=""):
     return {**pose, **dict.fromkeys(("m1", "m2", "m3", "m4"), speeds)}
 
 
-def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path):
-    """Pose at 50 Hz, rotors at 100 Hz in other rows, a voltage now and then."""
-    volts = {"v": [f"{11 + 0.01 * k:.2f}" if k % 20 == 0 else "" for k in range(80)]}
-    path = table(tmp_path / "a.csv", {**apart(0, "NaN"), **volts}, 80)
-    found = mapped(path, GOOD | {"battery": {"column": "v"}})
-    assert found.valid.all()
-    assert len(found.t) == 39  # from the rotors' first sample to their last
-    assert_allclose(found.rotor_speeds[:, 0] * 30 / pi, 3600 + np.arange(2, 80, 2))
-    assert found.voltage[9] == pytest.approx(11.2)
-    assert noted(found, "interpolated to the other rows") or noted(found, "missing")
-
-
 @pytest.mark.parametrize("own", [False, True])
 @pytest.mark.parametrize(
     "steps",  # s between samples of pose, rotors and IMU

@@ -14,6 +14,7 @@ from scipy.signal import butter, sosfilt, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded, resting
+from tests.support.imu_flights import imu_flight
 from tests.support.outcomes import refused
 from tests.support.sizes import rms
 from windwrench import _core
@@ -30,7 +31,6 @@ from windwrench.identification.motion.noise_spectrum import (
     pose_was_filtered,
 )
 from windwrench.identification.motion.residual import residual_wrench
-from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.sensor_noise import noisy_logs
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import high_pass, lagged, low_pass, robust_std
@@ -113,15 +113,6 @@ def test_at_20_hz_two_lost_samples_are_bridged_and_four_are_a_gap(lost, pieces):
     log = still_log(20.0)
     log.valid[200 : 200 + lost] = False
     assert len(log_signals(log)) == pieces
-
-
-def test_a_declared_clock_offset_delays_the_voltage_and_takes_the_first_poses_after_a_break():
-    log = still_log(200.0, voltage=np.linspace(12.0, 11.0, 4000))
-    log.valid[1000:1100] = False
-    late = VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": -0.02}))
-    undone = undo_log_sensing(log, late)
-    assert_allclose(undone.voltage[4:], log.voltage[:-4], rtol=1e-9)
-    assert_array_equal(np.flatnonzero(~undone.valid), [*range(4), *range(1000, 1104)])
 
 
 @pytest.mark.parametrize(
@@ -223,76 +214,51 @@ def test_a_rotor_s_own_lag_is_no_filter(vehicle, trajectory):
     assert note.startswith("the rotor speeds were filtered before the log was written")
 
 
-PERIOD = 0.005
-GRAVITY = 9.81
-GYRO_BIAS = np.array([0.01, -0.02, 0.015])
-FORCE_BIAS = np.array([0.05, -0.1, 0.08])
+GRAVITY = VEHICLE.gravity
+HEADING = Rotation.from_euler("z", 2.0)
 
 
 @pytest.fixture(scope="module")
-def motion():
-    """Waves in a room for 40 s, tilted towards the acceleration, from a heading of 2 rad; sensors
-    with white noise and biases.
+def flown():
+    """A flight with noisy and biased sensors, seen from a world that is turned by 2 rad: the log,
+    and velocity and attitude by its poses, smoothed.
     """
-    t = np.arange(0.0, 40.0, PERIOD)
-    wave = np.array([0.9, 0.7, 1.3])
-    position = np.sin(np.outer(t, wave)) * [1.0, 1.5, 0.2]
-    velocity = np.cos(np.outer(t, wave)) * [1.0, 1.5, 0.2] * wave
-    acceleration = -position * wave**2
-    felt = acceleration + np.array([0.0, 0.0, GRAVITY])
-    up = felt.copy()
-    up /= norm(up, axis=1)[:, None]
-    heading = 2.0 + 0.5 * np.sin(0.3 * t)
-    forward = np.column_stack([np.cos(heading), np.sin(heading), np.zeros_like(t)])
-    left = np.cross(up, forward)
-    left /= norm(left, axis=1)[:, None]
-    rotation = np.stack([np.cross(left, up), left, up], axis=2)
-    turned = Rotation.from_matrix(rotation)
-    rate = (turned[:-1].inv() * turned[1:]).as_rotvec() / PERIOD
-    rate = np.vstack([rate[:1], 0.5 * (rate[1:] + rate[:-1]), rate[-1:]])
-    rng = default_rng(0)
-    force = turned.inv().apply(felt)
-    return {
-        "t": t,
-        "position": position,
-        "velocity": velocity,
-        "rotation": rotation,
-        "gyro": rate + GYRO_BIAS + 0.005 * rng.standard_normal(rate.shape),
-        "force": force + FORCE_BIAS + 0.1 * rng.standard_normal(force.shape),
-        "noise": rng.standard_normal(position.shape),
-    }
+    log = imu_flight(VEHICLE, seconds=40.0, trajectory="yaw")
+    (signals,) = log_signals(log)
+    velocity = low_pass(signals.velocity, 4.0, signals.period)
+    turned = replace(log, position=HEADING.apply(log.position))
+    return turned, HEADING.apply(velocity), HEADING.as_matrix() @ signals.rotation
 
 
-def tilt_error(rotation, truth):
-    """Angle (rad) between the verticals of two attitudes, in body axes."""
-    return norm(rotation[:, 2] - truth[:, 2], axis=1)
+def fused_of(log, *positions):
+    return fuse(log.t, log.gyro, log.accelerometer, GRAVITY, (0.005, 0.1), *positions)
 
 
-def test_an_imu_alone_keeps_the_vertical(motion):
+def test_an_imu_alone_keeps_the_vertical(flown):
     """Tilt within some mrad, as it says; heading from zero, and velocity not known."""
-    fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1))
-    at = np.searchsorted(motion["t"], fused.t - 1e-9)
-    error = tilt_error(fused.rotation, motion["rotation"][at])
+    log, _, rotation = flown
+    fused = fused_of(log)
+    at = np.searchsorted(log.t, fused.t - 1e-9)
+    error = norm(fused.rotation[:, 2] - rotation[at][:, 2], axis=1)
     assert rms(error) < 0.02
     assert np.mean(error < 2.5 * np.hypot(fused.std[:, 0], fused.std[:, 1])) > 0.95
     assert abs(Rotation.from_matrix(fused.rotation[0]).as_euler("ZYX")[0]) < 0.1
     assert (fused.std[:, 3:6] > 4.0).all()
 
 
-def test_ten_positions_a_second_show_heading_velocity_and_biases(motion):
+def test_ten_positions_a_second_show_heading_velocity_and_biases(flown):
+    log, velocity, rotation = flown
     every = slice(None, None, 20)
-    placed = motion["position"][every] + 0.002 * motion["noise"][every]
-    positions = Readings(motion["t"][every], placed, 0.002)
-    fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1), positions)
-    at = np.searchsorted(motion["t"], fused.t - 1e-9)
-    off = Rotation.from_matrix(
-        np.swapaxes(motion["rotation"][at], 1, 2) @ fused.rotation
-    ).as_rotvec()
+    positions = Readings(log.t[every], log.position[every], VEHICLE.mocap.sigma_pos_m)
+    fused = fused_of(log, positions)
+    at = np.searchsorted(log.t, fused.t - 1e-9)
+    off = Rotation.from_matrix(np.swapaxes(rotation[at], 1, 2) @ fused.rotation).as_rotvec()
     assert np.abs(off).max() < 0.02
-    z = (fused.velocity - motion["velocity"][at]) / fused.std[:, 3:6]
+    z = (fused.velocity - velocity[at]) / fused.std[:, 3:6]
     assert 0.3 < rms(z) < 2.0
-    assert abs(fused.gyro_bias[len(at) // 2] - GYRO_BIAS).max() < 0.002
-    assert abs(fused.accelerometer_bias[len(at) // 2] - FORCE_BIAS).max() < 0.03
+    middle = len(at) // 2
+    assert_allclose(fused.gyro_bias[middle], [0.01, -0.005, 0.008], atol=0.002)
+    assert_allclose(fused.accelerometer_bias[middle], [0.05, -0.1, 0.08], atol=0.03)
 
 
 def test_the_smoother_of_an_imu_is_least_squares_over_all_knots():

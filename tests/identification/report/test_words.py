@@ -8,9 +8,16 @@ import numpy as np
 import pytest
 
 from tests.support.diagnoses import made_diagnosis, made_trace
-from tests.support.golden_report import diagnoses
 from windwrench.dynamics import effects, load_vehicle
-from windwrench.identification.findings import Errors, NamedEffect, Probabilities
+from windwrench.identification.findings import (
+    Alternative,
+    Disturbance,
+    Errors,
+    NamedEffect,
+    Probabilities,
+    Structure,
+    TransientDisturbance,
+)
 from windwrench.identification.report import report_data, report_schema
 from windwrench.identification.report.amounts import amount, steady_residual, title, with_amounts
 from windwrench.identification.report.files import SCHEMA_VERSION
@@ -135,7 +142,17 @@ def test_a_report_keeps_to_its_schema():
     lost = Errors(math.nan, math.inf, math.nan, 0.1)
     much = made_diagnosis(*traces, after=lost, rotor_faults=({"log": "log 0", "rotor": None},))
     bare = replace(much, verdict="nothing to explain", effects=(), traces=())
-    for found in (much, bare, *(found for _, found in diagnoses())):
+    (drag, _) = much.effects
+    pushed = replace(
+        much,
+        remainder="structured",
+        effects=(replace(drag, indistinguishable_from=("wind",)),),
+        gusts=(Disturbance("Fx", 0.0153, 0.25),),
+        pushes=(TransientDisturbance("tau_x", "flight", 1.5, -0.002),),
+        structure=(Structure("a wave at 1.1 Hz", "Fx", 0.31),),
+        probabilities=Probabilities({"wind": 0.95}, (Alternative((), 0.05),), 0.03),
+    )
+    for found in (much, bare, pushed):
         data = json.loads(json.dumps(report_data(found), allow_nan=False))
         jsonschema.validate(data, report_schema())
         assert data["schema_version"] == SCHEMA_VERSION

@@ -24,7 +24,6 @@ from tests.identification.vehicle_fit.flown import (
     inertial_flights,
 )
 from tests.support.alike import assert_alike
-from tests.support.data_paths import data_file
 from tests.support.flown import recorded
 from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, vehicles
 from tests.support.outcomes import refused
@@ -33,7 +32,6 @@ from windwrench.dynamics.vehicle import EffectSetting, ModelStatus, MotorCurve
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
 from windwrench.identification.causal_states import causal_states
 from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
-from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
