@@ -35,13 +35,13 @@ class Noise:
         """Return the filter's output (N, ...); rows outside ``whole`` mean nothing."""
         return np.asarray(lfilter(self.filter, 1.0, (values.T / self.scale).T, axis=0))
 
-    def log_likelihood(self, rest: Array) -> Array:
+    def log_likelihood(self, rest: Array | float) -> Array:
         """Return the log-likelihood of innovations with ``rest`` as the sum of squares, at the best
         variance.
         """
         n = int(self.whole.sum())
         log_scale = float(np.log(self.scale[self.whole]).sum())
-        return -0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale
+        return np.asarray(-0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale)
 
 
 def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
