@@ -22,7 +22,7 @@ from windwrench.dynamics.effects import compile_effects
 from windwrench.evidence.trials.logged_poses import FILTERS
 from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.motion.inertial_fusion import Readings, fuse
+from windwrench.identification.motion.inertial_fusion import ImuPiece, Readings, fuse
 from windwrench.identification.motion.inertial_signals import inertial_signals
 from windwrench.identification.motion.noise_spectrum import (
     filtering_notes,
@@ -160,7 +160,7 @@ def test_an_imu_at_1_khz_tells_as_much_as_one_of_half_its_noise_at_250_hz():
             ),
             GRAVITY,
         )
-        found.append(np.concatenate([signals.attitude_std[-1], signals.velocity_std[-1]]))
+        found.append(signals.std[-1, :6])
     assert_allclose(found[0], found[1], rtol=0.15)
 
 
@@ -263,6 +263,10 @@ def motion():
     }
 
 
+def piece_of(motion):
+    return ImuPiece(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1))
+
+
 def tilt_error(rotation, truth):
     """Angle (rad) between the verticals of two attitudes, in body axes."""
     return norm(rotation[:, 2] - truth[:, 2], axis=1)
@@ -270,7 +274,7 @@ def tilt_error(rotation, truth):
 
 def test_an_imu_alone_keeps_the_vertical(motion):
     """Tilt within some mrad, as it says; heading from zero, and velocity not known."""
-    fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1))
+    fused = fuse(piece_of(motion))
     at = np.searchsorted(motion["t"], fused.t - 1e-9)
     error = tilt_error(fused.rotation, motion["rotation"][at])
     assert rms(error) < 0.02
@@ -283,16 +287,16 @@ def test_ten_positions_a_second_show_heading_velocity_and_biases(motion):
     every = slice(None, None, 20)
     placed = motion["position"][every] + 0.002 * motion["noise"][every]
     positions = Readings(motion["t"][every], placed, 0.002)
-    fused = fuse(motion["t"], motion["gyro"], motion["force"], GRAVITY, (0.005, 0.1), positions)
+    fused = fuse(piece_of(motion), positions)
     at = np.searchsorted(motion["t"], fused.t - 1e-9)
     off = Rotation.from_matrix(
         np.swapaxes(motion["rotation"][at], 1, 2) @ fused.rotation
     ).as_rotvec()
     assert np.abs(off).max() < 0.02
-    z = (fused.velocity - motion["velocity"][at]) / fused.std[:, 3:6]
+    z = (fused.linear[:, :3] - motion["velocity"][at]) / fused.std[:, 3:6]
     assert 0.3 < rms(z) < 2.0
-    assert abs(fused.gyro_bias[len(at) // 2] - GYRO_BIAS).max() < 0.002
-    assert abs(fused.accelerometer_bias[len(at) // 2] - FORCE_BIAS).max() < 0.03
+    assert abs(fused.linear[len(at) // 2, 6:9] - GYRO_BIAS).max() < 0.002
+    assert abs(fused.linear[len(at) // 2, 9:] - FORCE_BIAS).max() < 0.03
 
 
 def test_the_smoother_of_an_imu_is_least_squares_over_all_knots():
