@@ -49,7 +49,7 @@ def profile(
     log_notes(found.notes)
     p, law = found.profile, found.law
     seen = {"direction_deg": math.degrees(p.direction), "along_wind_m": p.beside}
-    jet = dict(zip(_JET, astuple(found.shape), strict=True)) if found.shape else None
+    jet = dict(zip(_JET, astuple(found.shape)[2:], strict=True)) if found.shape else None
     result = {
         "log": flight.name,
         "vehicle": model.name,

@@ -43,11 +43,11 @@ _ROTORS = {
     "rotor 4 (front-right)": (-1.0, 1.0),
 }
 _SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
-# possible changes at each place
-_KINDS = {
-    **dict.fromkeys(_ROTORS, ("weaker", "carries more")),
-    **dict.fromkeys((*_SIDES, "all rotors"), ("carries more",)),
-    SOMETHING_ELSE: ("",),
+# possible changes, by place and kind; with their share of a place's prior: all places are alike
+_CHANGES = {
+    **{(rotor, kind): 0.5 for rotor in _ROTORS for kind in ("weaker", "carries more")},
+    **dict.fromkeys([(place, "carries more") for place in (*_SIDES, "all rotors")], 1.0),
+    (SOMETHING_ELSE, ""): 1.0,
 }
 
 _AMOUNTS = 80  # amounts of a change in the sum of its evidence
@@ -126,7 +126,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     # log posterior, and mean and deviation of the amount; keys: place and kind
     logs = {(NOWHERE, ""): nothing + math.log(_UNCHANGED)}
     sizes = {(NOWHERE, ""): (0.0, 0.0)}
-    for place, kind in ((place, kind) for place, kinds in _KINDS.items() for kind in kinds):
+    for (place, kind), share in _CHANGES.items():
         if place == SOMETHING_ELSE:
             means, spread = np.zeros((_AMOUNTS, 4)), np.repeat(amounts[:, None], 4, axis=1)
         else:
@@ -136,19 +136,18 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         weights = softmax(every)
         middle = float(amounts @ weights)
         sizes[place, kind] = middle, math.sqrt(float(np.square(amounts - middle) @ weights))
-        # each place is as likely as the other beforehand
-        each = (1.0 - _UNCHANGED) / (len(_KINDS) * len(_KINDS[place]))
+        each = (1.0 - _UNCHANGED) * share / sum(_CHANGES.values())
         logs[place, kind] = float(logsumexp(every)) + math.log(each)
     chances = dict(zip(logs, softmax(list(logs.values())).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in logs}
     likeliest = max(places, key=places.__getitem__)
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
-    share = np.exp(ways.log)
+    likely = np.exp(ways.log)
     return Change(
         tuple(before),
         tuple(after),
-        share @ ways.mean,
-        np.sqrt(share @ unchanged),
+        likely @ ways.mean,
+        np.sqrt(likely @ unchanged),
         places,
         kinds.get("weaker", 0.0),
         kinds.get("carries more", 0.0),
@@ -162,11 +161,9 @@ def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
     The ratio makes the total less certain, and is not taken off the total: a heavier vehicle draws
     more and pulls its battery down, so a correction would hide the change in question.
     """
-    levels = [
-        np.mean([math.nan if trim.voltage is None else math.log(trim.voltage) for trim in group])
-        for group in (after, before)
-    ]
-    return float(np.nan_to_num(levels[0] - levels[1]))
+    volts = ([trim.voltage for trim in group] for group in (after, before))
+    late, early = (np.log(np.array(group, dtype=np.float64)).mean() for group in volts)
+    return float(np.nan_to_num(late - early))
 
 
 def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:

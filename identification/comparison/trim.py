@@ -97,14 +97,13 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
             f"{name}: mean thrusts of the rotors are {np.round(mean, 4).tolist()}; expected four "
             "positive numbers"
         )
-    level = None
-    if voltage is not None:
-        known = steady & np.isfinite(voltage) & (voltage > 0.0)
-        level = float(np.mean(voltage[known])) if known.any() else None
-    return Trim(name, mean, seconds, _noise(t, thrust, steady, step), level)
+    known = np.zeros(0) if voltage is None else voltage[steady]
+    known = known[np.isfinite(known) & (known > 0.0)]
+    level = float(known.mean()) if known.size else None
+    return Trim(name, mean, seconds, _noise(thrust, steady, step), level)
 
 
-def _noise(t: Array, thrust: Array, steady: Mask, step: Array) -> Array:
+def _noise(thrust: Array, steady: Mask, step: Array) -> Array:
     """Return the variance (4,) of the four numbers of a flight, from the means of batches."""
     batch = np.floor(np.cumsum(np.where(steady, step, 0.0)) / BATCH).astype(np.int64)
     batches = (steady & (batch == number) for number in range(int(batch[-1]) + 1))
@@ -171,5 +170,4 @@ def carrying(t: Array, total: Array) -> Mask:
 def _smooth(values: Array, t: Array) -> Array:
     """Return a running mean: the noise of a pose is no motion."""
     width = max(1, round(_SMOOTH / median_step(t)))
-    smooth: Array = uniform_filter1d(values, width, mode="nearest")
-    return smooth
+    return np.asarray(uniform_filter1d(values, width, mode="nearest"))
