@@ -14,6 +14,7 @@ quadrotor with one rotor in each quadrant. Two questions are asked apart:
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
@@ -104,8 +105,7 @@ def find_fault(channels: Channels) -> RotorFault:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Tried:
+class _Tried(NamedTuple):
     """One lag and curve with noise fitted beside the likeliest jump: its row, and the ramp by its
     number; the log-likelihoods of no jump, and of this one.
     """

@@ -12,7 +12,7 @@ scatter, at either level, is summed over likewise.
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax
@@ -40,8 +40,7 @@ _MOST_ENDS = 8  # possible ends of sessions: the largest differences between fli
 _LEAST_LOG = -12.0  # below the likeliest way; less likely ways do not count
 
 
-@dataclass(frozen=True, eq=False)
-class Difference:
+class Difference(NamedTuple):
     """The difference (4,) of two sets, if nothing but the vehicle changed between them: a normal
     density for each of n ways (cuts into sessions and scales of the scatter).
     """

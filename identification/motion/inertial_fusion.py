@@ -11,18 +11,15 @@ velocity and position are not: the result states their large standard deviations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ... import _core
-from ..logs.table import Array, ArrayPair
+from ...runtime.arrays import Array, Index
+from ..logs.table import ArrayPair
 from .smoothing import resampled, second_difference
-
-Index = NDArray[np.int64]
 
 KNOT = 0.02  # s from state to state; between them the IMU is integrated
 # m/s, standard deviation of an unmeasured velocity, and s between two independent ones. A steady
@@ -34,13 +31,9 @@ POSITION_STD = 10.0  # m, at the start, if not measured
 TILT_STD = 0.3  # rad, at the start, from the mean specific force
 HEADING_STD = 0.3  # rad, if shown by positions; exact without any reference
 # of MEMS sensors, from one switching-on to the next: rad/s and m/s2, and their walk in a second
-GYRO_BIAS_STD = 0.03
-ACCELEROMETER_BIAS_STD = 0.2
-GYRO_BIAS_WALK = 3e-4
-ACCELEROMETER_BIAS_WALK = 3e-3
-# least credible noise of one sample: rad/s and m/s2
-LEAST_GYRO_NOISE = 0.001
-LEAST_ACCELEROMETER_NOISE = 0.01
+BIAS_STD = 0.03, 0.2
+BIAS_WALK = 3e-4, 3e-3
+LEAST_NOISE = 0.001, 0.01  # least credible noise of one sample: rad/s and m/s2
 LEVELLING = 5.0  # s, time constant of the first guess, which takes gravity for up
 ITERATIONS = 6
 SETTLED = 1e-4  # rad, largest change of attitude in the last iteration
@@ -49,8 +42,7 @@ N = 15
 ATTITUDE, VELOCITY, POSITION = 0, 3, 6  # the first of their three
 
 
-@dataclass(frozen=True, eq=False)
-class Readings:
+class Readings(NamedTuple):
     """Positions or attitudes measured beside an IMU: m of them, at times (m,) s."""
 
     t: Array  # (m,) s
@@ -72,72 +64,46 @@ class FusedMotion(NamedTuple):
     """Motion at m knots, and its standard deviations."""
 
     t: Array  # (m,) s
-    rotation: Array  # (m, 3, 3) body to world
+    rotation: Rotation  # (m) body to world
     # (m, 12) velocity (m/s) and position (m), world; bias of gyro (rad/s) and accelerometer (m/s2)
     linear: Array
     std: Array  # (m, 15) of attitude (rad, body), velocity, position and the two biases
 
 
-def _cross_matrix(x: Array) -> Array:
-    """Return the matrices (m, 3, 3) of the cross product with vectors (m, 3)."""
-    out = np.zeros((len(x), 3, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        out[:, j, i], out[:, i, j] = x[:, k], -x[:, k]
-    return out
-
-
-def _exp(x: Array) -> Array:
-    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3) rad."""
-    matrices = Rotation.from_rotvec(x.reshape(-1, 3)).as_matrix()
-    return np.asarray(matrices).reshape(*x.shape, 3)
-
-
-def _log(R: Array) -> Array:
-    """Return the rotation vectors (m, 3) of rotation matrices (m, 3, 3)."""
-    return np.asarray(Rotation.from_matrix(R).as_rotvec())
-
-
-def _times(A: Array, x: Array) -> Array:
-    """Return matrices (m, 3, 3) times vectors (m, 3)."""
-    return np.asarray((A @ x[:, :, None])[:, :, 0])
-
-
-def _integrate(gyro: Array, force: Array, dt: float, stride: int) -> tuple[Array, Array, Array]:
-    """Return the IMU's motion in each of m intervals between knots: turn (m, 3, 3), and the change
-    of velocity and position (m, 3) by the specific force, in the axes of its start.
+def _integrate(gyro: Array, force: Array, dt: float, stride: int) -> tuple[Rotation, Array, Array]:
+    """Return the IMU's motion in each of m intervals between knots: turns (m), and the change of
+    velocity and position (m, 3) by the specific force, in the axes of its start.
     """
     w, f = (0.5 * (x[:-1] + x[1:]).reshape(-1, stride, 3) for x in (gyro, force))
-    halves, wholes = _exp(0.5 * dt * w), _exp(dt * w)
-    turn, speed, way = np.eye(3), np.zeros((len(w), 3)), np.zeros((len(w), 3))
+    turn, (speed, way) = Rotation.identity(len(w)), np.zeros((2, len(w), 3))
     for j in range(stride):
-        a = _times(turn @ halves[:, j], f[:, j])
+        a = (turn * Rotation.from_rotvec(0.5 * dt * w[:, j])).apply(f[:, j])
         way += speed * dt + 0.5 * dt * dt * a
         speed += a * dt
-        turn = turn @ wholes[:, j]
+        turn = turn * Rotation.from_rotvec(dt * w[:, j])
     return turn, speed, way
 
 
 def _steps(
-    T: float, gravity: float, rotation: Array, linear: Array, turns: Array, ways: Array, moves: Array
+    T: float, gravity: float, rotation: Rotation, linear: Array, moved: tuple[Rotation, Array, Array]
 ) -> ArrayPair:
     """Return the steps from each of m knots to the next, ``T`` s later, about the nominal motion:
-    their matrices (m, 15, 15), and the next knots' defects (m, 15) by the IMU's turns, velocities
-    and ways.
+    their matrices (m, 15, 15), and the next knots' defects (m, 15) by the motion of the IMU.
     """
-    R, (velocity, position, b, a) = rotation[:-1], np.split(linear[:-1], 4, axis=1)
-    turn = turns @ _exp(-T * b)
-    way, move = ways - a * T, moves - 0.5 * T * T * a
-    F, one = np.tile(np.eye(N), (len(R), 1, 1)), np.eye(3)
-    F[:, 0:3, 0:3] = turn.swapaxes(1, 2)
+    before, (velocity, position, b, a) = rotation[:-1], np.split(linear[:-1], 4, axis=1)
+    turn = moved[0] * Rotation.from_rotvec(-T * b)
+    way, move = moved[1] - a * T, moved[2] - 0.5 * T * T * a
+    R, one = before.as_matrix(), np.eye(3)
+    F = np.tile(np.eye(N), (len(R), 1, 1))
+    F[:, 0:3, 0:3] = turn.inv().as_matrix()
     F[:, 0:3, 9:12], F[:, 6:9, 3:6] = -T * one, T * one
-    F[:, 3:6, 0:3] = -R @ _cross_matrix(way)
-    F[:, 6:9, 0:3] = -R @ _cross_matrix(move)
+    F[:, 3:6, 0:3], F[:, 6:9, 0:3] = (np.cross(x[:, None], R) for x in (way, move))
     F[:, 3:6, 12:15], F[:, 6:9, 12:15] = -T * R, -0.5 * T * T * R
     fall = np.array([0.0, 0.0, gravity])
-    after = [velocity + _times(R, way) - T * fall]
-    after += [position + T * velocity + _times(R, move) - 0.5 * T * T * fall, b, a]
-    tilt = _log(rotation[1:].swapaxes(1, 2) @ (R @ turn))
-    return F, np.concatenate([tilt, np.concatenate(after, axis=1) - linear[1:]], axis=1)
+    after = [velocity + before.apply(way) - T * fall]
+    after += [position + T * velocity + before.apply(move) - 0.5 * T * T * fall, b, a]
+    tilt = (rotation[1:].inv() * (before * turn)).as_rotvec()
+    return F, np.column_stack([tilt, np.column_stack(after) - linear[1:]])
 
 
 def fuse(
@@ -168,26 +134,24 @@ def fuse(
         readings = {POSITION: positions}
     if attitudes is not None:
         readings[ATTITUDE] = attitudes
-    sizes = np.maximum(imu.noise, [LEAST_GYRO_NOISE, LEAST_ACCELEROMETER_NOISE])
-    walks = np.array([GYRO_BIAS_WALK, ACCELEROMETER_BIAS_WALK])
-    gyro_noise, force_noise = sizes**2 * dt * T
-    spread = np.repeat([gyro_noise, force_noise, force_noise * T**2 / 3.0, *(walks**2 * T)], 3)
-    started = rotation[0].copy()
-    up = np.abs(started[2])  # a heading is a turn about the world's vertical, in body axes
+    gyro_noise, force_noise = np.maximum(imu.noise, LEAST_NOISE) ** 2 * dt * T
+    walks = np.square(BIAS_WALK) * T
+    spread = np.repeat([gyro_noise, force_noise, force_noise * T**2 / 3.0, *walks], 3)
+    started = rotation[0]
+    up = np.abs(started.as_matrix()[2])  # a heading is a turn about the world's vertical, in body axes
     angles = np.sqrt((TILT_STD * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
-    priors = [STEADY_VELOCITY_STD, POSITION_STD, GYRO_BIAS_STD, ACCELEROMETER_BIAS_STD]
-    prior_std = np.append(angles + 1e-4, np.repeat(priors, 3))
+    prior_std = np.append(angles + 1e-4, np.repeat([STEADY_VELOCITY_STD, POSITION_STD, *BIAS_STD], 3))
     begun = linear[0].copy()
     change, std = np.zeros((2, count + 1, N))
     for _ in range(ITERATIONS):
-        change[0, :3] = _log(rotation[:1].swapaxes(1, 2) @ started)
+        change[0, :3] = (rotation[0].inv() * started).as_rotvec()
         change[0, 3:], std[0] = begun - linear[0], prior_std
         measured = _measured(times, rates, rotation, linear, readings)
-        F, defect = _steps(T, imu.gravity, rotation, linear, *moved)
+        F, defect = _steps(T, imu.gravity, rotation, linear, moved)
         if not _core.smooth_inertial_motion(F, defect, spread, *measured, change, std):
             raise np.linalg.LinAlgError("the covariance of an inertial motion is singular")
         turn = Rotation.from_rotvec(change[:, :3])
-        rotation[:] = (Rotation.from_matrix(rotation) * turn).as_matrix()
+        rotation = rotation * turn
         linear += change[:, 3:]
         if turn.magnitude().max() < SETTLED:
             break
@@ -198,8 +162,8 @@ def fuse(
 
 def _first_guess(
     imu: ImuPiece, positions: Readings | None, attitudes: Readings | None
-) -> tuple[Array, float]:
-    """Return an attitude (m, 3, 3) to linearise about, and the standard deviation (rad) of its
+) -> tuple[Rotation, float]:
+    """Return an attitude (m) to linearise about, and the standard deviation (rad) of its
     heading at the start.
     """
     dt = float(imu.t[1] - imu.t[0])
@@ -215,20 +179,20 @@ def _first_guess(
     level = np.stack([forward, np.cross(up, forward), up])
     start = Rotation.from_matrix(level).as_quat(scalar_first=True)
     _core.level_attitude(rates, imu.force, dt, LEVELLING, start, quaternions)
-    out = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+    out = Rotation.from_quat(quaternions, scalar_first=True)
     if attitudes is not None:
         nearest = np.abs(imu.t - attitudes.t[0]).argmin()
-        heading = _turned_heading(out[nearest], attitudes.values[0])
+        heading = _turned_heading(out[nearest], Rotation.from_matrix(attitudes.values[0]))
     elif positions is not None and len(positions.t) > 20:
         heading = _heading(imu, out[0], positions)
     else:
         return out, 0.0
-    return _exp(np.array([0.0, 0.0, heading])) @ out, HEADING_STD
+    return Rotation.from_euler("z", heading) * out, HEADING_STD
 
 
-def _heading(imu: ImuPiece, start: Array, positions: Readings) -> float:
-    """Return the heading (rad) that turns the horizontal motion of a levelled IMU, from ``start``
-    (3, 3), into the positions': the mean turn between their changes of velocity over some seconds.
+def _heading(imu: ImuPiece, start: Rotation, positions: Readings) -> float:
+    """Return the heading (rad) that turns the horizontal motion of a levelled IMU, from ``start``,
+    into the positions': the mean turn between their changes of velocity over some seconds.
     """
     alone = fuse(imu)
     step = 2.0  # s: an IMU alone keeps a velocity's change over it, and a position shows it
@@ -240,14 +204,14 @@ def _heading(imu: ImuPiece, start: Array, positions: Readings) -> float:
     return float(np.angle(np.sum(np.conj(felt) * seen))) + zero
 
 
-def _turned_heading(before: Array, after: Array) -> float:
-    """Return the heading (rad) by which one attitude (3, 3) is turned from another."""
-    turn = after @ before.T
+def _turned_heading(before: Rotation, after: Rotation) -> float:
+    """Return the heading (rad) by which one attitude is turned from another."""
+    turn = (after * before.inv()).as_matrix()
     return math.atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
 
 
 def _measured(
-    times: Array, rates: Array, rotation: Array, linear: Array, readings: Mapping[int, Readings]
+    times: Array, rates: Array, rotation: Rotation, linear: Array, readings: Mapping[int, Readings]
 ) -> tuple[Index, Index, Array, Array, Array]:
     """Return the readings by the first of their states, sorted by the nearest knot: this knot, the
     first state, s behind the knot, the distance (3,) from a nominal motion, and its variance.
@@ -259,8 +223,8 @@ def _measured(
         late = r.t - times[knots]
         if first == ATTITUDE:
             turn = Rotation.from_rotvec(rates[knots] * late[:, None])
-            seen = (Rotation.from_matrix(rotation[knots]) * turn).inv()
-            off = (seen * Rotation.from_matrix(r.values)).as_rotvec()
+            seen = Rotation.from_matrix(r.values)
+            off = ((rotation[knots] * turn).inv() * seen).as_rotvec()
         else:
             off = r.values - linear[knots, first - 3 : first]
             if first == POSITION:

@@ -168,10 +168,10 @@ def _fused(log: FlightLog, imu: ImuPiece) -> FusedMotion:
         knot = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)
         near = np.abs(fused.t[knot] - attitudes.t) < 0.004
         if near.sum() > 20:
-            turn = np.swapaxes(fused.rotation[knot[near]], 1, 2) @ attitudes.values[near]
-            off = Rotation.from_matrix(turn).as_rotvec()
+            seen = Rotation.from_matrix(attitudes.values[near])
+            off = (fused.rotation[knot[near]].inv() * seen).as_rotvec()
             std = max(1.3 * robust_std(off - np.median(off, axis=0)), LEAST_ATTITUDE_STD)
-            attitudes = replace(attitudes, std=std)
+            attitudes = attitudes._replace(std=std)
     return fuse(imu, positions, attitudes)
 
 
@@ -195,7 +195,7 @@ def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:
     first = np.searchsorted(t, fused.t - 1e-9)[knot]
     turned = cumulative_trapezoid(gyro, dx=float(t[1] - t[0]), axis=0, initial=0)
     since = Rotation.from_rotvec(turned - turned[first])
-    return np.asarray((Rotation.from_matrix(fused.rotation[knot]) * since).as_matrix())
+    return np.asarray((fused.rotation[knot] * since).as_matrix())
 
 
 def with_drift(s: InertialSignals, rng: np.random.Generator, gravity: float) -> InertialSignals:

@@ -14,8 +14,7 @@ from scipy.signal import butter, lfilter, savgol_filter, sosfilt_zi, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from ... import _core
-
-Array = NDArray[np.float64]
+from ...runtime.arrays import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ def unbroken(
     return [run for run in runs if len(run) > count and t[run[-1]] - t[run[0]] > seconds]
 
 
-def runs_of(rows: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs_of(rows: Mask) -> list[tuple[int, int]]:
     """Return the first row, and the one after the last, of each run of true rows (n,)."""
     edges = np.flatnonzero(np.diff(rows, prepend=False, append=False))
     return [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
