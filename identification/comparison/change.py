@@ -124,8 +124,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     prior = log_softmax(-0.5 * np.square(amounts / _USUAL_AMOUNT))
     nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
     # log posterior, and mean and deviation of the amount; keys: place and kind
-    logs = {(NOWHERE, ""): nothing + math.log(_UNCHANGED)}
-    sizes = {(NOWHERE, ""): (0.0, 0.0)}
+    found = {(NOWHERE, ""): (nothing + math.log(_UNCHANGED), 0.0, 0.0)}
     for (place, kind), share in _CHANGES.items():
         if place == SOMETHING_ELSE:
             means, spread = np.zeros((_AMOUNTS, 4)), np.repeat(amounts[:, None], 4, axis=1)
@@ -135,11 +134,11 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         every = logs_of(means, spread) + prior
         weights = softmax(every)
         middle = float(amounts @ weights)
-        sizes[place, kind] = middle, math.sqrt(float(np.square(amounts - middle) @ weights))
+        std = math.sqrt(float(np.square(amounts - middle) @ weights))
         each = (1.0 - _UNCHANGED) * share / sum(_CHANGES.values())
-        logs[place, kind] = float(logsumexp(every)) + math.log(each)
-    chances = dict(zip(logs, softmax(list(logs.values())).tolist(), strict=True))
-    places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in logs}
+        found[place, kind] = float(logsumexp(every)) + math.log(each), middle, std
+    chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
+    places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
     likeliest = max(places, key=places.__getitem__)
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
     likely = np.exp(ways.log)
@@ -151,7 +150,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         places,
         kinds.get("weaker", 0.0),
         kinds.get("carries more", 0.0),
-        *sizes[likeliest, max(kinds, key=kinds.__getitem__)],
+        *found[likeliest, max(kinds, key=kinds.__getitem__)][1:],
     )
 
 

@@ -12,7 +12,7 @@ output*, Operations Research 30, 1982).
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -45,8 +45,7 @@ class Trim:
     name: str
     thrust: Array  # (4,)
     seconds: float  # length of the mean
-    # (4,) variance of ``features`` as means of one flight; zero: not known
-    noise: Array = field(default_factory=lambda: np.zeros(4))
+    noise: Array  # (4,) variance of ``features`` as means of one flight; zero: not known
     voltage: float | None = None  # V, mean over the same time
     session: str = ""  # common name of a session's flights; empty: not known
 
@@ -131,14 +130,14 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
         thrust = vehicle.commanded_thrust(log.command, log.voltage)
     else:
         thrust = log.command
+    total = thrust.sum(axis=1)
     if not log.has_pose:
-        return trim_of(name, t, thrust, carrying(t, thrust.sum(axis=1)), log.voltage)
+        return trim_of(name, t, thrust, carrying(t, total), log.voltage)
     at, place = t[log.valid], log.position[log.valid]
     if len(at) < 3:
         raise InputError(f"{name}: fewer than three poses; expected a flight")
     speeds = log.rotor_speeds
     if not log.has_rotor_speeds:  # then scaled: while the rotors are high, they carry the weight
-        total = thrust.sum(axis=1)
         carried = total[flying(total)]
         scale = vehicle.weight / float(np.median(carried)) if len(carried) else 0.0
         speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
