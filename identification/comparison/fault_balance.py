@@ -72,9 +72,8 @@ class FaultBalance:
 
     def steps(self, rows: Index, ramps: list[Array]) -> Array:
         """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
-        return np.array(
-            [np.sum([c.steps(rows, ramp) for c in self.channels], axis=0) for ramp in ramps]
-        )
+        each = [[c.steps(rows, ramp) for c in self.channels] for ramp in ramps]
+        return np.asarray(np.sum(each, axis=1))
 
     def share(self, row: int, ramp: int) -> Array:
         """Return the elapsed share (N,) of a change beginning at a row, by one of the ramps."""
@@ -158,4 +157,4 @@ class BalanceChannel:
         gain = np.square(sy - sm * self.my / self.mm) / own_share
         width = np.log(np.maximum(gain / noise.variance, 1.0))
         price = 0.5 * np.maximum(1.0 + width, math.log(noise.whole.sum()))
-        return noise.log_likelihood(self.rest - gain) - price
+        return np.asarray(noise.log_likelihood(self.rest - gain) - price)

@@ -112,7 +112,8 @@ def read_channels(
         raise InputError(f"{path}: no {' and no '.join(missing)}; expected all of them")
     assert log_map_of.commands is not None
     names = tuple(f"PX4 motor {i}" for i in log_map_of.commands.order)
-    return Channels(str(path), *streams.values(), motor_names=names), tuple(notes)
+    gyro, accelerometer, command = streams.values()
+    return Channels(str(path), gyro, accelerometer, command, motor_names=names), tuple(notes)
 
 
 def channels_of_log(log: FlightLog) -> Channels:

@@ -87,7 +87,7 @@ def find_fault(channels: Channels) -> RotorFault:
     rows = _rows(len(samples.t))
     tried = _search(samples, rows, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
-    evidence, *onset = _onsets(samples.t, rows, best)
+    evidence, starts, likely = _onsets(samples.t, rows, best)
     each, shares, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
@@ -100,7 +100,7 @@ def find_fault(channels: Channels) -> RotorFault:
         samples,
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
         1 + rotor,
-        _quantiles(*onset, STEP),
+        _quantiles(starts, likely, STEP),
         (1.0 - float(weights[rotor] @ shares), max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
@@ -179,9 +179,7 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
 
     # each channel's visible part, its standard deviation, and the hypothesis' means and spread
     each = shares[:, None]
-    tried = [
-        (*seen(best.balance.lost(rotor, share)), each, _ERROR * each) for rotor in range(4)
-    ]
+    tried = [(*seen(best.balance.lost(rotor, share)), each, _ERROR * each) for rotor in range(4)]
     # a jump of each channel, in parts of one rotor's usual torque or force there
     jumps = seen(np.tile(share[:, None], 4))
     tried.append((*jumps, lost * [0.0, 0.0, 0.0, 4.0], _ERROR * lost * [2.0, 2.0, 2.0, 4.0]))

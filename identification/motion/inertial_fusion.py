@@ -85,7 +85,11 @@ def _integrate(gyro: Array, force: Array, dt: float, stride: int) -> tuple[Rotat
 
 
 def _steps(
-    T: float, gravity: float, rotation: Rotation, linear: Array, moved: tuple[Rotation, Array, Array]
+    T: float,
+    gravity: float,
+    rotation: Rotation,
+    linear: Array,
+    moved: tuple[Rotation, Array, Array],
 ) -> ArrayPair:
     """Return the steps from each of m knots to the next, ``T`` s later, about the nominal motion:
     their matrices (m, 15, 15), and the next knots' defects (m, 15) by the motion of the IMU.
@@ -138,9 +142,13 @@ def fuse(
     walks = np.square(BIAS_WALK) * T
     spread = np.repeat([gyro_noise, force_noise, force_noise * T**2 / 3.0, *walks], 3)
     started = rotation[0]
-    up = np.abs(started.as_matrix()[2])  # a heading is a turn about the world's vertical, in body axes
+    up = np.abs(
+        started.as_matrix()[2]
+    )  # a heading is a turn about the world's vertical, in body axes
     angles = np.sqrt((TILT_STD * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
-    prior_std = np.append(angles + 1e-4, np.repeat([STEADY_VELOCITY_STD, POSITION_STD, *BIAS_STD], 3))
+    prior_std = np.append(
+        angles + 1e-4, np.repeat([STEADY_VELOCITY_STD, POSITION_STD, *BIAS_STD], 3)
+    )
     begun = linear[0].copy()
     change, std = np.zeros((2, count + 1, N))
     for _ in range(ITERATIONS):

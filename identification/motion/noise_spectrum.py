@@ -123,7 +123,8 @@ def _amplitudes(pieces: Sequence[Array]) -> Array | None:
 
 def _within(low: float, high: float) -> Mask:
     """Return the frequencies (f,) between two shares of half the sampling rate."""
-    return (_SHARES >= low) & (_SHARES <= high)
+    share = _SHARES
+    return (share >= low) & (share <= high)
 
 
 def _slope(amplitude: Array) -> float:
