@@ -59,8 +59,8 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
     ]
     rows = np.arange(first + 1, count)
     calls, to = calls_of(log, rows, filters[0], with_imu)
-    begin = np.searchsorted(to, np.append(rows, count))
-    states, best = np.full((count, STATE), np.nan), np.full(count, -np.inf)
+    last, posed = np.searchsorted(to, rows, side="right") - 1, calls["parts"] == 3
+    states, best = np.full((count, STATE), np.nan), np.full(len(rows), -np.inf)
     states[first] = np.concatenate([log.position[first], log.quaternion[first], np.zeros(6)])
     each = np.arange(len(calls))
     numbers, innovations = np.empty((len(calls), WITHOUT_COVARIANCE)), np.empty((len(calls), 12))
@@ -73,8 +73,7 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
         covariance[moving, moving] = np.square(deviations)
         ukf.reset(log.position[first], log.quaternion[first], covariance)
         make_calls(ukf.record, calls, each, numbers, *others, innovations)
-        last, posed, later = begin[1:] - 1, calls["parts"] == 3, slice(first + 1, None)
-        _core.choose_likeliest(last, posed, numbers, innovations, states[later], best[later])
+        _core.choose_likeliest(last, posed, numbers, innovations, states[first + 1 :], best)
     return states
 
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,8 +36,7 @@ _OMEGA = np.geomspace(0.01, 0.95 * math.pi / DECISION_PERIOD, 600)  # rad/s
 _MOTOR_LAG = 0.04  # s, of the rotors
 
 
-@dataclass(frozen=True, eq=False)
-class JetShape:
+class JetShape(NamedTuple):
     """A torque's profile, for a law. Of two numbers the first is that of the lower places."""
 
     place: Array  # (n,) m along the line

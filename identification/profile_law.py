@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -34,8 +34,7 @@ _ROWS = 100  # decisions of a flight in the jet, at least
 _SLOW = 6.0  # s, over which a place is the flight's way
 
 
-@dataclass(frozen=True, eq=False)
-class ProfiledJet:
+class ProfiledJet(NamedTuple):
     """A flight's profile and the law for it; ``why`` says why there is none.
 
     Attributes:

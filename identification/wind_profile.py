@@ -9,9 +9,8 @@ spline's posterior (Wahba, 1983): they hold 95 % of the places of a curve.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from operator import itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -35,8 +34,7 @@ _WEIGHTS = np.logspace(-4.0, 8.0, 37)  # of the penalty
 _DRAWS = 40
 
 
-@dataclass(frozen=True, eq=False)
-class WindProfile:
+class WindProfile(NamedTuple):
     """Force and torque along one line.
 
     Vectors have three parts: the way of the wind, at right angles to the line; along the line; up.

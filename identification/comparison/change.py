@@ -23,7 +23,7 @@ summed over the kinds.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
@@ -68,8 +68,7 @@ _UNCHANGED = 0.4
 SURE = 0.95  # least probability of a place named without a doubt
 
 
-@dataclass(frozen=True, eq=False)
-class Change:
+class Change(NamedTuple):
     """The change from the flights ``before`` to the flights ``after``."""
 
     before: tuple[Trim, ...]

@@ -6,8 +6,8 @@ Specific force and thrust are means over the same interval. No window of a deriv
 smears the time of a fault.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -40,8 +40,7 @@ RANGE_SHARE = 0.08
 IMPACT = 40.0  # m/s2 of specific force: the vehicle hit something
 
 
-@dataclass(frozen=True, eq=False)
-class Channels:
+class Channels(NamedTuple):
     """The three streams, in this kit's axes and order of rotors."""
 
     name: str
@@ -53,8 +52,7 @@ class Channels:
     motor_names: Names | None = None  # the log's own, of rotors 1 to 4
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(NamedTuple):
     """The streams on the grid, while the vehicle flies and before it tumbles (N intervals)."""
 
     t: Array  # (N,) s, middles

@@ -13,7 +13,6 @@ quadrotor with one rotor in each quadrant. Two questions are asked apart:
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -49,8 +48,7 @@ _ROUNDS = 2  # each fits the noise and searches again
 _SURE = 0.95  # least probability of a fault named without a doubt
 
 
-@dataclass(frozen=True, eq=False)
-class RotorFault:
+class RotorFault(NamedTuple):
     """The result of a search in one flight."""
 
     samples: Samples

@@ -182,10 +182,8 @@ def _first_guess(
     size = float(np.linalg.norm(first))
     up = first / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
     ahead = np.eye(3)[0 if abs(up[0]) < 1.0 - 1e-9 else 1]
-    forward = ahead - (up @ ahead) * up
-    forward /= np.linalg.norm(forward)
-    level = np.stack([forward, np.cross(up, forward), up])
-    start = Rotation.from_matrix(level).as_quat(scalar_first=True)
+    level, _ = Rotation.align_vectors(np.eye(3)[[2, 0]], [up, ahead], weights=[np.inf, 1.0])
+    start = level.as_quat(scalar_first=True)
     _core.level_attitude(rates, imu.force, dt, LEVELLING, start, quaternions)
     out = Rotation.from_quat(quaternions, scalar_first=True)
     if attitudes is not None:

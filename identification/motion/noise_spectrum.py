@@ -7,8 +7,8 @@ of the log shows the noise at the frequencies of the motion: the rest at the top
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +39,7 @@ _SHARES = np.arange(1, SEGMENT // 2 + 1) / (SEGMENT // 2)  # of half the samplin
 DIFFERENCES = 2  # taken before the spectrum, against leakage of slow motion
 
 
-@dataclass(frozen=True)
-class ChannelNoise:
+class ChannelNoise(NamedTuple):
     """The fall of one channel's noise towards half the sampling rate."""
 
     channel: str  # position, attitude, gyro, accelerometer, rotor speeds

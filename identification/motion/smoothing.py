@@ -5,8 +5,8 @@ pass the same filter: a causal filter's output against unfiltered regressors bia
 quarter.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ from ... import _core
 from ...runtime.arrays import Array, Mask
 
 
-@dataclass(frozen=True)
-class Cutoffs:
+class Cutoffs(NamedTuple):
     """Cut-off frequencies (Hz), of low-passes unless stated."""
 
     # a log's pose before it is differentiated, and rotor speeds from commands: wide enough to leave

@@ -2,8 +2,6 @@
 flies as the task does, and no law where there is no jet.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.random import default_rng
@@ -136,7 +134,7 @@ def test_in_calm_air_the_bound_is_the_fastest_fan():
 
 def test_margins_tell_where_the_loop_begins_to_swing():
     loop = following_loop(VEHICLE.inertia[2, 2], FilterNoise())
-    shape = replace(shape_of(PLACE, JET), torque=0.1 * PLACE)
+    shape = shape_of(PLACE, JET)._replace(torque=0.1 * PLACE)
     crossings = np.linspace(1.0, 6.0, 101)
     critical = crossings[np.argmax([loop.margins(c)[0] < 0.0 for c in crossings])]
     gains = np.array([0.8, 1.2]) * critical / 0.1
