@@ -77,7 +77,7 @@ def inertial_wrench(
     if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from both
         numbers[:, POSITION], numbers[:, VELOCITY] = np.nan, np.nan
     quaternion = numbers[:, QUATERNION]
-    quaternion /= np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     numbers[:, MODEL] = variances_along(factors_of(vehicle), loads)
     return WrenchEstimate(numbers, std), loads, _notes(log, pieces, vehicle)
 

@@ -176,9 +176,9 @@ def _estimate(
     estimate = ukf.smooth(events) if isinstance(ukf, RecordingUKF) else WrenchEstimate(numbers, std)
     estimate.numbers[~log.valid, NIS] = np.nan
     estimate.numbers[:first, STATUS] = COASTING
-    series = WrenchSeries(estimate, log.t, vehicle, ukf.tuning, (*log.notes, *doubts), loads)
-    series.notes += (*_notes(log, series, smooth), *_slow_motors(log, vehicle, estimate))
-    return series
+    notes = (*log.notes, *doubts, *_notes(log, estimate, smooth))
+    notes += _slow_motors(log, vehicle, estimate)
+    return WrenchSeries(estimate, log.t, vehicle, ukf.tuning, notes, loads)
 
 
 def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> Names:
@@ -249,10 +249,10 @@ def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> st
     )
 
 
-def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:
+def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[str]:
     """Yield the fate of measurements that were not simply taken in."""
-    refused = np.flatnonzero(series.status_code == REJECTED)
-    restarts = np.repeat(log.t[1:], np.diff(series.restarts))  # s
+    refused = np.flatnonzero(estimate.status_code == REJECTED)
+    restarts = np.repeat(log.t[1:], np.diff(estimate.restarts))  # s
     if refused.size:
         yield (
             f"{refused.size} of {int(log.valid.sum())} poses jump from those before and were "

@@ -142,13 +142,11 @@ def fuse(
     walks = np.square(BIAS_WALK) * T
     spread = np.repeat([gyro_noise, force_noise, force_noise * T**2 / 3.0, *walks], 3)
     started = rotation[0]
-    up = np.abs(
-        started.as_matrix()[2]
-    )  # a heading is a turn about the world's vertical, in body axes
+    # a heading is a turn about the world's vertical, in body axes
+    up = np.abs(started.as_matrix()[2])
     angles = np.sqrt((TILT_STD * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
-    prior_std = np.append(
-        angles + 1e-4, np.repeat([STEADY_VELOCITY_STD, POSITION_STD, *BIAS_STD], 3)
-    )
+    priors = np.repeat([STEADY_VELOCITY_STD, POSITION_STD, *BIAS_STD], 3)
+    prior_std = np.append(angles + 1e-4, priors)
     begun = linear[0].copy()
     change, std = np.zeros((2, count + 1, N))
     for _ in range(ITERATIONS):
