@@ -33,6 +33,7 @@ _SHARES = np.linspace(0.0, 1.3, 14)  # of ``gain * largest torque``, speeds of t
 _FLIGHTS = 120
 _START, _LOST = 0.1, 2.5  # m, from the axis, at the start on either side, and at most
 _OMEGA = np.geomspace(0.01, 0.95 * math.pi / DECISION_PERIOD, 600)  # rad/s
+_CALM = np.zeros((1, 2))  # noise of no flight
 _MOTOR_LAG = 0.04  # s, of the rotors
 
 
@@ -138,7 +139,7 @@ def _flight_loop() -> tuple[Array, Array, Array]:
 
 
 def following_loop(
-    inertia_z: float, filter_noise: FilterNoise, noise: Array | None = None
+    inertia_z: float, filter_noise: FilterNoise, noise: Array = _CALM
 ) -> FollowingLoop:
     """Return the loop of a vehicle with this inertia (kg m2), wrench filter, and measured noise
     (k, 2), under the kit's flight loop.
@@ -146,8 +147,7 @@ def following_loop(
     f = filter_noise
     steps = max(1, round(DECISION_PERIOD / f.period))
     lag = axis_lag(inertia_z, (f.torque, f.torque_walk, f.attitude), Air(), f.period, steps)
-    measured = np.zeros((1, 2)) if noise is None else noise
-    return FollowingLoop(lag.keep, lag.enter, *_flight_loop(), measured)
+    return FollowingLoop(lag.keep, lag.enter, *_flight_loop(), noise)
 
 
 def followed(

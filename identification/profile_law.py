@@ -95,10 +95,10 @@ def profile_log(
     if shape is None:
         return found(why, None, None)
 
-    def loop(rise: float, noise: Array | None = None) -> FollowingLoop:
+    def loop(rise: float, *noise: Array) -> FollowingLoop:
         tuning = UKFTuning.for_vehicle(vehicle, log.period, rise)
         noise_of = FilterNoise.of(tuning, log.period)
-        return following_loop(float(vehicle.inertia[2, 2]), noise_of, noise)
+        return following_loop(float(vehicle.inertia[2, 2]), noise_of, *noise)
 
     own = UKFTuning.for_vehicle(vehicle, log.period, rise_time)
     shown = estimate_log(log, vehicle, own)
