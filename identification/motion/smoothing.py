@@ -9,11 +9,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, savgol_filter, sosfilt_zi, sosfiltfilt, unit_impulse
 from scipy.spatial.transform import Rotation
 
 from ... import _core
-from ..logs.table import Array, Mask, Rows
+from ...runtime.arrays import Array, Mask
 
 
 class Cutoffs(NamedTuple):
@@ -105,7 +106,9 @@ def second_difference(at: Array, step: float, t: Array, x: Array) -> Array:
     return before - 2.0 * middle + after
 
 
-def unbroken(t: Array, rows: Rows, gap: float, count: int = 0, seconds: float = -1.0) -> list[Rows]:
+def unbroken(
+    t: Array, rows: NDArray[np.intp], gap: float, count: int = 0, seconds: float = -1.0
+) -> list[NDArray[np.intp]]:
     """Return the runs of ``rows`` with gaps of at most ``gap`` s, of more than ``count`` rows and
     more than ``seconds`` s.
     """
