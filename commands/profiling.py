@@ -27,8 +27,6 @@ def profile(
 
     Example: windwrench profile hovers.csv --vehicle ardrone2 --write law.yaml
     """
-    from dataclasses import astuple
-
     import numpy as np
     import yaml
 
@@ -49,7 +47,9 @@ def profile(
     log_notes(found.notes)
     p, law = found.profile, found.law
     seen = {"direction_deg": math.degrees(p.direction), "along_wind_m": p.beside}
-    jet = dict(zip(_JET, astuple(found.shape), strict=True)) if found.shape else None
+    jet: dict[str, Any] | None = None
+    if found.shape:
+        jet = dict(zip(_JET, found.shape[2:], strict=True))
     result = {
         "log": flight.name,
         "vehicle": model.name,

@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 
 from .. import _core
-from ..dynamics.effects import get
 from ..dynamics.vehicle import Vehicle
 from ..estimator import Recovery, UKFTuning, WrenchUKF
 from ..estimator.estimate import WITHOUT_COVARIANCE
@@ -24,7 +23,7 @@ from ..estimator.tuning import PERIOD
 from ..estimator.ukf import default_covariance, make_calls
 from .logs.flight_log import FlightLog
 from .logs.table import Array
-from .motion.sensing_effects import delay_of
+from .motion.sensing_effects import delay_of, sensing_of
 from .wrench_series import calls_of
 
 STATE = 13  # numbers: position, quaternion, velocity, angular velocity
@@ -50,9 +49,8 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
     first, count = int(np.flatnonzero(log.valid)[0]), len(log.t)
     # a declared delay has moved the poses off the clock of an IMU
     with_imu = log.gyro is not None and delay_of(vehicle) == 0.0
-    vehicle = replace(
-        vehicle, effects=tuple(e for e in vehicle.effects if get(e.name).kind != "sensing")
-    )
+    sensing = sensing_of(vehicle)
+    vehicle = replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in sensing))
     # with a fixed period: the log's, a median, would depend on later rows
     usual = UKFTuning.for_vehicle(vehicle, PERIOD)
     filters = [
@@ -61,23 +59,21 @@ def causal_states(log: FlightLog, vehicle: Vehicle) -> Array:
     ]
     rows = np.arange(first + 1, count)
     calls, to = calls_of(log, rows, filters[0], with_imu)
-    begin = np.searchsorted(to, np.append(rows, count))
-    states, best = np.full((count, STATE), np.nan), np.full(count, -np.inf)
+    last, posed = np.searchsorted(to, rows, side="right") - 1, calls["parts"] == 3
+    states, best = np.full((count, STATE), np.nan), np.full(len(rows), -np.inf)
     states[first] = np.concatenate([log.position[first], log.quaternion[first], np.zeros(6)])
     each = np.arange(len(calls))
     numbers, innovations = np.empty((len(calls), WITHOUT_COVARIANCE)), np.empty((len(calls), 12))
     others = np.empty((len(calls), 18)), np.empty((len(calls), *LOAD))
+    # at the start the angular velocity and the velocity are not known
+    moving = np.array([3, 4, 5, 9, 10, 11])
+    deviations = np.repeat([Recovery.angular_velocity_std, Recovery.velocity_std], 3)
     for ukf in filters:
         covariance = default_covariance(vehicle, ukf.tuning)
-        for where, deviation in (
-            (slice(3, 6), Recovery.angular_velocity_std),
-            (slice(9, 12), Recovery.velocity_std),
-        ):
-            np.fill_diagonal(covariance[where, where], deviation**2)
+        covariance[moving, moving] = np.square(deviations)
         ukf.reset(log.position[first], log.quaternion[first], covariance)
         make_calls(ukf.record, calls, each, numbers, *others, innovations)
-        last, posed, later = begin[1:] - 1, calls["parts"] == 3, slice(first + 1, None)
-        _core.choose_likeliest(last, posed, numbers, innovations, states[later], best[later])
+        _core.choose_likeliest(last, posed, numbers, innovations, states[first + 1 :], best)
     return states
 
 

@@ -8,6 +8,7 @@ poses, if there are some); their uncertainty is in the standard deviations.
 """
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.spatial.transform import Rotation
 
@@ -57,46 +58,41 @@ def inertial_wrench(
     noise, count = imu_noise(log), len(log.t)
     numbers, std = np.zeros((count, WITHOUT_COVARIANCE)), np.full((count, 18), np.nan)
     numbers[:, STATUS] = COASTING
-    loads = np.zeros((count, *LOAD))
+    table = np.zeros((count, STATE_SIZE + 6 + LOAD[0] * LOAD[1]))
     before = 0
     pieces = inertial_signals(log, vehicle.gravity)
     for number, s in enumerate(pieces):
-        state, spread, load = _piece(s, vehicle, tuning, log.period, noise)
         # rows between two pieces hold the values of the nearer end of the one before
         end = count if number + 1 == len(pieces) else int(np.searchsorted(log.t, s.t[-1]) + 1)
         t = log.t[before:end]
-        numbers[before:end, :STATE_SIZE] = resampled(t, s.t, state)
-        std[before:end, 12:] = resampled(t, s.t, spread)
-        loads[before:end] = resampled(t, s.t, load.reshape(len(s.t), -1)).reshape(-1, *LOAD)
+        table[before:end] = resampled(t, s.t, _piece(s, vehicle, tuning, log.period, noise))
         inside = (t >= s.t[0]) & (t <= s.t[-1] + log.period)
         numbers[before:end, STATUS] = np.where(inside, TRACKING, COASTING)
         before = end
+    numbers[:, :STATE_SIZE], std[:, 12:], loads = np.split(
+        table, [STATE_SIZE, STATE_SIZE + 6], axis=1
+    )
+    loads = loads.reshape(-1, *LOAD)
     numbers[:, NIS] = np.nan
     if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from both
         numbers[:, POSITION], numbers[:, VELOCITY] = np.nan, np.nan
     quaternion = numbers[:, QUATERNION]
-    quaternion /= np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     numbers[:, MODEL] = variances_along(factors_of(vehicle), loads)
     return WrenchEstimate(numbers, std), loads, _notes(log, pieces, vehicle)
 
 
 def _piece(
-    s: InertialSignals,
-    vehicle: Vehicle,
-    tuning: UKFTuning,
-    period: float,
-    noise: Pair,
-) -> tuple[Array, Array, Array]:
-    """Return the state (n, STATE_SIZE) of a piece, laid out as an estimate's, the standard
-    deviations of torque and force (n, 6), and the loads (n, 7, 3), smoothed likewise.
+    s: InertialSignals, vehicle: Vehicle, tuning: UKFTuning, period: float, noise: Pair
+) -> Array:
+    """Return a piece's state, laid out as an estimate's, the standard deviations of torque and
+    force, and the seven loads, smoothed likewise: a row (n, STATE_SIZE + 6 + 21) a sample.
     """
     acting, body = acting_wrench(s, vehicle)
     needed = needed_wrench(s, body)
     steps = s.period / period  # a walk of one step of the log, in one of the signals
-    walk_force, walk_torque, miss_force, miss_torque = (
-        np.broadcast_to(np.asarray(getattr(tuning, name), dtype=np.float64), 3)
-        for name in ("force_walk", "torque_walk", "thrust_noise", "motor_torque_noise")
-    )
+    given = tuning.force_walk, tuning.torque_walk, tuning.thrust_noise, tuning.motor_torque_noise
+    walk_force, walk_torque, miss_force, miss_torque = (np.broadcast_to(x, 3) for x in given)
     # an Ornstein-Uhlenbeck process, or a walk: the factor of a step, and its squared walks
     (keep_force, new_force), (keep_torque, new_torque) = (
         decay_of(np.broadcast_to(time, 3), s.period, period)
@@ -106,36 +102,32 @@ def _piece(
     needs = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
     inverse = np.linalg.inv(body.inertia)
     driven = np.einsum("ij,cnj->nic", inverse, np.stack([acting[:, 3:], *turns]))
-    force, torque = np.empty_like(needs), np.empty_like(driven)
-    spread = np.empty(6)
-    for i in range(3):
+    rates = cumulative_trapezoid(driven, dx=s.period, axis=0, initial=0)
+    rates[:, :, 0] = s.angular_velocity - rates[:, :, 0]
+    force, torque, spread = np.empty_like(needs), np.empty_like(rates), np.empty(6)
+    for i, own in enumerate(np.diagonal(inverse).tolist()):
         variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
-        walk = np.diag([walk_force[i] ** 2 * new_force[i]])
         # a walk hidden by white noise of this variance
-        y, model = needs[:, i], keep_force[i] * np.eye(1)
-        walked, std = _two_sided(y, np.zeros_like(y)[:, None], model, walk, variance)
+        walks = np.diag([walk_force[i] ** 2 * new_force[i]])
+        walked, std = _two_sided(needs[:, i], keep_force[i] * np.eye(1), walks, variance)
         force[:, i], spread[i] = walked[:, 0], std[0]
-        own = inverse[i, i]
-        torque[:, i], spread[3 + i] = _smoothed_turning(
-            s.angular_velocity[:, i],
-            driven[:, i],
-            np.array([[1.0, s.period], [0.0, keep_torque[i]]]),
-            (own * walk_torque[i]) ** 2 * new_torque[i],
-            (own * miss_torque[i] * s.period) ** 2 / steps,
-            max(noise[0], 1e-6) ** 2,
-        )
-        spread[3 + i] /= own
-    off = body.mass * s.bias_std
-    std_force = np.sqrt(spread[:3] ** 2 + np.einsum("nij,j->ni", np.square(s.rotation), off**2))
-    std_torque = np.sqrt(np.einsum("nij,j->ni", np.square(s.rotation), spread[3:] ** 2))
+        # the change of a rate is a walk, the rate beside it is hit by the rotors' errors
+        model = np.array([[1.0, s.period], [0.0, keep_torque[i]]])
+        missed = own * np.array([miss_torque[i] * s.period, walk_torque[i]])
+        walks = np.diag(missed**2 * [1.0 / steps, new_torque[i]])
+        walked, std = _two_sided(rates[:, i], model, walks, max(noise[0], 1e-6) ** 2)
+        torque[:, i], spread[3 + i] = walked[:, 1], std[1] / own
+    turned = np.square(s.rotation)
+    std_force = np.sqrt(spread[:3] ** 2 + turned @ (body.mass * s.bias_std) ** 2)
+    std_torque = np.sqrt(turned @ spread[3:] ** 2)
     state = np.zeros((len(s.t), STATE_SIZE))
     state[:, POSITION], state[:, VELOCITY] = s.position, s.velocity
     state[:, RATE] = s.angular_velocity
     state[:, QUATERNION] = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
     torque = np.einsum("nij,jk,nkc->cni", s.rotation, body.inertia, torque)
     state[:, TORQUE], state[:, FORCE] = torque[0], force[:, :, 0]
-    load = np.stack([*torque[1:3], *np.moveaxis(force[:, :, 1:], 2, 0), *torque[3:]], axis=1)
-    return state, np.column_stack([std_torque, std_force]), load
+    loads = *torque[1:3], force[:, :, 1], force[:, :, 2], *torque[3:]
+    return np.column_stack([state, std_torque, std_force, *loads])
 
 
 def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array], list[Array]]:
@@ -151,26 +143,11 @@ def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array
     turns = [(thrust, none, none), (none, thrust, none), (x, y, none), (none, none, z)]
     return (
         [thrust[:, None] * s.rotation[:, :, 2], needed[:, :3]],
-        [*(np.column_stack(turn) for turn in turns), turning],
+        [*map(np.column_stack, turns), turning],
     )
 
 
-def _smoothed_turning(
-    rate: Array, driven: Array, model: Array, walk: float, miss: float, variance: float
-) -> tuple[Array, float]:
-    """Return the angular acceleration (n, c) rad/s2 of an angular velocity (n,) beside the first
-    drive, its standard deviation, and the same of each other drive in action beside it.
-    """
-    acting = 0.5 * model[0, 1] * (driven[:-1] + driven[1:])
-    drive = np.zeros((len(rate), 2, driven.shape[1]))
-    drive[1:, 0] = acting
-    shown = np.column_stack([rate, np.cumsum(drive[:, 0, 1:], axis=0)])
-    drive[:, :, 1:] = 0.0
-    out, std = _two_sided(shown, drive, model, np.diag([miss, walk]), variance)
-    return out[:, 1], float(std[1])
-
-
-def _two_sided(y: Array, drive: Array, model: Array, noise: Array, variance: float) -> ArrayPair:
+def _two_sided(y: Array, model: Array, noise: Array, variance: float) -> ArrayPair:
     """Return the states (n, m, c) of a steady fixed-interval smoother with measurements (n, c) of
     the first, and their standard deviations (m,).
     """
@@ -181,19 +158,16 @@ def _two_sided(y: Array, drive: Array, model: Array, noise: Array, variance: flo
     after = P - np.outer(gain, P[0])
     back = np.linalg.solve(P, model @ after).T
     smoothed = solve_discrete_lyapunov(back, after - back @ P @ back.T)
-    predicted, filtered = np.empty_like(drive), np.empty_like(drive)
-    x = np.zeros(drive.shape[1:])
+    predicted, states = np.empty((2, len(y), m, y.shape[1]))
+    x = np.zeros(states.shape[1:])
     x[0] = np.mean(y[: max(1, len(y) // 200)], axis=0)
-    for k in range(len(y)):
-        if k:
-            x = model @ x + drive[k]
+    for k, measured in enumerate(y):
         predicted[k] = x
-        x = x + np.outer(gain, y[k] - x[0])
-        filtered[k] = x
-    out = filtered.copy()
+        states[k] = x + np.outer(gain, measured - x[0])
+        x = model @ states[k]
     for k in range(len(y) - 2, -1, -1):
-        out[k] = filtered[k] + back @ (out[k + 1] - predicted[k + 1])
-    return out, np.sqrt(np.maximum(np.diagonal(smoothed), 0.0))
+        states[k] += back @ (states[k + 1] - predicted[k + 1])
+    return states, np.sqrt(np.maximum(np.diagonal(smoothed), 0.0))
 
 
 def _notes(log: FlightLog, pieces: list[InertialSignals], vehicle: Vehicle) -> Names:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,30 +33,32 @@ _SHARES = np.linspace(0.0, 1.3, 14)  # of ``gain * largest torque``, speeds of t
 _FLIGHTS = 120
 _START, _LOST = 0.1, 2.5  # m, from the axis, at the start on either side, and at most
 _OMEGA = np.geomspace(0.01, 0.95 * math.pi / DECISION_PERIOD, 600)  # rad/s
+_CALM = np.zeros((1, 2))  # noise of no flight
 _MOTOR_LAG = 0.04  # s, of the rotors
 
 
-@dataclass(frozen=True)
-class JetShape:
+class JetShape(NamedTuple):
     """A torque's profile, for a law. Of two numbers the first is that of the lower places."""
 
+    place: Array  # (n,) m along the line
+    torque: Array  # (n,) Nm; zero beyond
     axis: float  # m, where the torque is zero
     slope: float  # Nm/m, the steepest over 0.2 m
-    torques: Pair  # Nm, the largest
-    peaks: Pair  # m, where they are; beyond, the fan is lost
-    edges: Pair  # m; beyond, the torque is below a fifth of the largest
+    torques: Array  # (2,) Nm, the largest
+    peaks: Array  # (2,) m, where they are; beyond, the fan is lost
+    edges: Array  # (2,) m; beyond, the torque is below a fifth of the largest
 
     @property
     def weaker(self) -> float:
         """The smaller one of the two largest torques, Nm."""
-        return min(-self.torques[0], self.torques[1])
+        return float(min(-self.torques[0], self.torques[1]))
 
 
 def shape_of(place: Array, torque: Array) -> JetShape | None:
     """Return the shape of a torque's profile (n,) that rises through zero between its extremes;
     None where it does not.
     """
-    ends = low, high = int(np.argmin(torque)), int(np.argmax(torque))
+    low, high = ends = np.array([np.argmin(torque), np.argmax(torque)])
     if low >= high or torque[low] >= 0.0 or torque[high] <= 0.0:
         return None
     rising = low + np.flatnonzero(torque[low + 1 : high + 1] >= 0.0)[0]
@@ -65,13 +67,9 @@ def shape_of(place: Array, torque: Array) -> JetShape | None:
     inside = torque < EDGE_SHARE * torque[low], torque > EDGE_SHARE * torque[high]
     left = low - np.argmin(np.append(inside[0][low::-1], False)) + 1
     right = high + np.argmin(np.append(inside[1][high:], False)) - 1
-    return JetShape(
-        float(axis),
-        float((ahead - behind).max()) / 0.2,
-        (float(torque[low]), float(torque[high])),
-        (float(place[ends[0]]), float(place[ends[1]])),
-        (float(place[left]), float(place[right])),
-    )
+    slope = float((ahead - behind).max()) / 0.2
+    edges = place[[left, right]]
+    return JetShape(place, torque, float(axis), slope, torque[ends], place[ends], edges)
 
 
 def no_jet(place: Array, torque: Array, std: Array) -> str:
@@ -126,11 +124,12 @@ class FollowingLoop:
         return (1.0 - felt * (z[:, 0, 0] - 1.0)) * (moved[..., 0] @ self.show)
 
 
-@lru_cache(maxsize=2)
-def _flight_loop(gains: FlightGains) -> tuple[Array, Array, Array]:
-    """Return the flight loop along one axis, from decision to decision."""
+@lru_cache(maxsize=1)
+def _flight_loop() -> tuple[Array, Array, Array]:
+    """Return the kit's flight loop along one axis, from decision to decision."""
     from scipy.signal import cont2discrete, tf2ss
 
+    gains = FlightGains()
     answer = gains.attitude * np.array([gains.velocity, gains.position, gains.integral])
     rotors = np.polymul([_MOTOR_LAG, 1.0], [1.0, gains.rate, gains.attitude])
     closed = np.polyadd(np.append(rotors, [0.0, 0.0, 0.0]), answer)
@@ -140,7 +139,7 @@ def _flight_loop(gains: FlightGains) -> tuple[Array, Array, Array]:
 
 
 def following_loop(
-    inertia_z: float, filter_noise: FilterNoise, noise: Array | None = None
+    inertia_z: float, filter_noise: FilterNoise, noise: Array = _CALM
 ) -> FollowingLoop:
     """Return the loop of a vehicle with this inertia (kg m2), wrench filter, and measured noise
     (k, 2), under the kit's flight loop.
@@ -148,27 +147,18 @@ def following_loop(
     f = filter_noise
     steps = max(1, round(DECISION_PERIOD / f.period))
     lag = axis_lag(inertia_z, (f.torque, f.torque_walk, f.attitude), Air(), f.period, steps)
-    measured = np.zeros((1, 2)) if noise is None else noise
-    return FollowingLoop(lag.keep, lag.enter, *_flight_loop(FlightGains()), measured)
+    return FollowingLoop(lag.keep, lag.enter, *_flight_loop(), noise)
 
 
 def followed(
-    loop: FollowingLoop,
-    place: Array,
-    torque: Array,
-    shape: JetShape,
-    gains: Array,
-    speeds: Array,
-    seed: int = 0,
+    loop: FollowingLoop, jet: JetShape, gains: Array, speeds: Array, seed: int = 0
 ) -> ArrayPair:
     """Fly the law behind fans of steady speeds. Each flight begins anywhere in the measured noise,
     with either sign; flights are the same for all gains and speeds.
 
     Args:
         loop: filter, flight loop and noise.
-        place: (n,) m of the profile.
-        torque: (n,) Nm; zero beyond.
-        shape: of this profile.
+        jet: the torque's profile.
         gains: (g,) m/s per Nm.
         speeds: (g, s) m/s.
         seed: of the flights.
@@ -181,10 +171,10 @@ def followed(
     first = rng.integers(len(loop.noise), size=_FLIGHTS)
     sides, signs = rng.choice([-1.0, 1.0], (2, _FLIGHTS))
     start = rng.uniform(-_START, _START, _FLIGHTS)
-    at, decisions = place - shape.axis, round(FLIGHT_TIME / DECISION_PERIOD)
-    left, right = np.array(shape.edges) - shape.axis
+    at, decisions = jet.place - jet.axis, round(FLIGHT_TIME / DECISION_PERIOD)
+    left, right = jet.edges - jet.axis
     state, error = np.zeros((len(loop.push), *size)), np.zeros((3, *size))
-    felt = np.broadcast_to(np.interp(start, at, torque), size)
+    felt = np.broadcast_to(np.interp(start, at, jet.torque), size)
     held, square = np.ones(size, dtype=bool), np.zeros(size)
     for k in range(decisions):
         noise, drift = signs * loop.noise[(first + k) % len(loop.noise)].T
@@ -193,7 +183,7 @@ def followed(
         state = np.tensordot(loop.carry, state, 1) + np.multiply.outer(loop.push, command)
         fan = sides * speeds[..., None] * DECISION_PERIOD * (k + 1)
         offset = np.tensordot(loop.show, state, 1) + start + drift - fan
-        true = np.interp(offset, at, torque, 0.0, 0.0)
+        true = np.interp(offset, at, jet.torque, 0.0, 0.0)
         error = np.tensordot(loop.keep, error, 1) + np.multiply.outer(loop.enter, true - felt)
         felt = true
         held &= (offset >= left) & (offset <= right)
@@ -201,12 +191,10 @@ def followed(
     return held.mean(axis=2), np.sqrt(square / decisions).mean(axis=2)
 
 
-def fastest_followed(
-    loop: FollowingLoop, place: Array, torque: Array, shape: JetShape, gains: Array
-) -> Array:
+def fastest_followed(loop: FollowingLoop, jet: JetShape, gains: Array) -> Array:
     """Return the fastest fan (g,) m/s that each gain follows in ``HELD_SHARE`` of its flights."""
-    speeds = np.minimum(gains * shape.weaker, MAX_COMMAND)[:, None] * _SHARES
-    shares = np.minimum.accumulate(followed(loop, place, torque, shape, gains, speeds)[0], axis=1)
+    speeds = np.minimum(gains * jet.weaker, MAX_COMMAND)[:, None] * _SHARES
+    shares = np.minimum.accumulate(followed(loop, jet, gains, speeds)[0], axis=1)
     rows = zip(shares[:, ::-1], speeds[:, ::-1], strict=True)
     return np.array([np.interp(HELD_SHARE, *row) for row in rows])
 
@@ -214,9 +202,7 @@ def fastest_followed(
 def design_admittance(
     loop: FollowingLoop,
     lagging: Callable[[float], FollowingLoop],
-    place: Array,
-    torque: Array,
-    shape: JetShape,
+    jet: JetShape,
     speed: float | None = None,
 ) -> NamedNumbers | None:
     """Return the gain with the least offset behind fans of all speeds up to one, among those with a
@@ -225,26 +211,24 @@ def design_admittance(
     Args:
         loop: that flies.
         lagging: the loop of a filter's rise time, s.
-        place: (n,) m of the profile.
-        torque: (n,) Nm.
-        shape: of the profile.
+        jet: the torque's profile.
         speed: m/s, the largest of these fans; default: half of the fastest that any gain follows.
     """
-    flown = place, torque, shape
     crossings = np.array([c for c in _CROSSINGS if loop.margins(c)[0] >= MARGIN])
-    gains = crossings / shape.slope
-    fastest = fastest_followed(loop, *flown, gains)
+    gains = crossings / jet.slope
+    fastest = fastest_followed(loop, jet, gains)
     if not fastest.any():
         return None
     wanted = 0.5 * float(fastest.max()) if speed is None else speed
     alike = np.tile(wanted * np.linspace(0.0, 1.0, 5), (len(gains), 1))
-    offsets = followed(loop, *flown, gains, alike, 1)[1].mean(axis=1)
+    offsets = followed(loop, jet, gains, alike, 1)[1].mean(axis=1)
     best = int(np.argmin(offsets))
-    margin, delay = loop.margins(crossings[best])
-    slow = [rise for rise in RISE_TIMES if lagging(rise).margins(crossings[best])[0] >= MARGIN]
+    gain, crossing = float(gains[best]), crossings[best]
+    margin, delay = loop.margins(crossing)
+    slow = [rise for rise in RISE_TIMES if lagging(rise).margins(crossing)[0] >= MARGIN]
     return {
-        "gain": float(gains[best]),
-        "bound_m_s": min(float(gains[best]) * shape.weaker, MAX_COMMAND),
+        "gain": gain,
+        "bound_m_s": min(gain * jet.weaker, MAX_COMMAND),
         "fastest_fan_m_s": float(fastest[best]),
         "designed_up_to_m_s": wanted,
         "offset_rms_m": float(offsets[best]),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -25,17 +25,16 @@ from .jet_design import (
     shape_of,
 )
 from .logs.flight_log import FlightLog
-from .logs.table import Array, Data, Names, Pair, finite_rows
+from .logs.table import Array, Data, Names, finite_rows
 from .wind_profile import WindProfile, wind_profile
-from .wrench_series import estimate_log
+from .wrench_series import WrenchSeries, estimate_log
 
 RISE_TIME = 0.45  # s, of the filter in the tasks
 _ROWS = 100  # decisions of a flight in the jet, at least
 _SLOW = 6.0  # s, over which a place is the flight's way
 
 
-@dataclass(frozen=True, eq=False)
-class ProfiledJet:
+class ProfiledJet(NamedTuple):
     """A flight's profile and the law for it; ``why`` says why there is none.
 
     Attributes:
@@ -91,49 +90,43 @@ def profile_log(
             others.append(wind_profile(series, profile.direction, beside))
     found = partial(ProfiledJet, profile, tuple(others), notes=series.notes)
     std = (profile.high - profile.wrench)[5] / 1.96
-    why, shape = no_jet(profile.place, profile.torque, std), None
-    if not why:
-        shape = shape_of(profile.place, profile.torque)
+    why = no_jet(profile.place, profile.torque, std)
+    shape = None if why else shape_of(profile.place, profile.torque)
     if shape is None:
         return found(why, None, None)
 
-    def loop(rise: float, noise: Array | None = None) -> FollowingLoop:
+    def loop(rise: float, *noise: Array) -> FollowingLoop:
         tuning = UKFTuning.for_vehicle(vehicle, log.period, rise)
         noise_of = FilterNoise.of(tuning, log.period)
-        return following_loop(float(vehicle.inertia[2, 2]), noise_of, noise)
+        return following_loop(float(vehicle.inertia[2, 2]), noise_of, *noise)
 
-    noise = _noise(log, vehicle, profile, shape.edges, rise_time, loop(rise_time))
+    own = UKFTuning.for_vehicle(vehicle, log.period, rise_time)
+    shown = estimate_log(log, vehicle, own)
+    noise = _noise(shown, 4.0 * rise_time, profile, shape, loop(rise_time))
     if len(noise) < _ROWS:
         return found(f"only {DECISION_PERIOD * len(noise):.0f} s lie in the jet", shape, None)
     flying = loop(rise_time, noise)
-    law = design_admittance(flying, loop, profile.place, profile.torque, shape, speed)
+    law = design_admittance(flying, loop, shape, speed)
     if law is None:
         return found("the torque's noise lets no gain follow a fan", shape, None)
     drawn = []
     for torque in profile.torque_draws:
         if one := shape_of(profile.place, torque):
             bound = min(law["gain"] * one.weaker, MAX_COMMAND)
-            gain = np.array([law["gain"]])
-            drawn.append((bound, fastest_followed(flying, profile.place, torque, one, gain)[0]))
+            drawn.append((bound, *fastest_followed(flying, one, np.array([law["gain"]]))))
     ends = np.quantile(drawn, (0.025, 0.975), axis=0).T.tolist()
     names = "bound_ci95_m_s", "fastest_fan_ci95_m_s"
     return found("", shape, law | dict(zip(names, ends, strict=True)))
 
 
 def _noise(
-    log: FlightLog,
-    vehicle: Vehicle,
-    profile: WindProfile,
-    edges: Pair,
-    rise_time: float,
-    loop: FollowingLoop,
+    series: WrenchSeries, settled: float, profile: WindProfile, jet: JetShape, loop: FollowingLoop
 ) -> Array:
-    """Return the noise (k, 2) of a flight within the ``edges`` (m) of a jet, a row a decision: of
-    the torque about z that the vehicle's own filter shows (Nm), and of the place (m).
+    """Return the noise (k, 2) of a flight within a jet's edges, a row a decision: of the torque
+    about z that the vehicle's own filter shows after it ``settled`` (s), Nm, and of the place (m).
     """
-    series = estimate_log(log, vehicle, UKFTuning.for_vehicle(vehicle, log.period, rise_time))
-    t = np.arange(log.t[0] + 4.0 * rise_time, log.t[-1], DECISION_PERIOD)
-    rows = np.searchsorted(log.t, t)
+    t = np.arange(series.t[0] + settled, series.t[-1], DECISION_PERIOD)
+    rows = np.searchsorted(series.t, t)
     place = profile.along(series.position)[rows]
     true = np.interp(place, profile.place, profile.torque)
     error, expected = np.zeros(3), true.copy()
@@ -142,5 +135,6 @@ def _noise(
         expected[k] -= error[2]
     way = uniform_filter1d(place, round(_SLOW / DECISION_PERIOD), mode="nearest")
     noise = np.column_stack([series.torque[rows, 2] - expected, place - way])
-    inside = noise[(place > edges[0]) & (place < edges[1]) & finite_rows(noise)]
+    low, high = jet.edges
+    inside = noise[(place > low) & (place < high) & finite_rows(noise)]
     return np.asarray(inside - inside.mean(axis=0)) if len(inside) else inside

@@ -9,11 +9,13 @@ spline's posterior (Wahba, 1983): they hold 95 % of the places of a curve.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
+from scipy.ndimage import label, median
 
 from ..estimator.estimate import TRACKING
 from ..runtime.errors import InputError
@@ -32,8 +34,7 @@ _WEIGHTS = np.logspace(-4.0, 8.0, 37)  # of the penalty
 _DRAWS = 40
 
 
-@dataclass(frozen=True, eq=False)
-class WindProfile:
+class WindProfile(NamedTuple):
     """Force and torque along one line.
 
     Vectors have three parts: the way of the wind, at right angles to the line; along the line; up.
@@ -105,15 +106,17 @@ def wind_profile(
     slow = moved < _FASTEST * MEAN
     used = means[slow]
     direction = _direction(used) if axis is None else axis
-    if float(np.sum(used[:, 3:6] @ _ways(direction)[0])) < 0.0:
-        direction += math.pi
     ways = _ways(direction)
+    if np.sum(used[:, 3:6] @ ways[0]) < 0.0:
+        direction += math.pi
+        ways = _ways(direction)
     beyond = used[:, :3] @ ways[0]
-    number = _groups(beyond)
-    lines = np.array([np.median(beyond[number == k]) for k in range(max(number) + 1)])
-    sizes = np.bincount(number[number >= 0]) if beside is None else -np.abs(lines - beside)
+    number, full = _lines_of(beyond)
+    lines = median(beyond, number, full)
+    nearest = np.bincount(number)[1:] if beside is None else -np.abs(lines - beside)
+    line = int(np.argmax(nearest))
     chosen = np.zeros(len(means), dtype=bool)
-    chosen[slow] = number == int(np.argmax(sizes))
+    chosen[slow] = number == full[line]
     here = good.copy()
     here[good] = np.repeat(chosen, counts)
     place = rows[here, :3] @ ways[1]
@@ -129,7 +132,7 @@ def wind_profile(
     mean, half = np.stack(wrench), 1.96 * np.stack(std)
     return WindProfile(
         math.remainder(direction, 2.0 * math.pi),
-        float(lines[np.argmax(sizes)]),
+        float(lines[line]),
         lines,
         at,
         mean,
@@ -150,12 +153,13 @@ def _direction(means: Array) -> float:
     return math.atan2(y, x)
 
 
-def _groups(x: Array) -> Rows:
-    """Return the number (n,) of the run of full bins that holds each value; -1: of none."""
+def _lines_of(x: Array) -> tuple[Rows, Rows]:
+    """Return the number (n,) of the run of full bins that holds each value, 0: of none; and the
+    numbers of all runs, from 1.
+    """
     bins = np.floor((x - x.min()) / _BAND).astype(int)
-    full = np.bincount(bins) >= _SHARE * len(x)
-    number = np.cumsum(np.diff(full.astype(int), prepend=0) > 0) - 1
-    return np.asarray(np.where(full, number, -1)[bins])
+    number, count = label(np.bincount(bins) >= _SHARE * len(x))
+    return number[bins], np.arange(1, count + 1)
 
 
 def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Array, Array, float]:
@@ -199,12 +203,13 @@ def _fit(X: Array, y: Array) -> ArrayPair:
     """
     XX, Xy, size = X.T @ X, X.T @ y, X.shape[1]
     bend, scale = np.diff(np.eye(size), 2, axis=0), float(np.trace(XX)) / size
-    found = []
-    for weight in scale * _WEIGHTS:
+
+    def fitted(weight: float) -> tuple[float, Array, Any]:
         factor = cho_factor(XX + weight * bend.T @ bend + 1e-9 * scale * np.eye(size))
         beta = cho_solve(factor, Xy)
-        spread = 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
+        spread = 2.0 * np.log(np.diag(factor[0])).sum()
         # a straight line costs no penalty
-        found.append((spread - float(beta @ Xy) - (size - 2) * math.log(weight), factor, beta))
-    _, factor, beta = min(found, key=lambda one: one[0])
+        return spread - beta @ Xy - (size - 2) * math.log(weight), beta, factor
+
+    _, beta, factor = min(map(fitted, scale * _WEIGHTS), key=itemgetter(0))
     return beta, cho_solve(factor, np.eye(size))

@@ -128,7 +128,6 @@ def estimate_log(
             (``screen_log``), or its rotor speeds make the filter's numbers overflow.
     """
     log, doubts = screen_log(log, vehicle, None)
-    report = report or (lambda share: None)
     return _estimate(log, vehicle, tuning, report, smooth, gate, doubts)
 
 
@@ -136,7 +135,7 @@ def _estimate(
     log: FlightLog,
     vehicle: Vehicle,
     tuning: UKFTuning | None = None,
-    report: Callable[[float], None] = lambda share: None,
+    report: Callable[[float], None] | None = None,
     smooth: bool = False,
     gate: float | None = GATE,
     doubts: Names = (),
@@ -159,7 +158,8 @@ def _estimate(
     numbers[: first + 1] = ukf.estimate.numbers[:WITHOUT_COVARIANCE]
     std[: first + 1] = ukf.estimate.std
     for begin in range(first + 1, count, _REPORTED):
-        report(begin / count)
+        if report is not None:
+            report(begin / count)
         rows = np.arange(begin, min(begin + _REPORTED, count))
         calls, to = calls_of(log, rows, ukf, not smooth)
         made = make_calls(ukf.record, calls, to, numbers, std, loads)
@@ -176,9 +176,9 @@ def _estimate(
     estimate = ukf.smooth(events) if isinstance(ukf, RecordingUKF) else WrenchEstimate(numbers, std)
     estimate.numbers[~log.valid, NIS] = np.nan
     estimate.numbers[:first, STATUS] = COASTING
-    series = WrenchSeries(estimate, log.t, vehicle, ukf.tuning, (*log.notes, *doubts), loads)
-    series.notes += (*_notes(log, series, smooth), *_slow_motors(log, vehicle, estimate))
-    return series
+    notes = (*log.notes, *doubts, *_notes(log, estimate, smooth))
+    notes += _slow_motors(log, vehicle, estimate)
+    return WrenchSeries(estimate, log.t, vehicle, ukf.tuning, notes, loads)
 
 
 def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> Names:
@@ -249,10 +249,10 @@ def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> st
     )
 
 
-def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:
+def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[str]:
     """Yield the fate of measurements that were not simply taken in."""
-    refused = np.flatnonzero(series.status_code == REJECTED)
-    restarts = np.repeat(log.t[1:], np.diff(series.restarts))  # s
+    refused = np.flatnonzero(estimate.status_code == REJECTED)
+    restarts = np.repeat(log.t[1:], np.diff(estimate.restarts))  # s
     if refused.size:
         yield (
             f"{refused.size} of {int(log.valid.sum())} poses jump from those before and were "
@@ -322,20 +322,18 @@ def calls_of(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tupl
     one period, and a correction by its measurements; and the row of each call.
     """
     steps = [steps_between(dt, ukf.period) for dt in (log.t[rows] - log.t[rows - 1]).tolist()]
-    imu, read = np.zeros((len(rows), 6)), np.zeros(len(rows), dtype=np.int64)
-    sensors = (log.gyro, log.accelerometer) if with_imu else ()
-    for part, sensor in enumerate(sensors):
-        if sensor is not None:
-            imu[:, 3 * part : 3 * part + 3] = np.nan_to_num(sensor[rows])
-            read += IMU_PARTS[part] * finite_rows(sensor[rows])
+    sensors = [log.gyro, log.accelerometer] if with_imu else [None, None]
+    felt = [np.full((len(rows), 3), np.nan) if x is None else x[rows] for x in sensors]
+    read = np.transpose([finite_rows(x) for x in felt]) @ IMU_PARTS
     carried, posed = np.repeat(rows, list(map(len, steps))), rows[log.valid[rows]]
     to = np.concatenate([carried, rows[read > 0], posed])
     calls = np.zeros(len(to), dtype=CALL)
     speeds = 0.5 * (log.rotor_speeds[to - 1] + log.rotor_speeds[to])
     convert(calls["z"], speeds, log.position[to], log.quaternion[to])
-    felt = slice(len(carried), len(to) - len(posed))
-    calls["z"][felt, :6], calls["parts"][felt] = imu[read > 0], read[read > 0]
-    calls["parts"][felt.stop :], calls["dt"][: felt.start] = 3, np.concatenate(steps)
+    imu = slice(len(carried), len(to) - len(posed))
+    calls["z"][imu, :6] = np.nan_to_num(np.hstack(felt)[read > 0])
+    calls["parts"][imu], calls["parts"][imu.stop :] = read[read > 0], 3
+    calls["dt"][: imu.start] = np.concatenate(steps)
     calls["voltage"] = ukf.vehicle.voltage_ref
     if log.voltage is not None:
         calls["voltage"] = 0.5 * (log.voltage[to - 1] + log.voltage[to])
@@ -361,5 +359,5 @@ def truth_rmse(series: WrenchSeries, log: FlightLog) -> ArrayPair | None:
     """
     if log.force is None or log.torque is None:
         return None
-    off = series.force - log.force, series.torque - log.torque
-    return np.sqrt(mean_square(off[0])), np.sqrt(mean_square(off[1]))
+    force, torque = series.force - log.force, series.torque - log.torque
+    return np.sqrt(mean_square(force)), np.sqrt(mean_square(torque))

@@ -4,14 +4,23 @@ for Foxglove and PlotJuggler.
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from ..runtime.extras import need
 from ..runtime.whole_files import replaced
 from .wrench_series import WrenchSeries
 
 _FRAME = "world"
-_WRENCH, _POSE = "geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/PoseStamped"
+_TOPICS = {
+    "/wrench": "geometry_msgs/msg/WrenchStamped",
+    "/wrench_std": "geometry_msgs/msg/WrenchStamped",
+    "/pose": "geometry_msgs/msg/PoseStamped",
+}
+# time, header, vector, point, quaternion, wrench, pose
+_PARTS = (
+    *("builtin_interfaces/msg/Time", "std_msgs/msg/Header"),
+    *("geometry_msgs/msg/Vector3", "geometry_msgs/msg/Point", "geometry_msgs/msg/Quaternion"),
+    *("geometry_msgs/msg/Wrench", "geometry_msgs/msg/Pose"),
+)
 
 
 def write_mcap(series: WrenchSeries, path: Path) -> None:
@@ -26,15 +35,7 @@ def write_mcap(series: WrenchSeries, path: Path) -> None:
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-
-    def made(name: str, *values: Any) -> Any:
-        package, kind = name.split("/")
-        return store.types[f"{package}/msg/{kind}"](*values)
-
-    def vector(x: Any, kind: str = "Vector3") -> Any:
-        return made(f"geometry_msgs/{kind}", *x)
-
-    names = {"/wrench": _WRENCH, "/wrench_std": _WRENCH, "/pose": _POSE}
+    time, header, vector, point, quaternion, wrench, pose = (store.types[name] for name in _PARTS)
     begin = min(float(series.t[0]), 0.0)  # a bag's times are not negative
     columns = (
         *(series.force, series.torque, series.std_force, series.std_torque),
@@ -45,22 +46,18 @@ def write_mcap(series: WrenchSeries, path: Path) -> None:
         with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
             topics = {
                 topic: writer.add_connection(topic, name, typestore=store)
-                for topic, name in names.items()
+                for topic, name in _TOPICS.items()
             }
-            rows = zip(series.t.tolist(), *(x.tolist() for x in columns), strict=True)
-            for t, force, torque, std_force, std_torque, position, quaternion in rows:
+            for t, *row in zip(series.t.tolist(), *columns, strict=True):
                 at = round(1e9 * (t - begin))
-                stamp = made("builtin_interfaces/Time", at // 10**9, at % 10**9)
-                header = made("std_msgs/Header", stamp, _FRAME)
-                turned = made("geometry_msgs/Quaternion", *quaternion)
-                parts = {
-                    "/wrench": made("geometry_msgs/Wrench", vector(force), vector(torque)),
-                    "/wrench_std": made(
-                        "geometry_msgs/Wrench", vector(std_force), vector(std_torque)
-                    ),
-                    "/pose": made("geometry_msgs/Pose", vector(position, "Point"), turned),
-                }
-                for topic, part in parts.items():
-                    message = store.types[names[topic]](header, part)
-                    writer.write(topics[topic], at, store.serialize_cdr(message, names[topic]))
+                stamped = header(time(at // 10**9, at % 10**9), _FRAME)
+                force, torque, std_force, std_torque = (vector(*x.tolist()) for x in row[:4])
+                parts = (
+                    wrench(force, torque),
+                    wrench(std_force, std_torque),
+                    pose(point(*row[4].tolist()), quaternion(*row[5].tolist())),
+                )
+                for (topic, name), part in zip(_TOPICS.items(), parts, strict=True):
+                    message = store.types[name](stamped, part)
+                    writer.write(topics[topic], at, store.serialize_cdr(message, name))
         (bag / "track.mcap").replace(partial)

@@ -23,7 +23,7 @@ summed over the kinds.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
@@ -43,11 +43,11 @@ _ROTORS = {
     "rotor 4 (front-right)": (-1.0, 1.0),
 }
 _SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
-# possible changes at each place
-_KINDS = {
-    **dict.fromkeys(_ROTORS, ("weaker", "carries more")),
-    **dict.fromkeys((*_SIDES, "all rotors"), ("carries more",)),
-    SOMETHING_ELSE: ("",),
+# possible changes, by place and kind; with their share of a place's prior: all places are alike
+_CHANGES = {
+    **{(rotor, kind): 0.5 for rotor in _ROTORS for kind in ("weaker", "carries more")},
+    **dict.fromkeys([(place, "carries more") for place in (*_SIDES, "all rotors")], 1.0),
+    (SOMETHING_ELSE, ""): 1.0,
 }
 
 _AMOUNTS = 80  # amounts of a change in the sum of its evidence
@@ -68,8 +68,7 @@ _UNCHANGED = 0.4
 SURE = 0.95  # least probability of a place named without a doubt
 
 
-@dataclass(frozen=True, eq=False)
-class Change:
+class Change(NamedTuple):
     """The change from the flights ``before`` to the flights ``after``."""
 
     before: tuple[Trim, ...]
@@ -124,9 +123,8 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     prior = log_softmax(-0.5 * np.square(amounts / _USUAL_AMOUNT))
     nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
     # log posterior, and mean and deviation of the amount; keys: place and kind
-    logs = {(NOWHERE, ""): nothing + math.log(_UNCHANGED)}
-    sizes = {(NOWHERE, ""): (0.0, 0.0)}
-    for place, kind in ((place, kind) for place, kinds in _KINDS.items() for kind in kinds):
+    found = {(NOWHERE, ""): (nothing + math.log(_UNCHANGED), 0.0, 0.0)}
+    for (place, kind), share in _CHANGES.items():
         if place == SOMETHING_ELSE:
             means, spread = np.zeros((_AMOUNTS, 4)), np.repeat(amounts[:, None], 4, axis=1)
         else:
@@ -135,24 +133,23 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         every = logs_of(means, spread) + prior
         weights = softmax(every)
         middle = float(amounts @ weights)
-        sizes[place, kind] = middle, math.sqrt(float(np.square(amounts - middle) @ weights))
-        # each place is as likely as the other beforehand
-        each = (1.0 - _UNCHANGED) / (len(_KINDS) * len(_KINDS[place]))
-        logs[place, kind] = float(logsumexp(every)) + math.log(each)
-    chances = dict(zip(logs, softmax(list(logs.values())).tolist(), strict=True))
-    places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in logs}
+        std = math.sqrt(float(np.square(amounts - middle) @ weights))
+        each = (1.0 - _UNCHANGED) * share / sum(_CHANGES.values())
+        found[place, kind] = float(logsumexp(every)) + math.log(each), middle, std
+    chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
+    places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
     likeliest = max(places, key=places.__getitem__)
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
-    share = np.exp(ways.log)
+    likely = np.exp(ways.log)
     return Change(
         tuple(before),
         tuple(after),
-        share @ ways.mean,
-        np.sqrt(share @ unchanged),
+        likely @ ways.mean,
+        np.sqrt(likely @ unchanged),
         places,
         kinds.get("weaker", 0.0),
         kinds.get("carries more", 0.0),
-        *sizes[likeliest, max(kinds, key=kinds.__getitem__)],
+        *found[likeliest, max(kinds, key=kinds.__getitem__)][1:],
     )
 
 
@@ -162,11 +159,9 @@ def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
     The ratio makes the total less certain, and is not taken off the total: a heavier vehicle draws
     more and pulls its battery down, so a correction would hide the change in question.
     """
-    levels = [
-        np.mean([math.nan if trim.voltage is None else math.log(trim.voltage) for trim in group])
-        for group in (after, before)
-    ]
-    return float(np.nan_to_num(levels[0] - levels[1]))
+    volts = ([trim.voltage for trim in group] for group in (after, before))
+    late, early = (np.log(np.array(group, dtype=np.float64)).mean() for group in volts)
+    return float(np.nan_to_num(late - early))
 
 
 def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:

@@ -11,49 +11,45 @@ sums that run backwards.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import toeplitz
 from scipy.ndimage import maximum_filter1d
 
-from ...runtime.arrays import Array, Index
+from ...runtime.arrays import Array, Index, Mask
 from .fault_channels import STEP, Samples
-from .fault_noise import Noise, fit_noise
+from .fault_noise import fit_noise
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
 _SIGNS = np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]], dtype=np.float64)
+PARTS = (0.0, 0.25, 0.5, 0.75)  # starts of a fault within an interval
 _AROUND = 5  # intervals around a strong acceleration: the model may be as wrong there
 _TURNING = 0.1  # activity per (rad/s)^2: the model's error while the vehicle turns
 
 
-class Begin(NamedTuple):
-    """The course of a loss."""
-
-    part: float  # elapsed part of the first interval
-    # as the rotors' speed falls (a motor that fails), or at once (a propeller that breaks)
-    lagged: bool
-
-
 class FaultBalance:
-    """The columns of the four channels with one lag and one curve of the rotors (N samples)."""
+    """The four channels with one lag and one curve of the rotors (N samples).
 
-    def __init__(self, samples: Samples, thrust: Array, lag: float) -> None:
+    Attributes:
+        channels: with the noise of the last fit.
+        ramps: elapsed shares (J,) of a loss in each interval; 1 afterwards. A loss begins within an
+            interval, at once (a propeller that breaks) or as the rotors' speed falls (a motor).
+    """
+
+    def __init__(self, samples: Samples, lag: float, bend: float, dead: float) -> None:
         w, turning = samples.angular_velocity, samples.angular_acceleration
-        ones = np.ones((len(w), 1))
         self.follows = samples.follows
-        self.thrust = thrust  # (N, 4)
-        self.lag = lag  # s
-        free = [
-            np.column_stack([ones, w[:, [i]], (w[:, (i + 1) % 3] * w[:, (i + 2) % 3])[:, None]])
-            for i in range(3)
-        ] + [np.zeros((len(w), 0))]
+        self.thrust = thrust = samples.thrust(lag, bend, dead)  # (N, 4)
+        self.ramps = [_ramp(part, late) for late in (0.0, lag) for part in PARTS]
+        gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, -2, axis=1)
+        one = np.ones(len(w))
+        free = [np.column_stack([one, w[:, i], gyroscopic[:, i]]) for i in range(3)]
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
         free[2] = np.column_stack([free[2], turning[:, :2]])
         y, moment = np.column_stack([turning, samples.specific_force]), thrust @ _SIGNS.T
         # each channel's measurement, moment and free columns
         self.columns = [
-            np.column_stack([y[:, c], moment[:, c], each]) for c, each in enumerate(free)
+            np.column_stack([y[:, c], moment[:, c], *free[c : c + 1]]) for c in range(4)
         ]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
         away += _TURNING * np.square(w).sum(axis=1) + samples.between
@@ -61,72 +57,71 @@ class FaultBalance:
         strong = maximum_filter1d(np.linalg.norm(turning[:, :2], axis=1), _AROUND)
         away += strong / max(float(strong.max()), 1e-300)
         # a rotor late by an interval is wrong there too
-        self.activity = np.maximum(away, np.concatenate([away[:1], away[:-1]]))
+        self.activity = np.maximum(away, np.append(away[:1], away[:-1]))
+        self.fit()
 
-    def ramp(self, begin: Begin) -> Array:
-        """Return the elapsed share (J,) of a loss in each interval; 1 afterwards."""
-        lag = self.lag if begin.lagged else 0.0
-        count = 1 + math.ceil(4.0 * lag / STEP)
-        x = STEP * np.arange(count + 1)
-        since = np.maximum(x - begin.part * STEP, 0.0)
-        # integral of 1 - exp(-since / lag)
-        area = since + lag * np.expm1(-since / lag) if lag > 0.0 else since
-        share: Array = np.diff(area) / STEP
-        return share
+    def fit(self, *step: Array) -> None:
+        """Fit the channels' noise to the residual of no change, or beside a ``step`` (N,)."""
+        self.channels = [
+            BalanceChannel(columns, self.activity, self.follows, *step) for columns in self.columns
+        ]
 
-    def share(self, row: int, begin: Begin) -> Array:
-        """Return the elapsed share (N,) of a change beginning at a row."""
-        share = np.zeros(len(self.thrust))
-        ramp = self.ramp(begin)
-        share[row:] = 1.0
-        share[row : row + len(ramp)] = ramp[: len(share) - row]
-        return share
+    def nothing(self) -> float:
+        """Return the log-likelihood where nothing happens."""
+        return sum(channel.nothing for channel in self.channels)
 
-    def channels(self, *step: Array) -> "list[BalanceChannel]":
-        """Return the channels, each with noise fitted to the residual of no change, or beside a
-        ``step`` (N,).
-        """
-        fitted = []
-        for columns in self.columns:
-            y, x = columns[:, 0], np.column_stack([columns[:, 1:], *step])
-            beta = np.linalg.lstsq(x, y, rcond=None)[0]
-            if beta[0] <= 0.0:  # a moment with a negative factor is left out
-                x = x[:, 1:]
-                beta = np.linalg.lstsq(x, y, rcond=None)[0]
-            noise = fit_noise(y - x @ beta, self.activity, self.follows)
-            fitted.append(BalanceChannel(columns, noise))
-        return fitted
+    def steps(self, rows: Index, ramps: list[Array]) -> Array:
+        """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
+        each = [[c.steps(rows, ramp) for c in self.channels] for ramp in ramps]
+        return np.asarray(np.sum(each, axis=1))
+
+    def share(self, row: int, ramp: int) -> Array:
+        """Return the elapsed share (N,) of a change beginning at a row, by one of the ramps."""
+        count = len(self.thrust)
+        return np.concatenate([np.zeros(row), self.ramps[ramp], np.ones(count)])[:count]
 
     def lost(self, rotor: int, share: Array) -> Array:
         """Return each channel's loss (N, 4) if a ``share`` (N,) of rotor 0 to 3 goes."""
         return (self.thrust[:, rotor] * share)[:, None] * _SIGNS[:, rotor]
 
 
+def _ramp(part: float, lag: float) -> Array:
+    """Return a loss from an elapsed ``part`` of the first interval on, by a lag (s)."""
+    since = np.maximum(STEP * (np.arange(2 + math.ceil(4.0 * lag / STEP)) - part), 0.0)
+    # integral of 1 - exp(-since / lag)
+    area = since + lag * np.expm1(-since / lag) if lag > 0.0 else since
+    return np.asarray(np.diff(area) / STEP)
+
+
 class BalanceChannel:
     """Innovations of a channel's measurement and moment, the free columns projected out."""
 
-    def __init__(self, columns: Array, noise: Noise) -> None:
-        self.noise, self.white = noise, noise.whiten(columns)
+    def __init__(self, columns: Array, activity: Array, follows: Mask, *step: Array) -> None:
+        y, x = columns[:, 0], np.column_stack([columns[:, 1:], *step])
+        beta = np.linalg.lstsq(x, y, rcond=None)[0]
+        if beta[0] <= 0.0:  # a moment with a negative factor is left out
+            x = x[:, 1:]
+            beta = np.linalg.lstsq(x, y, rcond=None)[0]
+        self.noise = noise = fit_noise(y - x @ beta, activity, follows)
+        self.white = noise.whiten(columns)
         self.basis = np.linalg.qr(self.white[:, 2:])[0]
         both = self.white[:, :2]
         self.both = both - self.basis @ (self.basis.T @ both)
-        (self.yy, self.my), (_, self.mm) = (self.both.T @ self.both).tolist()
-        self.mm = max(self.mm, 1e-300)
-        self.gain = max(self.my, 0.0) / self.mm
-
-    def nothing(self) -> float:
-        """Return the log-likelihood where nothing happens."""
-        return float(self.noise.log_likelihood(np.array(self.yy - self.gain * self.my)))
+        (yy, self.my), (_, mm) = (self.both.T @ self.both).tolist()
+        self.mm = max(mm, 1e-300)
+        # sum of squares where nothing happens, and its log-likelihood
+        self.rest = yy - max(self.my, 0.0) / self.mm * self.my
+        self.nothing = float(noise.log_likelihood(self.rest))
 
     def part(self, column: Array) -> tuple[float, float]:
         """Return the ratio, negative, of the factors of a column (N,) and of the moment, and its
         standard deviation: infinite where the channel does not follow the commands.
         """
         y, x = self.white[:, 0], np.insert(self.white[:, 1:], 1, self.noise.whiten(column), axis=1)
-        beta, *_ = np.linalg.lstsq(x, y, rcond=None)
+        beta = np.linalg.lstsq(x, y, rcond=None)[0]
         left = y - x @ beta
         covariance = np.linalg.pinv(x.T @ x) * float(left @ left) / max(1, len(y) - len(beta))
-        a, b = float(beta[0]), float(beta[1])
+        a, b = beta[:2].tolist()
         if a <= 2.0 * math.sqrt(covariance[0, 0]):
             return 0.0, math.inf
         slope = np.array([b / a**2, -1.0 / a])
@@ -138,35 +133,28 @@ class BalanceChannel:
         The size is the best one, at the price of a normal prior: as wide as this size, or as wide
         as a single sample's if wider.
         """
-        sy, sm, ss = self._beginning(rows, ramp)
-        own_share = np.maximum(ss - sm * sm / self.mm, 1e-12 * ss + 1e-300)
-        gain = np.square(sy - sm * self.my / self.mm) / own_share
-        width = np.log(np.maximum(gain / self.noise.variance, 1.0))
-        price = 0.5 * np.maximum(1.0 + width, math.log(self.noise.whole.sum()))
-        logs: Array = self.noise.log_likelihood(self.yy - self.gain * self.my - gain) - price
-        return logs
-
-    def _beginning(self, rows: Index, ramp: Array) -> Array:
-        """Return products (3, K) of a share of 1 beginning at each of ``rows`` (K,) by a ramp: with
-        y, with the moment, with itself; after projection.
-        """
-        noise, early = self.noise, len(self.noise.filter) - 1 + len(ramp)
-
-        def padded(x: Array) -> Array:
-            return np.concatenate([x, np.zeros((early + 1, *x.shape[1:]))])
-
-        against = np.zeros((len(noise.whole), 2 + self.basis.shape[1]))
-        against[noise.whole] = np.column_stack([self.both, self.basis])
-        full = np.where(noise.whole, noise.filtered(np.ones(len(against))), 0.0)
+        noise, count = self.noise, len(self.noise.whole)
+        # behind the last row nothing happens
+        whole, scale = np.append(noise.whole, False), np.append(noise.scale, np.inf)
+        against = np.zeros((count + 1, 2 + self.basis.shape[1]))
+        against[whole] = np.column_stack([self.both, self.basis])
+        # a share of 1 from each row on: its products with y, the moment, the basis, and itself
+        full = whole * np.append(noise.filtered(np.ones(count)), 0.0)
         late = np.column_stack([full[:, None] * against, full**2])
-        sums = padded(np.cumsum(late[::-1], axis=0)[::-1])[rows + early]
-        # the first outputs of the filter after each beginning, during the ramp
-        at = rows[:, None] + np.arange(early)
-        begun = padded(1.0 / noise.scale)[at]
+        # before them the first outputs of the filter after each beginning, during the ramp
+        early = len(noise.filter) - 1 + len(ramp)
+        at = np.minimum(rows[:, None] + np.arange(early + 1), count)
+        sums = np.cumsum(late[::-1], axis=0)[::-1][at[:, -1]]
+        at = at[:, :-1]
+        begun = 1.0 / scale[at]
         begun[:, : len(ramp)] *= ramp
         taps = toeplitz(np.append(noise.filter, np.zeros(len(ramp) - 1)), np.zeros(early))
-        values = begun @ taps.T * padded(noise.whole.astype(float))[at]
-        sums[:, :-1] += np.einsum("kj,kjq->kq", values, padded(against)[at])
-        p = sums[:, 2:-1]
-        own = sums[:, -1] + np.square(values).sum(axis=1) - np.square(p).sum(axis=1)
-        return np.array([sums[:, 0], sums[:, 1], own])
+        values = begun @ taps.T * whole[at]
+        sums[:, :-1] += np.einsum("kj,kjq->kq", values, against[at])
+        sy, sm, ss = sums[:, [0, 1, -1]].T
+        ss = ss + np.square(values).sum(axis=1) - np.square(sums[:, 2:-1]).sum(axis=1)
+        own_share = np.maximum(ss - sm * sm / self.mm, 1e-12 * ss + 1e-300)
+        gain = np.square(sy - sm * self.my / self.mm) / own_share
+        width = np.log(np.maximum(gain / noise.variance, 1.0))
+        price = 0.5 * np.maximum(1.0 + width, math.log(noise.whole.sum()))
+        return np.asarray(noise.log_likelihood(self.rest - gain) - price)

@@ -6,8 +6,8 @@ Specific force and thrust are means over the same interval. No window of a deriv
 smears the time of a fault.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -20,9 +20,9 @@ from ..logs.channels import Stream, readable
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import carrying, usual_thrust
 from ..logs.readers import px4_ulog
-from ..logs.reading import read_log, reader_by_content
-from ..logs.table import Data, Names, median_step
-from ..motion.smoothing import lagged, resampled, runs_of
+from ..logs.reading import READERS, read_log, reader_by_content
+from ..logs.table import Data, Names, Rows, median_step
+from ..motion.smoothing import lagged, runs_of
 
 _PX4 = "px4_ulog"  # the reader
 _CHANNELS = ("gyro", "accelerometer", "commands")  # needed in a PX4 log
@@ -40,8 +40,7 @@ RANGE_SHARE = 0.08
 IMPACT = 40.0  # m/s2 of specific force: the vehicle hit something
 
 
-@dataclass(frozen=True, eq=False)
-class Channels:
+class Channels(NamedTuple):
     """The three streams, in this kit's axes and order of rotors."""
 
     name: str
@@ -53,8 +52,7 @@ class Channels:
     motor_names: Names | None = None  # the log's own, of rotors 1 to 4
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(NamedTuple):
     """The streams on the grid, while the vehicle flies and before it tumbles (N intervals)."""
 
     t: Array  # (N,) s, middles
@@ -81,7 +79,7 @@ class Samples:
         """
         command = self.channels.command
         fine = np.arange(command.t[0], command.t[-1] + FINE, FINE)
-        u = resampled(fine, command.t, command.values)
+        u = command.at(fine)
         u /= np.median(np.interp(self.t, fine, u.mean(axis=1)))
         x = np.maximum(u - dead, 0.0) / (1.0 - dead)
         return _means(fine, lagged(bend * x * x + (1.0 - bend) * x, lag, FINE), self.t)
@@ -102,8 +100,8 @@ def read_channels(
     Raises:
         InputError: the file cannot be read, or lacks one of the three.
     """
-    by_content = reader_by_content(path) if log_map is None and reader in (None, _PX4) else None
-    if by_content is None or by_content.name != _PX4:
+    own_rates = log_map is None and reader in (None, _PX4)
+    if not own_rates or reader_by_content(path) is not READERS[_PX4]:
         log = log or read_log(path, reader, vehicle, log_map)
         return channels_of_log(log), log.notes
     (log_map_of, channels, _, notes), _ = px4_ulog.channels(path, has_ranges=False)
@@ -113,7 +111,7 @@ def read_channels(
     assert log_map_of.commands is not None
     names = tuple(f"PX4 motor {i}" for i in log_map_of.commands.order)
     gyro, accelerometer, command = streams.values()
-    return Channels(str(path), gyro, accelerometer, command, False, names), tuple(notes)
+    return Channels(str(path), gyro, accelerometer, command, motor_names=names), tuple(notes)
 
 
 def channels_of_log(log: FlightLog) -> Channels:
@@ -122,15 +120,16 @@ def channels_of_log(log: FlightLog) -> Channels:
     Raises:
         InputError: gyro, accelerometer, or both commands and rotor speeds are missing.
     """
-    name, known = log.source or log.name, log.command is None
+    name, command = log.source or log.name, log.command
     if log.gyro is None or log.accelerometer is None:
         raise InputError(
             f"{name}: no gyro or no accelerometer; expected gx, gy, gz and ax, ay, az, to look for "
             "a rotor that lost thrust"
         )
-    if known and not log.has_rotor_speeds:
-        raise InputError(f"{name}: no motor commands and no rotor speeds; expected one of them")
-    command = np.square(log.rotor_speeds) if log.command is None else log.command
+    if command is None:
+        if not log.has_rotor_speeds:
+            raise InputError(f"{name}: no motor commands and no rotor speeds; expected one of them")
+        command = np.square(log.rotor_speeds)
     # a held command changes at its own samples alone
     new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
     new[-1] = True
@@ -139,7 +138,7 @@ def channels_of_log(log: FlightLog) -> Channels:
         Stream("gyro", log.t, log.gyro).whole(),
         Stream("accelerometer", log.t, log.accelerometer).whole(),
         Stream("commands", log.t[new], command[new]),
-        known,
+        thrust_known=log.command is None,
     )
 
 
@@ -150,7 +149,7 @@ def sample(channels: Channels) -> Samples:
         InputError: fewer than 3 s of flight, or too few samples a second.
     """
     c = channels
-    times = (c.gyro.t, c.accelerometer.t, c.command.t)
+    times = c.gyro.t, c.accelerometer.t, c.command.t
     if min(map(len, times)) < 10:
         raise InputError(f"{c.name}: fewer than ten samples of gyro, accelerometer or commands")
     for what, at in zip(_CHANNELS[:2], times, strict=False):
@@ -163,14 +162,13 @@ def sample(channels: Channels) -> Samples:
     if len(edges) < 3:
         raise InputError(f"{c.name}: gyro, accelerometer and commands do not overlap in time")
     t = 0.5 * (edges[1:] + edges[:-1])
-    gyro = resampled(edges, c.gyro.t, c.gyro.values)
+    gyro = c.gyro.at(edges)
     force = _means(c.accelerometer.t, c.accelerometer.values, t)
     stop, why = _end(c)
     total = c.command.values.sum(axis=1)
     keep = (np.interp(t, c.command.t, total) > 0.5 * usual_thrust(total)) & (t < stop)
     for at in times[:2]:
-        after = np.clip(np.searchsorted(at, t), 1, len(at) - 1)
-        keep &= at[after] - at[after - 1] < LONGEST_GAP
+        keep &= np.diff(at)[_step_around(at, t)] < LONGEST_GAP
     if keep.any():
         keep &= t > t[np.argmax(keep)] + SETTLED
     for a, b in runs_of(keep):
@@ -180,55 +178,54 @@ def sample(channels: Channels) -> Samples:
             f"{c.name}: {keep.sum() * STEP:.3g} s in flight; expected at least {LEAST_SECONDS:g} s "
             "without a gap, to see what is usual"
         )
-    follows = np.concatenate([[False], keep[1:] & keep[:-1]])
     return Samples(
         t[keep],
         (np.diff(gyro, axis=0) / STEP)[keep],
         (0.5 * (gyro[1:] + gyro[:-1]))[keep],
         force[keep, 2],
-        follows[keep],
-        _between(c, t[keep]),
+        np.append(False, keep[:-1])[keep],
+        _between(c.command, t[keep]),
         c,
         why,
     )
 
 
-def _between(c: Channels, t: Array) -> Array:
+def _step_around(times: Array, t: Array) -> Rows:
+    """Return the number (N,) of the step of ``times`` around each of ``t`` (N,)."""
+    return np.clip(np.searchsorted(times, t), 1, len(times) - 1) - 1
+
+
+def _between(command: Stream, t: Array) -> Array:
     """Return the command's possible error between its samples (N,); see ``Samples``."""
-    at, command = c.command.t, c.command.values
-    after = np.clip(np.searchsorted(at, t), 1, len(at) - 1)
-    start, end = at[after - 1], at[after]
-    part = np.clip((t - start) / (end - start), 0.0, 1.0)
-    change = np.abs(command[after] - command[after - 1]).mean(axis=1)
-    usual = np.median(np.interp(t, at, command.mean(axis=1)))
-    coarse = end - start > 1.5 * STEP
-    return np.where(coarse, change / usual * np.sqrt(part * (1.0 - part)), 0.0)
+    before = _step_around(command.t, t)
+    step = np.diff(command.t)[before]
+    part = np.clip((t - command.t[before]) / step, 0.0, 1.0)
+    change = np.abs(np.diff(command.values, axis=0)[before]).mean(axis=1)
+    usual = np.median(np.interp(t, command.t, command.values.mean(axis=1)))
+    return np.where(step > 1.5 * STEP, change / usual * np.sqrt(part * (1.0 - part)), 0.0)
 
 
 def _means(times: Array, values: Array, middles: Array) -> Array:
     """Return the means (N, d) over the grid's intervals; values are linear between ``times``."""
     new = np.diff(times, prepend=-np.inf) > 0.0
     integral = make_interp_spline(times[new], values[new], k=1).antiderivative()
-    low, high = (
-        integral(np.clip(middles + half, times[0], times[-1])) for half in (-0.5 * STEP, 0.5 * STEP)
-    )
-    return np.asarray((high - low) / STEP)
+    ends = np.clip([middles - 0.5 * STEP, middles + 0.5 * STEP], times[0], times[-1])
+    return np.asarray(np.diff(integral(ends), axis=0)[0] / STEP)
 
 
 def _end(c: Channels) -> tuple[float, str]:
     """Return the end of the model's validity, and its reason: a clipped gyro, or an impact."""
     ends = [(np.inf, "")]
     count = max(3, round(CLIPPED_SECONDS / median_step(c.gyro.t)))
-    for axis in c.gyro.values.T:
-        size = np.abs(axis)
-        at_limit = np.abs(size[:, None] / RANGES - 1.0).min(axis=1) < RANGE_SHARE
-        at_limit |= (size > (1.0 - CLIPPED_SHARE) * size.max()) & (size > RANGES[0])
-        spread = maximum_filter1d(axis, count) - minimum_filter1d(axis, count)
-        clipped = at_limit & (spread < CLIPPED_SHARE * size)
-        if clipped.any():
-            # the filters look half their width to either side
-            first = max(0, int(np.argmax(clipped)) - count // 2)
-            ends.append((float(c.gyro.t[first]), "the gyro was at its limit"))
+    rate, size = c.gyro.values, np.abs(c.gyro.values)
+    at_limit = np.abs(size[..., None] / RANGES - 1.0).min(axis=2) < RANGE_SHARE
+    at_limit |= (size > (1.0 - CLIPPED_SHARE) * size.max(axis=0)) & (size > RANGES[0])
+    spread = maximum_filter1d(rate, count, axis=0) - minimum_filter1d(rate, count, axis=0)
+    clipped = np.any(at_limit & (spread < CLIPPED_SHARE * size), axis=1)
+    if clipped.any():
+        # the filters look half their width to either side
+        first = max(0, int(np.argmax(clipped)) - count // 2)
+        ends.append((float(c.gyro.t[first]), "the gyro was at its limit"))
     hit = np.linalg.norm(c.accelerometer.values, axis=1) > IMPACT
     # take-off may be hard: an impact counts once the rotors carry the vehicle
     aloft = c.command.t[carrying(c.command.values.sum(axis=1))]

@@ -13,7 +13,6 @@ quadrotor with one rotor in each quadrant. Two questions are asked apart:
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from scipy.special import log_softmax, logsumexp, softmax
 from scipy.stats import norm
 
 from ...runtime.arrays import Array, Index
-from .fault_balance import BalanceChannel, Begin, FaultBalance
+from .fault_balance import PARTS, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
 
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
@@ -33,25 +32,23 @@ _LAGS = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
 # curves of thrust against command: the square's share, and the dead zone in parts of the
 # median command
 _CURVES = ((0.0, 0.0), (0.2, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.3), (1.0, 0.3))
-# prior: nothing, one of the rotors, all rotors, another force or torque
-_PRIOR = (0.5, 0.3, 0.05, 0.15)
+# prior of nothing; of each rotor, all rotors, another force or torque
+_NOTHING = 0.5
+_EVENTS = (*[0.075] * 4, 0.05, 0.15)
 # the model's error of a loss, as a share: curve, lag and inflow of rotors at a new working point
 _ERROR = 0.25
 _BEFORE = 25  # least intervals of usual flight before a fault
 _AFTER = 4  # least intervals after a fault
 _PLACES = 2000  # most rows for the start of a fault
 _STEPS = 39  # shares tried within ``_LOSSES``
-_PARTS = (0.0, 0.25, 0.5, 0.75)  # starts of a fault within an interval
 # standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
 # usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
 _ROUNDS = 2  # each fits the noise and searches again
 _SURE = 0.95  # least probability of a fault named without a doubt
-_BEGINS = [Begin(part, lagged) for lagged in (False, True) for part in _PARTS]
 
 
-@dataclass(frozen=True, eq=False)
-class RotorFault:
+class RotorFault(NamedTuple):
     """The result of a search in one flight."""
 
     samples: Samples
@@ -85,16 +82,15 @@ def find_fault(channels: Channels) -> RotorFault:
         InputError: too little flight.
     """
     samples = sample(channels)
-    tried = _search(samples, channels.thrust_known)
+    rows = _rows(len(samples.t))
+    tried = _search(samples, rows, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
-    evidence, starts, start_weights = _onsets(samples, best)
+    evidence, starts, likely = _onsets(samples.t, rows, best)
     each, shares, weights = _patterns(best)
-    prior = np.array([*[_PRIOR[1] / 4] * 4, _PRIOR[2], _PRIOR[3]])
-    logs = np.log(prior) + each
-    # ``prior`` holds the prior of each kind of event; the search, with free sizes, gives the
-    # likelihood of an event
-    whole = math.log(_PRIOR[0]) + max(one.nothing for one in tried)
-    happened = evidence + math.log(float(prior.sum()))
+    logs = np.log(_EVENTS) + each
+    # the search, with free sizes, gives the likelihood of an event of any kind
+    whole = math.log(_NOTHING) + max(one.nothing for one in tried)
+    happened = evidence + math.log(sum(_EVENTS))
     chances = softmax(np.append(whole, happened + log_softmax(logs)))
     rotor = int(np.argmax(logs[:4]))
     _, least, most = _quantiles(shares, weights[rotor], 0.5 * float(shares[1] - shares[0]))
@@ -102,32 +98,31 @@ def find_fault(channels: Channels) -> RotorFault:
         samples,
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
         1 + rotor,
-        _quantiles(starts, start_weights, STEP),
+        _quantiles(starts, likely, STEP),
         (1.0 - float(weights[rotor] @ shares), max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
 
 class _Tried(NamedTuple):
-    """One lag and curve: the channels with their best noise, the likeliest jump, and the
-    log-likelihood of no jump.
+    """One lag and curve with noise fitted beside the likeliest jump: its row, and the ramp by its
+    number; the log-likelihoods of no jump, and of this one.
     """
 
     balance: FaultBalance
-    channels: list[BalanceChannel]
     nothing: float
     log: float
     row: int
-    begin: Begin
+    ramp: int
 
 
-def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
+def _search(samples: Samples, rows: Index, thrust_known: bool) -> list[_Tried]:
     """Return all trials: lags, and then curves, each from the best so far."""
-    rows, tried = _rows(len(samples.t)), dict[Interval, _Tried]()
+    tried = dict[Interval, _Tried]()
 
     def best_of(keys: Iterable[Interval]) -> Interval:
         for key in keys:
             if key not in tried:
-                tried[key] = _fitted(FaultBalance(samples, samples.thrust(*key), key[0]), rows)
+                tried[key] = _fitted(FaultBalance(samples, *key), rows)
         return max(tried, key=lambda key: tried[key].log)
 
     curves = _CURVES[:1] if thrust_known else _CURVES
@@ -140,44 +135,30 @@ def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
 
 def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
     """Return a lag and curve with noise fitted beside the likeliest jump."""
-    channels = balance.channels()
-    nothing = sum(channel.nothing() for channel in channels)
+    nothing = balance.nothing()
     for _ in range(_ROUNDS):
-        _, row, begin = _jump(balance, channels, rows)
-        channels = balance.channels(balance.share(row, begin))
-    nothing = max(nothing, sum(channel.nothing() for channel in channels))
-    return _Tried(balance, channels, nothing, *_jump(balance, channels, rows))
+        _, row, ramp = _jump(balance, rows)
+        balance.fit(balance.share(row, ramp))
+    return _Tried(balance, max(nothing, balance.nothing()), *_jump(balance, rows))
 
 
-def _steps(
-    balance: FaultBalance, channels: list[BalanceChannel], rows: Index, begins: list[Begin]
-) -> Array:
-    """Return the log-likelihoods (J, K) of a jump of each kind at each of some rows."""
-    ramps = [balance.ramp(begin) for begin in begins]
-    return np.array([np.sum([c.steps(rows, ramp) for c in channels], axis=0) for ramp in ramps])
-
-
-def _jump(
-    balance: FaultBalance, channels: list[BalanceChannel], rows: Index
-) -> tuple[float, int, Begin]:
-    """Return log-likelihood, row and kind of the likeliest jump, also at rows between ``rows``."""
-    k = int(np.argmax(_steps(balance, channels, rows, _BEGINS[:1])))
+def _jump(balance: FaultBalance, rows: Index) -> tuple[float, int, int]:
+    """Return log-likelihood, row and ramp of the likeliest jump, also at rows between ``rows``."""
+    k = int(np.argmax(balance.steps(rows, balance.ramps[:1])))
     around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
-    logs = _steps(balance, channels, around, _BEGINS)
-    j, k = divmod(int(np.argmax(logs)), len(around))
-    return float(logs[j, k]), int(around[k]), _BEGINS[j]
+    logs = balance.steps(around, balance.ramps)
+    ramp, k = divmod(int(np.argmax(logs)), len(around))
+    return float(logs[ramp, k]), int(around[k]), ramp
 
 
-def _onsets(samples: Samples, best: _Tried) -> tuple[float, Array, Array]:
+def _onsets(t: Array, every: Index, best: _Tried) -> tuple[float, Array, Array]:
     """Return the log-evidence of a jump, times (T,) in s of its start and their probabilities."""
-    every = _rows(len(samples.t))
     rows = np.arange(max(best.row - 5, _BEFORE), min(best.row + 6, every[-1] + 1))
-    logs, fine = (_steps(best.balance, best.channels, some, _BEGINS) for some in (every, rows))
-    parts = np.array([begin.part for begin in _BEGINS])
-    starts = samples.t[rows] + STEP * (parts[:, None] - 0.5)
+    ramps = best.balance.ramps
+    logs, fine = (best.balance.steps(some, ramps) for some in (every, rows))
+    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), t[rows])
     evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
-    places = len(_BEGINS) * len(samples.t)
-    return evidence - math.log(places), starts.ravel(), softmax(fine).ravel()
+    return evidence - math.log(len(ramps) * len(t)), starts.ravel(), softmax(fine).ravel()
 
 
 def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
@@ -187,27 +168,24 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
     """
     shares = np.linspace(*_LOSSES, _STEPS)
     lost = shares[shares <= _ALL_LOSE, None]
-    share = best.balance.share(best.row, best.begin)
+    share = best.balance.share(best.row, best.ramp)
 
     def seen(columns: Array) -> Array:
         """Return the visible part (4,) of a column in each channel, and its deviation (4,)."""
-        pairs = zip(best.channels, columns.T, strict=True)
+        pairs = zip(best.balance.channels, columns.T, strict=True)
         return np.array([channel.part(column) for channel, column in pairs]).T
 
     # each channel's visible part, its standard deviation, and the hypothesis' means and spread
-    tried = []
-    for rotor in range(4):
-        loss = seen(best.balance.lost(rotor, share))
-        tried.append((*loss, shares[:, None] * np.ones(4), _ERROR * shares[:, None]))
+    each = shares[:, None]
+    tried = [(*seen(best.balance.lost(rotor, share)), each, _ERROR * each) for rotor in range(4)]
     # a jump of each channel, in parts of one rotor's usual torque or force there
-    jumps = seen(np.repeat(share[:, None], 4, axis=1))
-    means, spread = lost * [0.0, 0.0, 0.0, 4.0], _ERROR * lost * [2.0, 2.0, 2.0, 4.0]
-    tried.append((*jumps, means, spread))
-    tried.append((*jumps, np.zeros((1, 4)), np.array([_OTHER])))
+    jumps = seen(np.tile(share[:, None], 4))
+    tried.append((*jumps, lost * [0.0, 0.0, 0.0, 4.0], _ERROR * lost * [2.0, 2.0, 2.0, 4.0]))
+    tried.append((*jumps, np.zeros((1, 1)), np.array(_OTHER)))
     # channels finite under every hypothesis, so all hypotheses explain the same numbers
     says = np.isfinite([std for _, std, *_ in tried]).all(axis=0)
     logs = [
-        norm.logpdf(part[says], means[:, says], np.hypot(std, spread)[:, says]).sum(axis=1)
+        norm.logpdf(part, means, np.hypot(std, spread)).sum(axis=1, where=says)
         for part, std, means, spread in tried
     ]
     evidence = np.array([logsumexp(log) - math.log(len(log)) for log in logs])

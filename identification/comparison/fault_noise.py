@@ -6,7 +6,8 @@ innovations (Willsky and Jones, *A generalized likelihood ratio approach to the 
 estimation of jumps in linear systems*, IEEE Transactions on Automatic Control 21, 1976).
 """
 
-from dataclasses import dataclass
+from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -18,8 +19,7 @@ ORDER = 10
 SHARES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # activity over the quiet level, tried in turn
 
 
-@dataclass(frozen=True, eq=False)
-class Noise:
+class Noise(NamedTuple):
     """Weights and whitening filter of one channel (N samples)."""
 
     scale: Array  # (N,) relative standard deviation
@@ -35,13 +35,13 @@ class Noise:
         """Return the filter's output (N, ...); rows outside ``whole`` mean nothing."""
         return np.asarray(lfilter(self.filter, 1.0, (values.T / self.scale).T, axis=0))
 
-    def log_likelihood(self, rest: Array) -> Array:
+    def log_likelihood(self, rest: Array | float) -> Array:
         """Return the log-likelihood of innovations with ``rest`` as the sum of squares, at the best
         variance.
         """
         n = int(self.whole.sum())
         log_scale = float(np.log(self.scale[self.whole]).sum())
-        return -0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale
+        return np.asarray(-0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale)
 
 
 def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
@@ -65,4 +65,4 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
         rest = np.square(present - past @ poles).sum()
         noise = Noise(scale, np.append(1.0, -poles), whole, float(rest / len(present)))
         tried.append((float(noise.log_likelihood(rest)), noise))
-    return max(tried, key=lambda one: one[0])[1]
+    return max(tried, key=itemgetter(0))[1]

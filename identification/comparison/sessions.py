@@ -12,12 +12,12 @@ scatter, at either level, is summed over likewise.
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax
 
-from ...runtime.arrays import Array, Index
+from ...runtime.arrays import Array, Index, Mask
 from .trim import Trim
 
 # Scatter of unchanged flights in the four numbers of a trim. Measured on 89 flights of one
@@ -40,8 +40,7 @@ _MOST_ENDS = 8  # possible ends of sessions: the largest differences between fli
 _LEAST_LOG = -12.0  # below the likeliest way; less likely ways do not count
 
 
-@dataclass(frozen=True, eq=False)
-class Difference:
+class Difference(NamedTuple):
     """The difference (4,) of two sets, if nothing but the vehicle changed between them: a normal
     density for each of n ways (cuts into sessions and scales of the scatter).
     """
@@ -56,10 +55,10 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     order of time.
     """
     # flights of one name stand together, behind those without a name
-    every = [*((trim, 0.0) for trim in before), *((trim, 1.0) for trim in after)]
-    names = [trim.session for trim, _ in every]
-    every.sort(key=lambda flown: names.index(flown[0].session) if flown[0].session else -1)
-    trims, later = [trim for trim, _ in every], np.array([which for _, which in every])
+    every = [*before, *after]
+    names = [trim.session for trim in every]
+    order = sorted(range(len(every)), key=lambda i: names.index(names[i]) if names[i] else -1)
+    trims, later = [every[i] for i in order], np.array(order) >= len(before)
     x = np.array([trim.features for trim in trims])
     noise = np.array([trim.noise for trim in trims])
     parts = (_of_cut(x, later, noise, cut, log) for cut, log in _cuts(trims, later, x))
@@ -69,17 +68,18 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     return Difference(mean[keep], variance[keep], log[keep])
 
 
-def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[Index, float]]:
+def _cuts(trims: Sequence[Trim], later: Mask, x: Array) -> list[tuple[Index, float]]:
     """Return each way to cut the flights into sessions: the number of each flight's session, and
     the logarithm of its prior.
     """
     apart = np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
-    volts = np.array([np.nan if trim.voltage is None else trim.voltage for trim in trims])
+    volts = np.array([trim.voltage for trim in trims], dtype=np.float64)
     rises = np.diff(volts) > _RISE * volts[:-1]  # False where one is not known
     chance = np.where(rises, _ENDS_AT_RISE, _ENDS)
     names = np.array([trim.session for trim in trims])
-    told = (names[1:] != "") | (names[:-1] != "") | (np.diff(later) != 0.0)
-    known = np.where(names[1:] != "", names[1:] != names[:-1], True)
+    named = names != ""
+    told = named[1:] | named[:-1] | np.diff(later)
+    known = ~named[1:] | (names[1:] != names[:-1])
     places = np.argsort(np.where(told, np.inf, -apart), kind="stable")
     places = places[: min(int((~told).sum()), _MOST_ENDS)]
     out = []
@@ -87,12 +87,12 @@ def _cuts(trims: Sequence[Trim], later: Array, x: Array) -> list[tuple[Index, fl
         ends = told & known
         ends[places] = chosen
         log = float(np.log(np.where(ends, chance, 1.0 - chance)[places]).sum())
-        out.append((np.concatenate([[0], np.cumsum(ends)]).astype(np.int64), log))
+        out.append((np.append(0, np.cumsum(ends)), log))
     return out
 
 
 def _of_cut(
-    x: Array, later: Array, noise: Array, cut: Index, log: float
+    x: Array, later: Mask, noise: Array, cut: Index, log: float
 ) -> tuple[Array, Array, Array]:
     """Return mean and variance (k, 4) of the difference, and the flights' log-likelihood (k,).
 

@@ -12,7 +12,7 @@ output*, Operations Research 30, 1982).
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -45,8 +45,7 @@ class Trim:
     name: str
     thrust: Array  # (4,)
     seconds: float  # length of the mean
-    # (4,) variance of ``features`` as means of one flight; zero: not known
-    noise: Array = field(default_factory=lambda: np.zeros(4))
+    noise: Array  # (4,) variance of ``features`` as means of one flight; zero: not known
     voltage: float | None = None  # V, mean over the same time
     session: str = ""  # common name of a session's flights; empty: not known
 
@@ -97,14 +96,13 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
             f"{name}: mean thrusts of the rotors are {np.round(mean, 4).tolist()}; expected four "
             "positive numbers"
         )
-    level = None
-    if voltage is not None:
-        known = steady & np.isfinite(voltage) & (voltage > 0.0)
-        level = float(np.mean(voltage[known])) if known.any() else None
-    return Trim(name, mean, seconds, _noise(t, thrust, steady, step), level)
+    known = np.zeros(0) if voltage is None else voltage[steady]
+    known = known[np.isfinite(known) & (known > 0.0)]
+    level = float(known.mean()) if known.size else None
+    return Trim(name, mean, seconds, _noise(thrust, steady, step), level)
 
 
-def _noise(t: Array, thrust: Array, steady: Mask, step: Array) -> Array:
+def _noise(thrust: Array, steady: Mask, step: Array) -> Array:
     """Return the variance (4,) of the four numbers of a flight, from the means of batches."""
     batch = np.floor(np.cumsum(np.where(steady, step, 0.0)) / BATCH).astype(np.int64)
     batches = (steady & (batch == number) for number in range(int(batch[-1]) + 1))
@@ -132,14 +130,14 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
         thrust = vehicle.commanded_thrust(log.command, log.voltage)
     else:
         thrust = log.command
+    total = thrust.sum(axis=1)
     if not log.has_pose:
-        return trim_of(name, t, thrust, carrying(t, thrust.sum(axis=1)), log.voltage)
+        return trim_of(name, t, thrust, carrying(t, total), log.voltage)
     at, place = t[log.valid], log.position[log.valid]
     if len(at) < 3:
         raise InputError(f"{name}: fewer than three poses; expected a flight")
     speeds = log.rotor_speeds
     if not log.has_rotor_speeds:  # then scaled: while the rotors are high, they carry the weight
-        total = thrust.sum(axis=1)
         carried = total[flying(total)]
         scale = vehicle.weight / float(np.median(carried)) if len(carried) else 0.0
         speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
@@ -171,5 +169,4 @@ def carrying(t: Array, total: Array) -> Mask:
 def _smooth(values: Array, t: Array) -> Array:
     """Return a running mean: the noise of a pose is no motion."""
     width = max(1, round(_SMOOTH / median_step(t)))
-    smooth: Array = uniform_filter1d(values, width, mode="nearest")
-    return smooth
+    return np.asarray(uniform_filter1d(values, width, mode="nearest"))

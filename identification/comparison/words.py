@@ -1,6 +1,7 @@
 """Changes between two sets of flights, and rotor faults within one: sentences, data, pictures."""
 
 from collections.abc import Callable, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +21,11 @@ from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
 from ..logs.table import Data, Values
 from ..logs.what_flew import PLACES
-from ..motion.smoothing import resampled
 from .change import NOWHERE, SOMETHING_ELSE, SURE, Change
 from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
+_FOUND = {str(i): f"rotor {i}" for i in range(1, 5)}
 _NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
@@ -33,7 +34,7 @@ def _cannot_tell(chances: Values, likeliest: str, name: Callable[[str], str]) ->
     """Return a sentence on an unsure finding and its rivals."""
     rivals = [
         f"{name(rival)} ({p:.2f})"
-        for rival, p in sorted(chances.items(), key=lambda item: -item[1])
+        for rival, p in sorted(chances.items(), key=itemgetter(1), reverse=True)
         if rival != likeliest and p >= _NAMED
     ]
     told = f"Cannot tell {name(likeliest)} ({chances[likeliest]:.2f})"
@@ -134,18 +135,21 @@ def _draw_change(change: Change) -> Any:
         left.plot(x, y, "o", color=colour, label=label, ms=7, alpha=0.8)
     left.axhline(0.0, color=PALE, lw=1)
     left.axvline(0.0, color=PALE, lw=1)
-    left.set_xlabel("left  -  thrust asked for, % of the total  -  right")
-    left.set_ylabel("rear  -  % of the total  -  front")
-    left.set_title("how each flight's rotors share the work")
+    left.set(
+        xlabel="left  -  thrust asked for, % of the total  -  right",
+        ylabel="rear  -  % of the total  -  front",
+        title="how each flight's rotors share the work",
+    )
     left.legend()
     left.axis("equal")
-    names = sorted(change.places, key=change.places.__getitem__)
-    chances = [change.places[name] for name in names]
+    names, chances = zip(*sorted(change.places.items(), key=itemgetter(1)), strict=True)
     right.barh(names, chances, color=[AFTER if n == change.place else GREY for n in names])
-    right.set_xlim(0.0, 1.0)
     right.axvline(SURE, color=BLACK, lw=1, ls="--")
-    right.set_xlabel("probability that something changed there")
-    right.set_title(f"sure from {SURE:g} (dashed)")
+    right.set(
+        xlim=(0.0, 1.0),
+        xlabel="probability that something changed there",
+        title=f"sure from {SURE:g} (dashed)",
+    )
     return figure
 
 
@@ -172,41 +176,37 @@ def fault_headline(fault: RotorFault) -> str:
         )
     if likeliest == ALL:
         return f"All rotors lost thrust at once {sure}: the battery, the air, or the vehicle."
-    place = _place_of(fault, fault.rotor)
     when, low, high = fault.onset
     left, least, most = (100 * share for share in fault.remaining)
     return (
-        f"R{place[1:]} lost {100 - left:.0f} % of its thrust "
+        f"R{_place_of(fault, fault.rotor)[1:]} lost {100 - left:.0f} % of its thrust "
         f"({100 - most:.0f} to {100 - least:.0f}) at t = {when:.3f} s ({low:.3f} to {high:.3f}, "
         f"the log's clock) {sure}."
     )
 
 
 def _finding(fault: RotorFault, name: str) -> str:
-    if name in (NOTHING, ALL, OTHER):
-        return name
-    return f"a fault of {_place_of(fault, int(name))}"
+    return f"a fault of {_place_of(fault, int(name))}" if name in _FOUND else name
 
 
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
-    names = {str(i): f"rotor {i}" for i in range(1, 5)}
-    motors = fault.samples.channels.motor_names
+    channels = fault.samples.channels
     of_rotor = {
         "rotor": fault.rotor,
-        "motor": motors[fault.rotor - 1] if motors else None,
+        "motor": channels.motor_names and channels.motor_names[fault.rotor - 1],
         "onset_s": fault.onset[0],
         "onset_ci95_s": list(fault.onset[1:]),
         "remaining": fault.remaining[0],
         "remaining_ci95": list(fault.remaining[1:]),
     }
     return {
-        "log": fault.samples.channels.name,
+        "log": channels.name,
         "headline": fault_headline(fault),
-        "found": names.get(fault.likeliest, fault.likeliest),
+        "found": _FOUND.get(fault.likeliest, fault.likeliest),
         "sure": fault.sure,
-        "probabilities": {names.get(k, k): p for k, p in fault.probabilities.items()},
-        **(of_rotor if fault.likeliest in names else dict.fromkeys(of_rotor)),
+        "probabilities": {_FOUND.get(k, k): p for k, p in fault.probabilities.items()},
+        **(of_rotor if fault.likeliest in _FOUND else dict.fromkeys(of_rotor)),
         "flight_s": fault.seconds,
         "ended_because": fault.samples.ended or None,
     }
@@ -227,22 +227,20 @@ def _draw_faults(faults: Sequence[RotorFault]) -> Any:
     figure = new_figure(3.4 * len(faults))
     axes = figure.subplots(len(faults), 2, squeeze=False)
     for fault, (left, right) in zip(faults, axes, strict=True):
-        samples, command = fault.samples, fault.samples.channels.command
-        commands = resampled(samples.t, command.t, command.values)
-        turning = samples.angular_acceleration
+        samples, channels = fault.samples, fault.samples.channels
+        commands, turning = channels.command.at(samples.t), samples.angular_acceleration
         for panel, what, lines, kind, names in (
             (left, "angular acceleration, rad/s2", turning, "about", "xyz"),
             (right, "command", commands, "rotor", "1234"),
         ):
             panel.plot(samples.t, lines, lw=1, label=[f"{kind} {name}" for name in names])
-            panel.set_ylabel(what)
             room_above(panel)
             panel.legend(loc="upper left", ncols=len(names))
-            panel.set_xlabel("t, s (the log's clock)")
-            if fault.likeliest in ("1", "2", "3", "4"):
+            panel.set(xlabel="t, s (the log's clock)", ylabel=what)
+            if fault.likeliest in _FOUND:
                 panel.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
                 panel.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
-        left.set_title(Path(samples.channels.name).name)
+        left.set_title(Path(channels.name).name)
         chance = fault.probabilities[fault.likeliest]
         right.set_title(f"{_finding(fault, fault.likeliest)}: {chance:.3f}")
     return figure

@@ -10,13 +10,14 @@ states.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.table import Array, Mask, Pair, Rows, finite_rows, median_step
-from .inertial_fusion import FusedMotion, Readings, fuse
+from .inertial_fusion import FusedMotion, ImuPiece, Readings, fuse
 from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body
 from .smoothing import (
     CUTOFFS,
@@ -46,9 +47,7 @@ DRIFT_TIME = 3.0  # s, over which the fusion's errors drift, in a sample of them
 class InertialSignals(Signals):
     """Signals of an IMU, with its sensors' readings and the standard deviations of the rest."""
 
-    attitude_std: Array  # (n, 3) rad, body
-    velocity_std: Array  # (n, 3) m/s, world
-    position_std: Array  # (n, 3) m, world
+    std: Array  # (n, 9) of attitude (rad, body), velocity (m/s) and position (m), world
     bias_std: Array  # (3,) m/s2, of the accelerometer's subtracted bias
 
 
@@ -103,11 +102,11 @@ def inertial_signals(log: FlightLog, gravity: float) -> list[InertialSignals]:
             f"{log.name}: no unbroken piece of gyro and accelerometer is longer than "
             f"{SHORTEST_PIECE:g} s"
         )
-    noise = imu_noise(log)
+    noise = np.array(imu_noise(log))
     return [_piece(log, rows, gravity, noise) for rows in pieces]
 
 
-def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Pair) -> InertialSignals:
+def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Array) -> InertialSignals:
     assert log.gyro is not None
     assert log.accelerometer is not None
     imu_times = log.t[rows]
@@ -124,72 +123,56 @@ def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Pair) -> InertialS
     gyro, force = (sampled(imu_times, x[rows]) for x in (log.gyro, log.accelerometer))
     speeds = sampled(log.t, log.rotor_speeds)
     t = even[::thin]
-    fused = _fused(log, t, gyro, force, gravity, noise, thin)
-    count = int(np.searchsorted(t, fused.t[-1] + 1e-9))
-    t, gyro, force, speeds = t[:count], gyro[:count], force[:count], speeds[:count]
-
-    def at_samples(x: Array) -> Array:
-        return resampled(t, fused.t, x)
-
-    gyro = gyro - at_samples(fused.gyro_bias)
-    force = force - at_samples(fused.accelerometer_bias)
+    fused = _fused(log, ImuPiece(t, gyro, force, gravity, noise / np.sqrt(thin)))
+    t = t[: np.searchsorted(t, fused.t[-1] + 1e-9)]
+    std = resampled(t, fused.t, fused.std)
+    velocity, position, *biases = np.split(resampled(t, fused.t, fused.linear), 4, axis=1)
+    gyro, force = gyro[: len(t)] - biases[0], force[: len(t)] - biases[1]
     rotation = _dense(t, gyro, fused)
     voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
     return InertialSignals(
         t,
         period,
-        at_samples(fused.position),
+        position,
         rotation,
-        at_samples(fused.velocity),
+        velocity,
         np.einsum("nij,nj->ni", rotation, force) - np.array([0.0, 0.0, gravity]),
         gyro,
         derivative(gyro, period),
-        np.maximum(speeds, 0.0),
+        np.maximum(speeds[: len(t)], 0.0),
         voltage,
-        at_samples(fused.std[:, 0:3]),
-        at_samples(fused.std[:, 3:6]),
-        at_samples(fused.std[:, 6:9]),
+        std[:, :9],
         np.median(fused.std[:, 12:15], axis=0),
     )
 
 
-def _fused(
-    log: FlightLog,
-    t: Array,
-    gyro: Array,
-    force: Array,
-    gravity: float,
-    noise: Pair,
-    thin: int,
-) -> FusedMotion:
+def _fused(log: FlightLog, imu: ImuPiece) -> FusedMotion:
     """Return the fused motion, with the noise of positions and attitudes by their own scatter."""
-    thinned_noise = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
-    placed = _measured(log, finite_rows(log.position), t)
-    turned = _measured(log, finite_rows(log.quaternion) & log.valid, t)
+    placed = _measured(log, finite_rows(log.position), imu.t)
+    turned = _measured(log, finite_rows(log.quaternion) & log.valid, imu.t)
     positions = attitudes = None
     if len(placed) > 3:
         positions = Readings(log.t[placed], log.position[placed], FIRST_POSITION_STD)
     if len(turned) > 3:
         matrices = Rotation.from_quat(log.quaternion[turned], scalar_first=True).as_matrix()
         attitudes = Readings(log.t[turned], matrices, FIRST_ATTITUDE_STD)
-    fused = fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
+    fused = fuse(imu, positions, attitudes)
     if positions is None:
         return fused
-    off = positions.values - resampled(positions.t, fused.t, fused.position)
+    off = positions.values - resampled(positions.t, fused.t, fused.linear[:, 3:6])
     off -= np.median(off, axis=0)
     std = max(1.3 * robust_std(off), LEAST_POSITION_STD)  # a smoother leaves less than noise
     kept = np.linalg.norm(off, axis=1) < OUTLIER * std
     positions = Readings(positions.t[kept], positions.values[kept], std)
     if attitudes is not None:
-        kept = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)  # within a knot
-        at_knot = np.abs(fused.t[kept] - attitudes.t) < 0.004
-        if at_knot.sum() > 20:
-            off = Rotation.from_matrix(
-                np.swapaxes(fused.rotation[kept[at_knot]], 1, 2) @ attitudes.values[at_knot]
-            ).as_rotvec()
+        knot = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)
+        near = np.abs(fused.t[knot] - attitudes.t) < 0.004
+        if near.sum() > 20:
+            seen = Rotation.from_matrix(attitudes.values[near])
+            off = (fused.rotation[knot[near]].inv() * seen).as_rotvec()
             std = max(1.3 * robust_std(off - np.median(off, axis=0)), LEAST_ATTITUDE_STD)
-            attitudes = replace(attitudes, std=std)
-    return fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
+            attitudes = attitudes._replace(std=std)
+    return fuse(imu, positions, attitudes)
 
 
 def _measured(log: FlightLog, there: Mask, t: Array) -> Rows:
@@ -208,12 +191,11 @@ def _changed(rows: Rows, values: Array) -> Rows:
 
 def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:
     """Return the attitude (n, 3, 3) at all samples: from the knot before, by the gyro."""
-    period = float(t[1] - t[0])
-    knot = np.clip(np.searchsorted(fused.t, t + 1e-9, side="right") - 1, 0, len(fused.t) - 1)
-    first = np.clip(np.rint((fused.t[knot] - t[0]) / period).astype(np.int64), 0, len(t) - 1)
-    turned = np.vstack([np.zeros(3), np.cumsum(0.5 * (gyro[1:] + gyro[:-1]) * period, axis=0)])
+    knot = np.searchsorted(fused.t, t + 1e-9, side="right") - 1
+    first = np.searchsorted(t, fused.t - 1e-9)[knot]
+    turned = cumulative_trapezoid(gyro, dx=float(t[1] - t[0]), axis=0, initial=0)
     since = Rotation.from_rotvec(turned - turned[first])
-    return np.asarray((Rotation.from_matrix(fused.rotation[knot]) * since).as_matrix())
+    return np.asarray((fused.rotation[knot] * since).as_matrix())
 
 
 def with_drift(s: InertialSignals, rng: np.random.Generator, gravity: float) -> InertialSignals:
@@ -222,13 +204,14 @@ def with_drift(s: InertialSignals, rng: np.random.Generator, gravity: float) -> 
     """
     slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), DRIFT_TIME / s.period, axis=0)
     slow /= np.sqrt(mean_square(slow)) + 1e-30
-    turn = Rotation.from_rotvec(slow[:, :3] * s.attitude_std).as_matrix()
+    slow *= s.std
+    turn = Rotation.from_rotvec(slow[:, :3]).as_matrix()
     down, rotation = np.array([0.0, 0.0, gravity]), s.rotation @ turn
     felt = in_body(s.acceleration + down, s.rotation)
     return replace(
         s,
         rotation=rotation,
         acceleration=np.einsum("nij,nj->ni", rotation, felt) - down,
-        velocity=s.velocity + slow[:, 3:6] * s.velocity_std,
-        position=s.position + slow[:, 6:] * s.position_std,
+        velocity=s.velocity + slow[:, 3:6],
+        position=s.position + slow[:, 6:],
     )

@@ -7,13 +7,13 @@ of the log shows the noise at the frequencies of the motion: the rest at the top
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, ArrayPair, Names, Pair, finite_rows, median_step
+from ..logs.table import Array, Mask, Names, Pair, finite_rows, median_step
 from .smoothing import turned, unbroken
 
 # shares of half the sampling rate between which the slope is read: above a vehicle's motion, below
@@ -35,11 +35,11 @@ LOWER_BAND = (0.2, 0.35)
 LEAST_LOWER_HZ = 20.0  # start of the lower band: a vehicle's motion ends below
 TOP_FROM = 0.8  # share of half the sampling rate, start of the top of the band
 MOST_FALL = 1.5
+_SHARES = np.arange(1, SEGMENT // 2 + 1) / (SEGMENT // 2)  # of half the sampling rate
 DIFFERENCES = 2  # taken before the spectrum, against leakage of slow motion
 
 
-@dataclass(frozen=True)
-class ChannelNoise:
+class ChannelNoise(NamedTuple):
     """The fall of one channel's noise towards half the sampling rate."""
 
     channel: str  # position, attitude, gyro, accelerometer, rotor speeds
@@ -67,12 +67,11 @@ def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
     or never change.
     """
     out = []
-    low, high = BAND
     for channel, pieces, period in _channels(log):
-        if (spectrum := _amplitudes(pieces)) is not None:
-            nyquist = 0.5 / period
-            slope, fall = _slope(*spectrum), _fall(*spectrum, nyquist)
-            out.append(ChannelNoise(channel, slope, fall, (low * nyquist, high * nyquist)))
+        if (amplitude := _amplitudes(pieces)) is not None:
+            low, high = (share * 0.5 / period for share in BAND)
+            fall = _fall(amplitude, 0.5 / period)
+            out.append(ChannelNoise(channel, _slope(amplitude), fall, (low, high)))
     return out
 
 
@@ -89,10 +88,8 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         ("accelerometer", log.accelerometer),
         (ROTORS, None if log.commanded else log.rotor_speeds),
     ):
-        if x is None:
-            continue
-        rows = np.flatnonzero(finite_rows(x))
-        if len(rows) <= SEGMENT:
+        rows = np.flatnonzero([] if x is None else finite_rows(x))
+        if x is None or len(rows) <= SEGMENT:
             continue
         period = median_step(log.t[rows])
         rate = log.rates.get("rotors" if name == ROTORS else name, np.inf)
@@ -103,48 +100,48 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period
 
 
-def _amplitudes(pieces: Sequence[Array]) -> ArrayPair | None:
-    """Return shares of half the sampling rate (f,) and logarithms of the amplitude (f, k) of
-    pieces (n, k) there; None for too short ones.
+def _amplitudes(pieces: Sequence[Array]) -> Array | None:
+    """Return logarithms of the amplitude (f, k) of pieces (n, k); None for too short ones.
 
     The power is the median of half overlapping segments: a leap of the pose, or a touch of the
     ground, spoils some of them.
     """
-    n, order = SEGMENT, DIFFERENCES
-    rough = [np.diff(piece, order, axis=0) for piece in pieces]
+    n = SEGMENT
+    rough = [np.diff(piece, DIFFERENCES, axis=0) for piece in pieces]
     segments = [x[a : a + n] for x in rough for a in range(0, len(x) - n + 1, n // 2)]
     if len(segments) < LEAST_SEGMENTS:
         return None
-    power = np.square(
-        np.abs(np.fft.rfft(np.hanning(n)[None, :, None] * np.array(segments), axis=1))
-    )
-    power = np.median(power[:, 1:], axis=0)
+    spectra = np.fft.rfft(np.hanning(n)[:, None] * np.array(segments), axis=1)[:, 1:]
+    power = np.median(np.square(np.abs(spectra)), axis=0)
     moving = power.max(axis=0) > 0.0
     if not moving.any():
         return None
-    share = np.arange(1, n // 2 + 1) / (n // 2)
-    undone = (2.0 * np.sin(0.5 * np.pi * share)) ** (2 * order)
-    return share, 0.5 * np.log(np.maximum(power[:, moving] / undone[:, None], 1e-300))
+    undone = (2.0 * np.sin(0.5 * np.pi * _SHARES)) ** (2 * DIFFERENCES)
+    return np.asarray(0.5 * np.log(np.maximum(power[:, moving] / undone[:, None], 1e-300)))
 
 
-def _slope(share: Array, amplitude: Array) -> float:
+def _within(low: float, high: float) -> Mask:
+    """Return the frequencies (f,) between two shares of half the sampling rate."""
+    share = _SHARES
+    return (share >= low) & (share <= high)
+
+
+def _slope(amplitude: Array) -> float:
     """Return the power of 1/f by which the amplitude falls over the band: the median channel's."""
-    inside = (share >= BAND[0]) & (share <= BAND[1])
-    at = np.log(share[inside])
+    inside = _within(*BAND)
+    at = np.log(_SHARES[inside])
     at -= at.mean()
     return float(np.median(-(at @ amplitude[inside] / (at @ at))))
 
 
-def _fall(share: Array, amplitude: Array, nyquist: float) -> float:
+def _fall(amplitude: Array, nyquist: float) -> float:
     """Return the amplitude in the lower band over the amplitude at the top; NaN if motion may be in
     the lower band.
     """
-    low, high = LOWER_BAND
-    if low * nyquist < LEAST_LOWER_HZ:
+    if LOWER_BAND[0] * nyquist < LEAST_LOWER_HZ:
         return float("nan")
-    lower = (share >= low) & (share <= high)
-    top = (share >= TOP_FROM) & (share <= BAND[1])
-    return float(np.exp(np.median(amplitude[lower].mean(axis=0) - amplitude[top].mean(axis=0))))
+    lower, top = amplitude[_within(*LOWER_BAND)], amplitude[_within(TOP_FROM, BAND[1])]
+    return float(np.exp(np.median(lower.mean(axis=0) - top.mean(axis=0))))
 
 
 def filtering_notes(log: FlightLog) -> Names:
@@ -153,8 +150,8 @@ def filtering_notes(log: FlightLog) -> Names:
     """
     filtered = [noise for noise in noise_spectra(log) if noise.filtered]
     pose = [noise for noise in filtered if noise.channel in POSE_CHANNELS]
-    other_groups = [[noise] for noise in filtered if noise not in pose]
-    return tuple(_sentence(group) for group in ([pose] if pose else []) + other_groups)
+    groups = [pose, *([noise] for noise in filtered if noise not in pose)]
+    return tuple(_sentence(group) for group in groups if group)
 
 
 def _sentence(group: Sequence[ChannelNoise]) -> str:

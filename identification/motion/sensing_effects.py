@@ -24,8 +24,8 @@ def sensing_of(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
 
 def delay_of(vehicle: Vehicle) -> float:
     """Return the delay (s) of rows without a vehicle's sensing effects behind the flight."""
-    late = [e for e in sensing_of(vehicle) if get(e.name).role == Role.DELAY]
-    return float(sum(abs(get(e.name).vector(e.coefficients)[0]) for e in late))
+    every = ((get(e.name), e.coefficients) for e in sensing_of(vehicle))
+    return float(sum(abs(e.vector(given)[0]) for e, given in every if e.role == Role.DELAY))
 
 
 def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
@@ -64,7 +64,7 @@ def _settled(log: FlightLog, delay: float) -> np.ndarray:
     """
     seen = np.flatnonzero(log.valid)
     broken = np.diff(log.t[seen], prepend=-np.inf) > LONGEST_GAP
-    starts = np.append(-np.inf, log.t[seen[broken]])
+    # the one behind the last also stands before the first
+    starts = np.append(log.t[seen[broken]], np.inf)
     began = starts[np.searchsorted(starts, log.t, side="right") - 1]
-    settled = log.t >= np.where(np.isfinite(began), began + delay - 1e-9, np.inf)
-    return settled
+    return np.asarray(log.t >= began + delay - 1e-9)

@@ -5,21 +5,19 @@ pass the same filter: a causal filter's output against unfiltered regressors bia
 quarter.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter, savgol_filter, sosfilt_zi, sosfiltfilt
+from scipy.signal import butter, lfilter, savgol_filter, sosfilt_zi, sosfiltfilt, unit_impulse
 from scipy.spatial.transform import Rotation
 
 from ... import _core
+from ...runtime.arrays import Array, Mask
 
-Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Cutoffs:
+class Cutoffs(NamedTuple):
     """Cut-off frequencies (Hz), of low-passes unless stated."""
 
     # a log's pose before it is differentiated, and rotor speeds from commands: wide enough to leave
@@ -54,11 +52,9 @@ def low_pass(x: Array, cutoff_hz: float, period: float) -> Array:
     """
     if cutoff_hz >= 0.49 / period:
         return x
-    columns = x.reshape(len(x), -1)
     edge = min(_EDGE, len(x) - 1)
-    before = 2.0 * columns[0] - columns[edge:0:-1]
-    after = 2.0 * columns[-1] - columns[-2 : -edge - 2 : -1]
-    out = np.concatenate([before, columns, after])
+    columns = x.reshape(len(x), -1)
+    out = np.pad(columns, ((edge, edge), (0, 0)), "reflect", reflect_type="odd")
     _core.low_pass(out, *_section(2.0 * cutoff_hz * period))
     return out[edge : edge + len(x)].reshape(x.shape)
 
@@ -75,16 +71,13 @@ def high_pass(x: Array, share_of_rate: float) -> Array:
     the cut-off as a share of the sampling rate. White noise keeps its standard deviation.
     """
     sections = butter(4, 2.0 * share_of_rate, btype="highpass", output="sos")
-    impulse = np.zeros(201)
-    impulse[100] = 1.0
-    kept = np.linalg.norm(sosfiltfilt(sections, impulse))  # of white noise
+    kept = np.linalg.norm(sosfiltfilt(sections, unit_impulse(201, "mid")))  # of white noise
     return np.asarray(sosfiltfilt(sections, x, axis=0), dtype=np.float64) / kept
 
 
 def mean_square(x: Array) -> Array:
     """Return the mean squares of the columns of ``x`` (n, ...)."""
-    out: Array = np.mean(np.square(x), axis=0)
-    return out
+    return np.asarray(np.mean(np.square(x), axis=0))
 
 
 def robust_std(x: Array) -> float:
@@ -123,7 +116,7 @@ def unbroken(
     return [run for run in runs if len(run) > count and t[run[-1]] - t[run[0]] > seconds]
 
 
-def runs_of(rows: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs_of(rows: Mask) -> list[tuple[int, int]]:
     """Return the first row, and the one after the last, of each run of true rows (n,)."""
     edges = np.flatnonzero(np.diff(rows, prepend=False, append=False))
     return [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
@@ -155,19 +148,8 @@ def turn_between(before: Array, after: Array) -> Array:
     """Return the rotations (n, 3) rad, body, from attitudes (n, 4) to others, each by at most half
     a turn.
     """
-    w0, x0, y0, z0 = before.T
-    w1, x1, y1, z1 = after.T
-    cosine = w0 * w1 + x0 * x1 + y0 * y1 + z0 * z1  # before* times after
-    sine = np.column_stack(
-        [
-            w0 * x1 - x0 * w1 - y0 * z1 + z0 * y1,
-            w0 * y1 - y0 * w1 - z0 * x1 + x0 * z1,
-            w0 * z1 - z0 * w1 - x0 * y1 + y0 * x1,
-        ]
-    )
-    half = np.linalg.norm(sine, axis=1)
-    angle = 2.0 * np.arctan2(half, np.abs(cosine)) * np.where(cosine < 0.0, -1.0, 1.0)
-    return np.asarray(sine * (angle / np.maximum(half, 1e-300))[:, None])
+    start, end = (Rotation.from_quat(q, scalar_first=True) for q in (before, after))
+    return np.asarray((start.inv() * end).as_rotvec())
 
 
 def turned(quaternion: Array) -> Array:

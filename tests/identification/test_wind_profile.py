@@ -112,23 +112,18 @@ def test_what_is_no_jet_is_told(torque, why):
 def test_in_calm_air_the_bound_is_the_fastest_fan():
     gains = np.array([8.0, 14.0])
     fastest = fastest_followed(
-        following_loop(VEHICLE.inertia[2, 2], FilterNoise()),
-        PLACE,
-        JET,
-        shape_of(PLACE, JET),
-        gains,
+        following_loop(VEHICLE.inertia[2, 2], FilterNoise()), shape_of(PLACE, JET), gains
     )
     assert_allclose(fastest, gains * 0.03, rtol=0.12)
 
 
 def test_margins_tell_where_the_loop_begins_to_swing():
     loop = following_loop(VEHICLE.inertia[2, 2], FilterNoise())
-    line = 0.1 * PLACE
-    shape = shape_of(PLACE, JET)
+    shape = shape_of(PLACE, JET)._replace(torque=0.1 * PLACE)
     crossings = np.linspace(1.0, 6.0, 101)
     critical = crossings[np.argmax([loop.margins(c)[0] < 0.0 for c in crossings])]
     gains = np.array([0.8, 1.2]) * critical / 0.1
-    _, offsets = followed(loop, PLACE, line, shape, gains, np.zeros((2, 1)))
+    _, offsets = followed(loop, shape, gains, np.zeros((2, 1)))
     assert offsets[0] < 0.1  # as at the start
     assert offsets[1] > 0.3
     # a delay as long as the margin leaves none

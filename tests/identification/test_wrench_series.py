@@ -311,7 +311,7 @@ def test_the_force_is_the_posterior_of_a_walk():
     walk = 0.01
     variance = 1.0
     y = np.cumsum(np.sqrt(walk) * rng.standard_normal(n)) + rng.standard_normal(n)
-    found, std = _two_sided(y[:, None], np.zeros((n, 1, 1)), np.eye(1), np.diag([walk]), variance)
+    found, std = _two_sided(y[:, None], np.eye(1), np.diag([walk]), variance)
     between = np.diff(np.eye(n), axis=0)
     covariance = inv(np.eye(n) / variance + between.T @ between / walk)
     inner = slice(150, 250)

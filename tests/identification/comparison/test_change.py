@@ -39,7 +39,7 @@ def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), sessions=1):
         for i in range(count):
             numbers = middle + np.array(FLIGHT_STD) * rng.standard_normal(4)
             thrust = solve(MIX, np.append(numbers[:3], 1.0)) * np.exp(numbers[3])
-            out.append(Trim(f"{session}, {i}", thrust, 20.0))
+            out.append(Trim(f"{session}, {i}", thrust, 20.0, np.zeros(4)))
     return out
 
 

@@ -24,6 +24,7 @@ from tests.identification.vehicle_fit.flown import (
     inertial_flights,
 )
 from tests.support.alike import assert_alike
+from tests.support.data_paths import data_file
 from tests.support.flown import recorded
 from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, vehicles
 from tests.support.outcomes import refused
