@@ -266,8 +266,7 @@ def errors_of_models(
     whole = [[(0.0, math.inf)]] * len(logs)
     starts = []
     for log, spans in zip(logs, windows or whole, strict=True):
-        first, last = log.t[[0, -1]].tolist()
-        ends = [(first + begin, min(first + end, last)) for begin, end in spans]
+        ends = [(log.t[0] + begin, log.t[0] + end) for begin, end in spans]
         starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
     if not any(len(part.rows) for part in starts):
         names = ", ".join(log.name for log in logs)
@@ -333,7 +332,7 @@ def logged_starts(
     """
     log = undo_log_sensing(with_commanded_speeds(log, vehicle), vehicle)
     ahead = log.period * np.arange(1, max(1, round(horizon / log.period)) + 1)
-    each = (np.arange(t0, t1 - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
+    each = (np.arange(t0, min(t1, log.t[-1]) - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
     starts, seen = [], []
     for piece in log_signals(log):

@@ -216,22 +216,20 @@ def _rotors_later(log: FlightLog, late: float, std: float) -> FlightLog:
     whole = round(late / log.period) * log.period
     late = whole if abs(whole - late) < _WHOLE * std else late
     source = log.t - late
-    after = np.clip(np.searchsorted(log.t, source), 1, len(log.t) - 1)
-    steps = log.t[after] - log.t[after - 1]
-    inside = (source >= log.t[0]) & (source <= log.t[-1]) & (steps <= _GAP * log.period)
+    steps = np.diff(log.t, prepend=-np.inf, append=np.inf)
+    inside = steps[np.searchsorted(log.t, source, side="right")] <= _GAP * log.period
     moved: Data = {}
     for name in ("rotor_speeds", "command", "voltage", "force", "torque"):
         x = getattr(log, name)
         if x is not None and np.isfinite(x).all():
-            moved[name] = Akima1DInterpolator(log.t, x)(np.clip(source, log.t[0], log.t[-1]))
+            moved[name] = Akima1DInterpolator(log.t, x)(source)
     return with_rows(replace(log, **moved), inside)
 
 
 def _moved(t: Array, x: Array, late: float) -> Array:
     """Return samples (N, k) moved ``late`` s back in time, to the nearest rows; NaN elsewhere."""
     source = np.flatnonzero(np.isfinite(x[:, 0]) & (t >= t[0] + late) & (t <= t[-1] + late))
-    when = t[source] - late
-    after = np.clip(np.searchsorted(t, when), 1, len(t) - 1)
+    target = np.interp(t[source] - late, t, np.arange(len(t)))
     out = np.full_like(x, np.nan)
-    out[after - (when - t[after - 1] < t[after] - when)] = x[source]
+    out[np.floor(target + 0.5).astype(int)] = x[source]
     return out

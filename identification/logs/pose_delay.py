@@ -170,7 +170,7 @@ def _segments(
         at = np.arange(first, last, period)
         turn = _means(at, period, t, angles)
         w = (turn[2:] - turn[:-2]) / (2.0 * period)
-        alpha = (turn[2:] - 2.0 * turn[1:-1] + turn[:-2]) / period**2
+        alpha = np.diff(turn, n=2, axis=0) / period**2
         needed = (alpha @ inertia + np.cross(w, w @ inertia))[:, :2]
         both = np.stack([_means(at[1:-1] - late, period, log.t, moments), needed])
         for begin in range(0, len(needed) - count + 1, count // 2):
@@ -244,21 +244,21 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
         if after > _WHITE or not inside.any():
             continue
         at, noise = at[inside], noise[inside]
-        near = [second_difference(at - late - k * fine, width, log.t, turns) for k in (-1, 0, 1)]
-        for axis, driven in enumerate(np.transpose(near, (2, 1, 0))):
-            noise[:, axis] -= driven @ np.linalg.lstsq(driven, noise[:, axis], rcond=None)[0]
+        driven = np.hstack(
+            [second_difference(at - late - k * fine, width, log.t, turns) for k in (-1, 0, 1)]
+        )
+        noise -= driven @ np.linalg.lstsq(driven, noise, rcond=None)[0]
         noise = _without_size(noise)
-        for i, lag in enumerate(lags):
-            answer = second_difference(at - lag, width, log.t, moments)
-            products[i] += np.sum(noise * _without_size(answer))
+        answers = (second_difference(at - lag, width, log.t, moments) for lag in lags)
+        products += [np.sum(noise * _without_size(answer)) for answer in answers]
         count += noise.size
     score = np.abs(products) / np.sqrt(max(count, 1))
     peak = int(np.argmax(score))
     near = np.abs(lags - lags[peak]) <= 3.0 * width
     if score[peak] <= max(_ANSWERED, 2.0 * float(np.max(score[~near], initial=0.0))):
         return None
-    weight = np.square(np.where(near & (score > 0.5 * _ANSWERED), score, 0.0))
-    return float(np.average(lags, weights=weight)), width
+    seen = near & (score > 0.5 * _ANSWERED)
+    return float(np.average(lags[seen], weights=np.square(score[seen]))), width
 
 
 def _without_size(x: Array) -> Array:
