@@ -164,10 +164,19 @@ def _flown(
     models[0]["time"] = t[0]
     voltage = np.zeros(len(log.t)) if log.voltage is None else log.voltage
     speeds, volts = (np.ascontiguousarray(x[first:]) for x in (log.rotor_speeds, voltage))
-    keeps = vehicle.status.force == "refuted"
-    flown = t, speeds, volts, states[last_known], starts - first
     reaction = np.array(() if loop is None else astuple(loop))
-    _core.predict_flight(models.ctypes.data, *flown, log.period, keeps, reaction, path)
+    _core.predict_flight(
+        models.ctypes.data,
+        t,
+        speeds,
+        volts,
+        states[last_known],
+        starts - first,
+        log.period,
+        vehicle.status.force == "refuted",
+        reaction,
+        path,
+    )
     raise_errors()
     return path
 

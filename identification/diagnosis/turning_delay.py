@@ -36,13 +36,13 @@ LONGEST_DELAY = 0.12  # s
 
 
 class _Spectra(NamedTuple):
-    """Spectra (f, 2) of moments and turns, roll and pitch, from ``count`` segments."""
+    """Spectra (f, 2) of moments and turns, roll and pitch."""
 
     omega: Array  # (f, 1) rad/s, in the band
     moment: Array
     turning: Array
     cross: NDArray[np.complex128]
-    count: float  # independent segments
+    segments: float  # independent ones
 
     def deviance(self, response: NDArray[np.complex128]) -> float:
         """Return minus twice the log likelihood, up to a constant, at the best gain an axis."""
@@ -54,7 +54,7 @@ class _Spectra(NamedTuple):
             gain = np.sum(along / noise, axis=0) / (np.sum(power / noise, axis=0) + 1e-300)
             gain = np.maximum(gain, 0.0)
             noise = self.turning - 2.0 * gain * along + gain**2 * power
-        return 2.0 * self.count * float(np.sum(np.log(noise / self.turning)))
+        return 2.0 * self.segments * float(np.sum(np.log(noise / self.turning)))
 
 
 def turning_delay(

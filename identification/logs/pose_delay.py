@@ -46,7 +46,7 @@ AHEAD = 0.03
 # s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
 _LAGS = 0.01 * np.arange(11)
 _STEP = 0.001  # s, of the search
-_DELAYS = _STEP * np.arange(-300, 301)
+_DELAYS = _STEP * np.arange(-300, 301, dtype=np.float64)
 _BAND_HZ = (0.8, 10.0)
 _SHARE_OF_RATE = 0.4  # of the poses' rate, the highest frequency
 _SEGMENT = 2.0  # s, of a spectrum
@@ -112,7 +112,8 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
         segments = _segments(log, vehicle, late)
         if segments is None:
             return None
-        response = _response(*segments)
+        omega, noise, *both = segments
+        response = _response(omega, noise, *both)
         step = response.likeliest()
         late = float(np.clip(late + step, -FARTHEST, FARTHEST))
         if step == 0.0:
@@ -125,7 +126,6 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
         return None
     # gusts answered by the loop leave a response of another shape, and turn its phase by as much
     misfit = np.sqrt(left / np.sum(np.square(response.omega) * whole))
-    omega, noise, *both = segments
     parts = zip(*(np.array_split(x, _PARTS) for x in both), strict=True)
     scatter = np.std([_response(omega, noise, *part).likeliest() for part in parts])
     std = float(np.hypot(scatter / np.sqrt(_PARTS), misfit))
@@ -179,7 +179,7 @@ def _segments(
             transforms.append(np.fft.rfft(part, axis=1))
     if len(transforms) < _FEWEST:
         return None
-    frequency = np.fft.rfftfreq(count, period)
+    frequency = np.asarray(np.fft.rfftfreq(count, period), dtype=np.float64)
     highest = min(_BAND_HZ[1], _SHARE_OF_RATE / step)
     band = (frequency >= _BAND_HZ[0]) & (frequency <= highest)
     frequency = frequency[band, None]
