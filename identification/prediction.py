@@ -32,7 +32,7 @@ from .logs.flight_log import NORM_TOLERANCE, FlightLog
 from .logs.table import Array, finite_rows
 from .motion.residual import loaded_model
 from .motion.sensing_effects import undo_log_sensing
-from .motion.signals import Signals, known_pieces, log_signals, longest_step
+from .motion.signals import known_pieces, log_signals, longest_step
 from .motion.smoothing import continuous, resampled, unbroken
 
 Segments = Sequence[tuple[float, float]]
@@ -164,10 +164,19 @@ def _flown(
     models[0]["time"] = t[0]
     voltage = np.zeros(len(log.t)) if log.voltage is None else log.voltage
     speeds, volts = (np.ascontiguousarray(x[first:]) for x in (log.rotor_speeds, voltage))
-    keeps = vehicle.status.force == "refuted"
-    flown = t, speeds, volts, states[last_known], starts - first
     reaction = np.array(() if loop is None else astuple(loop))
-    _core.predict_flight(models.ctypes.data, *flown, log.period, keeps, reaction, path)
+    _core.predict_flight(
+        models.ctypes.data,
+        t,
+        speeds,
+        volts,
+        states[last_known],
+        starts - first,
+        log.period,
+        vehicle.status.force == "refuted",
+        reaction,
+        path,
+    )
     raise_errors()
     return path
 
@@ -218,15 +227,13 @@ class PredictionErrors:
     def pooled(cls, parts: Sequence[PredictionErrors]) -> PredictionErrors:
         """Return the errors over all starts of several, at the samples of the slowest."""
         horizon = min((part.horizon for part in parts), key=len)
-        at = [
-            np.minimum(np.searchsorted(of, horizon - 0.5 * of[0]), len(of) - 1)
-            for of in (part.horizon for part in parts)
-        ]
-        of = [[part.model[:, i] for part, i in zip(parts, at, strict=True)]]
-        of.append([part.still[:, i] for part, i in zip(parts, at, strict=True)])
+        both = []
+        for part in parts:
+            at = np.searchsorted(part.horizon, horizon - 0.5 * part.horizon[0])
+            at = np.minimum(at, len(part.horizon) - 1)
+            both.append((part.model[:, at], part.still[:, at]))
         starts = [part.starts for part in parts]
-        means = (np.average(each, axis=0, weights=starts) for each in of)
-        return cls(sum(starts), horizon, *means)
+        return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))
 
 
 def prediction_errors(
@@ -268,8 +275,7 @@ def errors_of_models(
     whole = [[(0.0, math.inf)]] * len(logs)
     starts = []
     for log, spans in zip(logs, windows or whole, strict=True):
-        first, last = log.t[[0, -1]].tolist()
-        ends = [(first + begin, min(first + end, last)) for begin, end in spans]
+        ends = [(log.t[0] + begin, log.t[0] + end) for begin, end in spans]
         starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
     if not any(len(part.rows) for part in starts):
         names = ", ".join(log.name for log in logs)
@@ -283,10 +289,9 @@ def errors_at(
     """Return the errors of several models from the starts of flights, at least one of them."""
     parts = []
     for part in (part for part in starts if len(part.rows)):
-        horizon = part.log.period * np.arange(1, part.seen.shape[1] + 1)
         still = _distances(part.unchanged, part.seen).mean(axis=0)
         means = (_distances(part.flown(v), part.seen).mean(axis=0) for v in vehicles)
-        parts.append([PredictionErrors(len(part.rows), horizon, mean, still) for mean in means])
+        parts.append([PredictionErrors(len(part.rows), part.ahead, mean, still) for mean in means])
     return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
 
 
@@ -309,10 +314,20 @@ class LoggedStarts:
         return _flown(log, vehicle, self.states, self.rows, self.seen.shape[1])
 
     @property
+    def ahead(self) -> Array:
+        """The times (m,) of the samples, s after a start."""
+        return self.log.period * np.arange(1, self.seen.shape[1] + 1)
+
+    @property
     def unchanged(self) -> Array:
         """The states (n, m, STATE) with velocity and angular velocity as at the start."""
-        ahead = self.log.period * np.arange(1, self.seen.shape[1] + 1)
-        return _unchanged(self.states[self.rows], ahead)
+        ahead = self.ahead[:, None]
+        out = np.repeat(self.states[self.rows, None], len(ahead), axis=1)
+        out[..., POSITION] += ahead * out[..., VELOCITY]
+        turn = Rotation.from_rotvec((ahead * out[..., RATE]).reshape(-1, 3))
+        turned = (_attitudes(out) * turn).as_quat(scalar_first=True)
+        out[..., QUATERNION] = turned.reshape(*out.shape[:2], 4)
+        return out
 
 
 def logged_starts(
@@ -325,28 +340,23 @@ def logged_starts(
         InputError: no stretch of pose is unbroken for 3 s.
     """
     log = undo_log_sensing(with_commanded_speeds(log, vehicle), vehicle)
-    ahead = max(1, round(horizon / log.period))
+    ahead = log.period * np.arange(1, max(1, round(horizon / log.period)) + 1)
+    each = (np.arange(t0, min(t1, log.t[-1]) - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
+    times = np.concatenate([np.empty(0), *each])
     starts, seen = [], []
     for piece in log_signals(log):
-        rows = _start_rows(log, piece, segments, horizon)
+        first, last = piece.t[0] + _START_MARGIN, piece.t[-1] - horizon - _END_MARGIN
+        inside = times[(times >= first) & (times <= last)]
+        rows = np.unique(np.searchsorted(log.t, inside - 0.5 * log.period))
         rows = rows[:: math.ceil(len(rows) / _MOST_STARTS) or 1]
         starts.append(rows)
-        seen.append(_seen(piece, log.t[rows, None] + log.period * np.arange(1, ahead + 1)))
+        turned = continuous(Rotation.from_matrix(piece.rotation).as_quat(scalar_first=True))
+        states = np.hstack([piece.position, turned, piece.velocity, piece.angular_velocity])
+        at = log.t[rows, None] + ahead
+        seen.append(resampled(at.ravel(), piece.t, states).reshape(*at.shape, STATE))
     rows = np.concatenate(starts)
     states = causal_states(log, vehicle) if rows.size else np.empty((len(log.t), STATE))
     return LoggedStarts(log, states, rows, np.concatenate(seen))
-
-
-def _unchanged(begun: Array, ahead: Array) -> Array:
-    """Return the states (n, m, STATE) at m times ``ahead`` (s) of states (n, STATE) with constant
-    velocity and angular velocity.
-    """
-    out = np.repeat(begun[:, None], len(ahead), axis=1)
-    out[..., POSITION] += ahead[:, None] * out[..., VELOCITY]
-    turn = Rotation.from_rotvec((ahead[:, None] * out[..., RATE]).reshape(-1, 3))
-    turned = _attitudes(out) * turn
-    out[..., QUATERNION] = turned.as_quat(scalar_first=True).reshape(*out.shape[:2], 4)
-    return out
 
 
 def _attitudes(states: Array) -> Rotation:
@@ -365,26 +375,6 @@ def offsets(x: Array, y: Array) -> Array:
 def _distances(x: Array, y: Array) -> Array:
     """Return the distances (n, 4, m), in the order of ``QUANTITIES``, of states (n, m, STATE)."""
     return np.moveaxis(np.linalg.norm(offsets(x, y), axis=-1), 1, 2)
-
-
-def _start_rows(
-    log: FlightLog, piece: Signals, segments: Segments, horizon: float
-) -> NDArray[np.intp]:
-    """Return the start rows of predictions in a segment and well inside a piece."""
-    first = piece.t[0] + _START_MARGIN
-    last = piece.t[-1] - horizon - _END_MARGIN
-    each = (np.arange(t0, t1 - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
-    times = np.concatenate([np.empty(0), *each])
-    times = times[(times >= first) & (times <= last)]
-    return np.unique(np.searchsorted(log.t, times - 0.5 * log.period))
-
-
-def _seen(piece: Signals, times: Array) -> Array:
-    """Return the flight's states (..., STATE) at times (...) of a piece."""
-    turned = Rotation.from_matrix(piece.rotation).as_quat(scalar_first=True)
-    columns = piece.position, continuous(turned), piece.velocity, piece.angular_velocity
-    states = resampled(times.ravel(), piece.t, np.column_stack(columns))
-    return states.reshape(*times.shape, STATE)
 
 
 def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:

@@ -14,7 +14,7 @@ of the fitted one.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,26 +35,26 @@ SEGMENT = 2.0  # s, of a spectrum
 LONGEST_DELAY = 0.12  # s
 
 
-@dataclass(frozen=True, eq=False)
-class _Spectra:
-    """Spectra (frequencies in the band,) of a moment and of its turn, from ``count`` segments."""
+class _Spectra(NamedTuple):
+    """Spectra (f, 2) of moments and turns, roll and pitch."""
 
-    omega: Array  # rad/s
+    omega: Array  # (f, 1) rad/s, in the band
     moment: Array
     turning: Array
     cross: NDArray[np.complex128]
-    count: float  # independent segments
+    segments: float  # independent ones
 
     def deviance(self, response: NDArray[np.complex128]) -> float:
-        """Return minus twice the log likelihood, up to a constant, at the best gain."""
+        """Return minus twice the log likelihood, up to a constant, at the best gain an axis."""
         along = np.real(np.conj(response) * self.cross)
         power = np.square(np.abs(response)) * self.moment
         # the gain changes its own weights, the noise
         noise = self.turning
         for _ in range(6):
-            gain = max(float(np.sum(along / noise) / np.sum(power / noise)), 0.0)
+            gain = np.sum(along / noise, axis=0) / (np.sum(power / noise, axis=0) + 1e-300)
+            gain = np.maximum(gain, 0.0)
             noise = self.turning - 2.0 * gain * along + gain**2 * power
-        return 2.0 * self.count * float(np.sum(np.log(noise / self.turning)))
+        return 2.0 * self.segments * float(np.sum(np.log(noise / self.turning)))
 
 
 def turning_delay(
@@ -76,7 +76,11 @@ def turning_delay(
         if moves_time(e.name) and get(e.name).kind != "sensing"
         for x in e.coefficients.values()
     ]
-    spectra = [s for piece in pieces for s in _spectra(piece, vehicle)]
+    spectra = [
+        _spectra(piece, vehicle)
+        for piece in pieces
+        if piece.period * 2.2 * BAND_HZ[1] <= 1.0 and len(piece.t) * piece.period >= 2.0 * SEGMENT
+    ]
     if not spectra:
         return None
 
@@ -103,19 +107,14 @@ def turning_delay(
     return (seconds, std, -least) if clear else None
 
 
-def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
+def _spectra(piece: Signals, vehicle: Vehicle) -> _Spectra:
+    """Return the spectra of a piece, of two segments at least."""
     rate = 1.0 / piece.period
     length = round(SEGMENT * rate)
-    if rate < 2.2 * BAND_HZ[1] or len(piece.t) < 2 * length:
-        return []
-    out = []
-    moments = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
-    for x, y in zip(moments.T, piece.angular_acceleration[:, :2].T, strict=True):
-        f, xx = welch(x, rate, nperseg=length)
-        yy, xy = welch(y, rate, nperseg=length)[1], csd(x, y, rate, nperseg=length)[1]
-        band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
-        if np.all(xx[band] > 0) and np.all(yy[band] > 0):
-            out.append(
-                _Spectra(2.0 * np.pi * f[band], xx[band], yy[band], xy[band], len(x) / length)
-            )
-    return out
+    x = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
+    y = piece.angular_acceleration[:, :2]
+    f, xx = welch(x, rate, nperseg=length, axis=0)
+    yy, xy = (csd(z, y, rate, nperseg=length, axis=0)[1] for z in (y, x))
+    band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
+    omega = 2.0 * np.pi * f[band, None]
+    return _Spectra(omega, xx[band], np.real(yy[band]) + 1e-300, xy[band], len(x) / length)

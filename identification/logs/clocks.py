@@ -30,6 +30,7 @@ from .flight_log import FlightLog, with_rows
 from .inertial import (
     STILL,
     WINDOW,
+    mean_force,
     mean_rate,
     median_square,
     turn_rates,
@@ -37,7 +38,7 @@ from .inertial import (
     windows,
 )
 from .pose_delay import FARTHEST, LEAST, SURE, answer_to_noise, pose_delay
-from .table import Array, Data, Mask, NamedArrays, Names, Pair, Rows
+from .table import Array, Data, Names, Pair
 
 _COARSE, _FINE = 0.01, 0.001  # s, of the search's steps
 # s: between commands and motion lies a motor's lag of about so much. Smaller offsets of an IMU do
@@ -52,7 +53,7 @@ _MOVING = 0.3  # m/s2: the acceleration of a hovering vehicle by pose noise
 _WHOLE = 2.0  # standard deviations between an offset and whole rows
 _GAP = 3.5  # median time steps; rotor speeds are not moved across
 
-_Left = Callable[[float, slice | Rows], float]  # s of delay and windows: a middle squared error
+_Felt = Callable[[float, Array], Array]  # s of delay and windows (n,): a sensor's means (n, 3)
 
 
 def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Names]:
@@ -83,21 +84,21 @@ def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog,
         )
     whose, other = "IMU", "pose"
     rotors = ", by less than the rotor speeds tell whose clock is wrong"
-    is_pose = False
     delay = pose_delay(log, vehicle) if log.has_rotor_speeds else None
     lag, least = (_MOTOR_LAG, _TELLING) if log.commanded else (0.0, _MOTOR_LAG)
     if delay is not None and abs(late) > max(least, SURE * delay.std):
-        seconds = delay.seconds - lag
-        rotors, is_pose = " and the rotor speeds", abs(seconds) > abs(seconds + late)
-    if is_pose:  # rotors and IMU share a clock
-        whose, other, late = "pose", "IMU", -late
-        pose = {"position": log.position, "quaternion": log.quaternion}
-        moved = _moved(log.t, log.valid, late, pose)
-        log = replace(log, **moved, valid=np.isfinite(moved["position"][:, 0]))
+        rotors = " and the rotor speeds"
+        if abs(delay.seconds - lag) > abs(delay.seconds - lag + late):
+            whose, other, late = "pose", "IMU", -late  # rotors and IMU share a clock
+    if whose == "pose":
+        pose = np.where(log.valid[:, None], np.hstack([log.position, log.quaternion]), np.nan)
+        pose = _moved(log.t, pose, late)
+        seen = np.isfinite(pose[:, 0])
+        log = replace(log, position=pose[:, :3], quaternion=pose[:, 3:], valid=seen)
     else:
-        for name, x in {"gyro": log.gyro, "accelerometer": log.accelerometer}.items():
-            if x is not None:
-                log = replace(log, **_moved(log.t, np.isfinite(x[:, 0]), late, {name: x}))
+        sensors = {"gyro": log.gyro, "accelerometer": log.accelerometer}
+        moved: Data = {k: _moved(log.t, x, late) for k, x in sensors.items() if x is not None}
+        log = replace(log, **moved)
     return log, (_note(whose, late, std, f"{other}{rotors}", f"the {whose} was moved"),)
 
 
@@ -110,7 +111,8 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
     delay = pose_delay(log, vehicle)
     if delay is None:
         return log, ()
-    late, std, why = delay.seconds, delay.std, "beyond a vehicle's own delay"
+    late, std, is_clock = delay
+    why = "beyond a vehicle's own delay"
     answer = answer_to_noise(log, vehicle, late) if abs(late) > LEAST else None
     if answer is not None:
         ahead, width = answer
@@ -118,12 +120,11 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
         if abs(ahead - late) < SURE * np.hypot(std, unsure):
             share = unsure**2 / (unsure**2 + std**2)
             late, std = share * late + (1.0 - share) * ahead, float(np.sqrt(share)) * std
-            delay = replace(delay, seconds=late, std=std)
             if ahead > _SMEAR * width:
                 why = "and the rotor speeds answer the pose's noise ahead of its rows"
-                delay = replace(delay, beyond_honest=True)
+                is_clock = True
     # rotor speeds that are held from one measurement to the next are late by as long, at most
-    if not (delay.is_clear and delay.beyond_honest) or abs(late) < 1.0 / log.motor_rate:
+    if not is_clock or abs(late) <= max(LEAST, SURE * std, 1.0 / log.motor_rate):
         return log, ()
     if abs(late) > FARTHEST - LEAST:
         return log, (
@@ -147,9 +148,12 @@ def _imu_delay(log: FlightLog) -> Pair:
 
     The gyro tells, else the accelerometer.
     """
-    sensors = (log.gyro, 0.0, _turn_errors), (log.accelerometer, WINDOW, _force_errors)
-    for measured, before, compared in sensors:
-        seen = np.flatnonzero(log.valid)
+    seen = np.flatnonzero(log.valid)
+    sensors = (
+        (log.gyro, 0.0, STILL, _turns_and_felt),
+        (log.accelerometer, WINDOW, _MOVING, _forces_and_felt),
+    )
+    for measured, before, least, compared in sensors:
         if measured is None or not seen.size:
             continue
         read = np.isfinite(measured[:, 0])
@@ -160,55 +164,46 @@ def _imu_delay(log: FlightLog) -> Pair:
         if len(begins) < _FEWEST_WINDOWS:
             continue
         attitude = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
-        left, size = compared(begins, t, measured[read], pose_times, attitude, log.position[seen])
-        late = _likeliest(left, slice(None))
-        if left(late, slice(None)) <= GOOD * size:
-            parts = np.array_split(np.arange(len(begins)), _PARTS)
-            scatter = np.std([_likeliest(left, part) for part in parts])
+        needed, felt = compared(begins, t, measured[read], pose_times, attitude, log.position[seen])
+        late, left = _likeliest(felt, begins, needed)
+        if left <= GOOD * (median_square(unbiased(needed)) + least**2):
+            parts = zip(*(np.array_split(x, _PARTS) for x in (begins, needed)), strict=True)
+            scatter = np.std([_likeliest(felt, *part)[0] for part in parts])
             return late, float(scatter / np.sqrt(_PARTS))
     return 0.0, 0.0
 
 
-def _likeliest(left: _Left, part: slice | Rows) -> float:
-    """Return the delay in s with the least error in some windows."""
-    found = 0.0
+def _likeliest(felt: _Felt, begins: Array, needed: Array) -> Pair:
+    """Return the delay in s with the least error in some windows, and its middle squared error."""
+    found = left = 0.0
     for reach, step in ((FARTHEST, _COARSE), (_COARSE, _FINE)):
         tried = found + np.arange(-round(reach / step), round(reach / step) + 1) * step
-        found = float(tried[np.argmin([left(x, part) for x in tried])])
-    return found
+        left, found = min(
+            (median_square(unbiased(needed - felt(x, begins))), x) for x in tried.tolist()
+        )
+    return found, left
 
 
-def _turn_errors(
+def _turns_and_felt(
     begins: Array, t: Array, gyro: Array, pose_times: Array, attitude: Rotation, position: Array
-) -> tuple[_Left, float]:
-    """Return the error of a gyro (N, 3) delayed against the attitude, and the turns' own size."""
-    turned = turn_rates(begins, pose_times, attitude)
+) -> tuple[Array, _Felt]:
+    """Return the attitude's angular velocity (n, 3) in windows, and a gyro's (N, 3)."""
     sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
-
-    def left(late: float, part: slice | Rows) -> float:
-        return median_square(unbiased(turned[part] - mean_rate(begins[part] + late, t, sum_of)))
-
-    return left, median_square(unbiased(turned)) + STILL**2
+    return turn_rates(begins, pose_times, attitude), lambda late, at: mean_rate(
+        at + late, t, sum_of
+    )
 
 
-def _force_errors(
+def _forces_and_felt(
     begins: Array, t: Array, force: Array, pose_times: Array, attitude: Rotation, position: Array
-) -> tuple[_Left, float]:
-    """Return the error of an accelerometer (N, 3) delayed against the position's acceleration, and
-    the acceleration's own size.
-    """
+) -> tuple[Array, _Felt]:
+    """Return the position's acceleration (n, 3) around times, and an accelerometer's (N, 3)."""
     needed = second_difference(begins, WINDOW, pose_times, position) / WINDOW**2
-    at = np.linspace(pose_times[0], pose_times[-1], len(t))
-    turn = Slerp(pose_times, attitude)(at)
-
-    def left(late: float, part: slice | Rows) -> float:
-        sums = turn.apply(resampled(at + late, t, force))
-        for _ in range(2):
-            sums = cumulative_trapezoid(sums, at, axis=0, initial=0.0)
-        felt = second_difference(begins[part], WINDOW, at, sums) / WINDOW**2
-        return median_square(unbiased(needed[part] - felt))
-
-    return left, median_square(unbiased(needed)) + _MOVING**2
+    times = np.linspace(pose_times[0], pose_times[-1], len(t))
+    turn = Slerp(pose_times, attitude)(times)
+    return needed, lambda late, at: mean_force(
+        at, times, turn.apply(resampled(times + late, t, force))
+    )
 
 
 def _rotors_later(log: FlightLog, late: float, std: float) -> FlightLog:
@@ -221,28 +216,20 @@ def _rotors_later(log: FlightLog, late: float, std: float) -> FlightLog:
     whole = round(late / log.period) * log.period
     late = whole if abs(whole - late) < _WHOLE * std else late
     source = log.t - late
-    after = np.clip(np.searchsorted(log.t, source), 1, len(log.t) - 1)
-    steps = log.t[after] - log.t[after - 1]
-    inside = (source >= log.t[0]) & (source <= log.t[-1]) & (steps <= _GAP * log.period)
+    steps = np.diff(log.t, prepend=-np.inf, append=np.inf)
+    inside = steps[np.searchsorted(log.t, source, side="right")] <= _GAP * log.period
     moved: Data = {}
     for name in ("rotor_speeds", "command", "voltage", "force", "torque"):
         x = getattr(log, name)
         if x is not None and np.isfinite(x).all():
-            moved[name] = Akima1DInterpolator(log.t, x)(np.clip(source, log.t[0], log.t[-1]))
+            moved[name] = Akima1DInterpolator(log.t, x)(source)
     return with_rows(replace(log, **moved), inside)
 
 
-def _moved(t: Array, there: Mask, late: float, columns: NamedArrays) -> Data:
-    """Return columns (N, k) with the samples ``there`` (N,) moved ``late`` s back in time, to the
-    nearest rows; NaN elsewhere.
-    """
-    source = np.flatnonzero(there)
-    when = t[source] - late
-    inside = (when >= t[0]) & (when <= t[-1])
-    source, when = source[inside], when[inside]
-    after = np.clip(np.searchsorted(t, when), 1, len(t) - 1)
-    target = after - (when - t[after - 1] < t[after] - when)
-    out = {name: np.full_like(x, np.nan) for name, x in columns.items()}
-    for name, x in columns.items():
-        out[name][target] = x[source]
+def _moved(t: Array, x: Array, late: float) -> Array:
+    """Return samples (N, k) moved ``late`` s back in time, to the nearest rows; NaN elsewhere."""
+    source = np.flatnonzero(np.isfinite(x[:, 0]) & (t >= t[0] + late) & (t <= t[-1] + late))
+    target = np.interp(t[source] - late, t, np.arange(len(t)))
+    out = np.full_like(x, np.nan)
+    out[np.floor(target + 0.5).astype(int)] = x[source]
     return out

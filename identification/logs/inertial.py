@@ -167,6 +167,13 @@ def mean_rate(begins: Array, t: Array, sum_of: Array) -> Array:
     return (resampled(begins + WINDOW, t, sum_of) - resampled(begins, t, sum_of)) / WINDOW
 
 
+def mean_force(middles: Array, t: Array, force: Array) -> Array:
+    """Return a force's (N, 3) means (n, 3) over two windows, weighted as by a second difference."""
+    for _ in range(2):
+        force = cumulative_trapezoid(force, t, axis=0, initial=0.0)
+    return second_difference(middles, WINDOW, t, force) / WINDOW**2
+
+
 def unbiased(rates: Array) -> Array:
     """Return angular velocities or forces (n, 3) less their medians."""
     return rates - np.median(rates, axis=0)
@@ -194,11 +201,7 @@ def _force_shares(
     body = Slerp(pose_times, attitude)(np.clip(t, pose_times[0], pose_times[-1]))
 
     def mean(force: Array) -> Array:
-        """Return a force's (N, 3) mean over two windows, weighted as by a second difference."""
-        sums, times = force[inside], t[inside]
-        for _ in range(2):
-            sums = cumulative_trapezoid(sums, times, axis=0, initial=0.0)
-        return second_difference(middles, WINDOW, times, sums) / WINDOW**2
+        return mean_force(middles, t[inside], force[inside])
 
     up, turned = np.zeros(3), None
     needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2

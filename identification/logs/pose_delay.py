@@ -15,7 +15,7 @@ The answer tells more. No loop answers noise before the pose was measured. Rotor
 ahead of the noise's row prove a late pose, and no latency of the vehicle does the same.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,7 @@ AHEAD = 0.03
 # s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
 _LAGS = 0.01 * np.arange(11)
 _STEP = 0.001  # s, of the search
+_DELAYS = _STEP * np.arange(-300, 301, dtype=np.float64)
 _BAND_HZ = (0.8, 10.0)
 _SHARE_OF_RATE = 0.4  # of the poses' rate, the highest frequency
 _SEGMENT = 2.0  # s, of a spectrum
@@ -65,76 +66,37 @@ _FINEST = 0.005  # s, between two delays of an answer
 _FEWEST_POSES = 100
 _ANSWERED = 6.0  # standard deviations of a chance correlation
 
+Spectra = NDArray[np.complex128]
 
-@dataclass(frozen=True)
-class PoseDelay:
+
+class PoseDelay(NamedTuple):
     """A delay of the pose behind the rotor speeds; negative: ahead."""
 
     seconds: float
     std: float
     beyond_honest: bool  # whether no honest delay with any lag of the motors is as likely
 
-    @property
-    def is_clear(self) -> bool:
-        """Whether the delay is beyond noise."""
-        return abs(self.seconds) > max(LEAST, SURE * self.std)
 
-
-@dataclass(frozen=True, eq=False)
-class _Response:
+class _Response(NamedTuple):
     """Measured response of turns to moments: (f, 2) by frequency and axis, roll and pitch."""
 
     omega: Array  # (f, 1) rad/s
-    gain: NDArray[np.complex128]
+    gain: Spectra
     weight: Array  # one over the variance of the real part
 
-    def deviance(self, delays: Array, lag: float = 0.0) -> Array:
-        """Return the deviance at each of some delays (n,) in s, at the best gain of each axis."""
+    def explained(self, delays: Array, lag: float = 0.0) -> Array:
+        """Return the deviance that the moments explain at each of some delays (n,) in s, at the
+        best gain of each axis.
+        """
         shape = np.exp(-1j * self.omega * delays[:, None, None]) / (1.0 + 1j * self.omega * lag)
         along = np.sum(self.weight * np.real(np.conj(shape) * self.gain), axis=1)
         power = np.sum(self.weight * np.square(np.abs(shape)), axis=1)
-        explained = np.square(np.maximum(along, 0.0)) / power
-        return np.asarray(self.none - np.sum(explained, axis=1))
-
-    @property
-    def none(self) -> float:
-        """Deviance without any visible moment."""
-        return float(np.sum(self.weight * np.square(np.abs(self.gain))))
-
-    def misfit(self, left: float) -> float:
-        """Return the error in s of a delay by the deviance left at the best one: gusts answered by
-        the loop leave a response of another shape, and turn its phase by as much.
-        """
-        turn = np.square(np.abs(self.omega * self.gain))
-        return float(np.sqrt(left / np.sum(self.weight * turn)))
+        explained: Array = np.sum(np.square(np.maximum(along, 0.0)) / power, axis=1)
+        return explained
 
     def likeliest(self) -> float:
         """Return the likeliest delay, s."""
-        count = round(FARTHEST / _STEP)
-        tried = _STEP * np.arange(-count, count + 1, dtype=np.float64)
-        return float(tried[np.argmin(self.deviance(tried))])
-
-
-@dataclass(frozen=True, eq=False)
-class _Segments:
-    """Transforms (n, f, 2) of segments of a flight, and the power (f, 2) of the pose's noise."""
-
-    frequency: Array
-    moment: NDArray[np.complex128]
-    turning: NDArray[np.complex128]
-    noise: Array
-    highest_hz: float
-
-    def response(self, chosen: slice | Rows = slice(None)) -> _Response:
-        """Return the frequency response of some segments."""
-        band = (self.frequency >= _BAND_HZ[0]) & (self.frequency <= self.highest_hz)
-        x, y = self.moment[chosen][:, band], self.turning[chosen][:, band]
-        xx, yy = (np.mean(np.square(np.abs(z)), axis=0) + 1e-300 for z in (x, y))
-        xy = np.mean(np.conj(x) * y, axis=0)
-        left = np.maximum(yy - np.square(np.abs(xy)) / xx, 1e-12 * yy)
-        variance = left / (2.0 * _INDEPENDENT * len(x)) + self.noise[band]
-        omega = 2.0 * np.pi * self.frequency[band][:, None]
-        return _Response(omega, xy / xx, xx / variance)
+        return float(_DELAYS[np.argmax(self.explained(_DELAYS))])
 
 
 def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
@@ -148,32 +110,48 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
     late = 0.0
     for _ in range(_ROUNDS):  # a window over delayed signals cuts the two of them differently
         segments = _segments(log, vehicle, late)
-        if segments is None or len(segments.moment) < _FEWEST:
+        if segments is None:
             return None
-        response = segments.response()
+        omega, noise, *both = segments
+        response = _response(omega, noise, *both)
         step = response.likeliest()
-        late = min(max(late + step, -FARTHEST), FARTHEST)
+        late = float(np.clip(late + step, -FARTHEST, FARTHEST))
         if step == 0.0:
             break
-    assert segments is not None
-    here = response.deviance(np.zeros(1))[0]
-    free = 2.0 * response.gain.size - 3.0
-    scale = max(1.0, here / free)  # beyond what noise leaves
-    if response.none - here < _VISIBLE * scale:
+    best = response.explained(np.zeros(1))[0]
+    whole = response.weight * np.square(np.abs(response.gain))
+    left = np.sum(whole) - best
+    scale = max(1.0, left / (2.0 * whole.size - 3.0))  # beyond what noise leaves
+    if best < _VISIBLE * scale:
         return None
-    parts = np.array_split(np.arange(len(segments.moment)), _PARTS)
-    scatter = float(np.std([segments.response(part).likeliest() for part in parts]))
-    std = float(np.hypot(scatter / np.sqrt(_PARTS), response.misfit(here)))
+    # gusts answered by the loop leave a response of another shape, and turn its phase by as much
+    misfit = np.sqrt(left / np.sum(np.square(response.omega) * whole))
+    parts = zip(*(np.array_split(x, _PARTS) for x in both), strict=True)
+    scatter = np.std([_response(omega, noise, *part).likeliest() for part in parts])
+    std = float(np.hypot(scatter / np.sqrt(_PARTS), misfit))
     honest = np.arange(-AHEAD, HONEST + _STEP, _STEP)
-    least = min(
-        np.min(response.deviance(honest[honest <= _LAGS[-1] - lag] - late, lag)) for lag in _LAGS
+    as_good = max(
+        np.max(response.explained(honest[honest <= _LAGS[-1] - lag] - late, lag)) for lag in _LAGS
     )
-    beyond = bool(not -AHEAD < late < HONEST and least - here > _BEYOND * scale)
-    return PoseDelay(late, std, beyond)
+    return PoseDelay(late, std, bool(best - as_good > _BEYOND * scale))
 
 
-def _segments(log: FlightLog, vehicle: Vehicle | None, late: float) -> _Segments | None:
-    """Return a flight's segments with the pose moved ``late`` s back; None: there are none."""
+def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> _Response:
+    """Return the frequency response of some of the segments."""
+    xx, yy = (np.mean(np.square(np.abs(z)), axis=0) + 1e-300 for z in (moment, turning))
+    xy = np.mean(np.conj(moment) * turning, axis=0)
+    left = np.maximum(yy - np.square(np.abs(xy)) / xx, 1e-12 * yy)
+    variance = left / (2.0 * _INDEPENDENT * len(moment)) + noise
+    return _Response(omega, xy / xx, xx / variance)
+
+
+def _segments(
+    log: FlightLog, vehicle: Vehicle | None, late: float
+) -> tuple[Array, Array, Spectra, Spectra] | None:
+    """Return frequencies (f, 1) in rad/s, the power (f, 2) of the pose's noise, and transforms
+    (n, f, 2) of moments and of turns in segments of a flight with the pose moved ``late`` s back;
+    None: the segments are too few.
+    """
     rows = np.flatnonzero(log.valid)
     if len(rows) < _FEWEST:
         return None
@@ -182,34 +160,35 @@ def _segments(log: FlightLog, vehicle: Vehicle | None, late: float) -> _Segments
     count = round(_SEGMENT / period)
     inertia = np.eye(3) if vehicle is None else vehicle.inertia
     window = np.hanning(count)[:, None]
-    moments = np.square(log.rotor_speeds) @ _mixing(vehicle).T
-    transforms: list[list[NDArray[np.complex128]]] = []
-    noises = []
+    moments = _moments(log, vehicle)
+    transforms, noises = [], []
     for piece in unbroken(log.t, rows, max(_GAP, 3.5 * step), 60, _SEGMENT):
-        t, angles = _turns(log, piece)
+        t, angles = log.t[piece], _angles(log, piece)
         noises.append(robust_std(high_pass(angles, _NOISE_SHARE)))
         first = max(t[0], log.t[0] + late) + period
         last = min(t[-1], log.t[-1] + late) - period
         at = np.arange(first, last, period)
-        if len(at) <= count + 2:
-            continue
         turn = _means(at, period, t, angles)
-        moment = _means(at[1:-1] - late, period, log.t, moments)
         w = (turn[2:] - turn[:-2]) / (2.0 * period)
-        alpha = (turn[2:] - 2.0 * turn[1:-1] + turn[:-2]) / period**2
+        alpha = np.diff(turn, n=2, axis=0) / period**2
         needed = (alpha @ inertia + np.cross(w, w @ inertia))[:, :2]
+        both = np.stack([_means(at[1:-1] - late, period, log.t, moments), needed])
         for begin in range(0, len(needed) - count + 1, count // 2):
-            both = (z[begin : begin + count] for z in (moment, needed))
-            transforms.append([np.fft.rfft(window * (z - z.mean(axis=0)), axis=0) for z in both])
-    if not transforms:
+            part = both[:, begin : begin + count]
+            part = window * (part - part.mean(axis=1, keepdims=True))
+            transforms.append(np.fft.rfft(part, axis=1))
+    if len(transforms) < _FEWEST:
         return None
     frequency = np.asarray(np.fft.rfftfreq(count, period), dtype=np.float64)
+    highest = min(_BAND_HZ[1], _SHARE_OF_RATE / step)
+    band = (frequency >= _BAND_HZ[0]) & (frequency <= highest)
+    frequency = frequency[band, None]
     # white noise of the angles, through the mean over a period and two differences
     passed = np.sinc(frequency * period) * np.square(2.0 * np.sin(np.pi * frequency * period))
-    noise = np.square(np.outer(passed / period**2, np.mean(noises) * np.diag(inertia)[:2]))
+    noise = np.square(passed / period**2 * np.mean(noises) * np.diag(inertia)[:2])
     noise *= step / period * np.sum(np.square(window))
-    moving, turning = np.moveaxis(np.array(transforms), 1, 0)
-    return _Segments(frequency, moving, turning, noise, min(_BAND_HZ[1], _SHARE_OF_RATE / step))
+    moment, turning = np.array(transforms)[:, :, band].swapaxes(0, 1)
+    return 2.0 * np.pi * frequency, noise, moment, turning
 
 
 def _means(at: Array, width: float, t: Array, x: Array) -> Array:
@@ -220,14 +199,15 @@ def _means(at: Array, width: float, t: Array, x: Array) -> Array:
     return (resampled(at + 0.5 * width, t, sums) - resampled(at - 0.5 * width, t, sums)) / width
 
 
-def _mixing(vehicle: Vehicle | None) -> Array:
-    """Return roll and pitch (2, 4) of squared rotor speeds."""
-    return SIDES if vehicle is None else vehicle.mixing[1:3]
+def _moments(log: FlightLog, vehicle: Vehicle | None) -> Array:
+    """Return the rotors' roll and pitch moments (N, 2); without a vehicle, in no unit."""
+    mixing = SIDES if vehicle is None else vehicle.mixing[1:3]
+    return np.square(log.rotor_speeds) @ mixing.T
 
 
-def _turns(log: FlightLog, piece: Rows) -> tuple[Array, Array]:
-    """Return the times (n,) and the summed turns (n, 3) of the attitude in some rows."""
-    return log.t[piece], np.vstack([np.zeros(3), turned(log.quaternion[piece])])
+def _angles(log: FlightLog, piece: Rows) -> Array:
+    """Return the summed turns (n, 3) of the attitude in some rows."""
+    return np.vstack([np.zeros(3), turned(log.quaternion[piece])])
 
 
 def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pair | None:
@@ -251,34 +231,34 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
     most = round(FARTHEST / fine)
     lags = fine * np.arange(-most, most + 1)
     products, count = np.zeros(len(lags)), 0
-    moments = np.square(log.rotor_speeds) @ _mixing(vehicle).T
+    moments = _moments(log, vehicle)
     turns = moments - moments.mean(axis=0)
     for _ in range(2):
         turns = cumulative_trapezoid(turns, log.t, axis=0, initial=0.0)
     for piece in unbroken(log.t, rows, 1.5 * step, _FEWEST_POSES):
-        t, angles = _turns(log, piece)
-        at, angles = t[apart:-apart], angles[:, :2]
+        t, angles = log.t[piece], _angles(log, piece)[:, :2]
+        at = t[apart:-apart]
         noise = angles[2 * apart :] - 2.0 * angles[apart:-apart] + angles[: -2 * apart]
         after = np.sum(noise[apart:] * noise[:-apart]) / np.sum(np.square(noise) + 1e-300)
         inside = (at > t[0] + lags[-1] + width) & (at < t[-1] - lags[-1] - width)
         if after > _WHITE or not inside.any():
             continue
         at, noise = at[inside], noise[inside]
-        near = [second_difference(at - late - k * fine, width, log.t, turns) for k in (-1, 0, 1)]
-        for axis, driven in enumerate(np.transpose(near, (2, 1, 0))):
-            noise[:, axis] -= driven @ np.linalg.lstsq(driven, noise[:, axis], rcond=None)[0]
+        driven = np.hstack(
+            [second_difference(at - late - k * fine, width, log.t, turns) for k in (-1, 0, 1)]
+        )
+        noise -= driven @ np.linalg.lstsq(driven, noise, rcond=None)[0]
         noise = _without_size(noise)
-        for i, lag in enumerate(lags):
-            answer = second_difference(at - lag, width, log.t, moments)
-            products[i] += np.sum(noise * _without_size(answer))
+        answers = (second_difference(at - lag, width, log.t, moments) for lag in lags)
+        products += [np.sum(noise * _without_size(answer)) for answer in answers]
         count += noise.size
     score = np.abs(products) / np.sqrt(max(count, 1))
     peak = int(np.argmax(score))
     near = np.abs(lags - lags[peak]) <= 3.0 * width
     if score[peak] <= max(_ANSWERED, 2.0 * float(np.max(score[~near], initial=0.0))):
         return None
-    weight = np.square(np.where(near & (score > 0.5 * _ANSWERED), score, 0.0))
-    return float(lags @ weight / np.sum(weight)), width
+    seen = near & (score > 0.5 * _ANSWERED)
+    return float(np.average(lags[seen], weights=np.square(score[seen]))), width
 
 
 def _without_size(x: Array) -> Array:

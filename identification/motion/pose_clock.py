@@ -26,29 +26,27 @@ def on_pose_clock(log: FlightLog) -> FlightLog:
         return log
     begins = np.append(rows[0], rows[:-1] + 1)
     middles = np.append(0, (rows[1:] + rows[:-1]) // 2 + 1)
-    thin = with_rows(log, log.valid)
-
-    def held(x: Array | None) -> Array | None:
-        return None if x is None else _means(x[: rows[-1] + 1], begins)
-
-    squares = held(np.square(log.rotor_speeds))
+    flown = with_rows(log, np.arange(len(log.t)) <= rows[-1])
+    squares = _means(np.square(flown.rotor_speeds), begins)
     assert squares is not None
     return replace(
-        thin,
+        with_rows(log, log.valid),
         rotor_speeds=np.sqrt(squares),
-        command=held(log.command),
-        voltage=held(log.voltage),
-        force=held(log.force),
-        torque=held(log.torque),
-        gyro=None if log.gyro is None else _means(log.gyro, middles),
-        accelerometer=None if log.accelerometer is None else _means(log.accelerometer, middles),
+        command=_means(flown.command, begins),
+        voltage=_means(flown.voltage, begins),
+        force=_means(flown.force, begins),
+        torque=_means(flown.torque, begins),
+        gyro=_means(log.gyro, middles),
+        accelerometer=_means(log.accelerometer, middles),
     )
 
 
-def _means(x: Array, begins: Rows) -> Array:
+def _means(x: Array | None, begins: Rows) -> Array | None:
     """Return the means of the finite rows of x (N, ...), from each row of ``begins`` to the next;
     NaN: there are none.
     """
+    if x is None:
+        return None
     there = np.isfinite(x)
     counts = np.add.reduceat(there.astype(float), begins)
     sums = np.add.reduceat(np.where(there, x, 0.0), begins)
