@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import mode
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -28,9 +29,8 @@ from .table import Array, ArrayMap, Mask, NamedArrays, Rows, Table, finite_rows
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-WORLD_TURNS: NamedArrays = {"enu": np.eye(3), "ned": _HALF_TURN, "y_up": _Y_UP}
 BODY_TURNS: NamedArrays = {"flu": np.eye(3), "frd": _HALF_TURN, "y_up": _Y_UP}
-
+WORLD_TURNS = {"enu": BODY_TURNS["flu"], "ned": _HALF_TURN, "y_up": _Y_UP}
 
 _SENSOR_GAP = 3.5  # median steps, the longest gap for interpolating an inertial sensor
 
@@ -51,8 +51,7 @@ class ChannelGroup:
         """
         values = np.empty((len(self.t), len(part.columns)))
         for i, name in enumerate(part.columns):
-            fixed = constant(name)
-            values[:, i] = self.columns[name] if fixed is None else fixed
+            values[:, i] = self.columns.get(name, constant(name))
         return scaled(part, values)
 
     def there(self, part: Columns) -> Mask:
@@ -95,8 +94,6 @@ class Stream:
         """Return the values (M, K) at times (M,) in s: each column is linear between its finite
         values and held beyond the first and the last. A column without any is NaN.
         """
-        if np.isfinite(self.values).all() and np.array_equal(t, self.t):
-            return self.values
         out = np.full((len(t), self.values.shape[1]), np.nan)
         for i, column in enumerate(self.values.T):
             good = np.isfinite(column)
@@ -200,7 +197,7 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
 ROLLOVER = 2.0**32 * 1e-6  # s, of a counter of 32 bits of microseconds
 _JITTER = 1.0  # s, of the stamps at both ends of a rollover
 _RESET = 1.0  # s, the least step back of a restart; late rows are late by less
-_WINDOW = 5  # stamps, whose median is compared; one decides nothing
+_WINDOW, _LEAST_WINDOW = 5, 3  # stamps, whose median is compared; one decides nothing
 _HOLE = 1.5  # median steps: the least hole that a late row fills
 _ALONE = 100.0  # median steps, and at least ``jitter``: a lone first or last stamp
 # this far off all others is wrong
@@ -251,21 +248,16 @@ def _of_piece(
     A group with another number of pieces was not written in each of them. Such a group stays whole,
     without rows of earlier times.
     """
-    cuts = [_resets(samples.t) for samples in groups]
-    counts = Counter(len(cut) + 1 for cut in cuts if len(cut))
-    many = counts.most_common(1)[0][0] if counts else 1
+    cuts = [(samples, _resets(samples.t)) for samples in groups]
+    many = mode([len(cut) for _, cut in cuts if len(cut)] or [0]) + 1
     check_piece(path, piece, many)
     if many == 1:
         return groups, []
     parts = [
-        np.split(np.arange(len(samples.t)), cut) if len(cut) + 1 == many else None
-        for samples, cut in zip(groups, cuts, strict=True)
+        (samples, np.split(np.arange(len(samples.t)), cut) if len(cut) + 1 == many else [])
+        for samples, cut in cuts
     ]
-    both = list(zip(groups, parts, strict=True))
-    seconds = [
-        max(np.ptp(samples.t[part[i]]) for samples, part in both if part is not None)
-        for i in range(many)
-    ]
+    seconds = np.max([[np.ptp(s.t[rows]) for rows in part] for s, part in parts if part], axis=0)
     chosen = np.argmax(seconds) if piece is None else piece - 1
     lengths = ", ".join(f"{x:.3g}" for x in seconds)
     why, how = ("the longest, ", "; --piece reads another") if piece is None else ("", "")
@@ -273,7 +265,7 @@ def _of_piece(
         f"the clock starts anew {many - 1} time(s): the file holds {many} pieces of {lengths} s; "
         f"{why}piece {chosen + 1}, was read{how}"
     )
-    return [s if part is None else s.cut(part[chosen]) for s, part in both], [note]
+    return [samples.cut(part[chosen]) if part else samples for samples, part in parts], [note]
 
 
 def check_piece(path: Path, piece: int | None, many: int) -> None:
@@ -293,9 +285,9 @@ def _resets(t: Array) -> Rows:
     resets = []
     for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
         before, after = t[max(i - _WINDOW, 0) : i], t[i : i + _WINDOW]
-        enough = min(len(before), len(after)) >= min(_WINDOW, 3)
+        enough = min(len(before), len(after)) >= _LEAST_WINDOW
         if enough and np.median(after) < np.median(before) - _RESET:
-            resets.append(int(i))
+            resets.append(i)
     return np.array(resets, dtype=np.intp)
 
 
@@ -311,18 +303,13 @@ def in_order(t: Array) -> tuple[Rows, int]:
         steps = np.diff(t[rows])
         far = max(_ALONE * np.median(steps), _JITTER)
         rows = rows[int(steps[0] > far) : len(rows) - int(steps[-1] > far)]
-    if increases:
+    if increases or len(rows) < 2:
         return rows, 0
-    others = np.ones(len(t), dtype=bool)
-    others[rows] = False
     steps = np.diff(t[rows])
-    if not len(steps):
-        return rows, 0
-    hole = _HOLE * np.median(steps)
-    late = np.flatnonzero(others & (t > t[rows[0]]) & (t < t[rows[-1]]))
+    late = np.setdiff1d(np.flatnonzero((t > t[rows[0]]) & (t < t[rows[-1]])), rows)
     late = late[np.unique(t[late], return_index=True)[1]]
     after = np.searchsorted(t[rows], t[late])
-    late = late[(steps[after - 1] > hole) & (t[rows[after]] != t[late])]
+    late = late[(steps[after - 1] > _HOLE * np.median(steps)) & (t[rows[after]] != t[late])]
     together = np.concatenate([rows, late])
     return together[np.argsort(t[together], kind="stable")], len(late)
 
@@ -366,7 +353,7 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGr
             rows: one time goes back, or a row lacks a number.
     """
     clock, is_whole = log_map.time, log_map.rows == "whole"
-    notes = []
+    where, unit, notes = f"{table.path}: column {clock.column}", clock.unit, []
     repeated = [name for name, count in Counter(table.header).items() if count > 1]
     if repeated:
         notes.append(f"columns that stand there more than once were not used: {repeated[:10]}")
@@ -382,34 +369,31 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGr
     if len(samples.t) < len(rows):
         notes.append(f"{len(rows) - len(samples.t)} row(s) without a time were left out")
     if len(samples.t) < 2:
-        raise InputError(
-            f"{table.path}: column {clock.column}: {len(samples.t)} time(s); expected at least two"
-        )
+        raise InputError(f"{where}: {len(samples.t)} time(s); expected at least two")
     raw = samples.t
-    others = [x for name, x in samples.columns.items() if name not in clock.named]
     # a channel with a value in every row has one time for each value
-    if any(np.isfinite(x).all() for x in others) and (even := _even_times(raw)) is not None:
+    full = any(np.isfinite(x).all() for n, x in samples.columns.items() if n not in clock.named)
+    if full and (even := _even_times(raw)) is not None:
         rounded, raw = np.min(np.diff(np.unique(raw))), even
-        samples = replace(samples, t=raw)
         notes.append(
-            f"column {clock.column}: rounded to {rounded:.3g} {clock.unit}, with several rows a "
-            "time; the rows were taken as even in time"
+            f"column {clock.column}: rounded to {rounded:.3g} {unit}, with several rows a time; "
+            "the rows were taken as even in time"
         )
     step = np.diff(raw)
     back = np.flatnonzero(step <= 0.0 if is_whole else step < 0.0)
-    if back.size and (is_whole or back.size > _BACK * len(step)):
-        i, unit = int(back[0]), clock.unit
+    if back.size > (0.0 if is_whole else _BACK * len(step)):
+        i = back[0]
         raise InputError(
-            f"{table.path}: column {clock.column}, {samples.place(i + 1)}: {raw[i + 1]:.9g} {unit} "
+            f"{where}, {samples.place(i + 1)}: {raw[i + 1]:.9g} {unit} "
             f"{'goes back from' if step[i] else 'repeats the time'} {raw[i]:.9g} {unit} of the row "
             f"before; expected {'strictly ' if is_whole else ''}increasing times"
         )
     begin = raw[0] if clock.offset is None else 0.0
-    t = (raw - begin) * UNITS["time"][clock.unit] + (clock.offset or 0.0)
-    if not np.all(np.isfinite(t)) or np.any((np.diff(t) <= 0.0) & (step > 0.0)):
+    t = (raw - begin) * UNITS["time"][unit] + (clock.offset or 0.0)
+    if not np.isfinite(t).all() or np.any((np.diff(t) <= 0.0) & (step > 0.0)):
         raise InputError(
-            f"{table.path}: column {clock.column}: times of {raw[0]:.6g} to {raw[-1]:.6g} "
-            f"{clock.unit} cannot be told apart; expected those of one flight"
+            f"{where}: times of {raw[0]:.6g} to {raw[-1]:.6g} {unit} cannot be told apart; "
+            "expected those of one flight"
         )
     samples = replace(samples, t=t)
     if is_whole:
@@ -417,11 +401,12 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGr
         step = np.diff(t)
         gaps = np.flatnonzero(step[: log_map.stray_rows] > _STRAY_GAP * np.median(step))
         if gaps.size:
-            first, gap = int(gaps[-1]) + 1, step[gaps[-1]]
+            last = gaps[-1]
             notes.append(
-                f"dropped {first} stray sample(s) before a gap of {gap:.2g} s at the start"
+                f"dropped {last + 1} stray sample(s) before a gap of {step[last]:.2g} s at the "
+                "start"
             )
-            samples = samples.cut(slice(first, None))
+            samples = samples.cut(slice(last + 1, None))
         return samples, notes
     begins = np.flatnonzero(np.diff(raw, prepend=np.nan) != 0.0)
     if len(begins) < len(t):
@@ -429,8 +414,8 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGr
         joined = {}
         for name, column in samples.columns.items():  # the last value of each
             there = np.where(np.isnan(column), -1, np.arange(len(t)))
-            last = np.maximum.reduceat(there, begins)
-            joined[name] = np.where(last >= 0, column[last], np.nan)
+            latest = np.maximum.reduceat(there, begins)
+            joined[name] = np.where(latest < 0, np.nan, column[latest])
         samples = replace(samples.cut(np.append(begins[1:], len(t)) - 1), columns=joined)
     return samples, notes
 
@@ -456,29 +441,30 @@ def _refuse(
         value = f"{column[i]:g}"
         words = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
         assert samples.table is not None
-        where = f"{samples.table.path}: column {name}, {samples.place(i)}"
-        raise InputError(f"{where} is {words}; expected {expected}")
+        raise InputError(
+            f"{samples.table.path}: column {name}, {samples.place(i)} is {words}; expected "
+            f"{expected}"
+        )
 
 
 def _check_whole(samples: ChannelGroup, log_map: LogMap) -> None:
     """Raise InputError at a row with a part of a pose, or of a sensor's three values, or without
     another number. ``check_rows`` checks gaps of motors and of the voltage.
     """
-
-    def names_of(*parts: Columns | None) -> list[str]:
-        return [name for part in parts if part is not None for name in part.named]
-
-    def check(names: list[str], there: Mask | bool, expected: str) -> None:
-        for name in names:
-            column = samples.columns[name]
-            _refuse(samples, name, column, ~np.isfinite(column) & there, expected)
-
-    pose = names_of(log_map.position, log_map.attitude)
-    for names in (pose, names_of(log_map.accelerometer), names_of(log_map.gyro)):
-        there = np.any([~np.isnan(samples.columns[name]) for name in names], axis=0)
-        check(names, there, f"{_FINITE}; only {', '.join(names)} together may be empty")
-    others = names_of(log_map.wrench, log_map.force, log_map.torque, *log_map.extra.values())
-    check([name for name in others if name not in pose], True, _FINITE)
+    named = {section: part.named for section, part in log_map.sections.items()}
+    pose, accelerometer, gyro, *whole = (
+        named.get(section, [])
+        for section in ("position", "accelerometer", "gyro", "wrench", "force", "torque")
+    )
+    pose += named.get("attitude", [])
+    whole += [part.named for part in log_map.extra.values()]
+    others = [name for names in whole for name in names if name not in pose]
+    for names in (pose, accelerometer, gyro, others):
+        columns = np.array([samples.columns[name] for name in names])
+        there = np.any(~np.isnan(columns), axis=0) | (names is others)
+        words = "" if names is others else f"; only {', '.join(names)} together may be empty"
+        for name, column in zip(names, columns, strict=True):
+            _refuse(samples, name, column, ~np.isfinite(column) & there, _FINITE + words)
 
 
 def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
@@ -511,37 +497,35 @@ def check_rows(samples: ChannelGroup, log_map: LogMap) -> list[str]:
     Raises:
         InputError: a number is beyond any flight's, or a gap is long; the message names the row.
     """
-    is_whole, rotors, commands = log_map.rows == "whole", log_map.rotors, log_map.commands
-    battery = log_map.battery if is_whole else None
+    is_whole = log_map.rows == "whole"
     filled, slow = [], []
-    for part in filter(None, (rotors, commands, battery, log_map.force, log_map.torque)):
+    for section in ("rotors", "commands", "battery", "force", "torque"):
+        part = log_map.sections.get(section)
+        if part is None or (section == "battery" and not is_whole):
+            continue
         read = np.flatnonzero(np.isfinite(samples.values(part)).any(axis=1))
         inside = samples.cut(slice(read[0], read[-1] + 1)) if len(read) else samples
+        low, high, words = -np.inf, np.inf, ""
+        if section == "battery":
+            low, words = 0.0, "a voltage of at least 0"
+        elif section == "rotors" and log_map.is_own:
+            low, words = 0.0, "a rotor speed (its direction is the vehicle's spin) of at least 0"
+        elif is_whole and isinstance(part, Commands) and part.range and not part.clip:
+            low, high = sorted(part.range)
+            words = f"a motor command from {low:g} to {high:g}"
         for name, column in zip(part.columns, inside.values(part).T, strict=True):
             gap = _longest_gap(inside, name, column)
+            _refuse(inside, name, column, (column < low) | (column > high), words)
             count = np.count_nonzero(~np.isnan(column))
             if count < _DENSE * len(column):
                 slow.append(f"{name} {count} of {len(column)}")
             elif count < len(column):
                 filled.append(f"{name} {len(column) - count} (over up to {gap:.3g} s)")
-    limits: list[tuple[Columns, float, float, str]] = []
-    if battery is not None:
-        limits.append((battery, 0.0, np.inf, "a voltage of at least 0"))
-    if log_map.is_own and rotors is not None:
-        words = "a rotor speed (its direction is the vehicle's spin) of at least 0"
-        limits.append((rotors, 0.0, np.inf, words))
-    if is_whole and commands is not None and commands.range and not commands.clip:
-        low, high = sorted(commands.range)
-        limits.append((commands, low, high, f"a motor command from {low:g} to {high:g}"))
-    for part, low, high, words in limits:
-        for name, column in zip(part.columns, samples.values(part).T, strict=True):
-            _refuse(samples, name, column, (column < low) | (column > high), words)
-    notes = ["missing values interpolated: " + ", ".join(filled)] if filled else []
-    if slow:
-        notes.append(
-            "interpolated to the other rows, since they have values in: " + ", ".join(slow)
-        )
-    return notes
+    listed = {
+        "missing values interpolated": filled,
+        "interpolated to the other rows, since they have values in": slow,
+    }
+    return [f"{what}: {', '.join(columns)}" for what, columns in listed.items() if columns]
 
 
 def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
@@ -558,14 +542,14 @@ def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
     t = samples.t
     steps = np.diff(t[read])
     limit = max(_LONGEST_GAP, LONGEST_STEPS * np.median(steps) if len(steps) else 0.0)
-    edges = np.concatenate([[t[0]], t[read], [t[-1]]])
-    at = np.argmax(np.diff(edges))
-    gap = float(edges[at + 1] - edges[at])
-    is_long = not len(read) or gap > limit * (1.0 + 1e-9)
-    first = int(read[at - 1]) + 1 if at and len(read) else 0
+    gaps = np.diff(t[read], prepend=t[0], append=t[-1])
+    at = np.argmax(gaps)
+    is_long = not len(read) or gaps[at] > limit * (1.0 + 1e-9)
     words = (
-        f"it has no value for {gap:.3g} s, and gaps of up to {limit:.3g} s are interpolated over"
+        f"{_FINITE}: it has no value for {gaps[at]:.3g} s, and gaps of up to {limit:.3g} s are "
+        "interpolated over"
     )
-    bad = is_long & (np.arange(len(t)) == first)
-    _refuse(samples, name, column, bad, f"{_FINITE}: {words}")
+    # of each gap, the first row without a value
+    bad = is_long & (np.arange(len(t)) == np.append(0, read + 1)[at])
+    _refuse(samples, name, column, bad, words)
     return float(steps.max(initial=0.0))

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
+from ..motion.smoothing import unbroken
 from .flight_log import FlightLog
 from .flight_phases import flying
 from .log_map import Commands
@@ -57,35 +58,33 @@ def _speeds(
     unknown = "no rotor speeds: the log has motor commands"
     if vehicle is None:
         return None, [f"{unknown}, and no vehicle says what they give"]
+    name = vehicle.name
     if vehicle.motor_curve is not None:
         return vehicle.commanded_speeds(command, log.voltage), [
-            f"rotor speeds: worked out from the motor commands by the motor curve of "
-            f"{vehicle.name}, thrust {_polynomial(vehicle.motor_curve.thrust)} N a rotor, without "
-            "the motors' lag"
+            f"rotor speeds: worked out from the motor commands by the motor curve of {name}, "
+            f"thrust {_polynomial(vehicle.motor_curve.thrust)} N a rotor, without the motors' lag"
         ]
     if model.thrust:
         low, high = model.range or (0.0, 1.0)
         reference = vehicle.voltage_ref if vehicle.voltage_ref > 0.0 else model.full_voltage
         counts = low + command * (high - low)
-        thrust = np.polynomial.polynomial.polyval(
-            counts * (reference / model.full_voltage), model.thrust
-        )
+        thrust = np.polynomial.Polynomial(model.thrust)(counts * (reference / model.full_voltage))
         source = f" ({model.thrust_source})" if model.thrust_source else ""
         notes = [
             f"thrust model: no rotor speeds in the log; a motor is assumed to give "
             f"{_polynomial(model.thrust)} N{source} at "
             f"u = command * {reference:g} V / {model.full_voltage:g} V, and rotor speeds are "
-            f"sqrt(thrust / k) with the k of {vehicle.name}, at {reference:g} V whatever the "
+            f"sqrt(thrust / k) with the k of {name}, at {reference:g} V whatever the "
             "battery's voltage. A constant factor on thrust and the mass cannot be found from this "
             "log"
         ]
-        saturated = np.mean(command.max(axis=1) >= _SATURATED)
-        if saturated > 0.0:
+        if saturated := np.mean(command.max(axis=1) >= _SATURATED):
             notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
         return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
     least, most = model.thrust_span
     share = np.clip((command - least) / (most - least), 0.0, None)
-    relative = model.thrust_factor * np.square(share) + (1.0 - model.thrust_factor) * share
+    factor, rest = model.thrust_factor, 1.0 - model.thrust_factor
+    relative = factor * np.square(share) + rest * share
     total = relative.sum(axis=1)
     x, felt = log.accelerometer, None
     if x is not None:  # beside a pose, an unusual size counts as unknown
@@ -94,23 +93,21 @@ def _speeds(
     where = "a pose" if felt is None else "an accelerometer"
     if felt is None and not log.has_pose:
         return None, [
-            f"{unknown}, no pose and no accelerometer, and the vehicle {vehicle.name} states no "
+            f"{unknown}, no pose and no accelerometer, and the vehicle {name} states no "
             "motor_curve; state it to turn commands into thrust"
         ]
     scale = _scale(log, total, felt, vehicle)
     if scale is None:
         return None, [f"no rotor speeds: the motor commands are 0 wherever there is {where}"]
     balance = (
-        f"the mean vertical thrust in flight is the weight of {vehicle.name} ({vehicle.weight:.4g} "
-        "N)"
+        f"the mean vertical thrust in flight is the weight of {name} ({vehicle.weight:.4g} N)"
         if felt is None
-        else f"the thrust in flight is, on the median, the mass of {vehicle.name} "
-        f"({vehicle.mass:.4g} kg) times the accelerometer along the rotors' axis"
+        else f"the thrust in flight is, on the median, the mass of {name} ({vehicle.mass:.4g} kg) "
+        "times the accelerometer along the rotors' axis"
     )
-    factor, a = model.thrust_factor, "u" if (least, most) == (0.0, 1.0) else "a"
-    assumed = {0.0: a, 1.0: f"{a}^2"}.get(factor, f"{factor:g} {a}^2 + {1.0 - factor:.4g} {a}")
-    if a == "a":
-        assumed += f" with a = (u - {least:g}) / {most - least:g}"
+    assumed = {0.0: "u", 1.0: "u^2"}.get(factor, f"{factor:g} u^2 + {rest:.4g} u")
+    if (least, most) != (0.0, 1.0):
+        assumed = f"{assumed.replace('u', 'a')} with a = (u - {least:g}) / {most - least:g}"
     return np.sqrt(scale * relative / vehicle.k), [
         "thrust model: no rotor speeds in the log; the relative thrust of a motor command u is "
         f"assumed to be {assumed}, and its unknown scale is set so that {balance}: "
@@ -154,11 +151,8 @@ def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -
     rows = log.valid if felt is None else np.isfinite(felt)
     t, total = log.t[rows], total[rows]
     aloft = flying(total)
-    if len(high := np.flatnonzero(aloft)):
-        after = np.searchsorted(high, np.arange(len(t)))  # the next high one
-        inside = (after > 0) & (after < len(high))
-        before = high[np.maximum(after - 1, 0)]
-        aloft |= inside & (t[high[np.minimum(after, len(high) - 1)]] - t[before] <= _DIP)
+    for run in unbroken(t, np.flatnonzero(aloft), _DIP):
+        aloft[run[0] : run[-1]] = True
     if felt is not None:
         felt = felt[rows]
         usable = aloft & (total > 0.0) & (felt > 0.0)
@@ -166,5 +160,5 @@ def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -
         return vehicle.mass * float(np.median(share)) if len(share) else None
     _, x, y, _ = log.quaternion[rows].T
     vertical = (total * (1.0 - 2.0 * (x * x + y * y)))[aloft]
-    mean = float(np.mean(vertical)) if len(vertical) else 0.0
+    mean = float(np.sum(vertical)) / max(1, len(vertical))
     return vehicle.weight / mean if mean > 0.0 else None

@@ -33,7 +33,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
-from ..motion.smoothing import resampled
+from ..motion.smoothing import mean_square, resampled
 from .table import (
     Array,
     ArrayMap,
@@ -167,14 +167,14 @@ _preset = cache(load_vehicle)  # asked three times a log
 def time_notes(t: Array) -> Names:
     """Return a note on the gaps in times (N,) in s: steps of more than 3 median ones."""
     step = np.diff(t)
-    gaps = np.flatnonzero(step > _GAP * np.median(step)) if step.size else step
-    if not gaps.size:
+    usual = np.median(step) if step.size else np.inf
+    gaps = np.count_nonzero(step > _GAP * usual)
+    if not gaps:
         return ()
-    longest = gaps[np.argmax(step[gaps])]
+    longest = np.argmax(step)
     return (
-        f"{gaps.size} gap(s) in time; the longest is {step[longest]:.3g} s, at t = "
-        f"{t[longest]:.6g} s "
-        f"(median step {np.median(step):.4g} s)",
+        f"{gaps} gap(s) in time; the longest is {step[longest]:.3g} s, at t = {t[longest]:.6g} s "
+        f"(median step {usual:.4g} s)",
     )
 
 
@@ -220,12 +220,11 @@ def source_rate(t: Array, values: Array) -> float:
         values: (N, K); a row with NaN is no sample.
     """
     finite = finite_rows(values)
-    t, values = (t, values) if finite.all() else (t[finite], values[finite])
+    t, values = t[finite], values[finite]
     if len(t) < 2:
         return 0.0
-    changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1))
-    step = median_step(t)
-    return 1.0 / (step * max(_spacing(changes), _spacing(_corners(t, values))))
+    changes = np.flatnonzero(np.diff(values, axis=0).any(axis=1))
+    return 1.0 / (median_step(t) * max(_spacing(changes), _spacing(_corners(t, values))))
 
 
 def between_samples(t: Array, values: Array, rate: float) -> Array:
@@ -239,7 +238,7 @@ def between_samples(t: Array, values: Array, rate: float) -> Array:
     """
     beats = np.arange(t[0], t[-1], 1.0 / rate)
     off = 0.5 * np.diff(resampled(beats, t, values), n=2, axis=0)
-    return np.sqrt(np.mean(np.square(off), axis=0)) if len(off) else np.zeros(4)
+    return np.sqrt(mean_square(off)) if len(off) else np.zeros(4)
 
 
 def _corners(t: Array, values: Array) -> Rows:
@@ -252,12 +251,10 @@ def _corners(t: Array, values: Array) -> Rows:
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
     steps = np.abs(np.diff(values, axis=0))
     rounding = np.min(steps, axis=0, where=steps > 0.0, initial=np.inf)
-    off = values[2:] - values[:-2]  # in place: a copy of an hour takes 23 MB a column
-    off *= share
-    off += values[:-2]
-    np.abs(np.subtract(values[1:-1], off, out=off), out=off)
-    rms = np.sqrt(np.mean(np.square(off), axis=0))
-    is_corner = (off > np.maximum(_ON_LINE * rms, _ROUNDED * rounding)).any(axis=1)
+    line = values[:-2] + share * (values[2:] - values[:-2])
+    off = np.abs(values[1:-1] - line)
+    least = np.maximum(_ON_LINE * np.sqrt(mean_square(off)), _ROUNDED * rounding)
+    is_corner = (off > least).any(axis=1)
     if np.mean(is_corner) > _MOST_CORNERS:
         return np.empty(0, dtype=np.intp)
     return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))

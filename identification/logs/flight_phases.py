@@ -65,14 +65,15 @@ def flew(log: FlightLog) -> tuple[str, str]:
     rows = aloft & finite_rows(log.position)
     place = log.position[rows]
     if len(place) > 1:
-        steps = np.linalg.norm(np.diff(place, axis=0), axis=1) / np.diff(log.t[rows])
-        if (speed := np.quantile(steps, _SLOWER)) > _FASTEST:
-            said = f"the position moves by {speed:.2g} m/s"
-            return "not shown", f"{said}: another unit, or a simulation that blew up"
-        way = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
-        far = np.linalg.norm(way)
-        said = f"the motors turn, and the position spans {far:.3g} m, {way[2]:.3g} m of height"
-        drove = np.hypot(*way[:2]) > _DROVE[0] and way[2] < _DROVE[1]
+        speeds = np.linalg.norm(np.diff(place, axis=0), axis=1) / np.diff(log.t[rows])
+        if (speed := np.quantile(speeds, _SLOWER)) > _FASTEST:
+            return "not shown", (
+                f"the position moves by {speed:.2g} m/s: another unit, or a simulation that blew up"
+            )
+        x, y, z = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
+        far = np.linalg.norm((x, y, z))
+        said = f"the motors turn, and the position spans {far:.3g} m, {z:.3g} m of height"
+        drove = np.hypot(x, y) > _DROVE[0] and z < _DROVE[1]
         return "not shown" if far < _MOVES or drove else told, said
     if log.gyro is not None:
         rates = log.gyro[aloft & finite_rows(log.gyro)]
@@ -106,18 +107,16 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         vehicle: the vehicle.
     """
     at_rest = np.square(rotor_speeds) @ vehicle.k < _TURNING * vehicle.weight
-    grounded = [Phase(GROUND, float(t[0]), float(t[-1]))]
-    if at_rest.all():
-        return grounded
-    turning = np.flatnonzero(~at_rest)
-    on, off, last = int(turning[0]), int(turning[-1]), len(t) - 1
+    times, last = t.tolist(), len(t) - 1
+    on = _run(at_rest)
+    off = last - _run(at_rest[::-1])
     starts, lands = on > 0, off < last  # whether the log shows take-off and landing
     before = float(np.median(height[:on])) if starts else -np.inf
     after = float(np.median(height[off + 1 :])) if lands else -np.inf
     clear = height > max(before, after) + _CLEARANCE
     clear[:on] = clear[off + 1 :] = False
-    if not clear.any():  # the rotors turned, but the vehicle never left the ground
-        return grounded
+    if not clear.any():  # the vehicle never left the ground
+        return [Phase(GROUND, times[0], times[-1])]
 
     # well above the ground: a bounce on landing is no flight
     typical = float(np.median(height[clear]))
@@ -132,13 +131,10 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
     cruise, descent = min(cruise, touch_down), max(descent, lift_off)
     if cruise > descent:  # a hop: up and down again at once
         cruise = descent = (cruise + descent) // 2
-    edges = [0, lift_off, cruise, descent, touch_down, last]
-    names = [GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND]
-    return [
-        Phase(name, float(t[a]), float(t[b]))
-        for name, a, b in zip(names, edges, edges[1:], strict=False)
-        if b > a
-    ]
+    edges = [times[i] for i in (0, lift_off, cruise, descent, touch_down, last)]
+    names = (GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND)
+    phases = map(Phase, names, edges, edges[1:])
+    return [phase for phase in phases if phase.end > phase.start]
 
 
 def _first_climb(
@@ -151,4 +147,4 @@ def _first_climb(
 
 def _run(true: Mask) -> int:
     """Return how many elements from the first on are True."""
-    return len(true) if true.all() else int(np.argmin(true))
+    return int(np.argmin(np.append(true, False)))

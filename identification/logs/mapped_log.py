@@ -20,6 +20,7 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ..motion.smoothing import resampled
 from .channels import (
     LONGEST_STEPS,
     ChannelGroup,
@@ -52,9 +53,7 @@ from .log_map import (
     LogMap,
     Position,
     Rotors,
-    TimeColumn,
     check_whole,
-    constant,
 )
 from .table import Array, Mask, Names, Table, finite_rows, median_step
 from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
@@ -95,7 +94,7 @@ def map_table(
             names column and row.
     """
     if log_map.is_own:
-        named = [match[1] for name in table.header if (match := VEHICLE.fullmatch(name))]
+        named = [match[1] for match in map(VEHICLE.fullmatch, table.header) if match]
         if len(named) > 1:
             raise InputError(
                 f"{table.path}: the columns name the vehicles {' and '.join(named)}; expected one"
@@ -106,11 +105,11 @@ def map_table(
     columns = table.read(log_map.wanted)
     if log_map.is_own and rows_apart(ChannelGroup(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
-    notes = [*table.notes, *log_map.notes, *([log_map.time.note] if log_map.time.note else [])]
-    if not log_map.is_own or log_map.rows == "mixed":
-        notes.insert(0, f"columns: by the map {log_map.name}")
+    is_plain = log_map.is_own and log_map.rows != "mixed"
+    by = "" if is_plain else f"columns: by the map {log_map.name}"
     samples, words = rows_of(table, columns, log_map)
-    notes += words
+    said = (by, *table.notes, *log_map.notes, log_map.time.note, *words)
+    notes = [note for note in said if note]
     sections = sections_of(table.path, [samples], log_map, reader, notes, piece)
     del columns, samples
     table.forget()  # the streams are copies
@@ -170,29 +169,30 @@ def sections_of(
     of_clock += [note for s in recorded if s.table for note in check_rows(s, log_map)]
     if not (log_map.rotors or log_map.commands or log_map.wrench):
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
-        wanted = [f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors]
-        wanted = wanted or ["rotor speeds or motor commands"]
+        wanted = " or ".join(
+            f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors
+        )
         raise InputError(
-            f"{path}: no motors that turn; expected {' or '.join(wanted)}, found "
-            f"{', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
+            f"{path}: no motors that turn; expected {wanted or 'rotor speeds or motor commands'}, "
+            f"found {', '.join(dict.fromkeys(names[:20])) or 'nothing'}"
         )
     said = [*notes, *of_clock, *(part.note for part in log_map.sections.values() if part.note)]
     streams = {}
     for name, part in log_map.sections.items():
         samples = sources[name]
-        if isinstance(part, Rotors | Commands) and not flown.airframe:
-            are_speeds = isinstance(part, Rotors) and samples.table is None
-            if more := more_rotors(part.columns, samples.table or samples.columns, are_speeds):
-                where = f"{part.topic}: " if part.topic else ""
-                if reader or log_map.is_own:
-                    raise InputError(f"{path}: {where}{more}")
-                said.append(f"warning: {where}{more}. The map's four were taken")
+        if name == "attitude":
+            continue
         if name == "position":
             streams[name], words = _pose(path, log_map, samples, sources.get("attitude"))
             said += words
             continue
-        if name == "attitude":
-            continue
+        if isinstance(part, Rotors | Commands) and not flown.airframe:
+            are_speeds = isinstance(part, Rotors) and samples.table is None
+            if more := more_rotors(part.columns, samples.table or samples.columns, are_speeds):
+                more = f"{part.topic}: {more}" if part.topic else more
+                if reader or log_map.is_own:
+                    raise InputError(f"{path}: {more}")
+                said.append(f"warning: {more}. The map's four were taken")
         if name in _IMU:
             samples = samples.cut(_kept_rows(samples, log_map, part))
         values = in_kit_units(log_map, name, part, samples.values(part))
@@ -204,21 +204,21 @@ def sections_of(
         elif isinstance(part, Battery) and part.late:
             streams[name] = replace(stream, t=stream.t - part.late)
             said.append(f"battery voltage put {part.late:g} s sooner, by which it is logged late")
-    absent = [name for name in _IMU if readable(streams.get(name)) is None]
-    must_move = log_map.rows != "whole" or (poses and not log_map.is_own)
-    if log_map.position is None and absent and must_move:
-        expected = " or ".join(way.label for way in poses)
-        expected = f"{expected}, with an attitude beside it" if poses else "a pose"
-        raise InputError(
-            f"{path}: no pose, and no {' and no '.join(absent)}; expected {expected}, or "
-            f"{' and '.join(_IMU)}"
-        )
-    if log_map.position is None and not log_map.is_own:
-        what = ": no position that changes, with an attitude beside it, was logged"
-        said.append(f"no pose{what if poses else ' in the log'}")
-    if log_map.position is None and log_map.rows == "whole":  # all rows are the log's
-        t = recorded[0].t
-        streams["position"] = Stream("pose", t, np.full((len(t), 7), np.nan))
+    if log_map.position is None:
+        absent = [name for name in _IMU if readable(streams.get(name)) is None]
+        if absent and (log_map.rows != "whole" or (poses and not log_map.is_own)):
+            expected = " or ".join(way.label for way in poses)
+            expected = f"{expected}, with an attitude beside it" if poses else "a pose"
+            raise InputError(
+                f"{path}: no pose, and no {' and no '.join(absent)}; expected {expected}, or "
+                f"{' and '.join(_IMU)}"
+            )
+        if not log_map.is_own:
+            what = ": no position that changes, with an attitude beside it, was logged"
+            said.append(f"no pose{what if poses else ' in the log'}")
+        if log_map.rows == "whole":  # all rows are the log's
+            t = recorded[0].t
+            streams["position"] = Stream("pose", t, np.full((len(t), 7), np.nan))
     extra = {
         name: Stream(name, samples.t, samples.values(part))
         for name, part in log_map.extra.items()
@@ -232,16 +232,15 @@ def motors_left_out(names: Sequence[str], used: Collection[str]) -> list[str]:
     """Return a note on columns named as four motors', none of them used."""
     words = "|".join((WORDS["motor_words"], *WORDS["command_words"]))
     taken_apart = take_apart(names)
-    left = [
-        f"{group.columns[0]} ..."
+    left = {
+        f"{group.columns[0]} ...": None
         for way in WORDS["parts"]["motors"]
         for endings in way["endings"]
         for group in groups_of(taken_apart, endings)
         if re.search(words, group.key) and not re.search(WORDS["sticks"], group.key)
         if not {*group.columns} & {*used}
-    ]
-    listed = ", ".join(dict.fromkeys(left[:_SHOWN]))
-    return [f"columns named as motors' were left out: {listed}"] if left else []
+    }
+    return [f"columns named as motors' were left out: {', '.join([*left][:_SHOWN])}"] * bool(left)
 
 
 def _pose(
@@ -313,12 +312,12 @@ def _pose(
             f"{alone} of {placed.sum()} positions stand in rows without an attitude, which "
             "was interpolated to their times where it has samples close by"
         )
-    for name in turn.columns:
-        if constant(name) is not None:
-            notes.append(
-                f"warning: an angle of the attitude is not in the table and is taken as "
-                f"{name[1:]}: forces along the axis that it tilts are wrong by as much"
-            )
+    notes += [
+        "warning: an angle of the attitude is not in the table and is taken as "
+        f"{name[1:]}: forces along the axis that it tilts are wrong by as much"
+        for name in turn.columns
+        if name not in turn.named
+    ]
     return Stream(place.label, t, pose), notes
 
 
@@ -333,11 +332,11 @@ def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
     if rows_apart(samples, log_map):
         return samples.there(part)
     place = log_map.position
-    if place is not None and samples.has(place) and np.mean(samples.there(place)) > 0.5:
+    parts = filter(None, (place, log_map.accelerometer, log_map.gyro))
+    there = {one: samples.there(one) for one in parts if samples.has(one)}
+    if place in there and there[place].mean() > 0.5:
         return everything
-    inertial = (place, log_map.accelerometer, log_map.gyro)
-    there = [samples.there(one) for one in inertial if one is not None and samples.has(one)]
-    return np.asarray(np.any(there, axis=0))
+    return np.asarray(np.any([*there.values()], axis=0))
 
 
 def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream) -> list[str]:
@@ -383,17 +382,15 @@ def fitted(
     """
     header = set(names)
     where = f"{source}: map {log_map.name}"
-    parts: dict[str, TimeColumn | Columns] = {"time": log_map.time, **log_map.sections}
-    fitting = {
-        section: [way for way in log_map.ways(section) if header.issuperset(way.named)]
-        for section in parts
-    }
-    missing = []
-    for section, part in parts.items():
-        absent = [name for name in part.named if name not in header]
-        left_out = part.optional and (len(absent) == len(part.named) or reader)
+    fitting, missing = {}, []
+    for section in ("time", *log_map.sections):
+        ways = log_map.ways(section)
+        fitting[section] = [way for way in ways if header.issuperset(way.named)]
+        absent = [name for name in ways[0].named if name not in header]
+        is_optional = ways[0].optional
+        left_out = is_optional and (len(absent) == len(ways[0].named) or reader)
         if not fitting[section] and not left_out:
-            whose = f"{section} (all or none)" if part.optional else section
+            whose = f"{section} (all or none)" if is_optional else section
             missing += [(name, whose) for name in absent]
     if missing:
         lower, words = {name.lower(): name for name in names}, []
@@ -406,11 +403,10 @@ def fitted(
         raise InputError(
             f"{where} does not fit: no column {', '.join(words)}{more}; found {listed}"
         )
+    extra = {name: part for name, part in log_map.extra.items() if header.issuperset(part.named)}
     log_map = log_map.with_ways(fitting)
     check_whole(log_map, f"{where} does not fit")
-    extra = {name: part for name, part in log_map.extra.items() if set(part.named) <= header}
-    log_map = replace(log_map, extra=extra)
-    return with_range(log_map, vehicle, where)
+    return with_range(replace(log_map, extra=extra), vehicle, where)
 
 
 def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
@@ -422,14 +418,13 @@ def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
     commands = log_map.commands
     if commands is None or commands.range is not None:
         return log_map
-    curve = vehicle.motor_curve if vehicle is not None else None
-    if curve is None:
+    if vehicle is None or vehicle.motor_curve is None:
         raise InputError(
             f"{where}: commands: unit counts without a range; expected what stands for no and "
             "for full command, such as range: [0, 65535], or a vehicle whose motor_curve "
             "states it"
         )
-    return replace(log_map, commands=replace(commands, range=curve.command))
+    return replace(log_map, commands=replace(commands, range=vehicle.motor_curve.command))
 
 
 def chosen(
@@ -469,8 +464,10 @@ def _is_measured(section: str, way: Columns, samples: ChannelGroup, rows: str) -
     values = values[finite_rows(values)]
     if isinstance(way, Attitude) and not way.euler:
         return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
-    if section in ("rotors", "battery"):
-        return bool(np.any(values > 0.0 if section == "battery" else values != 0.0))
+    if section == "battery":
+        return bool(np.any(values > 0.0))
+    if section == "rotors":
+        return bool(np.any(values))
     if section == "position" and rows != "messages" and len(values):
         return bool(np.any(np.ptp(values, axis=0) > 0.0))
     return len(values) > 1
@@ -530,7 +527,6 @@ def flight_log(
         notes += tuple(wrench_notes)
     measured = {name: x for name, s in sensors.items() if np.isfinite(x := s.between(t)).any()}
     truth = {name: made[name].at(t) for name in ("force", "torque") if name in made}
-    kept = {name: stream.between(t) for name, stream in extra.items()}
     times = t - t[0] if log_map.time.offset is None else t
     notes += time_notes(times)
     without = np.count_nonzero(~valid) if valid.any() else 0
@@ -549,7 +545,7 @@ def flight_log(
         source=f"{path} (reader {reader})" if reader else str(path),
         notes=notes,
         valid=valid,
-        extra={name: x[:, 0] if x.shape[1] == 1 else x for name, x in kept.items()},
+        extra={n: x if (x := s.between(t)).shape[1] > 1 else x[:, 0] for n, s in extra.items()},
         commanded=kind == "wrench",
         command=made["commands"].at(t) if "commands" in made else None,
         vehicle=log_map.vehicle,
@@ -558,8 +554,7 @@ def flight_log(
         **measured,
         **truth,
     )
-    is_known = log.command is None or log.has_rotor_speeds
-    return log if is_known else with_commanded_speeds(log, vehicle, log_map.commands)
+    return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
 def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Stream], Names]:
@@ -576,23 +571,23 @@ def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Strea
                 f"{path}: {stream.name}: {len(stream.t)} message(s); expected at least two"
             )
         values = stream.values
-        if name in _MOTORS:
-            infinite = np.argwhere(np.isinf(values))
-            if infinite.size and name == "rotors":
-                row, rotor = infinite[0]
-                raise InputError(
-                    f"{path}: {stream.name}, message {row + 1}: the rotor speed of rotor "
-                    f"{rotor + 1} is {values[row, rotor]}; expected a finite number"
-                )
-            if len(stream.whole().t) < 2:
-                raise InputError(
-                    f"{path}: {stream.name}: no two samples have four finite {_MOTORS[name]}; "
-                    "expected some"
-                )
-            if name == "rotors" and np.any(values < 0.0):
+        if name == "rotors" and np.isinf(values).any():
+            row, rotor = np.argwhere(np.isinf(values))[0]
+            raise InputError(
+                f"{path}: {stream.name}, message {row + 1}: the rotor speed of rotor "
+                f"{rotor + 1} is {values[row, rotor]}; expected a finite number"
+            )
+        if name in _MOTORS and readable(stream) is None:
+            raise InputError(
+                f"{path}: {stream.name}: no two samples have four finite {_MOTORS[name]}; "
+                "expected some"
+            )
+        if name == "rotors":
+            if np.any(values < 0.0):
                 notes += (f"{stream.name}: negative rotor speeds were taken as positive",)
-            values = np.abs(values) if name == "rotors" else values
-            values = np.clip(values, 0.0, 1.0) if name == "commands" else values
+            values = np.abs(values)
+        elif name == "commands":
+            values = np.clip(values, 0.0, 1.0)
         elif name == "battery":
             plausible = (values >= LEAST_VOLTS) & (values <= MOST_VOLTS)
             wrong = values[~plausible & (values > 0.0)]
@@ -602,8 +597,8 @@ def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Strea
                     f"{wrong.max():.3g} V, are none of a vehicle's battery; left out",
                 )
             values = np.where(plausible, values, np.nan)
-        elif name in ("accelerometer", "gyro"):
-            values = np.where(np.isfinite(values).all(axis=1, keepdims=True), values, np.nan)
+        elif name in _IMU:
+            values = np.where(finite_rows(values)[:, None], values, np.nan)
         if name == "position" or (np.isfinite(values).any() and len(values) > 1):
             made[name] = Stream(stream.name, stream.t, values)
         elif name == "battery" and not np.any(values > 0.0):
@@ -624,23 +619,22 @@ def _rows(
     own = sensor is not None and (
         pose is None or median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0
     )
-    stream = sensor if own else pose
-    assert stream is not None
-    inside = (stream.t >= motors.t[0]) & (stream.t <= motors.t[-1])
-    if pose is not None and own:  # the pose and the motors must meet, too
-        together = (pose.t >= motors.t[0]) & (pose.t <= motors.t[-1])
-        stream, inside = (pose, together) if together.sum() < 2 else (stream, inside)
-    if inside.sum() < 2:
-        raise InputError(
-            f"{path}: {stream.name} (from {stream.t[0]:.6g} to {stream.t[-1]:.6g} s) and "
-            f"{motors.name} (from {motors.t[0]:.6g} to {motors.t[-1]:.6g} s) do not overlap; "
-            "expected both over the same flight"
-        )
-    t = stream.t[inside]
-    if not own:
+    begin, end = motors.t[0], motors.t[-1]
+    for stream in (pose, sensor if own else None):  # both must meet the motors
+        if stream is None:
+            continue
+        inside = (stream.t >= begin) & (stream.t <= end)
+        if inside.sum() < 2:
+            raise InputError(
+                f"{path}: {stream.name} (from {stream.t[0]:.6g} to {stream.t[-1]:.6g} s) and "
+                f"{motors.name} (from {begin:.6g} to {end:.6g} s) do not overlap; expected both "
+                "over the same flight"
+            )
+        t = stream.t[inside]
+    if sensor is None or not own:
         assert pose is not None
         return t, pose.values[inside], ()
-    rows = f"rows are those of {stream.name}, {1.0 / median_step(stream.t):.4g} Hz"
+    rows = f"rows are those of {sensor.name}, {1.0 / median_step(sensor.t):.4g} Hz"
     placed = np.full((len(t), 7), np.nan)
     if pose is None:
         return t, placed, (rows,)
@@ -651,8 +645,8 @@ def _rows(
         reach = max(0.6 * median_step(t), 0.5 * median_step(seen.t) / _OWN_ROWS)
         near = np.unique(near[np.abs(t[near] - seen.t) <= reach])
         near = near[(t[near] >= seen.t[0]) & (t[near] <= seen.t[-1])]
-        placed[near, :3] = Stream(pose.name, seen.t, seen.values[:, :3]).at(t[near])
-        placed[near, 3:] = slerp(t[near], Stream(pose.name, seen.t, seen.values[:, 3:]))
+        placed[near, :3] = resampled(t[near], seen.t, seen.values[:, :3])
+        placed[near, 3:] = slerp(t[near], replace(seen, values=seen.values[:, 3:]))
     rate = 1.0 / median_step(pose.t)
     rows += f"; the pose of {pose.name}, {rate:.4g} Hz, stands in the nearest of them"
     return t, placed, (rows,)

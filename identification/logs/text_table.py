@@ -15,12 +15,13 @@ import gzip
 import math
 import re
 import zlib
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
+from itertools import chain, product, starmap
 from pathlib import Path
+from statistics import mode
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -40,7 +41,7 @@ _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "wh
 _LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**18  # bytes read or unpacked at a time: less than a longest line
 _UNUSED = 2**21  # packed bytes without a line yet
-_DAY_0 = date(1970, 1, 1).toordinal()
+
 _BLOCK = 200  # lines turned into numbers at a time; their texts stay in the cache of the processor
 _LOOKED_AT = 2**18  # characters for finding the layout
 _LINES = 600  # lines, at most; Betaflight's decoder writes 150 before the header
@@ -52,7 +53,7 @@ _LIST = re.compile(  # between separators: numbers in brackets, or nothing
     re.IGNORECASE,
 )
 _MOMENT = re.compile(  # a date with a time of day, or this alone
-    r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?(?P<h>\d\d?):(?P<m>\d\d):(?P<s>\d\d(?:\.\d+)?)"
+    r"(?:(\d{4}[-/]\d\d[-/]\d\d)[T ])?(\d\d?):(\d\d):(\d\d(?:\.\d+)?)"
     r"(?:Z|[+-]\d\d:?\d\d)?"
 )
 _MOTION_CAPTURE = {  # first lines of exports
@@ -80,14 +81,13 @@ def _seconds(field: str) -> float | None:
     moment = _MOMENT.fullmatch(field)
     if moment is None:
         return None
-    day = moment["date"]
+    day, *clock = moment.groups("1970-01-01")
     try:
-        days = 0 if day is None else date.fromisoformat(day.replace("/", "-")).toordinal() - _DAY_0
+        days = date.fromisoformat(day.replace("/", "-")) - date(1970, 1, 1)
     except ValueError:  # the 31st of February
         return None
-    return (
-        86_400.0 * days + 3600.0 * int(moment["h"]) + 60.0 * int(moment["m"]) + float(moment["s"])
-    )
+    hours, minutes, seconds = map(float, clock)
+    return days.total_seconds() + 3600.0 * hours + 60.0 * minutes + seconds
 
 
 @dataclass(frozen=True)
@@ -166,15 +166,17 @@ def open_table(path: Path) -> Table:
         InputError: unreadable, no table, no regular file, without rows, or more than
             ``FileLimits`` allows.
     """
-    if not is_table(path):
-        raise InputError(
-            f"{path}: unknown kind of file; expected a table whose name ends in "
-            f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES, *ARRAY_SUFFIXES)))}"
-        )
     name = path.name.lower()
     if name.endswith(ARRAY_SUFFIXES):
         return open_arrays(path)
-    return open_parquet(path) if name.endswith(".parquet") else open_text(path)
+    if name.endswith(".parquet"):
+        return open_parquet(path)
+    if is_table(path):
+        return open_text(path)
+    raise InputError(
+        f"{path}: unknown kind of file; expected a table whose name ends in "
+        f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES, *ARRAY_SUFFIXES)))}"
+    )
 
 
 def open_text(path: Path) -> Table:
@@ -184,7 +186,7 @@ def open_text(path: Path) -> Table:
         InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
     """
     written: list[str] = []
-    for line in (line for block in _blocks(path) for line in _text_lines(block)):
+    for line in chain.from_iterable(map(_text_lines, _blocks(path))):
         written.append(line)
         if len(written) == _LINES or sum(map(len, written)) > _LOOKED_AT:
             break
@@ -198,22 +200,22 @@ def open_text(path: Path) -> Table:
     layout, first = _layout(path, head)
     header, first = _header(path, head, layout, first)
     layout = replace(layout, lists=_lists(layout, written[first:]))
-    between = [] if header is None else [line for line in head[header + 1 : first] if line.strip()]
-    said = [f"fields separated by {_SEPARATORS[layout.separator]}"]
-    if layout.decimal == ",":
-        said.append("decimal commas")
+    between = [] if header is None else list(filter(str.strip, head[header + 1 : first]))
+    said = {
+        f"fields separated by {_SEPARATORS[layout.separator]}": True,
+        "decimal commas": layout.decimal == ",",
+        "no header: columns are 1, 2, 3 ...": header is None,
+        f"{header} line(s) before the header": header,
+        f"{len(between)} line(s) between header and rows": between,
+    }
     if header is None:
         names = [str(i + 1) for i in range(len(layout.fields(head[first])))]
-        said.append("no header: columns are 1, 2, 3 ...")
     else:
         names = layout.names(head[header])
-    if header:
-        said.append(f"{header} line(s) before the header")
-    if between:
-        said.append(f"{len(between)} line(s) between header and rows")
     for i, count in reversed(layout.lists):
         names[i : i + 1] = [f"{names[i]}[{k}]" for k in range(count)]
-    notes = [] if said == ["fields separated by comma"] else [f"layout: {', '.join(said)}"]
+    layout_note = f"layout: {', '.join(words for words, applies in said.items() if applies)}"
+    notes = [] if layout_note == "layout: fields separated by comma" else [layout_note]
 
     blank: list[int] = []
     last = 0, ""  # rows up to the last line that the core does not read, and the line
@@ -249,11 +251,11 @@ def open_text(path: Path) -> Table:
 
     units = tuple(layout.fields(between[0])) if len(between) == 1 and not layout.lists else ()
     seen = [layout.fields(line) for line in written[first:] if line.strip()]
-    seen = [fields for fields in seen if len(fields) >= len(names)]
+    columns_seen = zip(*(fields for fields in seen if len(fields) >= len(names)), strict=False)
     numeric = tuple(
         name
-        for i, name in enumerate(names)
-        if all(layout.number(fields[i]) is not None for fields in seen)
+        for name, fields in zip(names, columns_seen, strict=False)
+        if None not in map(layout.number, fields)
     )
     lines = first + 1, tuple(blank)
     return Table(path, tuple(names), rows, load, *lines, units, tuple(notes), numeric)
@@ -372,8 +374,6 @@ def _walk(
             if is_plain:
                 count, used = _core.read_text_rows(block, at, layout.separator, slots, columns, row)
                 row, at = row + count, at + used
-            if at == len(block):
-                break
             end = at
             for _ in range(_BLOCK):
                 end = block.find(b"\n", end) + 1 or len(block)
@@ -390,16 +390,14 @@ def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
         InputError: none makes a table of them.
     """
     there = {" ", *"".join(head)}
-    layouts = [
-        TextLayout(separator, decimal)
-        for separator in _SEPARATORS
-        for decimal in (".", ",")
-        if separator in there and (decimal == "." or (separator != "," and "," in there))
+    scores = [
+        (*_score(head, layout), layout)
+        for layout in starmap(TextLayout, product(_SEPARATORS, ".,"))
+        if layout.separator in there and layout.decimal in {".", *there - {layout.separator}}
     ]
-    scores = [_score(head, layout) for layout in layouts]
-    best = np.argmax([round(score, 9) for score, _ in scores])
-    if scores[best][0]:
-        return layouts[best], scores[best][1]
+    best, first, layout = max(scores, key=lambda score: round(score[0], 9))
+    if best:
+        return layout, first
     if not any(head):
         raise InputError(f"{path}: empty file; expected a header and at least one row of numbers")
     raise InputError(
@@ -418,10 +416,10 @@ def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
             rows.append((i, len(fields), numbers))
     # the later lines decide: before them may stand a program's settings, numbers too
     tail = rows[len(rows) // 4 :]
-    width = Counter(n for _, n, _ in tail).most_common(1)[0][0] if tail else 0
+    width = mode([n for _, n, _ in tail] or [0])
     if width < _FEWEST:
         return 0.0, 0
-    whole = sum(1 for line in head[tail[0][0] :] if line.strip())
+    whole = sum(bool(line.strip()) for line in head[tail[0][0] :])
     counts = [k for _, n, k in tail if n == width]
     start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * max(counts))
     return sum(counts) / whole, start
@@ -430,7 +428,8 @@ def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
 def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:
     """Return how many fields are empty, and how many hold a number (``nan`` among them)."""
     empty = sum(not field or field.lower() in MISSING_WORDS for field in fields)
-    return empty, sum(layout.number(field) is not None for field in fields) - empty
+    others = sum(number is None for number in map(layout.number, fields))
+    return empty, len(fields) - others - empty
 
 
 def _header(path: Path, head: list[str], layout: TextLayout, full: int) -> tuple[int | None, int]:
@@ -446,15 +445,16 @@ def _header(path: Path, head: list[str], layout: TextLayout, full: int) -> tuple
     header, first = None, full
     for i in range(full - 1, -1, -1):
         fields = layout.names(head[i])
+        count = len(fields)
         empty, numbers = _counts(layout, fields)
-        named = len(fields) - empty - numbers
-        if 2 * len(fields) == width and named == len(fields) and i == first - 1:
+        named = count - empty - numbers
+        if 2 * count == width and named == count and i == first - 1:
             raise InputError(
                 f"{path}: line {first + 1} has {width} fields, twice as many as the header; "
                 f"{_DECIMAL_COMMA}"
             )
-        if len(fields) >= width - 1 and named >= max(2, 0.8 * len(fields)):
-            is_units_line = header is None and sum(map(is_unit, fields)) >= 0.7 * len(fields)
+        if count >= width - 1 and named >= max(2, 0.8 * count):
+            is_units_line = header is None and sum(map(is_unit, fields)) >= 0.7 * count
             header = i
             if not is_units_line:
                 break
@@ -489,7 +489,7 @@ def _fill(
                 f"{table.path}: {table.row(first + i)} has {len(fields)} field(s); expected "
                 f"{width}, as many as the header{hint}"
             )
-    is_plain = not any("_" in line for line in lines)  # Python's numbers may hold underscores
+    is_plain = "_" not in "".join(lines)  # Python's numbers may hold underscores
     columns = dict(zip(table.header, zip(*rows, strict=True), strict=True))
     for column, values in zip(wanted, out, strict=True):
         texts: Sequence[str] = columns[column]
