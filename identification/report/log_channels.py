@@ -58,10 +58,7 @@ def log_channels(log: FlightLog) -> list[Channel]:
     ]
     out = []
     for name, unit, values, series, section in given:
-        if values is None:
-            continue
-        rows = np.flatnonzero(finite_rows(values))
-        if len(rows) < 2:
+        if values is None or len(rows := np.flatnonzero(finite_rows(values))) < 2:
             continue
         t, title, drawn = log.t[rows], f"{name} ({unit})", values[rows]
         low, high = float(drawn.min()), float(drawn.max())

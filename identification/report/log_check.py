@@ -43,7 +43,7 @@ class LogCheck:
         """Return the gravest doubt, and what flew how long and how far."""
         answer, by = flew(self.log)
         what = self.log.vehicle or self.log.flown.airframe or "a vehicle of four rotors"
-        told = [f"Doubt: {self.doubts[0]}."] if self.doubts else []
+        told = [f"Doubt: {doubt}." for doubt in self.doubts[:1]]
         if answer.startswith("yes"):
             told.append(f"Flight of {answer[5:]} by {what}: {by}.")
         elif answer == "unknown":

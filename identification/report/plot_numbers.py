@@ -340,7 +340,7 @@ def candidate_bars(diagnosis: Diagnosis) -> list[Bar]:
         (x, "named" if x.named else "rival" if x.name in rivals else "")
         for x in diagnosis.candidates
     ]
-    shown = [(x, kind) for i, (x, kind) in enumerate(ranked) if i < 14 or kind]
+    shown = ranked[:14] + [(x, kind) for x, kind in ranked[14:] if kind]
     gains = np.nan_to_num([x.gain for x, _ in shown], posinf=0.0, neginf=0.0)
     high, low = np.max(gains, initial=0.05), max(np.min(gains, initial=0.0), -0.25)
     *places, zero = (100.0 * (np.maximum([*gains, 0.0], low) - low) / (high - low)).tolist()

@@ -100,17 +100,17 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     parameters = {name: x for name, x in reversed(list(pairs)) if math.isfinite(x)}
     flown = _what_flew(parameters, messages.pop("MSG", {}))
     flown.check(path)
-    pulses = messages.get("RCOU")
-    if "MOT" in messages and pulses is None:
+    pulses = messages.get("RCOU", {})
+    if "MOT" in messages and not pulses:
         raise InputError(
             f"{path}: MOT has the motors' outputs without their times, as Copter before 3.2 logged "
             "them; expected RCOU with TimeMS or TimeUS"
         )
-    if pulses:  # Ch before Copter 3.4, Chan before 3.3
-        messages["RCOU"] = {re.sub(r"Ch(an)?(?=\d)", "C", name): x for name, x in pulses.items()}
+    # Ch before Copter 3.4, Chan before 3.3
+    messages["RCOU"] = {re.sub(r"Ch(an)?(?=\d)", "C", name): x for name, x in pulses.items()}
     log_map, notes = _with_parameters(path, log_map, parameters, vehicle)
-    volts = messages.get("CURR", {}).get("Volt")
-    if volts is not None and np.median(volts) > MOST_VOLTS:
+    volts = messages.get("CURR", {}).get("Volt", np.zeros(1))
+    if np.median(volts) > MOST_VOLTS:
         messages["CURR"]["Volt"] = 0.01 * volts
         notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)

@@ -22,7 +22,8 @@ opinion on whole logs without encoding 10.
 """
 
 import re
-from collections.abc import Collection, Mapping
+from collections import defaultdict
+from collections.abc import Collection
 from itertools import zip_longest
 from pathlib import Path
 
@@ -43,7 +44,7 @@ from ..table import Array, NamedArrays, Table
 Ints = NDArray[np.int64]
 
 BEGINS = b"H Product:Blackbox"
-Headers = Mapping[str, str]
+Headers = defaultdict[str, str]
 SIGNATURE = ("time (us)", "motor[0]", "motor[3]")
 
 # stated units in the map's: g, degrees per second, volts
@@ -90,11 +91,11 @@ def read(
         raise InputError(f"{path}: its headers do not end; expected frames behind them")
     lines = data[start:begin].decode("ascii", "replace").split("\n")
     pairs = (line.removeprefix("H ").partition(":") for line in lines)
-    headers = {key.strip(): value.strip() for key, _, value in pairs}
+    headers = defaultdict(str, {key.strip(): value.strip() for key, _, value in pairs})
     version = headers.get("Data version", "2")
     if version != "2":
         raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
-    names = headers.get("Field I name", "").replace(_HUNDREDS, "").split(",")
+    names = headers["Field I name"].replace(_HUNDREDS, "").split(",")
     layout = _layout(path, headers, names)
     wanted = [*shipped_map("recordings/betaflight").wanted, *_MORE_MOTORS]
     keep = [name for name in wanted if name in names]
@@ -139,7 +140,8 @@ def read_table(
     read = table.read([*names.values()])
     fields = {field: scales.get(field, 1.0) * read[name] for field, name in names.items()}
     notes = [*table.notes, *motors_left_out(table.header, names.values())]
-    return _log(path, "betaflight_csv", fields, {*scales}, {}, option, vehicle, notes, piece)
+    none: Headers = defaultdict(str)
+    return _log(path, "betaflight_csv", fields, {*scales}, none, option, vehicle, notes, piece)
 
 
 def _log(
@@ -171,7 +173,7 @@ def _log(
         low, high, whence = _range(path, [fields[name] for name in groups["motor"]], headers)
         scales["motor"] = 1.0 / (high - low)
         said.append(f"commands: {low:g} to {high:g} ({whence}) taken as 0 to 1")
-    poles, whence = _magnet_poles(path, option, headers.get("motor_poles", ""))
+    poles, whence = _magnet_poles(path, option, headers["motor_poles"])
     if any(np.any(fields[name] > 0.0) for name in groups["eRPM"]):
         scales["eRPM"] = 200.0 / poles
         said.append(f"eRPM: {poles} magnet poles ({whence})")
@@ -196,9 +198,9 @@ def _gyro_scale(headers: Headers) -> float:
     """Return the gyro's count in deg/s: the bits of a number in the header, of degrees per second,
     or of radians per microsecond in Baseflight's.
     """
-    fine = 0.1 if headers.get("blackbox_high_resolution") == "1" else 1.0
+    fine = 0.1 if headers["blackbox_high_resolution"] == "1" else 1.0
     try:
-        bits = int(headers.get("gyro_scale") or headers.get("gyro.scale") or "", 16)
+        bits = int(headers["gyro_scale"] or headers["gyro.scale"], 16)
         scale = float(np.array(bits, "<u4").view("<f4"))
     except (ValueError, OverflowError):
         return fine
@@ -213,10 +215,9 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
     Raises:
         InputError: the header's are none.
     """
-    stated = headers.get("motorOutput", "")
-    if stated:
+    if stated := headers["motorOutput"]:
         try:
-            low, high = (float(x) for x in stated.split(","))
+            low, high = map(float, stated.split(","))
         except ValueError:
             low = high = 0.0
         if not 0.0 <= low < high <= 1e5:
@@ -225,12 +226,13 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
             )
         return low, high, "motorOutput of the header"
     names = ("minthrottle", "maxthrottle")
-    least, most = (_whole_number(headers.get(name, ""), 1, 10**9) for name in names)
+    least, most = (_whole_number(headers[name], 1, 10**9) for name in names)
     if 0 < least < most:
         return float(least), float(most), "minthrottle and maxthrottle of the header"
-    outside = any(np.any((x > _PWM[1]) | ((x < _PWM[0]) & (x > 0.0))) for x in motors)
-    low, high = _DSHOT if outside else _PWM
-    return low, high, f"assumed: {'DShot' if outside else 'pulses in us'}, no header says it"
+    low, high = _PWM
+    if any(np.any((x > high) | ((x < low) & (x > 0.0))) for x in motors):
+        return *_DSHOT, "assumed: DShot, no header says it"
+    return low, high, "assumed: pulses in us, no header says it"
 
 
 def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
@@ -254,7 +256,7 @@ def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
 
 def _one_g(t: Array, force: list[Array], headers: Headers) -> tuple[float, str]:
     """Return the accelerometer's counts of 1 g, and words on whence they are known."""
-    if stated := _whole_number(headers.get("acc_1G", ""), 1, 10**6):
+    if stated := _whole_number(headers["acc_1G"], 1, 10**6):
         return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
     length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
     middle = np.nanmedian(length) if np.isfinite(length).any() else 0.0
@@ -306,9 +308,9 @@ def _layout(path: Path, headers: Headers, names: list[str]) -> list[Ints]:
     every = headers.get("I interval", "32")
     intervals = [max(1, number(text, 1)) for text in (every, top or "1", bottom)]
     constants = np.zeros(max(_PREDICTORS) + 1, np.int64)
-    constants[4] = number(headers.get("minthrottle", ""), 1150)
-    constants[8], constants[9] = 1500, number(headers.get("vbatref", ""), 4095)
-    constants[11] = number(headers.get("motorOutput", "").split(",")[0], 0)
+    constants[4] = number(headers["minthrottle"], 1150)
+    constants[8], constants[9] = 1500, number(headers["vbatref"], 4095)
+    constants[11] = number(headers["motorOutput"].split(",")[0], 0)
     rows = (  # with zeros behind them
         np.array(list(zip_longest(*lists, [0], fillvalue=0)), np.int64).T.copy()
         for lists in (encodings, predictors)
@@ -323,7 +325,7 @@ def _numbers(path: Path, headers: Headers, key: str, known: Collection[int]) -> 
     Raises:
         InputError: one is unknown.
     """
-    texts = headers[key].split(",") if headers.get(key) else []
+    texts = headers[key].split(",") if headers[key] else []
     expected = [str(x) for x in known]
     if bad := [text for text in texts if text.strip() not in expected]:
         raise InputError(

@@ -79,11 +79,11 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         events.append(ChannelGroup(t, columns))
     if not events:
         raise InputError(f"{path}: no event twice; expected at least two samples")
-    first = min(float(samples.t[0]) for samples in events)
+    first = min(samples.t[0] for samples in events)
     notes.append(f"times: the vehicle's clock, which stood at {first:.6g} s at the first event")
     log_map = load_map("cflib")
     there, _ = chosen(events, log_map)
-    if there.position is None and (there.gyro is None or there.accelerometer is None):
+    if there.position is None and None in (there.gyro, there.accelerometer):
         # as CrazyPAD's logs: rows of motor commands, for comparing flights
         log_map = replace(there, rows="whole", gyro=None, accelerometer=None)
         notes.append(

@@ -138,8 +138,8 @@ def channels(
     empty = {s.topic for s in recorded if not s.columns} - {s.topic for s in recorded if s.columns}
     notes += [f"{topic}: not of four motors that turn; left out" for topic in sorted(empty)]
     sections = sections_of(path, recorded, log_map, "px4_ulog", notes, piece, flown)
-    position, said = sections[0].position, sections[3]
-    if position is not None and position.topic == _FILTER:
+    log_map, _, _, said = sections
+    if log_map.position is not None and log_map.position.topic == _FILTER:
         fields = topics[_FILTER][0]
         counters = ("xy_reset_counter", "z_reset_counter")
         if resets := [name for name in counters if np.ptp(fields.get(name, 0.0)) > 0.0]:
