@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..controllers import make_controller
 from ..dynamics.vehicle import EffectSetting, Vehicle
@@ -80,7 +79,7 @@ class Story:
         picture = self.out / "fly.png"
         draw_episode(episode, f"{CONTROLLER}, {SCENARIO}", picture)
         error = episode.observation[:, :6] - np.hstack([episode.force, episode.torque])
-        force, torque = (float(np.sqrt(np.mean(part**2))) for part in (error[:, :3], error[:, 3:]))
+        force, torque = (np.sqrt(np.mean(part**2)) for part in (error[:, :3], error[:, 3:]))
         command = f"windwrench fly --scenario {SCENARIO} --seed {self.seed}"
         if self.vehicle_name != "ardrone2":
             command += f" --vehicle {shlex.quote(self.vehicle_name)}"
@@ -209,14 +208,13 @@ def _draw(before: Episode, after: Episode, path: Path) -> None:
     figure = new_figure(4.0)
     axes: Any = figure.subplots()
     longest = max((before, after), key=lambda e: len(e.time))
-    fan: NDArray[np.float64] = longest.fan_y
+    fan = longest.fan_y
     axes.fill_between(longest.time, fan - 0.45, fan + 0.45, color=JET, label="width of the fan")
     axes.plot(longest.time, fan, "--", color=BLACK, lw=1.5, label="fan")
     axes.plot(before.time, before.y, color=BEFORE, lw=2, label="vehicle, declared model")
     axes.plot(after.time, after.y, color=AFTER, lw=2, label="vehicle, amended model")
-    axes.set_title(f"RMSE {before.rmse:.3f} m before, {after.rmse:.3f} m after")
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("y (m)")
+    title = f"RMSE {before.rmse:.3f} m before, {after.rmse:.3f} m after"
+    axes.set(title=title, xlabel="time (s)", ylabel="y (m)")
     room_above(axes)
     axes.legend(loc="upper left", ncols=2)
     write_png(figure, path)

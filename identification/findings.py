@@ -91,11 +91,11 @@ class Trace:
 
     log: str
     period: float
-    t: Array = field(repr=False)
-    before: Array = field(repr=False)
-    after: Array = field(repr=False)
-    held_out: Mask = field(repr=False)
-    parts: ArrayMap = field(default_factory=dict, repr=False)
+    t: Array
+    before: Array
+    after: Array
+    held_out: Mask
+    parts: ArrayMap = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +115,9 @@ class Signature:
     effect: str
     channel: str
     regressor: str
-    x: Array = field(repr=False)
-    residual: Array = field(repr=False)
-    fitted: Array = field(repr=False)
+    x: Array
+    residual: Array
+    fitted: Array
 
 
 @dataclass(frozen=True)
@@ -201,6 +201,9 @@ class Probabilities:
     names: Values
     alternatives: tuple[Alternative, ...]
     unknown: float
+
+
+_UNKNOWN = Probabilities({}, (), math.nan)
 
 
 @dataclass(frozen=True)
@@ -308,7 +311,7 @@ class Diagnosis:
     needs_pose: Names = ()
     doubts: Mapping[str, Names] = field(default_factory=dict)
     ranking: Ranking | None = None
-    probabilities: Probabilities = field(default_factory=lambda: Probabilities({}, (), math.nan))
+    probabilities: Probabilities = _UNKNOWN
 
     @property
     def held_out_by_log(self) -> dict[str, list[Pair]]:
@@ -319,7 +322,7 @@ class Diagnosis:
         return blocks
 
     def __repr__(self) -> str:
-        names = ", ".join(e.name + (" (tentative)" if e.tentative else "") for e in self.effects)
+        names = ", ".join(e.name + " (tentative)" * e.tentative for e in self.effects)
         return (
             f"<{type(self).__name__} {self.verdict}: {names or 'no effect'}; force error "
             f"{self.before.force_rms:.3g} -> {self.after.force_rms:.3g} N, torque error "

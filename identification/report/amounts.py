@@ -7,7 +7,7 @@ user's own.
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,8 +43,7 @@ _LEAST_BLOCKS = 4
 _STEADY = 4.0  # least standard errors of a mean over blocks, beyond chance
 
 
-@dataclass(frozen=True)
-class Amount:
+class Amount(NamedTuple):
     """The practical quantity of a coefficient.
 
     Attributes:
@@ -63,7 +62,7 @@ class Amount:
 
     def __str__(self) -> str:
         """Return ``0.31 ± 0.01 N along x``."""
-        number = with_std(self.value, self.std) + (f"{SPACE}{self.unit}" if self.unit else "")
+        number = f"{with_std(self.value, self.std)}{SPACE}{self.unit}".removesuffix(SPACE)
         return f"{number} {self.where}".rstrip()
 
 
@@ -85,8 +84,7 @@ def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
         unit, when = _AT[unit]
     elif unit in _RELATIVE and "relative" in meaning:
         factor, unit = _RELATIVE[unit]
-    value, std = factor * value, factor * std
-    where = ""
+    value, std, where = factor * value, factor * std, ""
     if place := _PLACE.search(meaning):
         how, frame, axis, rotor = place.groups()
         where = rotor or f"{how} {axis}"
@@ -96,8 +94,7 @@ def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
         factor, unit = scale_of([value], unit)
     else:
         factor, unit = _SMALL_UNITS.get(unit if abs(value) < _SMALL else "", (1.0, unit))
-    value, std = factor * value, factor * std
-    return Amount(value, std, "" if unit == "1" else unit, where, when)
+    return Amount(factor * value, factor * std, "" if unit == "1" else unit, where, when)
 
 
 def known(effect: NamedEffect) -> list[str]:
@@ -117,14 +114,13 @@ def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
         return f"{title(effect.name)} {_wind(effect)}"
     names = known(effect) or list(effect.coefficients)[:1]
     names = [name for name in names if effect.units.get(name) == effect.units.get(names[0])]
-    acts = {name: amount(effect, name, vehicle) for name in names}
-    if not acts[names[0]].unit:
-        return f"{title(effect.name)} {names[0]} = {acts[names[0]]}"
-    most = ""
+    first, most = amount(effect, names[0], vehicle), ""
+    if not first.unit:
+        return f"{title(effect.name)} {names[0]} = {first}"
     if len(names) > _MOST:
         most, names = "up to ", [max(names, key=lambda name: abs(effect.coefficients[name]))]
-    told = ", ".join(str(acts[name]) for name in names)
-    return f"{title(effect.name)} {most}{told} {acts[names[0]].when}".rstrip()
+    told = ", ".join(str(amount(effect, name, vehicle)) for name in names)
+    return f"{title(effect.name)} {most}{told} {first.when}".rstrip()
 
 
 def _wind(effect: NamedEffect) -> Amount:
@@ -163,10 +159,10 @@ def steady_wrench(pieces: Sequence[Array], periods: Sequence[float], floors: Pai
         ("force", "N", "along", 0, floors[0]),
         ("torque", "Nm", "about", 3, floors[1]),
     ):
-        i = first + int(np.argmax(np.abs(mean[first : first + 3])))
+        i = first + np.argmax(np.abs(mean[first : first + 3]))
         if abs(mean[i]) > _STEADY * error[i] and not abs(mean[i]) < floor:
             factor, small = scale_of([mean[i]], unit)
-            size = with_std(factor * float(mean[i]), factor * float(error[i]))
+            size = with_std(factor * mean[i], factor * error[i])
             told.append(f"a {what} of {size}{SPACE}{small} {way} {CHANNELS[i][-1]}")
     return in_words(told)
 

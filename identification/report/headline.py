@@ -100,10 +100,10 @@ def wrench_headline(series: WrenchSeries) -> str:
     force's spread.
     """
     rows = finite_rows(series.force)
-    wrench = np.nan_to_num(np.column_stack([series.force, series.torque])[rows])
-    stated = np.nan_to_num(np.column_stack([series.std_force, series.std_torque])[rows])
+    wrench = np.nan_to_num(np.hstack([series.force, series.torque])[rows])
+    stated = np.nan_to_num(np.hstack([series.std_force, series.std_torque])[rows])
     std = np.median(stated, axis=0)
-    floors = float(std[:3].max()), float(std[3:].max())
+    floors = std[:3].max(), std[3:].max()
     steady = steady_wrench([wrench], [median_step(series.t)], floors)
     told = steady or f"no steady force above {in_unit(floors[0], 'N')}"
     spread = in_unit(math.sqrt(wrench[:, :3].var(axis=0).sum()), "N")

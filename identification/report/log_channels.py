@@ -1,7 +1,7 @@
 """The channels of a log: rates, gaps and ranges, and a picture of them over time."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from ...runtime.drawing import SERIES, new_figure, styled
 from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Names, Rows, finite_rows
+from ..logs.table import Array, Names, finite_rows, median_step
+from .plot_numbers import telling_samples
 
 _GAP = 3.0  # median steps of a channel
 _BINS = 4000  # for a picture's 900 pixels: each bin draws a line's least and largest value
@@ -17,8 +18,7 @@ _AXES = ("x", "y", "z")
 _ROTORS = ("1 front-left", "2 rear-left", "3 rear-right", "4 front-right")
 
 
-@dataclass(frozen=True, eq=False)
-class Channel:
+class Channel(NamedTuple):
     """One channel of a log."""
 
     name: str
@@ -42,17 +42,13 @@ def log_channels(log: FlightLog) -> list[Channel]:
         turned = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
         axis[log.valid] = turned.apply([0.0, 0.0, 1.0])
     tilt = np.degrees(np.arccos(np.clip(axis[:, 2:], -1.0, 1.0)))
-    rotors = "rotor speeds (from commands)" if log.commanded else "rotor speeds"
+    rotors, source = "rotor speeds", "rotors"
+    if log.commanded:
+        rotors, source = "rotor speeds (from commands)", "commands"
     given = [
         ("position", "m", log.position, _AXES, "position"),
         ("attitude (tilt)", "deg", tilt, _AXES[:2], "position"),
-        (
-            rotors,
-            "rad/s",
-            log.rotor_speeds if log.has_rotor_speeds else None,
-            _ROTORS,
-            "commands" if log.commanded else "rotors",
-        ),
+        (rotors, "rad/s", log.rotor_speeds, _ROTORS, source),
         ("motor commands", "0 to 1", log.command, _ROTORS, "commands"),
         ("battery", "V", None if log.voltage is None else log.voltage[:, None], ("",), "battery"),
         ("accelerometer", "m/s2", log.accelerometer, _AXES, "accelerometer"),
@@ -62,38 +58,19 @@ def log_channels(log: FlightLog) -> list[Channel]:
     ]
     out = []
     for name, unit, values, series, section in given:
-        if values is None:
-            continue
-        rows = np.flatnonzero(finite_rows(values))
-        if len(rows) < 2:
+        if values is None or len(rows := np.flatnonzero(finite_rows(values))) < 2:
             continue
         t, title, drawn = log.t[rows], f"{name} ({unit})", values[rows]
         low, high = float(drawn.min()), float(drawn.max())
         if values is tilt:
             drawn, title = axis[rows, :2], "thrust axis (x, y of 1)"
-        steps = np.diff(t)
-        step = float(np.median(steps))
+        steps, step = np.diff(t), median_step(t)
         rate = min(log.rates.get(section) or np.inf, 1.0 / step)
         gaps, longest = int(np.sum(steps > _GAP * step)), max(float(steps.max()), 1.0 / rate)
         numbers = (len(rows), rate, gaps, longest, low, high)
-        shown = _extremes(drawn)
+        shown = telling_samples(drawn, _BINS)
         out.append(Channel(name, unit, *numbers, t[shown], drawn[shown], title, series))
     return out
-
-
-def _extremes(values: Array) -> Rows:
-    """Return the rows for drawing the lines of values (N, k) over N: the extremes of each line in
-    each bin, or all if few.
-    """
-    size = len(values) // _BINS
-    if size < 3:
-        return np.arange(len(values))
-    whole = len(values) // size
-    bins = values[: whole * size].reshape(whole, size, -1)
-    rows = size * np.arange(whole)[:, None]
-    ends = rows[:, 0], np.arange(whole * size, len(values))
-    extremes = [(rows + pick(bins, axis=1)).ravel() for pick in (np.argmin, np.argmax)]
-    return np.unique(np.concatenate([*extremes, *ends]))
 
 
 @styled()

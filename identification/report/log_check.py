@@ -43,7 +43,7 @@ class LogCheck:
         """Return the gravest doubt, and what flew how long and how far."""
         answer, by = flew(self.log)
         what = self.log.vehicle or self.log.flown.airframe or "a vehicle of four rotors"
-        told = [f"Doubt: {self.doubts[0]}."] if self.doubts else []
+        told = [f"Doubt: {doubt}." for doubt in self.doubts[:1]]
         if answer.startswith("yes"):
             told.append(f"Flight of {answer[5:]} by {what}: {by}.")
         elif answer == "unknown":
@@ -57,11 +57,6 @@ class LogCheck:
     def as_dict(self) -> Data:
         """Return the check as plain values."""
         log = self.log
-        reasons = self.guess.reasons if self.guess else ()
-        fields = (
-            {"field": f"{r.section}.{r.field}".rstrip("."), "certain": r.certain, "why": r.why}
-            for r in reasons
-        )
         return {
             "headline": self.headline(),
             "log": log.name,
@@ -77,7 +72,10 @@ class LogCheck:
             "notes": list(log.notes),
             "doubts": [*self.doubts, *self.limits],
             "map": self.map_text or None,
-            "fields": list(fields),
+            "fields": [
+                {"field": f"{r.section}.{r.field}".rstrip("."), "certain": r.certain, "why": r.why}
+                for r in (self.guess.reasons if self.guess else ())
+            ],
         }
 
 
@@ -117,7 +115,8 @@ def check_log(
             read_by = f"the reader {named[1]}" if named else "this kit's own format"
     guesses = guess.doubts if guess else ()
     guessed = [f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}" for r in guesses]
-    doubts = _doubts(log, guessed, flown_vehicle(vehicle, log.vehicle))
+    vehicle = flown_vehicle(vehicle, log.vehicle)
+    doubts = _doubts(log, guessed, vehicle)
     limits = [
         f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
         f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "
@@ -125,10 +124,9 @@ def check_log(
         for c in noise_spectra(log)
         if c.filtered
     ]
-    if flown_vehicle(vehicle, log.vehicle) is None:
+    if vehicle is None:
         limits.append("no vehicle is given: the rotor speeds were not checked against its weight")
-    channels = log_channels(log)
-    return LogCheck(log, read_by, channels, doubts, tuple(limits), guess, text)
+    return LogCheck(log, read_by, log_channels(log), doubts, tuple(limits), guess, text)
 
 
 def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:

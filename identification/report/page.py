@@ -43,11 +43,7 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         amounts=amounts,
         headline=headline(diagnosis),
         tone=_TONES[diagnosis.verdict],
-        stated=diagnosis.probabilities,
         table=error_table(diagnosis),
-        missing=words.MISSING,
-        doubts=words.doubts(diagnosis),
-        outside=words.is_outside(diagnosis),
         plots=plots,
         still=still_picture(drawn) if drawn else "",
         bars=bars,
@@ -59,7 +55,6 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         shared_style=_page_file("page.css"),
         library_style=_page_file("uplot/uPlot.min.css"),
         script=script,
-        toggles=data["time"]["effects"] if "time" in data else [],
         command=command,
         version=__version__,
     )
@@ -105,7 +100,7 @@ def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
         before, after = (getattr(side, name) for side in (diagnosis.before, diagnosis.after))
         factor, unit = words.scale_of((before, after, floor), unit) if unit else (1.0, "")
         # zero before and after: these logs cannot tell this error
-        told = bool(before or after)
+        told = before or after
         old, new, least = (
             words.rounded(factor * x) if told else words.MISSING for x in (before, after, floor)
         )

@@ -8,7 +8,6 @@ value is one of the log.
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -36,8 +35,7 @@ _GROUPS = (("force", slice(0, 3), "N"), ("torque", slice(3, 6), "Nm"))
 _SYMBOLS = ("Fx", "Fy", "Fz", "τx", "τy", "τz")
 
 
-@dataclass(frozen=True)
-class PlotTable:
+class PlotTable(NamedTuple):
     """A caption, the heads of the columns, and the rows as texts."""
 
     caption: str
@@ -45,8 +43,7 @@ class PlotTable:
     rows: list[Names]
 
 
-@dataclass(frozen=True, eq=False)
-class Plot:
+class Plot(NamedTuple):
     """One plot of the page."""
 
     packed: Data  # ``key`` is the plot's name in the page
@@ -62,58 +59,48 @@ class Plot:
 class _Joined:
     """The residual of all pieces of flight, one after the other on a common axis (n samples)."""
 
-    def __init__(self, traces: Sequence[Trace], effects: Sequence[NamedEffect] = ()) -> None:
+    def __init__(self, traces: Sequence[Trace], effects: Sequence[NamedEffect]) -> None:
         self.traces = traces
         # start of each piece: its own time for one piece, side by side for several
-        lengths = [float(trace.t[-1] - trace.t[0]) for trace in traces]
-        gap = 0.01 * sum(lengths)
-        self.starts = [sum(lengths[:k]) + gap * k for k in range(len(traces))]
-        if len(traces) == 1:
-            self.starts = [float(traces[0].t[0])]
+        lengths = np.array([trace.t[-1] - trace.t[0] for trace in traces])
+        ends = np.cumsum(lengths + 0.01 * lengths.sum())
+        self.starts = [traces[0].t[0] if len(traces) == 1 else 0.0, *ends[:-1]]
         self.end = self.starts[-1] + lengths[-1]
-        self.before, self.after, self.x = (
-            np.concatenate(each)
-            for each in (
-                [trace.before for trace in traces],
-                [trace.after for trace in traces],
-                [t.t - t.t[0] + start for t, start in zip(traces, self.starts, strict=True)],
-            )
-        )
+        self.before = np.concatenate([trace.before for trace in traces])
+        self.after = np.concatenate([trace.after for trace in traces])
+        moved = [t.t - t.t[0] + start for t, start in zip(traces, self.starts, strict=True)]
+        self.x = np.concatenate(moved)
         self.parts = {
             effect.name: np.concatenate([trace.parts[effect.name] for trace in traces])
             for effect in effects
             if all(effect.name in trace.parts for trace in traces)
         }
-        self.first_rows = np.cumsum([0, *(len(trace.t) for trace in traces)])[:-1]
+        self.pieces = np.split(np.arange(len(self.x)), np.cumsum([*map(len, moved)])[:-1])
         # the compared channels: force, torque or both. The torque is zero throughout if unknown, as
         # with commands for rotor speeds
-        self.channels = [
-            i
-            for _, group, _ in _GROUPS
-            if self.before[:, group].any() or self.after[:, group].any()
-            for i in range(group.start, group.stop)
-        ]
+        is_known = np.any([self.before, self.after], axis=(0, 1)).reshape(2, 3).any(axis=1)
+        self.channels = np.flatnonzero(np.repeat(is_known, 3)).tolist()
 
     def kept(self, i: int) -> list[Rows]:
         """Return the drawn samples of each piece for channel ``i``."""
         a_sample = _BASE64 * 2.0 * (3 + len(self.parts)) * len(CHANNELS)
         share = max(int(_MOST_BYTES / a_sample / 4), _LEAST_COLUMNS) / len(self.x)
+        lines = np.column_stack([self.before[:, i], self.after[:, i]])
         return [
-            first + telling_samples(trace, i, max(round(share * len(trace.t)), 1))
-            for first, trace in zip(self.first_rows, self.traces, strict=True)
+            rows[telling_samples(lines[rows], max(round(share * len(rows)), 1))]
+            for rows in self.pieces
         ]
 
     def held_out(self) -> list[Pair]:
         """Return start and end of each held-out block."""
         return [
-            (float(self.x[first + a]), float(self.x[first + min(b, len(trace.t) - 1)]))
-            for first, trace in zip(self.first_rows, self.traces, strict=True)
+            (self.x[rows[a]], self.x[rows[min(b, len(rows) - 1)]])
+            for rows, trace in zip(self.pieces, self.traces, strict=True)
             for a, b in runs_of(trace.held_out)
         ]
 
 
-@dataclass(frozen=True, eq=False)
-class PagePlots:
+class PagePlots(NamedTuple):
     """The plots of a page, and the script's plain data; empty without anything to draw."""
 
     time: list[Plot]  # one a channel
@@ -137,7 +124,7 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
         data["time"] = {
             "effects": list(joined.parts),
             "pieces": [
-                {"log": trace.log, "x": start, "t": float(trace.t[0])}
+                {"log": trace.log, "x": start, "t": trace.t[0]}
                 for trace, start in zip(joined.traces, joined.starts, strict=True)
             ],
             "end": joined.end,
@@ -151,9 +138,8 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
             if long and group.start in joined.channels
         ]
     signatures = [_plot_of_signature(s, number) for number, s in enumerate(diagnosis.signatures)]
-    for name, plots in (("frequency", frequency), ("signatures", signatures)):
-        if plots:
-            data[name] = [plot.packed for plot in plots]
+    drawn = {"frequency": frequency, "signatures": signatures}
+    data |= {name: [plot.packed for plot in plots] for name, plots in drawn.items() if plots}
     return PagePlots(time, frequency, signatures, plain(data, 8))
 
 
@@ -164,7 +150,7 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
     ``after`` with any choice of parts added is a sum of them.
     """
     group = slice(0, 3) if i < 3 else slice(3, 6)  # with the same axis
-    largest = float(np.abs([joined.before[:, group], joined.after[:, group]]).max(initial=0.0))
+    largest = np.abs([joined.before[:, group], joined.after[:, group]]).max()
     factor, unit = scale_of([largest], "N" if i < 3 else "Nm")
     before, after, *parts = (
         factor * x[:, i] for x in (joined.before, joined.after, *joined.parts.values())
@@ -173,7 +159,7 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
     kept = joined.kept(i)
     rows = np.concatenate(kept)
     times = [joined.x[k] - joined.x[k[0]] for k in kept]
-    tick = max(_TICK, max(np.diff(t, prepend=0.0).max() for t in times) / _STEPS)
+    tick = max(_TICK, np.diff(np.concatenate(times), prepend=0.0).max() / _STEPS)
     steps = np.concatenate([np.diff(np.rint(t / tick), prepend=0.0) for t in times])
     return Plot(
         {
@@ -204,10 +190,9 @@ def _plot_of_spectrum(
     traces: Sequence[Trace], what: str, group: slice, unit: str, cutoff_hz: float
 ) -> Plot:
     longest = max(len(trace.t) * trace.period for trace in traces)
-    lowest = 1.0 / min(longest, _SPECTRUM_SECONDS)
-    x = np.linspace(lowest, max(cutoff_hz, 1.0), _FREQUENCIES)
+    x = np.linspace(1.0 / min(longest, _SPECTRUM_SECONDS), max(cutoff_hz, 1.0), _FREQUENCIES)
     before, after = (_spectrum(traces, side, group, x) for side in ("before", "after"))
-    factor, unit = scale_of([float(np.max(before))], unit)
+    factor, unit = scale_of(before, unit)
     before, after = factor * before, factor * after
     rows = np.linspace(0, len(x) - 1, _ROWS).astype(int)
     name = f"{what} ({unit}/√Hz)"
@@ -228,7 +213,7 @@ def _plot_of_spectrum(
         name,
         "frequency (Hz)",
         f"Amplitude spectrum of the residual {what} in {unit} per root hertz, before and after; "
-        f"before, it is largest at {rounded(x[int(np.argmax(before))], 2)} Hz.",
+        f"before, it is largest at {rounded(x[np.argmax(before)], 2)} Hz.",
     )
 
 
@@ -236,31 +221,28 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
     """Return the amplitude (f,) per root hertz of all pieces together, the longer counting for
     more.
     """
-    total, weight = np.zeros(len(grid)), 0.0
+    powers = []
     for trace in traces:
         x, rate = getattr(trace, side)[:, group], 1.0 / trace.period
         longest = min(len(x), round(_SPECTRUM_SECONDS * rate))
         f, power = welch(x, rate, nperseg=longest, axis=0)
-        total += len(x) / rate * np.interp(grid, f, power.sum(axis=1))
-        weight += len(x) / rate
-    return np.asarray(np.sqrt(total / weight), dtype=np.float64)
+        powers.append(np.interp(grid, f, power.sum(axis=1)))
+    spectrum: Array = np.sqrt(np.average(powers, 0, [len(x.t) * x.period for x in traces]))
+    return spectrum
 
 
 def _plot_of_signature(signature: Signature, number: int) -> Plot:
     columns = np.column_stack([signature.x, signature.residual, signature.fitted])
     columns = columns[finite_rows(columns)]
-    channel = CHANNELS.index(signature.channel)
-    symbol, unit = _SYMBOLS[channel], "N" if channel < 3 else "Nm"
-    factor, unit = scale_of(np.abs(columns[:, 1:]).ravel(), unit)
+    symbol = _SYMBOLS[CHANNELS.index(signature.channel)]
+    factor, unit = scale_of(columns[:, 1:].ravel(), "N" if symbol.startswith("F") else "Nm")
     x, residual, fitted = (columns * [1.0, factor, factor]).T
     middle, mean = binned(x, residual)
     kept = np.linspace(0, len(x) - 1, min(len(x), _POINTS)).astype(int)
     kept = kept[np.argsort(x[kept], kind="stable")]
-    correlation = (
-        f"; correlation {rounded(float(np.corrcoef(residual, fitted)[0, 1]), 2)}"
-        if len(x) > 2 and residual.std() > 0 and fitted.std() > 0
-        else ""
-    )
+    correlation = ""
+    if len(x) > 2 and residual.std() > 0 and fitted.std() > 0:
+        correlation = f"; correlation {rounded(np.corrcoef(residual, fitted)[0, 1], 2)}"
     return Plot(
         {
             "key": f"signature-{number}",
@@ -304,19 +286,18 @@ def binned(x: Array, y: Array, count: int = 14) -> ArrayPair:
     return np.array([x[p].mean() for p in parts]), np.array([y[p].mean() for p in parts])
 
 
-def telling_samples(trace: Trace, i: int, columns: int) -> Rows:
-    """Return the drawn samples of a piece for channel ``i``: all of a short piece, or in each of
-    ``columns`` stretches the lowest and highest before and after.
+def telling_samples(lines: Array, columns: int) -> Rows:
+    """Return the drawn rows of lines (n, k): all of a few, or both ends, and in each of ``columns``
+    stretches the lowest and highest of each line.
     """
-    n = len(trace.t)
+    n = len(lines)
     if n <= 4 * columns:
         return np.arange(n)
     edges = np.linspace(0, n, columns + 1).astype(int)
     width = int(np.diff(edges).max())
     rows = np.minimum(edges[:-1, None] + np.arange(width), edges[1:, None] - 1)
     extremes = [
-        np.take_along_axis(rows, which(x[rows], axis=1)[:, None], axis=1).ravel()
-        for x in (trace.before[:, i], trace.after[:, i])
+        np.take_along_axis(rows, which(lines[rows], axis=1), axis=1).ravel()
         for which in (np.argmin, np.argmax)
     ]
     return np.unique(np.concatenate([[0, n - 1], *extremes]))
@@ -324,7 +305,7 @@ def telling_samples(trace: Trace, i: int, columns: int) -> Rows:
 
 def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> PlotTable:
     """Return the residual's rms before and after in a channel, interval by interval."""
-    many, each = len(traces) > _MOST_PIECES, max(_ROWS // len(traces), 1)
+    each = max(_ROWS // len(traces), 1)
     head: Names = ("Piece", "Time (s)", "Held out", "Before", "After")
     rows: list[Names] = []
     for number, trace in enumerate(traces[:_MOST_PIECES], 1):
@@ -335,7 +316,8 @@ def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) 
             rows.append((str(number), time, held, *sides))
     if len(traces) == 1:
         head, rows = head[1:], [row[1:] for row in rows]
-    more = f", the first {_MOST_PIECES} of {len(traces)} pieces" if many else ""
+    more = f", the first {_MOST_PIECES} of {len(traces)} pieces"
+    more = more if len(traces) > _MOST_PIECES else ""
     return PlotTable(f"Residual {_SYMBOLS[i]}, rms ({unit}){more}", head, rows)
 
 
@@ -354,24 +336,17 @@ def candidate_bars(diagnosis: Diagnosis) -> list[Bar]:
     indistinguishable from a named one.
     """
     rivals = {x for effect in diagnosis.effects for x in effect.indistinguishable_from}
-    kinds = [
-        "named" if x.named else "rival" if x.name in rivals else "" for x in diagnosis.candidates
+    ranked = [
+        (x, "named" if x.named else "rival" if x.name in rivals else "")
+        for x in diagnosis.candidates
     ]
-    ranked = zip(diagnosis.candidates, kinds, strict=True)
-    shown = [(x, kind) for i, (x, kind) in enumerate(ranked) if i < 14 or kind]
+    shown = ranked[:14] + [(x, kind) for x, kind in ranked[14:] if kind]
     gains = np.nan_to_num([x.gain for x, _ in shown], posinf=0.0, neginf=0.0)
     high, low = np.max(gains, initial=0.05), max(np.min(gains, initial=0.0), -0.25)
-    places = 100.0 * (np.maximum([*gains, 0.0], low) - low) / (high - low)
-    zero = places[-1]
+    *places, zero = (100.0 * (np.maximum([*gains, 0.0], low) - low) / (high - low)).tolist()
     return [
-        Bar(
-            candidate.name,
-            percent(candidate.gain),
-            kind,
-            round(float(min(place, zero)), 1),
-            round(float(abs(place - zero)), 1),
-        )
-        for (candidate, kind), place in zip(shown, places[:-1], strict=True)
+        Bar(x.name, percent(x.gain), kind, round(min(at, zero), 1), round(abs(at - zero), 1))
+        for (x, kind), at in zip(shown, places, strict=True)
     ]
 
 
@@ -380,10 +355,9 @@ def packed_series(x: Array) -> Data | None:
     zeros, throughout.
     """
     x = np.nan_to_num(x)
-    largest = float(np.abs(x).max(initial=0.0))
-    if largest < 1e-12:
+    scale = np.abs(x).max(initial=0.0) / _STEPS
+    if scale * _STEPS < 1e-12:
         return None
-    scale = largest / _STEPS
     return {"scale": scale, "data": _base64(np.rint(x / scale), "<i2")}
 
 

@@ -3,8 +3,6 @@
 import math
 from pathlib import Path
 
-import numpy as np
-
 from ...runtime.drawing import BLACK, ESTIMATE, GREY, JET, SERIES, new_figure, room_above, styled
 from ...runtime.page_files import write_png
 from ..profile_law import ProfiledJet
@@ -23,7 +21,7 @@ def draw_profile(found: ProfiledJet, title: str, path: Path) -> Path:
     figure, p, shape = new_figure(6.2), found.profile, found.shape
     panels = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1.0])
     for panel, (part, name, unit) in zip(panels, _PARTS, strict=True):
-        scale, unit = scale_of([float(np.abs(p.wrench[part]).max())], unit)
+        scale, unit = scale_of(p.wrench[part], unit)
         panel.plot(p.means[:, 0], scale * p.means[:, 1 + part], ".", color=GREY, ms=2, label="1 s")
         for other, style in zip(found.others, ("--", ":", "-."), strict=False):
             label = f"line at {other.beside:.2f} m"

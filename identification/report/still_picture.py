@@ -22,8 +22,7 @@ def still_picture(plots: Sequence[Plot]) -> str:
     for place, plot in enumerate(plots, 1):
         axes = figure.add_subplot(rows, _COLUMNS, place)
         told = filter(None, (plot.caption, plot.title, plot.readout))
-        axes.set_title(fill(" ".join(told), _LETTERS))
-        axes.set_xlabel(plot.axis)
+        axes.set(title=fill(" ".join(told), _LETTERS), xlabel=plot.axis)
         dots = "mean" in plot.lines  # a signature is a cloud of points with its mean
         for name, (x, y) in plot.lines.items():
             style = "." if dots and name != "mean" else "-"

@@ -31,12 +31,12 @@ def with_std(value: float, std: float) -> str:
     """
     if not math.isfinite(value):
         return MISSING
-    known = math.isfinite(std) and std > 0
-    size = max(abs(value), std if known else 0.0)
+    std = std if math.isfinite(std) else 0.0
+    size = max(abs(value), std)
     power = math.floor(math.log10(size)) if size else 0
     power = 0 if -3 <= power < 4 else power
     scaled = value / 10.0**power
-    if known:
+    if std > 0.0:
         spread = float(f"{std:.1e}") / 10.0**power
         decimals = min(max(1 - math.floor(math.log10(spread)), 0), 9)
         text = f"{scaled:.{decimals}f} ± {spread:.{decimals}f}"
@@ -44,7 +44,7 @@ def with_std(value: float, std: float) -> str:
         text = rounded(scaled)
     text = text.replace("-", "−")
     if power:
-        text = f"{f'({text})' if known else text} × 10{str(power).translate(_SUPERSCRIPT)}"
+        text = f"{f'({text})' if std > 0.0 else text} × 10{str(power).translate(_SUPERSCRIPT)}"
     return text
 
 
@@ -128,18 +128,18 @@ def by_energy(diagnosis: Diagnosis) -> list[NamedEffect]:
 def doubts(diagnosis: Diagnosis) -> list[str]:
     """Return the reasons to doubt the logs, and then the names."""
     names = {text for some in diagnosis.doubts.values() for text in some}
-    logs = [text for text in diagnosis.notes if _WARNING in text]
-    return [*logs, *(text for text in diagnosis.notes if text in names and text not in logs)]
+    doubted = (text for text in diagnosis.notes if _WARNING in text or text in names)
+    return sorted(doubted, key=lambda text: _WARNING not in text)
 
 
 def error_amounts(diagnosis: Diagnosis) -> Iterator[str]:
     """Yield the error on held-out data in words: force and torque well above the noise floor."""
     before, after = diagnosis.before, diagnosis.after
-    rows = [
+    rows = (
         ("force", before.force_rms, after.force_rms, diagnosis.floor_force_rms, "N"),
         ("torque", before.torque_rms, after.torque_rms, diagnosis.floor_torque_rms, "Nm"),
-    ]
-    known = [row for row in rows if math.isfinite(row[1]) and math.isfinite(row[2])]
+    )
+    known = [row for row in rows if math.isfinite(row[1] + row[2])]
     if not known:
         yield "held-out error: not known"
     for what, old, new, floor, unit in [x for x in known if x[1] > _TELLING * x[3]] or known[:1]:
@@ -170,13 +170,11 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
             f"The residual looks random, as turbulence does{_disturbances(diagnosis)}: "
             "no test found structure in it."
         )
-    if not diagnosis.structure:
-        return f"The residual has structure that no effect {tried(diagnosis)} explains."
-    strongest = diagnosis.structure[0]
-    return (
-        f"The residual has structure that no effect {tried(diagnosis)} explains; the strongest is "
-        f"in {strongest.where} ({percent(strongest.gain)} of the residual)."
+    strongest = "".join(
+        f"; the strongest is in {found.where} ({percent(found.gain)} of the residual)"
+        for found in diagnosis.structure[:1]
     )
+    return f"The residual has structure that no effect {tried(diagnosis)} explains{strongest}."
 
 
 def _disturbances(diagnosis: Diagnosis) -> str:

@@ -4,7 +4,7 @@ shaded.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -48,27 +48,26 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     figure.suptitle(f"External wrench: {log.name}, {vehicle.name}", parse_math=False)
 
     height.plot(series.t, series.position[:, 2], color=BLACK, lw=1.2)
-    height.set_ylabel("height (m)" if known else "height (not known)")
+    height.set_ylabel("height (m)")
     if not known:
-        height.set_yticks([])
+        height.set(ylabel="height (not known)", yticks=[])
     backdrop = _draw_thrust(height, series.t, log, vehicle)
-    scale, unit = scale_of([float(np.percentile(np.abs(series.torque), 99))], "Nm")
+    scale, unit = scale_of([np.percentile(np.abs(series.torque), 99)], "Nm")
     truth = None if log.torque is None else scale * log.torque
     mean, std = scale * series.torque, scale * series.std_torque
     _draw_vectors(force, series.t, series.force, series.std_force, log.force, ("f", "N"))
     _draw_vectors(torque, series.t, mean, std, truth, ("τ", unit))
     force.set_ylabel("external force (N)")
-    torque.set_ylabel(f"external torque ({unit})")
-    torque.set_xlabel("time (s)")
-    if any(phase.name == GROUND for phase in phases):
+    torque.set(ylabel=f"external torque ({unit})", xlabel="time (s)")
+    if GROUND in {phase.name for phase in phases}:
         weight = f"weight {vehicle.weight:.3g} N"
         force.axhline(vehicle.weight, color=BLACK, lw=0.8, ls=":", label=weight)
     columns, room = (4, 0.14) if log.force is None else (3, 0.26)
-    for panel in (height, force, torque):
+    for panel, behind in ((height, backdrop), (force, force), (torque, torque)):
         panel.grid()
         panel.margins(x=0.0)
-        _shade(backdrop if panel is height else panel, phases, log)
-        if panel is not height and panel.get_legend_handles_labels()[0]:
+        _shade(behind, phases, log)
+        if panel.get_legend_handles_labels()[0]:
             panel.legend(loc="upper center", ncols=columns)
             room_above(panel, room)
     for phase in phases:
@@ -108,16 +107,14 @@ def _draw_vectors(
     for i, (axis, colour) in enumerate(zip("xyz", SERIES, strict=False)):
         name = f"{symbol}$_{axis}$"
         panel.fill_between(t, low[:, i], high[:, i], color=colour, alpha=0.18, lw=0)
+        (line,) = panel.plot(t, mean[:, i], color=colour, lw=1.1, label=name)
         if truth is not None:
-            true = f"true {name}"
             rmse = np.sqrt(np.mean(np.square(mean[:, i] - truth[:, i])))
-            name += f" (RMSE {rmse:.3g} {unit})"
-        panel.plot(t, mean[:, i], color=colour, lw=1.1, label=name)
-        if truth is not None:
-            panel.plot(t, truth[:, i], color=colour, lw=1.0, ls="--", label=true)
+            line.set_label(f"{name} (RMSE {rmse:.3g} {unit})")
+            panel.plot(t, truth[:, i], color=colour, lw=1.0, ls="--", label=f"true {name}")
     # the wide band of the filter's first moments must not set the scale
-    bottom = min(float(np.percentile(low, 1, axis=0).min()), float(mean.min()))
-    top = max(float(np.percentile(high, 99, axis=0).max()), float(mean.max()))
+    bottom = min(np.percentile(low, 1, axis=0).min(), mean.min())
+    top = max(np.percentile(high, 99, axis=0).max(), mean.max())
     panel.set_ylim(bottom - 0.05 * (top - bottom), top + 0.05 * (top - bottom))
 
 
@@ -133,6 +130,15 @@ def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
     lost = after - poses[np.searchsorted(poses, log.t, "right") - 1] > _LASTING
     if lost.any() and log.has_pose:
         lost[1:] |= lost[:-1]  # up to the next pose
-        look: dict[str, Any] = {"facecolor": "none", "edgecolor": GREY, "hatch": "///"}
-        place = panel.get_xaxis_transform()
-        panel.fill_between(log.t, 0.0, 1.0, where=lost, transform=place, zorder=0, lw=0, **look)
+        panel.fill_between(
+            log.t,
+            0.0,
+            1.0,
+            where=lost,
+            transform=panel.get_xaxis_transform(),
+            zorder=0,
+            lw=0,
+            facecolor="none",
+            edgecolor=GREY,
+            hatch="///",
+        )

@@ -20,7 +20,8 @@ message a line, its type's name first, FMT among them, and numbers in whole unit
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+import re
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -39,7 +40,7 @@ from ..channels import ChannelGroup, Stream, in_order
 from ..flight_log import FlightLog
 from ..log_map import LogMap, shipped_map, stated
 from ..mapped_log import MOST_VOLTS, log_of
-from ..table import Array
+from ..table import Array, NamedNumbers, Values
 from ..what_flew import (
     ORDERS,
     PLUS,
@@ -52,7 +53,6 @@ from ..what_flew import (
 )
 
 Bytes = NDArray[np.uint8]
-Parameters = Mapping[str, float]
 
 _EARTH = 6_378_137.0  # m
 _PLACE = ("Lat", "Lng", "Alt")  # of POS
@@ -60,7 +60,9 @@ _NUMBERS = ("C", "I", "Inst")  # of a core, a sensor or a battery
 _PLUS = 0  # of FRAME_TYPE, and of FRAME before Copter 3.5
 _MOTOR1 = 33  # of SERVOn_FUNCTION
 _CHANNELS = 14  # of RCOU
-Messages = dict[str, NDArray[Any]]  # (N,) of one type: columns by name, numbers or bytes of texts
+Rows = NDArray[Any]
+Layout = np.dtype[Any]
+Messages = dict[str, Rows]  # (N,) of one type: columns by name, numbers or bytes of texts
 
 _AS_TEXT = b"FMT, 128, 89, FMT,"  # stands in a log as text
 BEGINS = b"\xa3\x95|(?s:.*)" + _AS_TEXT
@@ -98,27 +100,26 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     parameters = {name: x for name, x in reversed(list(pairs)) if math.isfinite(x)}
     flown = _what_flew(parameters, messages.pop("MSG", {}))
     flown.check(path)
-    pulses = messages.get("RCOU")
-    if "MOT" in messages and pulses is None:
+    pulses = messages.get("RCOU", {})
+    if "MOT" in messages and not pulses:
         raise InputError(
             f"{path}: MOT has the motors' outputs without their times, as Copter before 3.2 logged "
             "them; expected RCOU with TimeMS or TimeUS"
         )
     # Ch before Copter 3.4, Chan before 3.3
-    letter = next((x for x in ("Ch", "Chan") if pulses is not None and f"{x}1" in pulses), "C")
-    log_map, notes = _with_parameters(path, log_map, parameters, vehicle, letter)
-    volts = messages.get("CURR", {}).get("Volt")
-    if volts is not None and np.median(volts) > MOST_VOLTS:
+    messages["RCOU"] = {re.sub(r"Ch(an)?(?=\d)", "C", name): x for name, x in pulses.items()}
+    log_map, notes = _with_parameters(path, log_map, parameters, vehicle)
+    volts = messages.get("CURR", {}).get("Volt", np.zeros(1))
+    if np.median(volts) > MOST_VOLTS:
         messages["CURR"]["Volt"] = 0.01 * volts
         notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
     telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
     notes += telemetry_notes
-    columns = {*log_map.wanted, *_PLACE, *(f"{letter}{i + 1}" for i in range(_CHANNELS))}
-    kept = (_samples(name, rows, columns) for name, rows in messages.items())
-    recorded = [samples for samples in kept if samples is not None]
+    columns = {*log_map.wanted, *_PLACE, *(f"C{i + 1}" for i in range(_CHANNELS))}
     if skipped:
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
-    groups = [*recorded, *telemetry]
+    recorded = [_samples(name, rows, columns) for name, rows in messages.items()]
+    groups = [samples for samples in (*recorded, *telemetry) if len(samples.t) > 1]
     return log_of(path, groups, log_map, "ardupilot_bin", notes, vehicle, piece, flown)
 
 
@@ -129,31 +130,28 @@ def _times(messages: Messages) -> Array:
     return 1e-3 * messages.get("TimeMS", np.empty(0))
 
 
-def _samples(name: str, messages: Messages, columns: set[str]) -> ChannelGroup | None:
-    """Return some columns of a type's messages, of the first core, sensor or battery; None: less
-    than two messages. Places become north, east, down in m from the first.
+def _samples(name: str, messages: Messages, columns: set[str]) -> ChannelGroup:
+    """Return some columns of a type's messages, of the first core, sensor or battery. Places become
+    north, east, down in m from the first.
     """
     for number in _NUMBERS:
         if number in messages:
             first = messages[number] == messages[number].min()
             messages = {name: column[first] for name, column in messages.items()}
-    t = _times(messages)
-    if len(t) < 2:
-        return None
-    kept = {name: messages[name] for name in messages if name in columns}
+    kept = {name: column for name, column in messages.items() if name in columns}
     if set(_PLACE) <= set(kept):
         north, east, altitude = (kept.pop(name) for name in _PLACE)  # degrees, and m
         east = (east - east[0]) * np.cos(np.radians(north[0]))
         kept |= {"N": _EARTH * np.radians(north - north[0]), "E": _EARTH * np.radians(east)}
         kept["D"] = -altitude
-    return ChannelGroup(t, kept, name)
+    return ChannelGroup(_times(messages), kept, name)
 
 
 def _texts(messages: Messages, column: str) -> list[str]:
     return [x.decode("ascii", "replace").strip("\0 ") for x in messages.get(column, ())]
 
 
-def _what_flew(parameters: Parameters, messages: Messages) -> WhatFlew:
+def _what_flew(parameters: Values, messages: Messages) -> WhatFlew:
     """Return a log's statements on its vehicle, from texts, else from parameters."""
     known = stated("airframes")
     for text in _texts(messages, "Message"):
@@ -172,12 +170,12 @@ def _what_flew(parameters: Parameters, messages: Messages) -> WhatFlew:
     return WhatFlew("", "SERVOn_FUNCTION", motors) if motors else UNSTATED
 
 
-def _functions(parameters: Parameters) -> list[int]:
+def _functions(parameters: Values) -> list[int]:
     """Return each output's function."""
     return [int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)]
 
 
-def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple[Order, str]:
+def _order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Order, str]:
     """Return the motor of each of the vehicle's rotors, and a note on the source.
 
     Raises:
@@ -188,26 +186,24 @@ def _order(path: Path, parameters: Parameters, vehicle: Vehicle | None) -> tuple
         order = ORDERS["ardupilot-x"]
         return order, f"quad x assumed, which the log does not state: {order_words(order)}"
     kind = int(parameters.get(name, 1))
-    if kind == _PLUS and (motors_of_plus := order_by_places(PLUS, vehicle)) is not None:
-        motors = ", ".join(map(str, motors_of_plus))
-        return (
-            motors_of_plus,
-            f"{name} {kind}, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {motors}",
-        )
+    if kind == _PLUS and (motors := order_by_places(PLUS, vehicle)):
+        listed = ", ".join(map(str, motors))
+        return motors, f"{name} 0, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {listed}"
     known = stated("airframes")["ardupilot_order"]
     if kind not in known:
-        what = f"{kind}, a plus," if kind == _PLUS else str(kind)
+        what, end = f"{kind}", ""
+        if kind == _PLUS:
+            what, end = "0, a plus,", ", or a vehicle file with rotor_positions of a plus"
         raise InputError(
             f"{path}: parameter {name} is {what} whose rotors do not stand as the vehicle's; "
-            f"expected one of {', '.join(map(str, known))}, whose rotors stand in an x"
-            + (", or a vehicle file with rotor_positions of a plus" if kind == _PLUS else "")
+            f"expected one of {', '.join(map(str, known))}, whose rotors stand in an x{end}"
         )
     order = ORDERS[known[kind]]
     return order, f"{name} {kind}: {order_words(order)}"
 
 
 def _with_parameters(
-    path: Path, log_map: LogMap, parameters: Parameters, vehicle: Vehicle | None, letter: str
+    path: Path, log_map: LogMap, parameters: Values, vehicle: Vehicle | None
 ) -> tuple[LogMap, list[str]]:
     """Return the map with the order of the motors, and with their outputs, range and thrust curve;
     and notes.
@@ -225,47 +221,45 @@ def _with_parameters(
         raise InputError(
             f"{path}: parameters {whence} are {low:g} and {high:g} us; expected MIN below MAX"
         )
-    expo = min(max(parameters.get("MOT_THST_EXPO", 0.65), 0.0), 1.0)
+    expo = float(np.clip(parameters.get("MOT_THST_EXPO", 0.65), 0.0, 1.0))
     least, most = parameters.get("MOT_SPIN_MIN", 0.15), parameters.get("MOT_SPIN_MAX", 0.95)
     if not 0.0 <= least < most:
         least, most = 0.0, 1.0
     slots = slots_of_motors(_functions(parameters), _MOTOR1) or list(range(4))
-    outputs = [slot + 1 for slot in slots]
+    outputs = [str(slot + 1) for slot in slots]
     assert log_map.commands is not None
     commands = replace(
         log_map.commands,
-        columns=tuple(f"{letter}{output}" for output in outputs),
+        columns=tuple(f"C{output}" for output in outputs),
         range=(low, high),
         thrust_factor=expo,
         thrust_span=(least, most),
         note=f"commands: RCOU, {low:g} to {high:g} us ({whence}) taken as 0 to 1; motors 1 to 4 at "
-        f"outputs {', '.join(map(str, outputs))}. ArduPilot takes thrust as (1 - e) a + e a^2 "
+        f"outputs {', '.join(outputs)}. ArduPilot takes thrust as (1 - e) a + e a^2 "
         f"with e = {expo:g} (MOT_THST_EXPO) of a = 0 to 1 at the commands {least:g} to {most:g}",
     )
     return replace(log_map, commands=commands).with_order(order), [*log_map.notes, note]
 
 
-def _telemetry(messages: Messages, parameters: Parameters) -> tuple[list[ChannelGroup], list[str]]:
+def _telemetry(messages: Messages, parameters: Values) -> tuple[list[ChannelGroup], list[str]]:
     """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC, and notes."""
     if not {"Instance", "RPM", "TimeUS"} <= set(messages):
         return [], []
     slots, which = slots_of_motors(_functions(parameters), _MOTOR1), messages["Instance"]
-    if not slots or not set(slots) <= set(which.astype(int).tolist()):
+    if not slots or not np.isin(slots, which).all():
         slots = list(range(4))
     each = []
     for slot in slots:
-        one = {name: column[which == slot] for name, column in messages.items()}
-        if len(one["RPM"]) < 2 or not np.any(one["RPM"] > 0.0):
+        times, rpm = (x[which == slot] for x in (_times(messages), messages["RPM"]))
+        if len(rpm) < 2 or not np.any(rpm > 0.0):
             return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
-        rows, _ = in_order(times := _times(one))
-        each.append(Stream("ESC", times[rows], one["RPM"][rows, None]))
+        rows, _ = in_order(times)
+        each.append(Stream("ESC", times[rows], rpm[rows, None]))
     t = each[0].t
     columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)
-    return [ChannelGroup(t, columns, "ESC")], [
-        f"rotor speeds: measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took "
-        "them"
-    ]
+    told = f"measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took them"
+    return [ChannelGroup(t, columns, "ESC")], [f"rotor speeds: {told}"]
 
 
 def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messages], int]:
@@ -340,14 +334,12 @@ def _numbers(texts: Sequence[bytes]) -> NDArray[np.float64]:
     return numbers
 
 
-def _rows(data: Bytes, places: NDArray[np.int32], layout: np.dtype[Any]) -> NDArray[Any]:
+def _rows(data: Bytes, places: NDArray[np.int32], layout: Layout) -> Rows:
     """Return the messages (N,) at places (N,), by their layout."""
     return sliding_window_view(data[_HEAD:], layout.itemsize)[places].view(layout)[:, 0]
 
 
-def _layouts(
-    formats: NDArray[Any], wanted: Collection[str]
-) -> dict[int, tuple[str, np.dtype[Any], dict[str, float]]]:
+def _layouts(formats: Rows, wanted: Collection[str]) -> dict[int, tuple[str, Layout, NamedNumbers]]:
     """Return name, layout and units of the wanted types, by number; types with a wrong length are
     left out.
     """
@@ -355,10 +347,10 @@ def _layouts(
     for number, length, *texts in formats.tolist():
         name, letters, joined = (x.split(b"\0")[0].decode("ascii", "replace") for x in texts)
         columns = joined.split(",")
-        known = all(letter in _TYPES for letter in letters) and all(columns)
-        if name not in wanted or not known or not len(letters) == len(columns) == len(set(columns)):
+        is_known = {*letters} <= _TYPES.keys() and "" not in columns
+        if not (name in wanted and is_known and len(letters) == len(columns) == len({*columns})):
             continue
-        layout = np.dtype(list(zip(columns, map(_TYPES.__getitem__, letters), strict=True)))
+        layout = np.dtype([*zip(columns, map(_TYPES.__getitem__, letters), strict=True)])
         units = [_UNITS.get(letter, 1.0) for letter in letters]
         if layout.itemsize + _HEAD == length:
             layouts[number] = name, layout, dict(zip(columns, units, strict=True))

@@ -22,10 +22,10 @@ opinion on whole logs without encoding 10.
 """
 
 import re
-from collections.abc import Collection, Mapping
+from collections import defaultdict
+from collections.abc import Collection
 from itertools import zip_longest
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ from ..table import Array, NamedArrays, Table
 Ints = NDArray[np.int64]
 
 BEGINS = b"H Product:Blackbox"
-Headers = Mapping[str, str]
+Headers = defaultdict[str, str]
 SIGNATURE = ("time (us)", "motor[0]", "motor[3]")
 
 # stated units in the map's: g, degrees per second, volts
@@ -53,7 +53,7 @@ _UNITS |= {"V": 1.0, "mV": 1e-3}
 _POLES = 14  # on most motors of 5 inch quadrotors
 _STANDING = 0.5  # s after arming without motion
 _RADIANS = 1e-5  # a gyro's scale below is in rad/us
-_ONE_G = 2.0 ** np.arange(8, 15)  # counts
+_ONE_G = 8, 14  # powers of two, counts
 _DSHOT, _PWM = (48.0, 2047.0), (1000.0, 2000.0)
 _MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of other vehicles than quadrotors
 _HUNDREDS = "(/100)"  # behind the name eRPM of some versions, which are all in hundreds
@@ -63,17 +63,6 @@ _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
 _ENCODINGS = (0, 1, 3, 6, 7, 8, 9, 10)
 _PREDICTORS = (*range(12), 256)
 _FRAMES = "IPSGH"
-
-
-class _Layout(NamedTuple):
-    """A header's statements on the frames; I and P frames have the same fields."""
-
-    encodings: Ints  # (6, F) of I, P, S, G and H frames; the last row is of none
-    predictors: Ints  # (6, F)
-    counts: Ints  # (5,) fields of each
-    intervals: Ints  # (3,) of I frames, and numerator and denominator of P frames, in loops
-    constants: Ints  # (257,) what each predictor adds
-    places: Ints  # (3,) fields loopIteration, time and motor[0]; -1: none
 
 
 def read(
@@ -92,46 +81,42 @@ def read(
         raise InputError(
             f"{path}: cannot be read as {WHAT}: it does not begin with {BEGINS.decode()!r}"
         )
-    starts = [match.start() for match in re.finditer(re.escape(BEGINS), data)]
-    ends = [*starts[1:], len(data)]
-    check_piece(path, piece, len(starts))
-    longest = max(range(len(starts)), key=lambda i: ends[i] - starts[i])
-    chosen = longest if piece is None else piece - 1
-    block = _HEADERS.match(data, starts[chosen], ends[chosen])
-    begin = starts[chosen] if block is None else block.end()
+    edges = [*(match.start() for match in re.finditer(BEGINS, data)), len(data)]
+    logs = len(edges) - 1
+    check_piece(path, piece, logs)
+    chosen = int(np.argmax(np.diff(edges))) if piece is None else piece - 1
+    start, end = edges[chosen : chosen + 2]
+    begin = next(_HEADERS.finditer(data, start, end)).end()
     if data[begin : begin + 2] == b"H ":
         raise InputError(f"{path}: its headers do not end; expected frames behind them")
-    lines = data[starts[chosen] : begin].decode("ascii", "replace").split("\n")
+    lines = data[start:begin].decode("ascii", "replace").split("\n")
     pairs = (line.removeprefix("H ").partition(":") for line in lines)
-    headers = {key.strip(): value.strip() for key, _, value in pairs}
+    headers = defaultdict(str, {key.strip(): value.strip() for key, _, value in pairs})
     version = headers.get("Data version", "2")
     if version != "2":
         raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
-    names = headers.get("Field I name", "").replace(_HUNDREDS, "").split(",")
+    names = headers["Field I name"].replace(_HUNDREDS, "").split(",")
     layout = _layout(path, headers, names)
     wanted = [*shipped_map("recordings/betaflight").wanted, *_MORE_MOTORS]
     keep = [name for name in wanted if name in names]
     if "time" not in keep:
         raise InputError(f"{path}: no field time; found {', '.join(names[:20])}")
-    where = np.array([names.index(name) for name in keep], dtype=np.int64)
-    frames = np.frombuffer(data[: ends[chosen]], np.uint8)
+    where = np.array([*map(names.index, keep)], np.int64)
+    frames = np.frombuffer(data[:end], np.uint8)
     most = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
     rows = np.empty((most + 1, len(keep)), np.int64)  # memory is taken as filled
-    count, lost = _core.decode_blackbox(frames, begin, *layout, where, rows)
+    count, lost = _core.decode_blackbox(frames, begin, *[*layout, where, rows])
     check_count(path, count, most, "frames")
     if count < 2:
         raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
-    rows = rows[:count]
     notes = [f"blackbox of {headers.get('Firmware revision', 'an unknown firmware')[:60]}"]
-    if len(starts) > 1:
-        notes.append(
-            f"the file holds {len(starts)} logs; number {chosen + 1} was read"
-            + ("" if piece else ", the longest; --piece reads another")
-        )
+    if logs > 1:
+        longest = "" if piece else ", the longest; --piece reads another"
+        notes.append(f"the file holds {logs} logs; number {chosen + 1} was read{longest}")
     if lost:
         notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
     notes += motors_left_out(names, wanted)
-    fields = dict(zip(keep, rows.T.astype(float), strict=True))
+    fields = dict(zip(keep, rows[:count].T.astype(float), strict=True))
     return _log(path, "betaflight", fields, set(), headers, option, vehicle, notes)
 
 
@@ -148,14 +133,15 @@ def read_table(
     scales, names = {}, {"time": "time (us)"}
     for name in table.header:
         field, _, unit = name.replace(_HUNDREDS, "").removesuffix(")").partition(" (")
-        if field in wanted and (not unit or unit in _UNITS):
+        if field in wanted and unit in ("", *_UNITS):
             names[field] = name
             if unit:
                 scales[field] = _UNITS[unit]
-    read = table.read(list(names.values()))
+    read = table.read([*names.values()])
     fields = {field: scales.get(field, 1.0) * read[name] for field, name in names.items()}
     notes = [*table.notes, *motors_left_out(table.header, names.values())]
-    return _log(path, "betaflight_csv", fields, {*scales}, {}, option, vehicle, notes, piece)
+    none: Headers = defaultdict(str)
+    return _log(path, "betaflight_csv", fields, {*scales}, none, option, vehicle, notes, piece)
 
 
 def _log(
@@ -187,7 +173,7 @@ def _log(
         low, high, whence = _range(path, [fields[name] for name in groups["motor"]], headers)
         scales["motor"] = 1.0 / (high - low)
         said.append(f"commands: {low:g} to {high:g} ({whence}) taken as 0 to 1")
-    poles, whence = _magnet_poles(path, option, headers.get("motor_poles", ""))
+    poles, whence = _magnet_poles(path, option, headers["motor_poles"])
     if any(np.any(fields[name] > 0.0) for name in groups["eRPM"]):
         scales["eRPM"] = 200.0 / poles
         said.append(f"eRPM: {poles} magnet poles ({whence})")
@@ -205,23 +191,22 @@ def _log(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
-    samples = [ChannelGroup(t, fields)]
-    return log_of(path, samples, log_map, reader, said, vehicle, piece)
+    return log_of(path, [ChannelGroup(t, fields)], log_map, reader, said, vehicle, piece)
 
 
 def _gyro_scale(headers: Headers) -> float:
     """Return the gyro's count in deg/s: the bits of a number in the header, of degrees per second,
     or of radians per microsecond in Baseflight's.
     """
-    fine = 0.1 if headers.get("blackbox_high_resolution") == "1" else 1.0
+    fine = 0.1 if headers["blackbox_high_resolution"] == "1" else 1.0
     try:
-        bits = int(headers.get("gyro_scale") or headers.get("gyro.scale") or "", 16)
+        bits = int(headers["gyro_scale"] or headers["gyro.scale"], 16)
         scale = float(np.array(bits, "<u4").view("<f4"))
     except (ValueError, OverflowError):
         return fine
     if not 1e-12 < scale < 1e3:
         return fine
-    return fine * scale * (1e6 * np.degrees(1.0) if scale < _RADIANS else 1.0)
+    return fine * scale * (1e6 * _UNITS["rad/s"] if scale < _RADIANS else 1.0)
 
 
 def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, float, str]:
@@ -230,10 +215,9 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
     Raises:
         InputError: the header's are none.
     """
-    stated = headers.get("motorOutput", "")
-    if stated:
+    if stated := headers["motorOutput"]:
         try:
-            low, high = (float(x) for x in stated.split(","))
+            low, high = map(float, stated.split(","))
         except ValueError:
             low = high = 0.0
         if not 0.0 <= low < high <= 1e5:
@@ -241,14 +225,14 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
                 f"{path}: header motorOutput: {stated[:60]!r}; expected two rising numbers"
             )
         return low, high, "motorOutput of the header"
-    least, most = (
-        _whole_number(headers.get(name, ""), 1, 10**9) for name in ("minthrottle", "maxthrottle")
-    )
-    if least and most and least < most:
+    names = ("minthrottle", "maxthrottle")
+    least, most = (_whole_number(headers[name], 1, 10**9) for name in names)
+    if 0 < least < most:
         return float(least), float(most), "minthrottle and maxthrottle of the header"
-    outside = any(np.any((x > _PWM[1]) | ((x < _PWM[0]) & (x > 0.0))) for x in motors)
-    low, high = _DSHOT if outside else _PWM
-    return low, high, f"assumed: {'DShot' if outside else 'pulses in us'}, no header says it"
+    low, high = _PWM
+    if any(np.any((x > high) | ((x < low) & (x > 0.0))) for x in motors):
+        return *_DSHOT, "assumed: DShot, no header says it"
+    return low, high, "assumed: pulses in us, no header says it"
 
 
 def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
@@ -272,33 +256,38 @@ def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
 
 def _one_g(t: Array, force: list[Array], headers: Headers) -> tuple[float, str]:
     """Return the accelerometer's counts of 1 g, and words on whence they are known."""
-    if stated := _whole_number(headers.get("acc_1G", ""), 1, 10**6):
+    if stated := _whole_number(headers["acc_1G"], 1, 10**6):
         return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
     length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
     middle = np.nanmedian(length) if np.isfinite(length).any() else 0.0
-    counts = float(_ONE_G[np.argmin(np.abs(np.log2(np.maximum(middle, 1.0) / _ONE_G)))])
+    counts = 2.0 ** float(np.clip(np.rint(np.log2(max(middle, 1.0))), *_ONE_G))
     return counts, (
         f"accelerometer: {counts:g} counts taken as 1 g, from its {middle:.4g} in the first "
         f"{_STANDING:g} s; no header says it"
     )
 
 
-def _whole_number(text: str, least: int, most: int) -> int | None:
-    """Return a header's whole number; None: no whole number between two limits."""
-    if not text.lstrip("-").isdecimal() or len(text) > 10:
-        return None
-    return int(text) if least <= int(text) <= most else None
+def _whole_number(text: str, least: int, most: int, default: int = 0) -> int:
+    """Return a header's whole number, or the default for no whole number between two limits."""
+    is_whole = text.lstrip("-").isdecimal() and len(text) <= 10
+    return int(text) if is_whole and least <= int(text) <= most else default
 
 
-def _layout(path: Path, headers: Headers, names: list[str]) -> _Layout:
-    """Return the frames' layout from the headers.
+def _layout(path: Path, headers: Headers, names: list[str]) -> list[Ints]:
+    """Return the frames' layout from the headers, as the core takes it: the encodings (6, F) of I,
+    P, S, G and H frames and none; their predictors (6, F); the number of fields (5,) of each; the
+    intervals (3,) of I frames, and numerator and denominator of P frames, in loops; the constants
+    (257,) of the predictors; and the places (3,) of loopIteration, time and motor[0], -1: none.
+    I and P frames have the same fields.
 
     Raises:
         InputError: the headers contradict themselves, or name something unknown.
     """
     check_count(path, len(names), LIMITS.log_fields, "fields")
-    predictors = _frame_lists(path, headers, "predictor", _PREDICTORS)
-    encodings = _frame_lists(path, headers, "encoding", _ENCODINGS)
+    predictors, encodings = (
+        [_numbers(path, headers, f"Field {letter} {what}", known) for letter in _FRAMES]
+        for what, known in (("predictor", _PREDICTORS), ("encoding", _ENCODINGS))
+    )
     for letter, one, other in zip(_FRAMES, predictors, encodings, strict=True):
         sizes = {len(one), len(other)}
         if len(sizes) > 1 or (letter in "IP" and sizes != {len(names)}):
@@ -307,47 +296,39 @@ def _layout(path: Path, headers: Headers, names: list[str]) -> _Layout:
                 f"{' and '.join(map(str, sorted(sizes)))} numbers; expected as many as the "
                 f"{len(names)} names of Field I"
             )
-    places = [
-        names.index(name) if name in names else -1 for name in ("loopIteration", "time", "motor[0]")
-    ]
+    sought = ("loopIteration", "time", "motor[0]")
+    places = [names.index(name) if name in names else -1 for name in sought]
     if places[0] < 0 and any(6 in one for one in predictors):
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
 
     def number(text: str, default: int) -> int:
-        stated = _whole_number(text, -999_999_999, 999_999_999)
-        return default if stated is None else stated
+        return _whole_number(text, -999_999_999, 999_999_999, default)
 
     top, _, bottom = headers.get("P interval", "1/1").rpartition("/")
     every = headers.get("I interval", "32")
     intervals = [max(1, number(text, 1)) for text in (every, top or "1", bottom)]
-    least = headers.get("motorOutput", "").split(",")[0]
     constants = np.zeros(max(_PREDICTORS) + 1, np.int64)
-    constants[4] = number(headers.get("minthrottle", ""), 1150)
-    constants[8], constants[9] = 1500, number(headers.get("vbatref", ""), 4095)
-    constants[11] = number(least, 0)
+    constants[4] = number(headers["minthrottle"], 1150)
+    constants[8], constants[9] = 1500, number(headers["vbatref"], 4095)
+    constants[11] = number(headers["motorOutput"].split(",")[0], 0)
     rows = (  # with zeros behind them
         np.array(list(zip_longest(*lists, [0], fillvalue=0)), np.int64).T.copy()
         for lists in (encodings, predictors)
     )
     counts = [len(one) for one in encodings]
-    return _Layout(*rows, *(np.array(x, np.int64) for x in (counts, intervals, constants, places)))
+    return [*rows, *(np.array(x, np.int64) for x in (counts, intervals, constants, places))]
 
 
-def _frame_lists(
-    path: Path, headers: Headers, what: str, known: Collection[int]
-) -> list[list[int]]:
-    """Return the predictors or the encodings of each kind of frame.
+def _numbers(path: Path, headers: Headers, key: str, known: Collection[int]) -> list[int]:
+    """Return the numbers of a header.
 
     Raises:
-        InputError: a predictor or encoding is unknown.
+        InputError: one is unknown.
     """
-    lists = []
-    for letter in _FRAMES:
-        key = f"Field {letter} {what}"
-        texts = headers.get(key, "").split(",") if headers.get(key) else []
-        if bad := [text for text in texts if text.strip() not in map(str, known)]:
-            raise InputError(
-                f"{path}: header {key}: {bad[0][:20]}; expected one of {', '.join(map(str, known))}"
-            )
-        lists.append([int(text) for text in texts])
-    return lists
+    texts = headers[key].split(",") if headers[key] else []
+    expected = [str(x) for x in known]
+    if bad := [text for text in texts if text.strip() not in expected]:
+        raise InputError(
+            f"{path}: header {key}: {bad[0][:20]}; expected one of {', '.join(expected)}"
+        )
+    return [int(text) for text in texts]

@@ -37,15 +37,15 @@ from ..mapped_log import chosen, log_of
 _FIRST = b"tick(I),"  # first column of a log before 2021
 BEGINS = rb"\xbc[\x01\x02]\0|[\x02-\xff]tick\(I\),"
 
+Rows = NDArray[Any]  # events of one type
 Layout = np.dtype[Any]  # an event's number, time and variables
 
 WHAT = "a Crazyflie's SD-card log"
 _START = re.compile(rb"\xbc([\x01\x02])\0(..)", re.DOTALL)
 _EVENT = re.compile(rb"(..)([^\0]{0,200})\0(..)", re.DOTALL)
-_VARIABLE = re.compile(rb"([^\0]{1,200})\(([bBhHiIqQefd])\)\0")
-_COLUMN = re.compile(rb"([^\0,]{1,200})\(([bBhHiIqQefd])\),")
+_VARIABLE = re.compile(rb"([^\0,]{1,200})\(([bBhHiIqQefd])\)[\0,]")
 _CHECKED = 0xFFFFFFFF  # CRC-32 of a block and its own, inverted
-_VARIABLES = "a variable's name and the letter of its type, one of b B h H i I q Q e f d"
+_EXPECTED = "a variable's name and the letter of its type, one of b B h H i I q Q e f d"
 _RUN = 4096  # events looked at together
 _TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
 
@@ -72,20 +72,18 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             "are left); what stands before was used"
         )
     events = []
-    for rows in runs:
-        if len(rows) < 2:
-            continue
+    for rows in (rows for rows in runs if len(rows) > 1):
         t = _TIMES[version][1] * rows["time"].astype(float)
         with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
             columns = {name: rows[name].astype(float) for name in (rows.dtype.names or ())[2:]}
         events.append(ChannelGroup(t, columns))
     if not events:
         raise InputError(f"{path}: no event twice; expected at least two samples")
-    first = min(float(samples.t[0]) for samples in events)
+    first = min(samples.t[0] for samples in events)
     notes.append(f"times: the vehicle's clock, which stood at {first:.6g} s at the first event")
     log_map = load_map("cflib")
     there, _ = chosen(events, log_map)
-    if there.position is None and (there.gyro is None or there.accelerometer is None):
+    if there.position is None and None in (there.gyro, there.accelerometer):
         # as CrazyPAD's logs: rows of motor commands, for comparing flights
         log_map = replace(there, rows="whole", gyro=None, accelerometer=None)
         notes.append(
@@ -101,55 +99,62 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
     Raises:
         InputError: the header is cut or says something else.
     """
-    place = 0
-
-    def next_part(pattern: re.Pattern[bytes], expected: str) -> tuple[bytes, ...]:
-        nonlocal place
-        match = pattern.match(data, place)
-        if match is None:
-            raise InputError(f"{path}: byte {place} of its header: expected {expected}")
-        place = match.end()
-        return match.groups()
-
-    first, count = next_part(_START, "bc, the version 1 or 2, and the number of events")
-    version = first[0]
-    kinds = {}
-    for _ in range(int.from_bytes(count, "little")):
-        number, name, variables = next_part(_EVENT, "an event's number, name and variables")
-        many, event = int.from_bytes(variables, "little"), name.decode("ascii", "replace")
-        check_count(f"{path}: event {event!r}", many, LIMITS.log_fields, "variables")
-        fields = [
-            (variable.decode("ascii", "replace"), f"<{letter.decode()}")
-            for variable, letter in (next_part(_VARIABLE, _VARIABLES) for _ in range(many))
-        ]
-        names = [variable for variable, _ in fields]
-        key = int.from_bytes(number, "little")
-        if len(set(names)) < len(names) or key in kinds or {"event", "time"} & set(names):
-            raise InputError(
-                f"{path}: event {event!r}: a number or a variable stands there twice; expected "
-                "each once"
-            )
-        kinds[key] = np.dtype([("event", "<u2"), ("time", _TIMES[version][0]), *fields])
+    start = _part(path, data, 0, _START, "bc, the version 1 or 2, and the number of events")
+    version, place = start[1][0], start.end()
+    kinds: dict[int, Layout] = {}
+    for _ in range(int.from_bytes(start[2], "little")):
+        event = _part(path, data, place, _EVENT, "an event's number, name and variables")
+        number, many = (int.from_bytes(event[i], "little") for i in (1, 3))
+        where = f"{path}: event {event[2].decode('ascii', 'replace')!r}"
+        check_count(where, many, LIMITS.log_fields, "variables")
+        kind, place = _layout(path, data, event.end(), many, ("<u2", _TIMES[version][0]))
+        if number in kinds:
+            raise InputError(f"{where}: its number stands there twice; expected each once")
+        kinds[number] = kind
     return version, kinds, place
 
 
-def _rows(path: Path, data: bytes) -> tuple[NDArray[Any], int]:
+def _part(
+    path: Path, data: bytes, place: int, pattern: re.Pattern[bytes], expected: str
+) -> re.Match[bytes]:
+    """Return a part of the header.
+
+    Raises:
+        InputError: something else stands there.
+    """
+    if match := pattern.match(data, place):
+        return match
+    raise InputError(f"{path}: byte {place} of its header: expected {expected}")
+
+
+def _layout(
+    path: Path, data: bytes, place: int, many: int, types: tuple[str, str]
+) -> tuple[Layout, int]:
+    """Return the layout of an event, by the types of its number and time and by the names of its
+    variables, and the place behind the names.
+
+    Raises:
+        InputError: the header is cut, says something else, or names a variable twice.
+    """
+    fields = [*zip(("event", "time"), types, strict=True)]
+    for _ in range(many):
+        variable = _part(path, data, place, _VARIABLE, _EXPECTED)
+        name = variable[1].decode("ascii", "replace").strip()
+        if name in dict(fields):
+            raise InputError(f"{path}: {name!r} stands in its header twice; expected each once")
+        fields.append((name, f"<{variable[2].decode()}"))
+        place = variable.end()
+    return np.dtype(fields), place
+
+
+def _rows(path: Path, data: bytes) -> tuple[Rows, int]:
     """Return the rows of a log before 2021, as events, and the place of the first byte behind.
 
     Raises:
         InputError: the header is cut or says something else.
     """
-    fields, place = [("event", "V0"), ("time", "<u4")], 1 + len(_FIRST)
-    for _ in range(data[0] - 1):
-        match = _COLUMN.match(data, place)
-        if match is None:
-            raise InputError(f"{path}: byte {place} of its header: expected {_VARIABLES}")
-        place = match.end()
-        fields.append((match[1].decode("ascii", "replace").strip(), f"<{match[2].decode()}"))
-    names = [name for name, _ in fields]
-    if len(set(names)) < len(names):
-        raise InputError(f"{path}: a variable stands in its header twice; expected each once")
-    layout, blocks, count, end = np.dtype(fields), [], 0, place + 4
+    layout, place = _layout(path, data, 1 + len(_FIRST), data[0] - 1, ("V0", "<u4"))
+    blocks, count, end = [], 0, place + 4
     while end < len(data):
         behind = end + 1 + data[end] * layout.itemsize + 4
         if not data[end] or zlib.crc32(data[end:behind]) != _CHECKED:
@@ -158,15 +163,15 @@ def _rows(path: Path, data: bytes) -> tuple[NDArray[Any], int]:
         count += data[end]
         end = behind
     check_count(path, count, LIMITS.table_rows, "rows")
-    check_count(path, count * len(fields), LIMITS.table_numbers, "numbers")
+    check_count(path, count * data[0], LIMITS.table_numbers, "numbers")
     return np.frombuffer(b"".join(blocks), layout), end
 
 
 def _events(
     path: Path, data: bytes, kinds: Mapping[int, Layout], begin: int
-) -> tuple[list[NDArray[Any]], int]:
+) -> tuple[list[Rows], int]:
     """Return the events of each type, and the place of the first byte behind."""
-    runs: dict[int, list[NDArray[Any]]] = {number: [] for number in kinds}
+    runs: dict[int, list[Rows]] = {number: [] for number in kinds}
     place, count, numbers = begin, 0, 0
     while place + 2 <= len(data):
         number = data[place] | data[place + 1] << 8
@@ -182,7 +187,7 @@ def _events(
         runs[number].append(rows)
         place += len(rows) * layout.itemsize
         count += len(rows)
-        numbers += len(rows) * len((layout.names or ())[2:])
+        numbers += len(rows) * len(layout.names or ())
         check_count(path, count, LIMITS.table_rows, "events")
         check_count(path, numbers, LIMITS.table_numbers, "numbers")
     return [np.concatenate(rows) for rows in runs.values() if rows], place

@@ -21,9 +21,9 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,6 +42,11 @@ from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_place
 BEGINS = rb"ULog\x01\x12\x35"
 WHAT = "a PX4 log (ULog)"
 _FILTER, _STATUS = "vehicle_local_position", "vehicle_status"
+# columns, and the fields that say whether they are measured
+_FLAGS = {
+    "battery_status": {"voltage_v": "connected"},
+    _FILTER: {"x": "xy_valid", "y": "xy_valid", "z": "z_valid"},
+}
 _SENSORS = (  # field of an inertial sensor, and field of its gain over a time
     ("gyro_rad", "delta_angle"),
     ("accelerometer_m_s2", "delta_velocity"),
@@ -54,15 +59,14 @@ _BANKS = {"MAIN": "PWM_MAIN_FUNC", "AUX": "PWM_AUX_FUNC", "UAVCAN": "UAVCAN_EC_F
 _OUTPUTS = 16  # of a bank
 _ESCS = 8
 _LARGEST_SHARE = 1.5  # an output beyond is no share, but of the protocol's range
-_DSHOT = (0.0, 1999.0)
-_UAVCAN = (0.0, 8191.0)
+_DSHOT = 1999.0  # full command
+_UAVCAN = 8191.0
 _DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
 _LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed or not
 _ABOVE_PULSES = 1.1  # times the longest pulse: no pulse is longer
 
 
-@dataclass(frozen=True, eq=False)
-class Outputs:
+class Outputs(NamedTuple):
     """The outputs of motors 1 to 4, and their values for commands 0 and 1."""
 
     slots: list[int]  # from 0
@@ -114,7 +118,7 @@ def channels(
         note = f"{rotors.note}, in rad/s, as PX4 in Gazebo (SIM_GZ_EN = 1) writes them"
         log_map = log_map.with_ways({"rotors": [replace(rotors, unit="rad/s", note=note)]})
     motors, sent = log_map.ways("commands")
-    factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
+    factor = float(np.clip(parameters.get("THR_MDL_FAC", 0.0), 0.0, 1.0))
     note = (
         f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
         f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
@@ -126,24 +130,19 @@ def channels(
     notes = [*log_map.notes, order_note]
     if is_damaged:
         notes.append("the file is damaged or was cut; what could be read of it was used")
-    batteries = topics.get("battery_status", [])
-    if batteries and all(not np.any(fields.get("connected", 1)) for fields in batteries):
+    batteries = [fields.get("connected", 1) for fields in topics.get("battery_status", [])]
+    if batteries and not any(map(np.any, batteries)):
         notes.append("battery_status: no battery is connected (connected = 0), so no voltage")
-    recorded = [
-        samples
-        for topic, instances in topics.items()
-        for fields in instances
-        for samples in _samples(topic, fields, outputs)
-    ]
+    instances = [(topic, fields) for topic, each in topics.items() for fields in each]
+    recorded = [s for topic, fields in instances for s in _samples(topic, fields, outputs)]
     empty = {s.topic for s in recorded if not s.columns} - {s.topic for s in recorded if s.columns}
     notes += [f"{topic}: not of four motors that turn; left out" for topic in sorted(empty)]
     sections = sections_of(path, recorded, log_map, "px4_ulog", notes, piece, flown)
-    position, said = sections[0].position, sections[3]
-    if position is not None and position.topic == _FILTER:
+    log_map, _, _, said = sections
+    if log_map.position is not None and log_map.position.topic == _FILTER:
         fields = topics[_FILTER][0]
         counters = ("xy_reset_counter", "z_reset_counter")
-        resets = [name for name in counters if name in fields and np.ptp(fields[name]) > 0.0]
-        if resets:
+        if resets := [name for name in counters if np.ptp(fields.get(name, 0.0)) > 0.0]:
             said.append(
                 f"the onboard position was reset in the log ({', '.join(resets)}): it jumps there"
             )
@@ -173,13 +172,12 @@ def read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, bool
                 place += _MESSAGE + int.from_bytes(file.read(2), "little")
         is_damaged = bool(parsed.file_corruption) or place != size
     topics: dict[str, list[ArrayMap]] = {}
-    for data in parsed.data_list:
-        if "timestamp" in data.data:
-            where, count = f"{path}: topic {data.name}", len(data.data["timestamp"])
-            check_count(where, count, LIMITS.table_rows, "messages")
-            with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
-                fields = {name: x.astype(float) for name, x in data.data.items()}
-            topics.setdefault(data.name, []).append(fields)
+    for data in (one for one in parsed.data_list if "timestamp" in one.data):
+        count = len(data.data["timestamp"])
+        check_count(f"{path}: topic {data.name}", count, LIMITS.table_rows, "messages")
+        with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
+            fields = {name: x.astype(float) for name, x in data.data.items()}
+        topics.setdefault(data.name, []).append(fields)
     parameters = {
         name: float(value)
         for name, value in parsed.initial_parameters.items()
@@ -197,8 +195,7 @@ def _samples(topic: str, fields: ArrayMap, outputs: Outputs) -> Iterator[Channel
     plausible = np.all((sampled > 0.0) & (np.abs(published - sampled) < 1e6))
     t = _MICROSECOND * (sampled if plausible else published)
     if topic in ("sensor_combined", "vehicle_imu"):
-        for field, gained in _SENSORS:
-            yield _sensor(topic, t, fields, field, gained)
+        yield from (_sensor(topic, t, fields, *names) for names in _SENSORS)
         return
     columns = {name: x for name, x in fields.items() if "timestamp" not in name}
     if topic == "actuator_outputs":
@@ -211,43 +208,39 @@ def unified(topic: str, fields: ArrayMap) -> NamedArrays:
     columns = dict(fields)
     if topic == "esc_status":
         # the ESCs of motors 1 to 4: found by their functions, if all are stated
-        functions = [f"esc[{i}].actuator_function" for i in range(_ESCS)]
-        named = [int(columns[name][-1]) if name in columns else -1 for name in functions]
-        reported = [f"esc[{i}].esc_rpm" for i in slots_of_motors(named, _MOTOR1) or range(4)]
+        functions = [columns.get(f"esc[{i}].actuator_function", [-1])[-1] for i in range(_ESCS)]
+        reported = [f"esc[{i}].esc_rpm" for i in slots_of_motors(functions, _MOTOR1) or range(4)]
         if not set(reported) <= set(columns):
             return {}
         return {f"esc[{i}].esc_rpm": columns[name] for i, name in enumerate(reported)}
     if topic == "actuator_motors":
         # NaN: a motor is off
-        columns = {n: np.clip(np.nan_to_num(x, nan=0.0), 0.0, 1.0) for n, x in columns.items()}
+        columns = {n: np.clip(np.nan_to_num(x), 0.0, 1.0) for n, x in columns.items()}
         is_used = any(np.any(columns.get(f"control[{i}]", 0.0) > 0.0) for i in range(4))
         return columns if is_used else {}
-    if topic == "battery_status" and {"connected", "voltage_v"} <= set(columns):
-        there = columns["connected"] != 0.0
-        columns["voltage_v"] = np.where(there, columns["voltage_v"], np.nan)
-    elif topic.endswith("_odometry"):
+    for name, flag in _FLAGS.get(topic, {}).items():
+        if {name, flag} <= set(columns):
+            columns[name] = np.where(columns[flag] != 0.0, columns[name], np.nan)
+    if topic.endswith("_odometry"):
         # in NED or in FRD fixed to the earth, both with z down: 1 and 2 since PX4 1.14, 0 and 1
         # before
         known = (1, 2) if "pose_frame" in columns else (0, 1)
         frame = columns.get("pose_frame", columns.get("local_frame", np.zeros(1)))
-        if "x" in columns:  # before PX4 1.14
-            columns |= {f"position[{i}]": columns[name] for i, name in enumerate("xyz")}
-        for name in (f"position[{i}]" for i in range(3) if f"position[{i}]" in columns):
-            columns[name] = np.where(np.isin(frame, known), columns[name], np.nan)
-    elif topic == _FILTER:
-        for flag, names in (("xy_valid", "xy"), ("z_valid", "z")):
-            for name in names if flag in columns else "":
-                columns[name] = np.where(columns[flag] == 0.0, np.nan, columns[name])
+        there = np.isin(frame, known)
+        for i, name in enumerate("xyz"):
+            new = f"position[{i}]"
+            if (stored := name if name in columns else new) in columns:  # x before PX4 1.14
+                columns[new] = np.where(there, columns[stored], np.nan)
     return columns
 
 
 def _sensor(topic: str, t: Array, fields: ArrayMap, field: str, gained: str) -> ChannelGroup:
     """Return a gyro or an accelerometer at its own times, as far as the topic has it."""
     source = field if topic == "sensor_combined" else gained
-    names = {f"{field}[{i}]": f"{source}[{i}]" for i in range(3)}
-    axes = {name: fields[stored] for name, stored in names.items() if stored in fields}
-    if source == gained and f"{gained}_dt" in fields:
-        span = _MICROSECOND * fields[f"{gained}_dt"]
+    stored = [f"{source}[{i}]" for i in range(3)]
+    axes = {f"{field}{name[-3:]}": fields[name] for name in stored if name in fields}
+    if f"{source}_dt" in fields:  # of gains
+        span = _MICROSECOND * fields[f"{source}_dt"]
         axes = {n: column / np.where(span > 0.0, span, np.nan) for n, column in axes.items()}
         t = t - 0.5 * span
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
@@ -320,18 +313,18 @@ def what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
         statuses: instances of vehicle_status.
     """
     known = stated("airframes")
-    count, frame, kind, start = (
-        int(parameters.get(name, 0))
-        for name in ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
-    )
+    names = ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
+    count, frame, kind, start = (int(parameters.get(name, 0)) for name in names)
     if frame in known["px4_airframe"]:
         return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
     if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
         return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
-    claims = [("mav_type", kind, f"parameter MAV_TYPE = {kind}")]
-    for kind in (int(x) for fields in statuses for x in fields.get("system_type", ())[-1:]):
-        claims.append(("mav_type", kind, f"vehicle_status.system_type = {kind}"))
-    claims.append(("px4_start", start // 1000, f"parameter SYS_AUTOSTART = {start}"))
+    types = [int(x) for fields in statuses for x in fields.get("system_type", ())[-1:]]
+    claims = (
+        ("mav_type", kind, f"parameter MAV_TYPE = {kind}"),
+        *(("mav_type", x, f"vehicle_status.system_type = {x}") for x in types),
+        ("px4_start", start // 1000, f"parameter SYS_AUTOSTART = {start}"),
+    )
     said = ((known[table][key], by) for table, key, by in claims if key in known[table])
     airframe, by = next(said, (QUADROTOR if count == 4 else "", ""))
     return WhatFlew(airframe, "parameter CA_ROTOR_COUNT" if count else by, count or None)
@@ -352,7 +345,7 @@ def motor_order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tupl
         for i in range(4)
     ]
     said, whence = "", "as on PX4's quad x, which the log does not state"
-    if parameters.get("CA_ROTOR_COUNT") and any(x or y for x, y in places):
+    if parameters.get("CA_ROTOR_COUNT") and np.any(places):
         whence, said = "by the positions in CA_ROTORn_PX and PY", "CA_ROTORn_PX and CA_ROTORn_PY"
     elif start // 1000 == 5:
         places, whence = list(PLUS), f"as on a quad plus (SYS_AUTOSTART = {start})"
@@ -380,23 +373,24 @@ def outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outp
     Raises:
         InputError: a range of pulses is none, or the outputs fit no protocol.
     """
-    bank, slots = "MAIN", [0, 1, 2, 3]
+    bank, slots = "MAIN", list(range(4))
     for name, prefix in reversed(_BANKS.items()):  # the first of several
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
         if of_bank := slots_of_motors(functions, _MOTOR1):
             bank, slots = name, of_bank
     each = (_of_motors(fields, slots) for fields in sent)
     motors = next((motors for motors in each if motors is not None), np.zeros((0, 4)))
-    most = np.nanmax(motors) if np.isfinite(motors).any() else 0.0
+    most = motors.max(initial=0.0)
     turning = motors[motors > 0.5 * most]  # not the stop command
     usual = np.median(turning) if turning.size else _LEAST_PULSE
 
     def pulses(end: str, default: float) -> Array:
         """Return one end (4,) of the outputs' ranges of pulses, us."""
-        names = [(f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots]
-        given = ([parameters.get(name, 0.0) for name in one] for one in names)
-        return np.array([next((x for x in one if x > 0.0), default) for one in given])
+        names = ((f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots)
+        given = (filter(None, map(positive.get, one)) for one in names)
+        return np.array([next(one, default) for one in given])
 
+    positive = {name: x for name, x in parameters.items() if x > 0.0}
     lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
     # with a bus for sensors alone the motors have pulses, long ones at rest, too
     has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and np.any(motors < _LEAST_PULSE)
@@ -404,10 +398,11 @@ def outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outp
     is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
     if 0.0 < most <= _LARGEST_SHARE:
         return Outputs(slots, np.zeros(4), np.ones(4), "shares of 1")
-    if bank == "UAVCAN" or has_bus or most > _ABOVE_PULSES * highs.max():
-        protocol, (low, high), stated = "UAVCAN", _UAVCAN, bank == "UAVCAN" or has_bus
+    is_uavcan = bank == "UAVCAN" or has_bus
+    if is_uavcan or most > _ABOVE_PULSES * highs.max():
+        protocol, high, stated = "UAVCAN", _UAVCAN, is_uavcan
     elif is_dshot or usual < _LEAST_PULSE:
-        protocol, (low, high), stated = "DShot", _DSHOT, is_dshot
+        protocol, high, stated = "DShot", _DSHOT, is_dshot
     else:
         if not np.all(highs > lows):
             raise InputError(
@@ -422,8 +417,7 @@ def outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outp
             f"or numbers of {protocol} up to {high:g}"
         )
     why = "as parameters state" if stated else "since no pulses are like that"
-    words = f"{protocol}, {low:g} to {high:g}, {why}"
-    return Outputs(slots, np.full(4, low), np.full(4, high), words)
+    return Outputs(slots, np.zeros(4), np.full(4, high), f"{protocol}, 0 to {high:g}, {why}")
 
 
 def shares_of_outputs(columns: ArrayMap, outputs: Outputs) -> NamedArrays:
@@ -434,11 +428,10 @@ def shares_of_outputs(columns: ArrayMap, outputs: Outputs) -> NamedArrays:
         return {}
     low, high = (np.full(_OUTPUTS, end) for end in (outputs.low.min(), outputs.high.max()))
     low[outputs.slots], high[outputs.slots] = outputs.low, outputs.high
-    names = [f"output[{i}]" for i in range(_OUTPUTS)]
     return {
         name: np.clip((np.nan_to_num(columns[name]) - low[i]) / (high[i] - low[i]), 0.0, 1.0)
-        for i, name in enumerate(names)
-        if name in columns
+        for i in range(_OUTPUTS)
+        if (name := f"output[{i}]") in columns
     }
 
 
@@ -446,8 +439,6 @@ def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> Array | None:
     """Return the values of the motors' outputs (N, 4). None: one is missing or never changes, as of
     a servo, or of an unused bank.
     """
-    names = [f"output[{slot}]" for slot in slots]
-    if not set(names) <= set(columns):
-        return None
-    sent = np.nan_to_num(np.column_stack([columns[name] for name in names]))
-    return sent if np.all(np.ptp(sent, axis=0) > 0.0) else None
+    each = [columns.get(f"output[{slot}]", np.zeros(1)) for slot in slots]
+    is_sent = all(np.ptp(np.nan_to_num(one)) > 0.0 for one in each)
+    return np.nan_to_num(np.column_stack(each)) if is_sent else None

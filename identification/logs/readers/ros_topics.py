@@ -6,8 +6,9 @@ columns: numbers by the paths of their fields, such as ``pose.position.x``, ``da
 import re
 from array import array
 from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import reduce
 from itertools import islice
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from ..log_map import LogMap, parse_map, stated
 from ..table import Array, Data, NamedArrays
 from .px4_ulog import unified
 
+Types = Mapping[str, str]  # of messages, by topic
+Stated = Mapping[str, Any]  # of a map's section, or of a map
 SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerometer", "gyro")
 # sections in the messages of another, without a topic of their own
 BESIDE = {"attitude": "position", "gyro": "accelerometer"}
@@ -27,13 +30,11 @@ _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
 _SHOWN = 30  # fields in an error
-_MOTORS = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])))
+_MOTORS = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])), re.IGNORECASE)
 _PX4 = "px4_msgs/msg/"
 
 
-def map_of(
-    types: Mapping[str, str], given: Mapping[str, Any], source: str, where: str
-) -> tuple[LogMap, list[str]]:
+def map_of(types: Types, given: Stated, source: str, where: str) -> tuple[LogMap, list[str]]:
     """Return the log map of topics, and notes.
 
     Args:
@@ -58,9 +59,9 @@ def map_of(
         beside = _topic_of(sections.get(BESIDE.get(section, "")))
         topic, why = _topic_of(said) or beside, ""
         try:
-            if topic is None and (said or section not in BESIDE):
+            if not topic and (said or section not in BESIDE):
                 topic, why = _chosen(types, section, said, where)
-            if topic is None:
+            if not topic:
                 continue
             usual = _usual(types, section, said, topic, where)
         except InputError as error:
@@ -74,25 +75,18 @@ def map_of(
             notes.append(f"{section}: topic {topic} ({types[topic]}){why}")
         if "order" in usual and not {"order", "columns"} & {*said}:
             notes.append(f"{section}: motors as on {usual['order']}, which the bag does not state")
-    lacks = []
-    if not {*MOTORS, "wrench"} & {*sections, *given}:
-        lacks.append("rotors")
     # an ambiguous pose is no reason to go on without one
-    if "position" not in sections and ("gyro" not in sections or "position" in refused):
-        lacks.append("position")
-    for section in lacks[:1]:
+    is_posed = "position" in sections or ("gyro" in sections and "position" not in refused)
+    is_driven = {*MOTORS, "wrench"} & {*sections, *given}
+    if not (is_posed and is_driven):
+        section = "position" if is_driven else "rotors"
         why = refused.get(section) or f"{section}: {_missing(types, section, where)}"
         raise InputError(f"{source}: {why}")
-    is_ned = types.get(_topic_of(sections.get("position")) or "") in stated("ros")["ned"]
+    is_ned = types.get(_topic_of(sections.get("position"))) in stated("ros")["ned"]
     used = {_topic_of(section) for section in sections.values()}
     motors = {kind for name in MOTORS for kind in stated("ros")[name]}
-    left = [
-        topic
-        for topic, kind in sorted(types.items())
-        if topic not in used
-        and (kind in motors or (kind in stated("ros")["arrays"] and _MOTORS.search(topic.lower())))
-    ]
-    if left:
+    named = {topic for topic in _of_types(types, stated("ros")["arrays"]) if _MOTORS.search(topic)}
+    if left := sorted({*_of_types(types, motors), *named} - used):
         notes.append(f"topics that may hold motors were left out: {', '.join(left)}")
     clock: Data = {"time": {"column": "stamp", "unit": "ns"}}
     clock |= {"world": "ned", "body": "frd"} if is_ned else {}
@@ -103,15 +97,17 @@ def map_of(
     return log_map, [*notes, *refused.values()]
 
 
-def _topic_of(section: object) -> str | None:
-    """Return a section's topic."""
-    topic = section.get("topic") if isinstance(section, Mapping) else None
-    return None if topic is None else str(topic)
+def _topic_of(section: object) -> str:
+    """Return a section's topic; empty: none."""
+    return str(section.get("topic") or "") if isinstance(section, Mapping) else ""
 
 
-def _usual(
-    types: Mapping[str, str], section: str, said: Mapping[str, Any], topic: str, where: str
-) -> Data:
+def _of_types(types: Types, wanted: Collection[str]) -> list[str]:
+    """Return the topics of some types of messages."""
+    return sorted(topic for topic, kind in types.items() if kind in wanted)
+
+
+def _usual(types: Types, section: str, said: Stated, topic: str, where: str) -> Data:
     """Return a section of a topic's messages by their type alone.
 
     Raises:
@@ -136,29 +132,26 @@ def _usual(
     return dict(known.get(kind, {}))
 
 
-def _chosen(
-    types: Mapping[str, str], section: str, said: Mapping[str, Any], where: str
-) -> tuple[str | None, str]:
+def _chosen(types: Types, section: str, said: Stated, where: str) -> tuple[str, str]:
     """Return the topic of a section, the only possible one or the one by name, and a note on the
-    choice; None: there is none.
+    choice; empty: there is none.
 
     Raises:
         InputError: several topics are possible.
     """
 
-    def named_by(topic: str, words: str) -> bool:
-        return any(word in topic.lower() for word in stated("ros")[words])
+    def named_by(words: str) -> list[str]:
+        return [x for x in several if any(word in x.lower() for word in stated("ros")[words])]
 
     fitting = {*stated("ros")[section], *(stated("ros")["arrays"] if "unit" in said else ())}
-    several = sorted(topic for topic, kind in types.items() if kind in fitting)
+    several = _of_types(types, fitting)
     if section in ("position", "rotors"):
-        flown = [topic for topic in several if not named_by(topic, "setpoint_words")]
+        flown = sorted({*several} - {*named_by("setpoint_words")})
         several = flown or (several if section == "rotors" else [])
     usable = several
-    if section == "position" and len(usable) > 1:
-        measured = [topic for topic in several if named_by(topic, "measured_words")]
-        usable = measured if len(measured) == 1 else several
-    elif section in ("accelerometer", "gyro") and len(usable) > 1:
+    if section == "position" and len(measured := named_by("measured_words")) == 1:
+        usable = measured
+    elif section in ("accelerometer", "gyro"):
         usable = [topic for topic in several if not topic.endswith("_raw")] or several
     if len(usable) > 1:
         raise InputError(
@@ -167,27 +160,27 @@ def _chosen(
         )
     others = [topic for topic in several if topic not in usable]
     why = f", chosen by its name before {', '.join(others)}; a map says another" if others else ""
-    return (usable[0] if usable else None), why
+    return "".join(usable), why
 
 
-def _missing(types: Mapping[str, str], section: str, where: str) -> str:
+def _missing(types: Types, section: str, where: str) -> str:
     """Return words on topics without rotor speeds and commands, or without a pose and inertial
     sensors.
     """
     topics = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(types.items())) or "none"
     names = MOTORS if section == "rotors" else (section,)
     known = dict.fromkeys(kind for name in names for kind in stated("ros")[name])
-    arrays = sorted(topic for topic, kind in types.items() if kind in stated("ros")["arrays"])
-    left_out = sorted(topic for topic, kind in types.items() if kind in known)
+    arrays, left_out = (_of_types(types, kinds) for kinds in (stated("ros")["arrays"], known))
     seen = "no topic of a type that fits"
-    seen = f"no topic but set-points by their names ({', '.join(left_out)})" if left_out else seen
+    if left_out:
+        seen = f"no topic but set-points by their names ({', '.join(left_out)})"
     wanted = f"one of {' or '.join(known)}, or its topic and columns in {where}"
     if section == "rotors" and arrays:
         seen = f"{', '.join(arrays)} could be it, but a multi-array states no unit"
         wanted = (
             f"in {where} the line rotors: {{topic: {arrays[0]}, unit: rad/s}} (or rpm, Hz), or "
+            f"commands: {{topic: {arrays[0]}, unit: us}} (or normalised)"
         )
-        wanted += f"commands: {{topic: {arrays[0]}, unit: us}} (or normalised)"
     return f"{seen}; expected {wanted}. The topics: {topics}"
 
 
@@ -234,13 +227,13 @@ class MessageFields:
             InputError: the message has more than ``FileLimits.log_fields``.
         """
         known = self._getters
-        if not known or not (self._is_px4 or self._wanted.keys() <= known.keys()):
+        if not known or not (self._is_px4 or known.keys() >= {*self._wanted}):
             before = self._rows()
             paths = list(islice(_paths(message), LIMITS.log_fields + 1))
             check_count(self.where, len(paths), LIMITS.log_fields, "fields of a message")
             arrays = set(map(array_of, self._wanted))
-            used = [path for path in paths if self._is_px4 or array_of(path) in arrays]
-            if new := [path for path in used if path not in known]:
+            is_used = self._is_px4
+            if new := [x for x in paths if x not in known and (is_used or array_of(x) in arrays)]:
                 known |= {path: _getter(path) for path in new}
                 rows = np.pad(before, ((0, 0), (0, len(new))), constant_values=np.nan)
                 self._numbers = array("d", rows.tobytes())
@@ -294,11 +287,6 @@ def _getter(path: str) -> Callable[[Any], Any]:
     """Return a function that returns a field of a message."""
     if "[" not in path:
         return attrgetter(path)
-    steps = [int(x) if x.isdecimal() else x for x in re.findall(r"[^.\[\]]+", path)]
-
-    def get(value: Any) -> Any:
-        for step in steps:
-            value = value[step] if isinstance(step, int) else getattr(value, step)
-        return value
-
-    return get
+    names = re.findall(r"[^.\[\]]+", path)
+    steps = [itemgetter(int(x)) if x.isdecimal() else attrgetter(x) for x in names]
+    return lambda message: reduce(lambda value, get: get(value), steps, message)

@@ -115,9 +115,9 @@ def read(
                 notes += [f"{topic}: {doubt}; the times of recording were taken"] if doubt else []
     if not decoded:
         raise InputError(f"{path}: {notes[-1]}")
-    origin = min(int(times[0]) for times, _, _ in decoded)
+    origin = min(times[0] for times, _, _ in decoded)
     recorded = [
-        ChannelGroup(_NANOSECOND * (times - origin).astype(float), columns, name)
+        ChannelGroup(_NANOSECOND * (times - origin), columns, name)
         for times, columns, name in decoded
     ]
     return log_of(path, recorded, log_map, "rosbag", notes, vehicle, piece)
@@ -179,10 +179,9 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
 
     stores = []
     for variant in definitions():
-        store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
+        stores.append(get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE))
         for name, text in variant.items():
-            store.register(get_types_from_msg(text, name))
-        stores.append(store)
+            stores[-1].register(get_types_from_msg(text, name))
     if not is_ros1:
         check_bag_files(path)
 
@@ -190,8 +189,8 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
         kind = types[topic]
         where = f"{path}: topic {topic}"
         with one_line(f"{where}: a message cannot be read", kind):
-            wanted = [connection for connection in reader.connections if connection.topic == topic]
-            fitting = [s for s in stores if all(_same(c, s, is_ros1) for c in wanted)]
+            wanted = [one for one in reader.connections if one.topic == topic]
+            fitting = [s for s in stores if all(_same(one, s, is_ros1) for one in wanted)]
             if not fitting:
                 raise InputError(
                     f"{where}: its {kind} has another definition than the one this reader knows "
@@ -249,13 +248,12 @@ def _decoded_topic(fields: MessageFields, messages: Iterator[tuple[int, Any]]) -
         fields.take(message)
     if not recorded:
         raise InputError(f"{fields.where} has no messages; expected at least two")
-    columns = fields.columns()
-    received_at, sampled_at = np.array(recorded), np.array(stamped)
+    received_at, sampled_at, doubt = np.array(recorded), np.array(stamped), ""
     if not np.any(sampled_at):
-        return received_at, columns, "no time stamps"
-    if np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
-        return received_at, columns, "its time stamps are of another clock than the bag's"
-    return sampled_at, columns, ""
+        doubt = "no time stamps"
+    elif np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
+        doubt = "its time stamps are of another clock than the bag's"
+    return received_at if doubt else sampled_at, fields.columns(), doubt
 
 
 def _at_most(make: Callable[[], Any], spent: list[int]) -> Callable[..., bytes]:
@@ -269,7 +267,7 @@ def _at_most(make: Callable[[], Any], spent: list[int]) -> Callable[..., bytes]:
         out: bytes = machine.decompress(data, max_length=LARGEST)
         if not machine.eof:
             raise ValueError(f"a chunk unpacks to more than {LARGEST} bytes, or ends too soon")
-        spent.append(spent.pop() + len(out))
+        spent[0] += len(out)
         if spent[0] > LIMITS.bag_unpacked:
             raise ValueError(
                 f"its chunks unpack to more than {LIMITS.bag_unpacked} bytes; copy the topics of "
@@ -289,8 +287,7 @@ def limited_unpacking() -> Iterator[None]:
     from rosbags.rosbag1 import reader
     from rosbags.rosbag2 import storage_mcap
 
-    spent = [0]
-    entries = count()
+    spent, entries = [0], count()
 
     class Entry(reader.IndexData):  # type: ignore[misc]
         """An entry of the index, counted."""
@@ -302,16 +299,15 @@ def limited_unpacking() -> Iterator[None]:
                 raise ValueError(f"its index has more than {LIMITS.bag_index} entries")
             return super().__new__(cls, *values)
 
-    lz4_at_most = _at_most(lz4.frame.LZ4FrameDecompressor, spent)
+    unpacks = {
+        "bz2": _at_most(bz2.BZ2Decompressor, spent),
+        "lz4": _at_most(lz4.frame.LZ4FrameDecompressor, spent),
+        "zstd": _at_most(storage_mcap.zstd.ZstdDecompressor, spent),
+    }
     with (
         patch.object(reader, "IndexData", Entry),
-        patch.dict(
-            reader.decompressors, {"bz2": _at_most(bz2.BZ2Decompressor, spent), "lz4": lz4_at_most}
-        ),
-        patch.dict(
-            storage_mcap.DECOMPRESSORS,
-            {"zstd": _at_most(storage_mcap.zstd.ZstdDecompressor, spent), "lz4": lz4_at_most},
-        ),
+        patch.dict(reader.decompressors, unpacks),
+        patch.dict(storage_mcap.DECOMPRESSORS, unpacks),
     ):
         yield
 
@@ -324,15 +320,14 @@ def check_bag_files(path: Path) -> None:
             messages are packed one by one, without a limit on unpacking.
     """
     is_folder = os.path.isdir(path)
-    folder = path if is_folder else path.parent
-    metadata = folder / "metadata.yaml"
-    files = [file for file in folder.iterdir() if not file.is_dir()] if is_folder else [path]
-    text = ""
+    metadata = (path if is_folder else path.parent) / "metadata.yaml"
+    files, text = [path], ""
     if metadata.exists():
         check_regular(metadata, "the metadata of a ROS 2 bag", _METADATA)
         text = metadata.read_bytes().decode("utf-8", "replace")
     if is_folder:
-        files += [path / name for name in _LISTED.findall(text) if (path / name).exists()]
+        listed = (path / name for name in _LISTED.findall(text))
+        files = [x for x in (*path.iterdir(), *filter(Path.exists, listed)) if not x.is_dir()]
     for file in files:
         check_regular(file, "a file of a ROS 2 bag")
         if file.suffix.lower() != ".db3":

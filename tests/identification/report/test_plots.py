@@ -75,7 +75,7 @@ def test_a_spike_of_any_channel_stays():
         channel = plots[i].packed
         drawn = FACTORS[channel["unit"]] * size
         assert abs(unpacked(channel[side]) - drawn).min() <= 1e-4 * abs(drawn)
-    kept = telling_samples(trace, 0, 150)
+    kept = telling_samples(np.column_stack([trace.before[:, 0], trace.after[:, 0]]), 150)
     assert 12_345 in kept
     assert (kept[0], kept[-1]) == (0, len(trace.t) - 1)
     assert len(kept) <= 4 * 150 + 2
@@ -208,9 +208,9 @@ def test_a_line_of_many_rows_is_drawn_by_its_extremes():
     rows = 1_000_003
     values = default_rng(1).normal(size=(rows, 2))
     values[777_777, 0], values[rows - 1, 1] = 50.0, -50.0
-    shown = log_channels._extremes(values)
+    shown = telling_samples(values, log_channels._BINS)
     assert (np.diff(shown) > 0).all()
     assert {0, 777_777, rows - 1} <= set(shown.tolist())
     assert len(shown) < 5 * log_channels._BINS
     few = values[: 2 * log_channels._BINS]
-    assert_array_equal(few[log_channels._extremes(few)], few)
+    assert_array_equal(few[telling_samples(few, log_channels._BINS)], few)
