@@ -25,10 +25,12 @@ FILTERED = (
 LEAST_ROTOR_TIME_OFFSET = 0.001  # s, worth a note
 # when two changes are alike: most standard deviations between any two components, and the share of
 # the changes to which effect models agree
-MOST_APART, SHARE = 2.5, 0.1
+MOST_APART = 2.5
+SHARE = 0.1
 # quantile of the fitted rows up to which the fit knows a quantity, and the least share of other
 # rows beyond it for a note
-KNOWN, OUTSIDE = 0.995, 0.05
+KNOWN = 0.995
+OUTSIDE = 0.05
 
 
 def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str]:
@@ -69,7 +71,8 @@ def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
     A coefficient fitted at 6 m/s holds at 14 m/s only if the effect's form holds so far. No fit
     knows this.
     """
-    seen, vehicle = flights.fit_rows, flights.vehicle
+    seen = flights.fit_rows
+    vehicle = flights.vehicle
     thrust = vehicle.rotor_wrench(flights.at_rows("rotor_speeds"))[:, 0]
     for name, unit, values in (
         ("the speed", "m/s", np.linalg.norm(flights.at_rows("velocity"), axis=1)),

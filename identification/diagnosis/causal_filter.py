@@ -66,8 +66,10 @@ def level(heading: Array, x: Array) -> Array:
     """Return vectors (n, 3) in body axes about three others: the world's x and y, turned with the
     heading (n, 2), and body z.
     """
-    (c, s), out = heading.T, x.copy()
-    out[:, 0], out[:, 1] = c * x[:, 0] - s * x[:, 1], s * x[:, 0] + c * x[:, 1]
+    c, s = heading.T
+    out = x.copy()
+    out[:, 0] = c * x[:, 0] - s * x[:, 1]
+    out[:, 1] = s * x[:, 0] + c * x[:, 1]
     return out
 
 

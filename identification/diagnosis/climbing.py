@@ -23,7 +23,8 @@ def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
     """Return the mode of the posterior from a setting on (damped Gauss-Newton); ``at`` raises an
     error for an impossible vehicle.
     """
-    here, (value, target) = start, height(start, at)
+    here = start
+    value, target = height(start, at)
     for _ in range(ROUNDS):
         there = target()
         for share in SHARES:
@@ -56,7 +57,8 @@ def linearised(
     """Return the height of a quadratic likelihood at the setting of its linearisation, and its mode
     within the limits of the coefficients.
     """
-    at, every = base.at(base.asked), range(len(base.asked))
+    at = base.at(base.asked)
+    every = range(len(base.asked))
     m = base.marginal(at, base.plain, power=power)
     here = [setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]
     z = np.array(here) / base.size[at]

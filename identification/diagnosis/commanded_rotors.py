@@ -54,8 +54,10 @@ def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     carried = np.flatnonzero(thrust > CARRYING_SHARE * usual_thrust(thrust))
     if not carried.size:
         return log
-    first, last = carried[0], carried[-1]
-    begin, end = log.t[first], log.t[last]
+    first = carried[0]
+    last = carried[-1]
+    begin = log.t[first]
+    end = log.t[last]
     begin += TAKE_OFF if first > 0 else 0.0
     end -= TAKE_OFF if last < len(thrust) - 1 else 0.0
     keep = (log.t >= begin) & (log.t <= end)

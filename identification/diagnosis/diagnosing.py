@@ -111,7 +111,9 @@ def diagnose(
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
     said = Judged(flights, [n for n in names() if n not in without], settings, report)
-    effects, residuals, setting = said.effects, said.balance, said.setting
+    effects = said.effects
+    residuals = said.balance
+    setting = said.setting
     sure = said.remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
@@ -190,7 +192,8 @@ class Judged:
         rule: DiagnosisSettings,
         report: Report,
     ) -> None:
-        self._flights, self._rule = flights, rule
+        self._flights = flights
+        self._rule = rule
         library = [e for e in library if e not in flights.not_identifiable]
         given = self._given = what_commands_show(flights, library)
         report("asking how probable each effect is")
@@ -199,7 +202,8 @@ class Judged:
             if flights.has_raw_poses
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
-        self.ranking, best = fitted.ranking, fitted.ranking.sets[0]
+        self.ranking = fitted.ranking
+        best = fitted.ranking.sets[0]
         self.setting = {e: dict(x) for e, x in {**given.fixed, **fitted.setting}.items()}
         if fitted.sensors:
             self.setting[""] = {name: value for name, (value, _) in fitted.sensors.items()}
@@ -265,7 +269,8 @@ class Judged:
         """Return the standard deviations of an effect in the likeliest set. For a factor on the
         thrust of commands, they include the spread of thrust from flight to flight.
         """
-        flights, std = self._flights, self.ranking.sets[0].std[effect]
+        flights = self._flights
+        std = self.ranking.sets[0].std[effect]
         if not flights.commanded or get(effect).role not in THRUST_FACTORS:
             return dict(std)
         return self._widened(effect, std, THRUST_STD / math.sqrt(len(flights.logs)))
@@ -281,10 +286,14 @@ class Judged:
         """Return the probability of a calibration, in every set, to differ from the vehicle's
         statement; 0 where the difference is too small for a name.
         """
-        flights, best = self._flights, self.ranking.sets[0]
-        own, stds, most = flights.coefficients({}, effect), self._std(effect), 0.0
+        flights = self._flights
+        best = self.ranking.sets[0]
+        own = flights.coefficients({}, effect)
+        stds = self._std(effect)
+        most = 0.0
         for name, value in best.coefficients[effect].items():
-            off, std = abs(value - own.get(name, 0.0)), stds.get(name, 0.0)
+            off = abs(value - own.get(name, 0.0))
+            std = stds.get(name, 0.0)
             least = LEAST_SIZE * typical_size((effect, name), flights.vehicle)
             if off > least and std:
                 most = max(most, _apart(off, std))
@@ -298,7 +307,8 @@ class Judged:
             factors = playing(*THRUST_FACTORS)
             return tuple(x for x in factors if x != effect) if effect in factors else ()
         best = self.ranking.sets[0]
-        rest, least = set(best.effects) - {effect}, LEAST_RIVAL * best.probability
+        rest = set(best.effects) - {effect}
+        least = LEAST_RIVAL * best.probability
         more = [
             set(x.effects) - rest
             for x in self.ranking.sets
@@ -308,7 +318,9 @@ class Judged:
 
     def _doubts(self, named: Sequence[str], strange: float) -> dict[str, Names]:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
-        flights, rule, fitted = self._flights, self._rule, self._fitted
+        flights = self._flights
+        rule = self._rule
+        fitted = self._fitted
         alike = composites(flights.vehicle, fitted.setting, self.ranking.sets[0].std)
         doubts = {"composite": tuple(alike)}
         if strange > rule.most_unknown:
@@ -346,7 +358,9 @@ class Judged:
     def _named(
         self, effect: str, probability: float, size: float, unsure: bool, others: Names
     ) -> NamedEffect:
-        flights, rule, fitted = self._flights, self._rule, self._fitted
+        flights = self._flights
+        rule = self._rule
+        fitted = self._fitted
         std = self._std(effect)
         # the point of action of an effect at the rotors, as declared, is nothing to report
         values = {
@@ -363,7 +377,8 @@ class Judged:
             if name != CENTRAL
         ]
         # shares of the residual's energy without it, each channel over its sensors' noise
-        after, over = self.balance.after, mean_square(flights.visible_noise) ** 0.5
+        after = self.balance.after
+        over = mean_square(flights.visible_noise) ** 0.5
         left, whole = (
             float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
             for x in (after, after + self.parts[effect])
@@ -389,7 +404,8 @@ class Judged:
 
     def traces(self) -> Iterator[Trace]:
         """Yield the residual of each piece of flight over time."""
-        flights, residuals = self._flights, self.balance
+        flights = self._flights
+        residuals = self.balance
         for rows in flights.runs:
             yield Trace(
                 flights.logs[flights.log[rows[0]]].name,
@@ -418,7 +434,9 @@ def _predicted(
     flights: RegressedFlights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]]
 ) -> Pair:
     """Return how far a model's predictions of the held-out stretches are off: NIS, and m RMS."""
-    nis, distance, weight = [], [], []
+    nis = []
+    distance = []
+    weight = []
     for i, log in enumerate(flights.logs):
         own = [(a, b) for k, a, b in segments if k == i]
         if own:

@@ -84,7 +84,8 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
         flights: the vehicle's flights.
     """
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
-    rate, body = whole.angular_velocity, in_body(whole.velocity, rotation)
+    rate = whole.angular_velocity
+    body = in_body(whole.velocity, rotation)
     above = position[:, 2] - position[:, 2].min()
     shapes = []  # group, name, variable, channels
     every = tuple(range(6))
@@ -161,7 +162,9 @@ def variables(whole: FlightState) -> NamedArrays:
     """Return the variables (n,) of a changing coefficient by name, of mean zero and standard
     deviation one.
     """
-    position, rotation, velocity = whole.position, whole.rotation, whole.velocity
+    position = whole.position
+    rotation = whole.rotation
+    velocity = whole.velocity
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     speed = np.linalg.norm(velocity, axis=1)
     raw = {

@@ -43,7 +43,8 @@ class Marginal:
 
     def explained(self, index: Sequence[int], z: Array) -> float:
         """Return the deviance explained by some columns at coefficients ``z``."""
-        right, normal = self.right[index], self.normal[np.ix_(index, index)]
+        right = self.right[index]
+        normal = self.normal[np.ix_(index, index)]
         return float(2.0 * right @ z - z @ normal @ z)
 
 
@@ -155,7 +156,8 @@ def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[floa
         tried: the possible ones of these columns.
         sizes: possible standard deviations of their coefficients.
     """
-    square, left = np.square(sizes)[:, None], m.own[tried]
+    square = np.square(sizes)[:, None]
+    left = m.own[tried]
     gained = 0.5 * square * np.square(m.right[tried]) / (1.0 + square * left)
     factors = gained - 0.5 * np.log1p(square * left)
     return float(logsumexp(factors)) - math.log(factors.size)

@@ -90,17 +90,20 @@ class Likelihood:
         near: "Likelihood | None" = None,
         same_noise: bool = False,
     ) -> None:
-        self.flights, self.setting = flights, setting
+        self.flights = flights
+        self.setting = setting
         self.vehicle = flights.amended(setting)
         self.pieces: list[Poses]
         self.tracks: list[Track]
         self.known: list[Array]
         self._fit: list[Mask]  # (n,) samples open to the fit
         if near is not None and sensing_of(near.vehicle) == sensing_of(self.vehicle):
-            self.pieces, self._fit = near.pieces, near._fit
+            self.pieces = near.pieces
+            self._fit = near._fit
         else:
             finer = iter(near.finer if near else ())
-            self.pieces, self._fit = [], []
+            self.pieces = []
+            self._fit = []
             for i, log in enumerate(flights.logs):
                 rows = flights.log == i
                 if not flights.fit_rows[rows].any():  # a test log
@@ -122,8 +125,10 @@ class Likelihood:
         self.finer: list[Array] = []
         self.answers: list[Array] = []
         if near:
-            self.finer, self.answers = near.finer, near.answers
-            self.known, self.tracks = near.known, near.tracks
+            self.finer = near.finer
+            self.answers = near.answers
+            self.known = near.known
+            self.tracks = near.tracks
         else:
             self._see_rotors()
         if same:
@@ -220,9 +225,11 @@ class Likelihood:
         def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
             self._run(steady, self._said(jumps, gains))
             for i, track in enumerate(self.tracks):
-                none, counts = np.empty((len(track.t), 6, 0)), self._counts(i)
+                none = np.empty((len(track.t), 6, 0))
+                counts = self._counts(i)
                 if explained is not None:
-                    pose, force = explained[i][:, 0, :, None], explained[i][:, 1, :, None]
+                    pose = explained[i][:, 0, :, None]
+                    force = explained[i][:, 1, :, None]
                     change = self._changes(track, steady, force, pose)[:, :, 0]
                     track = replace(track, innovations=track.innovations - change)
                 if slopes is None:
@@ -243,7 +250,8 @@ class Likelihood:
 
     def _blocks(self, track: Track) -> Iterator[slice]:
         """Return the parts of a piece. One part's columns are in memory at a time."""
-        length, n = round(BLOCK / self.period), len(track.t)
+        length = round(BLOCK / self.period)
+        n = len(track.t)
         return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
 
     def _counts(self, piece: int) -> Mask:
@@ -257,7 +265,8 @@ class Likelihood:
         answers most of a gust's torque before the pose shows any.
         """
         out = []
-        sizes, times = self.flights.inertias * self.noise.disturbance, self.noise.time.tolist()
+        sizes = self.flights.inertias * self.noise.disturbance
+        times = self.noise.time.tolist()
         for axis, (size, time) in enumerate(zip(sizes.tolist(), times, strict=True)):
             keep = math.exp(-self.period / time)
             shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
@@ -350,7 +359,8 @@ class Likelihood:
 
     def _add_changing_coefficients(self) -> None:
         """Add the dictionary's columns: effects of the setting with changing coefficients."""
-        parts, poses = {}, {}
+        parts = {}
+        poses = {}
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
                 moved = [x * self._moved((effect, name)) for name, x in own.items()]
@@ -435,7 +445,8 @@ class Likelihood:
         Rounding biases an expected torque low, by its share of the variance (errors in variables):
         a hover holds little torque, and rounding hides it.
         """
-        rounded, (whole, _) = 2.0 * np.square(self._rounding()[3:]), joined(self.tracks)
+        rounded = 2.0 * np.square(self._rounding()[3:])
+        whole, _ = joined(self.tracks)
         expected = whole.rotors[:, 1:] - np.concatenate(self.answers)[:, 1:]
         share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
@@ -459,7 +470,8 @@ class Likelihood:
         (Unknown linear feedback: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
         """
         whole, _ = joined(self.tracks)
-        rate, body = whole.angular_velocity, in_body(whole.velocity, whole.rotation)
+        rate = whole.angular_velocity
+        body = in_body(whole.velocity, whole.rotation)
         tilt = whole.rotation[:, 2]
         states = (
             (body[:, 2],),
@@ -473,7 +485,8 @@ class Likelihood:
             answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
             change = np.diff(rotors, prepend=rotors[:1])
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
-                column, along = np.zeros((len(x), 6)), answer * x / max(float(x.std()), 1e-9)
+                column = np.zeros((len(x), 6))
+                along = answer * x / max(float(x.std()), 1e-9)
                 if axis == DRIVEN[0]:
                     column[:, :3] = along[:, None] * whole.rotation[:, :, 2]
                 else:
@@ -501,20 +514,27 @@ class Likelihood:
         return out
 
     def _products(self, starts: Starts) -> Base:
-        acting, moved, steady = self._acting, self._posed, self.steady
+        acting = self._acting
+        moved = self._posed
+        steady = self.steady
         asked = (*(c for c in acting if c not in moved), *moved)
         # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
         names = (*asked, *drives)
         root = np.linalg.cholesky(steady.covariance)
         inverse = np.linalg.inv(root)
-        samples, first, still = 0, 0, np.zeros_like(self._base)
+        samples = 0
+        first = 0
+        still = np.zeros_like(self._base)
         most = sum(len([*self._blocks(track)]) for track in self.tracks)
-        products, count = np.empty((most, len(names) + 1, len(names) + 1)), 0
+        products = np.empty((most, len(names) + 1, len(names) + 1))
+        count = 0
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
-            state, counts = np.zeros((6, 3, len(names))), self._counts(i)
+            state = np.zeros((6, 3, len(names)))
+            counts = self._counts(i)
             for at in self._blocks(track):
-                rows, here = at.stop - at.start, slice(first + at.start, first + at.stop)
+                rows = at.stop - at.start
+                here = slice(first + at.start, first + at.stop)
                 x = np.stack([acting.get(c, still)[here] for c in asked], axis=2)
                 y = np.stack([column[here] for column in moved.values()], axis=2)
                 driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
@@ -523,7 +543,8 @@ class Likelihood:
                     driven[:, 2 + j, j] = jumps[at, 2 + j, len(STATES) : 2 * len(STATES)]
                 out = np.empty((rows, 6, len(names) + 1))
                 changes = self._changes(track, steady, x, y, at, driven.reshape(rows, 6, -1), state)
-                out[:, :, :-1], out[:, :, -1] = changes, track.innovations[at]
+                out[:, :, :-1] = changes
+                out[:, :, -1] = track.innovations[at]
                 kept = (inverse @ out[counts[at]]).reshape(-1, out.shape[2])
                 samples += int(counts[at].sum())
                 if len(kept):
@@ -562,7 +583,8 @@ class Likelihood:
         """
         jumps = np.empty((len(acting), 6, 0)) if jumps is None else jumps
         slopes = np.empty((6, 7, 0)) if slopes is None else slopes
-        e, disturbance = jumps.shape[2], track.disturbance[at].copy()
+        e = jumps.shape[2]
+        disturbance = track.disturbance[at].copy()
         disturbance[:, 3:] = level(track.heading[at], disturbance[:, 3:])
         if state is None:
             state = np.zeros((6, 3, acting.shape[2] + e + slopes.shape[2]))

@@ -56,11 +56,14 @@ class NoiseSearch:
             gains: (3, e) at its start.
         """
         x = _free(near)
-        low, high = x - 16.0, x + 16.0
+        low = x - 16.0
+        high = x + 16.0
         low[:, 0] = math.log(LEAST_POSE)
-        low[:, 2:], high[:, 2:] = (math.log(TIMES[0]), 0.0), (math.log(TIMES[1]), 1e4)
+        low[:, 2:] = (math.log(TIMES[0]), 0.0)
+        high[:, 2:] = (math.log(TIMES[1]), 1e4)
         none = np.full(gains.size, np.inf)
-        low, high = np.append(-none, low), np.append(none, high)
+        low = np.append(-none, low)
+        high = np.append(none, high)
         at = np.clip(np.append(gains, x), low, high)
         height, normal, right = self._slopes(at)
         damping = DAMPING
@@ -100,15 +103,18 @@ class NoiseSearch:
         """Return the height, Fisher's information (c, c), and minus the height's gradient (c,)."""
         steady = self._filter(at)
         slopes, change = self._filter_slopes(at, steady)
-        size, n = len(at), 0
+        size = len(at)
+        n = 0
         whiten = np.linalg.inv(np.linalg.cholesky(steady.covariance))
-        whole, own = np.zeros((size + 1, size + 1)), np.zeros((6, 6))
+        whole = np.zeros((size + 1, size + 1))
+        own = np.zeros((6, 6))
         for e, changes in self.see(steady, self._gains(at), slopes):
             rows = (whiten @ np.dstack([changes, e])).reshape(-1, size + 1)
             whole += rows.T @ rows
             own += e.T @ e
             n += len(e)
-        normal, right = whole[:-1, :-1], whole[:-1, -1]
+        normal = whole[:-1, :-1]
+        right = whole[:-1, -1]
         held = np.tile(self.held, len(PAIRS))
         normal[range(len(held)), range(len(held))] += held**-2
         right[: len(held)] -= at[: len(held)] / held**2

@@ -134,7 +134,8 @@ def variants_of(
     """Return the variants of an effect beside the effects of a setting, without coefficients fixed
     by the vehicle's file.
     """
-    own, wholes = tuple(flights.columns_of([effect])), [(c,) for c in starts if c[0] == effect]
+    own = tuple(flights.columns_of([effect]))
+    wholes = [(c,) for c in starts if c[0] == effect]
     if moves_time(effect) and effect not in setting:
         return [own, *wholes]
     if flights.is_nonlinear(effect) and effect not in setting:
@@ -171,7 +172,8 @@ def _bounds(column: Column, flights: RegressedFlights) -> Pair:
     if name.startswith(START_PREFIX):
         return PRIORS.near_start if moves_time(effect) else (0.0, math.inf)
     c = coefficient(bare(column))
-    low, high = c.minimum, min(c.maximum, c.plausible)
+    low = c.minimum
+    high = min(c.maximum, c.plausible)
     if get(effect).role == Role.MASS:
         low = max(low, -PRIORS.most_missing_mass * unit_of_change(column, flights.vehicle))
     own = declared(column, flights)

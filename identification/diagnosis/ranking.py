@@ -86,7 +86,8 @@ def rank(
         tried[frozenset(setting)] = setting
         # a slow disturbance does much of what a steady effect does: each is fitted beside the other
         for _ in range(ROUNDS):
-            near, begun = Likelihood(flights, setting, near), setting
+            near = Likelihood(flights, setting, near)
+            begun = setting
             setting = mode(begun, partial(height, near=near))
             moved = (
                 abs(x - begun[e].get(n, 0.0)) / prior_size((e, n), flights)
@@ -107,7 +108,8 @@ def rank(
         return scores.get(frozenset(best.setting), -math.inf)
 
     def first() -> tuple[Likelihood, Starts, Base]:
-        nothing, starts = Likelihood(flights, {}), starts_of(flights, library, {})
+        nothing = Likelihood(flights, {})
+        starts = starts_of(flights, library, {})
         return nothing, starts, nothing.base(library, starts)
 
     # made anew at the end if no set is likeliest: its columns of ten minutes take 0.5 GB
@@ -238,7 +240,8 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
-    sensors, behind = likelihood.sensors(best), _behind(likelihood, best)
+    sensors = likelihood.sensors(best)
+    behind = _behind(likelihood, best)
     return FittedPosterior(last, last.ranking(), best, sensors=sensors, behind=behind)
 
 

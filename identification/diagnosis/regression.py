@@ -74,7 +74,8 @@ NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 
 # typical sizes, the steps of derivatives by a coefficient: in a fit, and in a column examined for
 # its noise (there a signal moves in time by a sample, not by a part of one)
-STEP, LARGE_STEP = 0.1, 0.5
+STEP = 0.1
+LARGE_STEP = 0.5
 # coefficients by effect, beside the declared vehicle
 Setting = Mapping[str, Values]
 Effects = frozenset[str]
@@ -220,7 +221,8 @@ class RegressedFlights:
         self.sensor_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6)
         # effects whose columns are sensor noise to a large part
         self.not_identifiable = self._lost_in_noise(noisy)
-        rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
+        rotors = self.rotor_wrench({})
+        more = noisy.rotor_wrench({})
         # (4,) its share of the variance of what the rotors deliver: thrust and torque
         self.rotor_noise = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
 
@@ -305,7 +307,8 @@ class RegressedFlights:
         in an IMU.
         """
         weight = 1.0 / (mean_square(self.sensor_noise) + 1e-30)
-        lost, traceless = set(), set()
+        lost = set()
+        traceless = set()
         for effect in effects:
             noise = whole = 0.0
             pairs = zip(self._typical_parts(effect), noisy._typical_parts(effect), strict=True)
@@ -345,7 +348,8 @@ class RegressedFlights:
         """Return thrust (N) and torque (Nm, body) of the rotors at the rows (rows, 4), behind the
         vehicle's lag and its like, low-passed.
         """
-        vehicle, pieces = self.amended(setting), self.pieces(setting)
+        vehicle = self.amended(setting)
+        pieces = self.pieces(setting)
         return np.concatenate([p.smooth(delivered(p.signals, vehicle)) for p in pieces])
 
     def at_rows(self, name: str, setting: Setting | None = None) -> Array:
@@ -415,7 +419,8 @@ class RegressedFlights:
         needed = needed_wrench(signals, self.vehicle)
         if self.commanded:
             needed[:, 3:] = 0.0
-        needed, felt = _smooth(needed, signals)[rows], None
+        needed = _smooth(needed, signals)[rows]
+        felt = None
         if not self.inertial and (read := _accelerometer(self.logs[log])):
             at = resampled(signals.t, *read)
             force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, at)
@@ -493,7 +498,8 @@ class RegressedFlights:
         key = tuple((name, *sorted(values.items())) for name, values in setting.items())
 
         def made() -> Array:
-            vehicle, left = self.amended(setting), []
+            vehicle = self.amended(setting)
+            left = []
             for piece in self.pieces(setting):
                 acting = self.acting(piece.signals, setting, piece.log, vehicle)
                 if self.commanded:
@@ -515,7 +521,8 @@ class RegressedFlights:
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
         like the residual.
         """
-        vehicle, offsets = vehicle or self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
+        vehicle = vehicle or self.amended(setting)
+        offsets = setting.get(ROTOR_TIME_OFFSET[0], {})
         s = with_time_offsets(signals, offsets)
         s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
         wrench, _ = acting_wrench(s, vehicle, self.vehicle)
@@ -571,7 +578,8 @@ class RegressedFlights:
         # moving signals in time moves their noise too, and a one-sided step would seem to reduce
         # the noise: the difference is two-sided
         if effect and moves_time(effect) and abs(value) > abs(delta):
-            c, far = coefficient(column), abs(delta)
+            c = coefficient(column)
+            far = abs(delta)
             if c.minimum <= value - far and value + far <= c.maximum:
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
         return (residual(setting) - at(value + delta)) / delta
@@ -595,7 +603,8 @@ def _accelerometer(log: FlightLog) -> ArrayPair | None:
     if log.accelerometer is None:
         return None
     read = finite_rows(log.accelerometer)
-    times, values = log.t[read], log.accelerometer[read]
+    times = log.t[read]
+    values = log.accelerometer[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
     if not len(times) or float(np.diff(ends).max()) >= LONGEST_GAP:
         return None

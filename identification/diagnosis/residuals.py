@@ -59,7 +59,8 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     quiet = CALM * weight_and_torque(flights.vehicle)[[0, 3]]
     least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
     noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
-    old, new = np.square(before[held_out]), np.square(after[held_out])
+    old = np.square(before[held_out])
+    new = np.square(after[held_out])
     change = np.mean((new - old) / (old.mean(axis=0) + 1e-30), axis=1)
     block = flights.block[held_out]
     blocks = np.array([change[block == b].mean() for b in np.unique(block)])
@@ -93,7 +94,8 @@ def transient_disturbances(
     noise of one strength, however fast, has peaks of about four standard deviations in a minute. A
     transient has more, in terms of the median.
     """
-    residual, edge = flights.residual(setting), round(MARGIN / flights.period)
+    residual = flights.residual(setting)
+    edge = round(MARGIN / flights.period)
     inner = np.concatenate([rows[edge : len(rows) - edge] for rows in flights.runs])
     if not inner.size:
         return []
@@ -110,7 +112,8 @@ def transient_disturbances(
             above = abs(peak) / max(float(std[i]), 1e-30)
             before, _ = largest.get(channel, (LEAST_SIGNIFICANCE, None))
             if above > before and abs(peak) > least[i]:
-                log, t = flights.logs[flights.log[row]].name, float(flights.t[row])
+                log = flights.logs[flights.log[row]].name
+                t = float(flights.t[row])
                 largest[channel] = above, TransientDisturbance(channel, log, t, peak)
     return [transient for _, transient in sorted(largest.values(), key=lambda x: -x[0])]
 

@@ -54,7 +54,8 @@ def unrounded(pieces: Seen, step: float) -> list[Array]:
     Statistical Society B 43 (1981), 41-45).
     """
     logged = [poses.rotor_speeds for poses, _ in pieces]
-    speeds, variance = [x.copy() for x in logged], [np.zeros_like(x) for x in logged]
+    speeds = [x.copy() for x in logged]
+    variance = [np.zeros_like(x) for x in logged]
     for _ in range(ROUNDS):
         each = list(zip(logged, speeds, variance, _predicted(pieces, speeds), strict=True))
         left = [np.square(now[LAGS:] - z) + v[LAGS:] for _, now, v, z in each]
@@ -77,7 +78,8 @@ def _predicted(pieces: Seen, rotors: list[Array]) -> list[Array]:
     x = np.concatenate([_known_before(track, now) for (_, track), now in each])
     later = [now[LAGS:] for now in rotors]
     y = np.concatenate(later)
-    mean, size = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
+    mean = x.mean(axis=0)
+    size = np.maximum(x.std(axis=0), 1e-12)
     z = np.column_stack([(x - mean) / size, np.ones(len(x))])
     normal = z.T @ z
     # against columns nearly alike, and constant ones: all others have a square of one

@@ -42,7 +42,8 @@ class RowLikelihood:
     def __init__(
         self, flights: RegressedFlights, library: Sequence[str], first: Setting, fixed: Setting
     ) -> None:
-        self.flights, self.library = flights, list(library)
+        self.flights = flights
+        self.library = list(library)
         self.rows = Rows(flights, fixed)
         self.nuisances = _named(row_nuisances(self.rows))
         self.power = 1.0
@@ -57,7 +58,8 @@ class RowLikelihood:
         traced = {c[0] for c, x in columns.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
         own = [x * prior_size(c, self.flights) for c, x in columns.items() if c[0] in traced]
-        signals, explained = followers(rows), np.zeros_like(y)
+        signals = followers(rows)
+        explained = np.zeros_like(y)
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
@@ -108,7 +110,9 @@ class RowLikelihood:
             effects: effects to ask about; default: all of the library.
             unknown: whether the dictionary's columns are among them.
         """
-        rows, flights, residual = self.rows, self.flights, self.rows.residual(setting)
+        rows = self.rows
+        flights = self.flights
+        residual = self.rows.residual(setting)
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
         columns = dict(self.nuisances)
@@ -128,12 +132,16 @@ class RowLikelihood:
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns, changing coefficients among them."""
-        rows, flights, vehicle = self.rows, self.flights, self.flights.vehicle
-        pieces, states = flights.pieces({}), []
+        rows = self.rows
+        flights = self.flights
+        vehicle = self.flights.vehicle
+        pieces = flights.pieces({})
+        states = []
         for s in (p.signals for p in pieces):
             rotors = delivered(s, vehicle) / flights.inertias[2:]
             # the acceleration is the rotors' alone, without disturbances
-            push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
+            push = rotors[:, :1] * s.rotation[:, :, 2]
+            rate = s.angular_velocity
             states.append(FlightState(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
         whole, ends = joined(states)
         out = {}
@@ -183,7 +191,8 @@ class RowLikelihood:
         time offsets of logs, in the units of ``offsets``, with their standard deviations.
         """
         base = self.base(setting, {}, ())
-        modes, out = base.mode(base.plain, self.power), {}
+        modes = base.mode(base.plain, self.power)
+        out = {}
         for (_, name), offset in self.flights.offsets.items():
             mode, std = modes["", NUISANCE + name]
             out[name] = float(np.clip(offset.size * mode, *offset.range)), offset.size * std

@@ -36,7 +36,8 @@ def row_nuisances(rows: Rows) -> NamedArrays:
     numbers = np.unique(flights.log).tolist()
     for i in numbers:
         here = (flights.log == i)[:, None].astype(float)
-        thrust, turning = here * rotors[:, :1], here * rotors[:, 1:]
+        thrust = here * rotors[:, :1]
+        turning = here * rotors[:, 1:]
         own = _of_accelerometers(rows, here, thrust) if rows.has_accelerometer else {}
         if flights.commanded:
             own |= _of_commands(rows, here, thrust)
@@ -71,7 +72,8 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     turns may show the delay of commands. Even then the delay of thrust may differ: the flight loop
     answers vertical motion.
     """
-    flights, up = rows.flights, thrust * AXES["z"]
+    flights = rows.flights
+    up = thrust * AXES["z"]
     t = flights.t[here[:, 0] > 0.0]
     w = 2.0 * (flights.t[:, None] - t[0]) / max(float(t[-1] - t[0]), 1e-9) - 1.0
     out = {
@@ -102,7 +104,8 @@ def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedA
     out = {f"{MODEL_ERROR} of thrust's changes": rows.from_body(varying * AXES["z"])}
     gains = np.hypot(PRIORS.model_error, noise[1:]).tolist()
     for (name, along), gain in zip(AXES.items(), gains, strict=True):
-        force, torque = PRIORS.model_error * thrust * along, gain * turning * along
+        force = PRIORS.model_error * thrust * along
+        torque = gain * turning * along
         out[f"{MODEL_ERROR} of force {name}"] = rows.from_body(force)
         out[f"{MODEL_ERROR} of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)
     return out

@@ -53,12 +53,14 @@ class Rows:
     """
 
     def __init__(self, flights: RegressedFlights, fixed: Setting) -> None:
-        self.with_torques, cutoff = not flights.commanded, CUTOFFS.residual_hz
+        self.with_torques = not flights.commanded
+        cutoff = CUTOFFS.residual_hz
         self._cutoff = np.inf
         if flights.commanded or flights.filtered:
             self._cutoff = cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else FILTERED_CUTOFF_HZ
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
-        self.flights, self.fixed = flights, fixed
+        self.flights = flights
+        self.fixed = fixed
         self._at: Index = np.concatenate([rows[::step] for rows in flights.runs])
         self.begins: Mask = flights.start[self._at]
         self.t: Array = flights.t[self._at]
@@ -110,7 +112,8 @@ class Rows:
             InputError: no vehicle is possible.
         """
         setting = {**self.fixed, **setting}
-        left, felt = self.flights.residual(setting) / self._inertias, self.flights.felt(setting)
+        left = self.flights.residual(setting) / self._inertias
+        felt = self.flights.felt(setting)
         rotation = self.flights.at_rows("rotation", setting)
         shown = in_body(left[:, :3], rotation)
         read = None if felt is None else shown + in_body(felt / self._inertias[:3], rotation)

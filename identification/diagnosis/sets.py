@@ -82,7 +82,9 @@ def is_possible(
     needs a quadratic part below zero. A true coefficient of zero is at a bound too, but its best
     fit is not far outside.
     """
-    words, vehicle, own = get(effect), flights.vehicle, setting[effect]
+    words = get(effect)
+    vehicle = flights.vehicle
+    own = setting[effect]
     if words.possible is not None and not words.possible(own, vehicle):
         return False
     if not plausible or words.implausible is None:
@@ -123,7 +125,8 @@ class Posterior:
         idle: Collection[Effects] = (),
     ) -> None:
         self.flights, self.library, self.bases, self.power = flights, library, bases, power
-        self.idle, self.given = idle, given
+        self.idle = idle
+        self.given = given
         self.asked_about = len(library) - len(given or ())
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[Effects, _Candidate] = {}
@@ -177,10 +180,12 @@ class Posterior:
         # integrated out: everything any flight may have, and a little of every effect
         little = np.concatenate([np.ones(len(base.plain)), self._negligible(base, asked)])
         m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
-        low, high = base.low[asked], base.high[asked]
+        low = base.low[asked]
+        high = base.high[asked]
         variants = self._variants(base)
         ways = Counter(v[0][0] for v in variants)
-        p, always = self.inclusion, len(self.given or ())
+        p = self.inclusion
+        always = len(self.given or ())
 
         def score(some: tuple[Variant, ...]) -> float:
             key = frozenset(v[0][0] for v in some)
@@ -209,7 +214,8 @@ class Posterior:
             if all(c in at for v in some for c in v):
                 score(some)
         level = [(*first, v) for v in variants if v not in first]
-        begun, most = len(first) + 1, MOST_EFFECTS + always
+        begun = len(first) + 1
+        most = MOST_EFFECTS + always
         for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
             level.sort(key=score, reverse=True)
             grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
@@ -241,7 +247,8 @@ class Posterior:
             quieter: the last base with the likeliest noise beside the strangest column. The set,
                 and the set with one more column, have the likelier noise of both.
         """
-        none, more = [], []
+        none = []
+        more = []
         for base in (self.bases[-1], *((quieter,) if quieter else ())):
             m = self._dictionary_beside_best(base)
             groups: dict[str, list[int]] = {}
@@ -280,7 +287,8 @@ class Posterior:
         base, best = self._likeliest()
         asked = base.at(base.asked)
         m = base.marginal(asked, base.plain, power=self.power)
-        low, high = base.low[asked], base.high[asked]
+        low = base.low[asked]
+        high = base.high[asked]
         place = {c: i for i, c in enumerate(base.asked)}
         whole, rest = (
             set_evidence(m, [place[c] for c in best.columns if c[0] != out], low, high)
@@ -303,7 +311,8 @@ class Posterior:
         base = next(x for x in self.bases if x.effects == given)
         asked = [c for c in base.asked if c[0] not in given]
         always = base.at(c for c in base.asked if c[0] in given)
-        at, index = base.at(asked), {c: i for i, c in enumerate(asked)}
+        at = base.at(asked)
+        index = {c: i for i, c in enumerate(asked)}
         m = base.marginal(at, np.append(base.plain, always), power=self.power)
         normal = m.normal + np.eye(len(asked))
         whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
@@ -337,7 +346,8 @@ class Posterior:
             if name.startswith(START_PREFIX) or effect in {v[0][0] for v in best.variants}:
                 continue
             sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
-            z, i = base.typical[base.at(columns)] * sign, [index[c] for c in columns]
+            z = base.typical[base.at(columns)] * sign
+            i = [index[c] for c in columns]
             out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
 
@@ -350,7 +360,8 @@ class Posterior:
         # an effect of the set is true to some per cent, whatever makes it change
         changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
         wrong = np.full(len(changing), EFFECT_ERROR / SHARE_OF_EFFECT)
-        little, ones = self._negligible(base, asked), np.ones(len(base.plain) + len(own))
+        little = self._negligible(base, asked)
+        ones = np.ones(len(base.plain) + len(own))
         chosen = np.concatenate([base.plain, own, asked, changing])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
         power = self.power * (1.0 if varied else ROUNDED)
@@ -385,7 +396,8 @@ class Posterior:
 
     def _at_mode(self, candidate: _Candidate) -> tuple[Setting, Setting]:
         """Return the coefficients of a set at the mode, and their standard deviations."""
-        base, evidence = candidate.base, candidate.evidence
+        base = candidate.base
+        evidence = candidate.evidence
         setting = {}
         std = {}
         modes = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
@@ -399,14 +411,16 @@ class Posterior:
                     if moves_time(effect):
                         own[get(effect).coefficients[0].name] *= mode
                     continue
-                name, size = bare(c)[1], float(base.size[base.columns[c]])
+                name = bare(c)[1]
+                size = float(base.size[base.columns[c]])
                 limits = coefficient((effect, name))
                 value = mode * size + declared(c, self.flights)
                 own[name] = min(max(value, limits.minimum), limits.maximum)
                 off[name] = deviation * size
                 if c[1].startswith(WHOLE_PREFIX):
                     own[CENTRAL] = 1.0
-            setting[effect], std[effect] = own, off
+            setting[effect] = own
+            std[effect] = off
         return setting, std
 
     def ranking(self, quieter: Base | None = None) -> Ranking:

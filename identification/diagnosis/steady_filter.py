@@ -49,13 +49,16 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     """Return the steady filter of poses, every ``period`` s, with this noise."""
     keep = np.exp(-period / noise.time)
     # in units of the pose's noise and of a period
-    pose, decay = noise.pose[..., PAIRS], keep[..., PAIRS]
+    pose = noise.pose[..., PAIRS]
+    decay = keep[..., PAIRS]
     unit = period * period / pose
     half = np.array([0.5, 1.0, 0.0])
     white = np.square(noise.white[..., PAIRS] * unit)
     drift = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
     shape = (*pose.shape[:-1], 6, 6)
-    F, Q, H = np.zeros(shape), np.zeros(shape), np.zeros((2, 6))
+    F = np.zeros(shape)
+    Q = np.zeros(shape)
+    H = np.zeros((2, 6))
     for i in range(2):
         at = slice(3 * i, 3 * i + 3)
         F[..., at, at] = [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]]
@@ -84,12 +87,15 @@ def _riccati(F: Array, Q: Array, H: Array) -> Array:
     """Return the steady covariance of the prediction, for measurements with unit noise, by doubling
     (B. D. O. Anderson, International Journal of Control 28 (1978), 295-306).
     """
-    A, X = np.swapaxes(F, -1, -2), Q
+    A = np.swapaxes(F, -1, -2)
+    X = Q
     G = np.broadcast_to(H.T @ H, F.shape)
     for _ in range(40):
         W = np.linalg.inv(np.eye(F.shape[-1]) + G @ X)
         further = np.swapaxes(A, -1, -2) @ X @ W @ A
-        G, A, X = G + A @ W @ G @ np.swapaxes(A, -1, -2), A @ W @ A, X + further
+        G = G + A @ W @ G @ np.swapaxes(A, -1, -2)
+        A = A @ W @ A
+        X = X + further
         if np.abs(further).max(initial=0.0) <= 1e-10 * np.abs(X).max(initial=0.0):
             break
     return X

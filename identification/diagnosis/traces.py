@@ -20,7 +20,8 @@ from .regression import RegressedFlights, Setting, without
 
 # least shares for a channel to carry an effect: of its deviance, in the forces or in the torques,
 # and of its wrench, with a changed input
-LEAST_SHARE, LEAST_CHANGE = 0.05, 0.01
+LEAST_SHARE = 0.05
+LEAST_CHANGE = 0.01
 ORDER = (
     "position",
     "attitude",
@@ -89,7 +90,8 @@ def carrying_channels(flights: RegressedFlights, setting: Setting, effect: str) 
     part = flights.residual(without(setting, effect)) - flights.residual(setting)
     noise = mean_square(flights.sensor_noise) + 1e-30
     force, torque = (mean_square(part) / noise).reshape(2, 3).sum(axis=1)
-    least, carrying = LEAST_SHARE * max(force + torque, 1e-30), {*_read(flights, setting, effect)}
+    least = LEAST_SHARE * max(force + torque, 1e-30)
+    carrying = {*_read(flights, setting, effect)}
     if force > least:
         carrying.add("accelerometer" if flights.inertial else "position")
     if torque > least and not flights.commanded:
@@ -102,7 +104,8 @@ def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[
     if get(effect).kind == "sensing":
         yield from ("position", "attitude")
         return
-    vehicle, less = flights.vehicle, without(setting, effect)
+    vehicle = flights.vehicle
+    less = without(setting, effect)
     unit = vehicle.weight * np.repeat([1.0, vehicle.arm_l], 3)
 
     def added(s: Signals) -> Array:

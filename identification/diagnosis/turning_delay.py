@@ -92,7 +92,9 @@ def turning_delay(
     best = minimize_scalar(
         deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
     )
-    seconds, least, near = float(best.x), float(best.fun), 0.1 * step
+    seconds = float(best.x)
+    least = float(best.fun)
+    near = 0.1 * step
     bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
     std = float(np.sqrt(2.0 / max(bend, 1e-6)))
     # a lag delays each frequency differently, and the frequencies shown by the loop are not known
@@ -112,7 +114,8 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
     moments = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
     for x, y in zip(moments.T, piece.angular_acceleration[:, :2].T, strict=True):
         f, xx = welch(x, rate, nperseg=length)
-        yy, xy = welch(y, rate, nperseg=length)[1], csd(x, y, rate, nperseg=length)[1]
+        yy = welch(y, rate, nperseg=length)[1]
+        xy = csd(x, y, rate, nperseg=length)[1]
         band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
         if np.all(xx[band] > 0) and np.all(yy[band] > 0):
             out.append(

@@ -34,7 +34,8 @@ def worth(
     if not setting:
         return {}
     rows = Rows(flights, fixed)
-    fit, left = rows.fit, rows.residual(setting)
+    fit = rows.fit
+    left = rows.residual(setting)
     power, noise = (mean_square(x[fit]) for x in (left, rows.noise()))
     size = np.sqrt(np.maximum(power - noise, NOISE_KNOWN**2 * noise)) + 1e-12
     nuisances = list(row_nuisances(rows).values())
