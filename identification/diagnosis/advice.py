@@ -51,8 +51,7 @@ def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str
             (x, dx), (y, dy) = (_relative(vehicle, e, setting[e], std[e]) for e in (a, b))
             off = np.subtract.outer(x, y)
             alike = SHARE * np.maximum.outer(np.abs(x), np.abs(y))
-            size = np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)
-            if np.all(np.abs(off) < MOST_APART * size):
+            if np.all(np.abs(off) < MOST_APART * np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)):
                 other = " or ".join(playing(third))
                 yield f"{a} and {b} change alike: {other} may be the one cause"
 
@@ -61,8 +60,7 @@ def _relative(vehicle: Vehicle, effect: str, values: Values, std: Values) -> Arr
     """Return the relative changes by an effect, and their standard deviations."""
     names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
     unit = np.array([unit_of_change((effect, name), vehicle) for name in names])
-    both = np.array([[values[name], std.get(name, 0.0)] for name in names])
-    return np.asarray(both.T / unit)
+    return np.asarray(np.array([[values[name], std.get(name, 0.0)] for name in names]).T / unit)
 
 
 def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:

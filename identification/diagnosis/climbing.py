@@ -6,7 +6,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ...runtime.errors import InputError
-from .evidence import set_evidence
 from .priors import Base, Setting, declared
 from .regression import RegressedFlights, coefficient
 
@@ -57,15 +56,15 @@ def linearised(
     """Return the height of a quadratic likelihood at the setting of its linearisation, and its mode
     within the limits of the coefficients.
     """
-    at = base.at(base.asked)
-    every = range(len(base.asked))
-    m = base.marginal(at, base.plain, power=power)
+    m = base.marginal(base.asked, base.plain, power)
+    every = range(len(m.at))
+    size = base.size[m.at]
     here = [setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]
-    z = np.array(here) / base.size[at]
-    value = 0.5 * (float(z @ z) - m.explained(every, z)) - m.constant
+    z = np.array(here) / size
+    value = 0.5 * (float(z @ z) - m.quadratic.explained(every, z)) - m.quadratic.constant
 
     def target() -> Setting:
-        best = set_evidence(m, every, base.low[at], base.high[at]).mode * base.size[at]
+        best = m.evidence(every).mode * size
         out = {e: dict(values) for e, values in setting.items()}
         for c, x in zip(base.asked, best.tolist(), strict=True):
             limits = coefficient(c)

@@ -67,5 +67,4 @@ def what_commands_show(flights: RegressedFlights, library: Sequence[str]) -> Giv
     }
     if thrust:  # only thrust over mass is known
         library = [e for e in library if e in first or get(e).role not in THRUST_FACTORS]
-    fixed = {late.name: dict(late.coefficients)} if late else {}
-    return Given(library, first, fixed, late)
+    return Given(library, first, {late.name: dict(late.coefficients)} if late else {}, late)

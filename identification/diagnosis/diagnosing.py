@@ -245,8 +245,7 @@ class Judged:
             self.structure = (Structure(group, where, gained / fitted.posterior.left()),)
         some = self.balance.noisy or disturbed > 0.0 or bool(self.pushes)
         self.remainder = "structured" if structured else "random" if some else "none"
-        biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
-        by_bias = fitted.posterior.shown(biases)
+        by_bias = fitted.posterior.shown([("", f"{NUISANCE}{name}") for _, name in flights.biases])
         unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
         self.hidden = {e for e in unseen if by_bias[e] >= LEAST_SHOWN}
         self.unseen = unseen - self.hidden
@@ -294,8 +293,7 @@ class Judged:
         for name, value in best.coefficients[effect].items():
             off = abs(value - own.get(name, 0.0))
             std = stds.get(name, 0.0)
-            least = LEAST_SIZE * typical_size((effect, name), flights.vehicle)
-            if off > least and std:
+            if off > LEAST_SIZE * typical_size((effect, name), flights.vehicle) and std:
                 most = max(most, _apart(off, std))
         return most
 
@@ -434,23 +432,16 @@ def _predicted(
     flights: RegressedFlights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]]
 ) -> Pair:
     """Return how far a model's predictions of the held-out stretches are off: NIS, and m RMS."""
-    nis = []
-    distance = []
-    weight = []
+    each = []
     for i, log in enumerate(flights.logs):
-        own = [(a, b) for k, a, b in segments if k == i]
-        if own:
-            nis.append(nis_without_wrench_state(log, vehicle, own))
-            distance.append(rollout_error(log, vehicle, own))
-            weight.append(sum(b - a for a, b in own))
-    squares = np.square(distance)
-    return _mean(np.array(nis), weight), float(np.sqrt(_mean(squares, weight)))
+        if own := [(a, b) for k, a, b in segments if k == i]:
+            distance = rollout_error(log, vehicle, own)
+            seconds = sum(b - a for a, b in own)
+            each.append((nis_without_wrench_state(log, vehicle, own), distance * distance, seconds))
+    nis, squares, weight = np.array(each).reshape(-1, 3).T
+    return _mean(nis, weight), math.sqrt(_mean(squares, weight))
 
 
-def _mean(values: Array, weight: Sequence[float]) -> float:
+def _mean(values: Array, weight: Array) -> float:
     good = np.isfinite(values)
-    return (
-        float(np.average(values[good], weights=np.array(weight)[good]))
-        if good.any()
-        else float("nan")
-    )
+    return float(np.average(values[good], weights=weight[good])) if good.any() else math.nan

@@ -180,8 +180,7 @@ def variables(whole: FlightState) -> NamedArrays:
         "thrust": whole.rotors[:, 0],
         "yaw rate": whole.angular_velocity[:, 2],
     }
-    scaled = {name: _scaled(x) for name, x in raw.items()}
-    return {name: x for name, x in scaled.items() if x.any()}
+    return {name: z for name, x in raw.items() if (z := _scaled(x)).any()}
 
 
 def changing_columns(parts: ArrayMap, followed: ArrayMap) -> Columns:

@@ -207,11 +207,9 @@ class Likelihood:
         speeds = np.concatenate([p.rotor_speeds for p in self.pieces]).mean(axis=0)
         off = self._rounding_std * np.vstack([np.zeros(4), np.eye(4)])
         wrenches = self.vehicle.rotor_wrench(speeds + off)
-        steps = wrenches[1:] - wrenches[0]
         # between two samples the mean of both counts
-        wrench = np.sqrt(np.sum(np.square(steps), axis=0) / 2.0)
-        out = np.array([0.0, 0.0, *wrench]) / self.flights.inertias
-        return np.maximum(out, 1e-9)
+        wrench = np.sqrt(np.sum(np.square(wrenches[1:] - wrenches[0]), axis=0) / 2.0)
+        return np.maximum(np.array([0.0, 0.0, *wrench]) / self.flights.inertias, 1e-9)
 
     def _search_noise(self, explained: Sequence[Array] | None = None) -> None:
         """Take the likeliest noise, and the likeliest gains on the rotors' innovations.
@@ -320,8 +318,7 @@ class Likelihood:
         """
         effect, name = column
         delta = STEP * typical_size(column, self.flights.vehicle)
-        own = EffectSetting(effect, {name: delta})
-        vehicle = replace(self.flights.vehicle, effects=(own,))
+        vehicle = replace(self.flights.vehicle, effects=(EffectSetting(effect, {name: delta}),))
         out = []
         for piece, track in zip(self.pieces, self.tracks, strict=True):
             log = FlightLog(
@@ -435,8 +432,7 @@ class Likelihood:
         change[:, :3] = 0.0
         axis = [c.name for c in get(column[0]).coefficients].index(column[1])
         (marker,) = playing(Role.MARKER)
-        place = self._moved((marker, get(marker).coefficients[axis].name))
-        self._posed[column] = -place
+        self._posed[column] = -self._moved((marker, get(marker).coefficients[axis].name))
 
     def _add_model_errors(self) -> None:
         """Add the columns of slightly larger forces and torques, and of the torques expected from
@@ -552,8 +548,7 @@ class Likelihood:
                     count += 1
             first += len(track.position)
         penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
-        blocks = products[:count]
-        return in_prior_units(self.flights, names, blocks, penalty, self.setting, starts)
+        return in_prior_units(self.flights, names, products[:count], penalty, self.setting, starts)
 
     def _changes(
         self,

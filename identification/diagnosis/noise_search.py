@@ -129,8 +129,7 @@ class NoiseSearch:
         """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
         covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
         """
-        numbers = range(SEARCHED)
-        noise = [self._noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in numbers]
+        noise = [self._noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in range(SEARCHED)]
         moved = PoseNoise(*(np.stack(each) for each in zip(*map(astuple, noise), strict=True)))
         there = steady_filter(moved, self.period, self.gravity)
         gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)

@@ -12,8 +12,7 @@ import numpy as np
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
 from ..logs.table import Array, NamedNumbers, Pair, Values
-from .evidence import Index, Marginal, SetEvidence, marginal
-from .log_offsets import TIMINGS
+from .evidence import Index, Marginal, SetEvidence, marginal, set_evidence
 from .regression import (
     CENTRAL,
     START_PREFIX,
@@ -82,7 +81,7 @@ class Base:
     effects: Effects  # of the setting
     plain: Index  # nuisances of any flight
     typical: Array  # (c,) typical sizes in prior standard deviations
-    dictionary: Index  # columns of the discrepancy
+    dictionary: Sequence[Column]  # columns of the discrepancy
     starts: Starts
     # the evidence of sets, by the likelihood's power and their columns; None for an impossible set
     tried: dict[tuple[float, tuple[Variant, ...]], SetEvidence | None] = field(default_factory=dict)
@@ -102,14 +101,20 @@ class Base:
         return [c for c in self.columns if c[0]]
 
     def marginal(
-        self, asked: Index, others: Index, size: Array | None = None, power: float = 1.0
-    ) -> Marginal:
+        self,
+        asked: Sequence[Column],
+        others: Index,
+        power: float = 1.0,
+        size: Array | None = None,
+    ) -> "Asked":
         """Return the likelihood, to a power, of the columns asked about, with others integrated
         out; ``size``: standard deviations of their prior, if not their own.
         """
         products = power * self.total
         products[-1, -1] += power * self.penalty
-        return marginal(products, asked, others, np.ones(len(others)) if size is None else size)
+        at = self.at(asked)
+        size = np.ones(len(others)) if size is None else size
+        return Asked(self, asked, at, marginal(products, at, others, size))
 
     def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, Pair]:
         """Return the coefficients of some columns at the mode without all others, and their
@@ -121,6 +126,29 @@ class Base:
         std = np.sqrt(np.diag(np.linalg.inv(normal))) * self.size[chosen]
         modes = zip(chosen, mode.tolist(), std.tolist(), strict=True)
         return {self.names[i]: (x, s) for i, x, s in modes}
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """The likelihood of some columns of a base, with all others integrated out."""
+
+    base: Base
+    columns: Sequence[Column]
+    at: Index  # in the base
+    quadratic: Marginal
+
+    @cached_property
+    def place(self) -> dict[Column, int]:
+        """The index of each column."""
+        return {c: i for i, c in enumerate(self.columns)}
+
+    def evidence(self, index: Sequence[int]) -> SetEvidence:
+        """Return the evidence of some of the columns, by their index."""
+        return set_evidence(self.quadratic, index, self.base.low[self.at], self.base.high[self.at])
+
+    def explained(self, index: Sequence[int]) -> float:
+        """Return the deviance explained by some of the columns, by their index."""
+        return self.quadratic.explained(index, self.evidence(index).mode)
 
 
 def bare(column: Column) -> Column:
@@ -150,14 +178,13 @@ def variants_of(
 def prior_size(column: Column, flights: RegressedFlights) -> float:
     """Return the standard deviation of a column's coefficient before a flight is seen."""
     effect, name = column
-    if column in TIMINGS:
-        return TIMINGS[column].size
     if not effect:
         if name == BETWEEN:
             return PRIORS.between_samples
         if name.startswith(GAIN):
             return PRIORS.gains[int(name[-1])]
-        return PRIORS.model_error if name.startswith(MODEL_ERROR) else 1.0
+        is_error = name.startswith(MODEL_ERROR)
+        return PRIORS.model_error if is_error else typical_size(column, flights.vehicle)
     if name.startswith(START_PREFIX) or name == CENTRAL:
         return 1.0
     factor = PRIORS.any_size if get(effect).any_size else 1.0
@@ -220,11 +247,11 @@ def in_prior_units(
     blocks *= scale[:, None]
     blocks *= scale
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
-    plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
-    dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
     typical = np.array([typical_size(c, flights.vehicle) for c in own])
     total = blocks.sum(axis=0)
-    single = np.delete(np.arange(len(names)), dictionary)
+    free = np.array([not effect for effect, _ in names], dtype=np.bool_)
+    unknown = np.array([name.startswith(UNKNOWN) for _, name in names], dtype=np.bool_)
+    single = np.flatnonzero(~unknown)
     held = np.append(single, len(names))
     return Base(
         names,
@@ -236,8 +263,8 @@ def in_prior_units(
         single,
         penalty,
         frozenset(k for k in setting if k),
-        np.array(plain, dtype=np.intp),
+        np.flatnonzero(free & ~unknown),
         typical / size,
-        np.array(dictionary, dtype=np.intp),
+        [c for c in names if c[1].startswith(UNKNOWN)],
         starts,
     )

@@ -21,7 +21,6 @@ from ...dynamics.effects import get
 from ..findings import Disturbance, Ranking
 from ..logs.table import Array, Names, Pair, Values
 from .climbing import Height, linearised, mode
-from .evidence import set_evidence
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts, prior_size
 from .regression import (
@@ -78,8 +77,7 @@ def rank(
     """
 
     def height(x: Setting, near: Likelihood) -> Height:
-        base = Likelihood(flights, x, near, same_noise=True).base(x, {})
-        return linearised(flights, base, x)
+        return linearised(flights, Likelihood(flights, x, near, same_noise=True).base(x, {}), x)
 
     def fitted(setting: Setting, near: Likelihood) -> Likelihood:
         report(f"trying {', '.join(setting)}")
@@ -255,12 +253,10 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     if not hidden or not best:
         return {}
     base = likelihood.base(best, {}, [*best, *hidden])
-    at = base.at(base.asked)
-    m = base.marginal(at, base.plain, power=likelihood.power)
+    m = base.marginal(base.asked, base.plain, likelihood.power)
 
     def explained(effects: set[str]) -> float:
-        index = [i for i, (effect, _) in enumerate(base.asked) if effect in effects]
-        return m.explained(index, set_evidence(m, index, base.low[at], base.high[at]).mode)
+        return m.explained([i for c, i in m.place.items() if c[0] in effects])
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)

@@ -468,8 +468,7 @@ class RegressedFlights:
         the file states some. All may have changed where it states all.
         """
         own = self._declared.get(effect, {})
-        every = {c.name for c in get(effect).coefficients} - {CENTRAL}
-        return own if every - set(own) else {}
+        return own if {c.name for c in get(effect).coefficients} - {CENTRAL, *own} else {}
 
     def columns_of(self, effects: Iterable[str]) -> list[Column]:
         """Return the columns of effects: their coefficients except for the fixed ones, and for
@@ -486,8 +485,7 @@ class RegressedFlights:
         """Return whether an effect's force is not linear in its coefficients, with no values of all
         of them in a file to linearise about.
         """
-        whole = effect in self._declared and not self.stated(effect)
-        return is_nonlinear(effect) and not whole
+        return is_nonlinear(effect) and not (effect in self._declared and not self.stated(effect))
 
     def residual(self, setting: Setting) -> Array:
         """Return the residual (rows, 6) with these effects.

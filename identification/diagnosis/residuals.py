@@ -60,8 +60,7 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
     noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
     old = np.square(before[held_out])
-    new = np.square(after[held_out])
-    change = np.mean((new - old) / (old.mean(axis=0) + 1e-30), axis=1)
+    change = np.mean((np.square(after[held_out]) - old) / (old.mean(axis=0) + 1e-30), axis=1)
     block = flights.block[held_out]
     blocks = np.array([change[block == b].mean() for b in np.unique(block)])
     return Balance(
@@ -80,8 +79,7 @@ def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:
     negligible one; ``-inf`` without a fitted disturbance.
     """
     slow = [x.unanswered_below(CUTOFFS.calm_hz) for x in disturbances]
-    calm = CALM * weight_and_torque(vehicle)
-    return float(np.log(np.max(slow / calm))) if slow else -np.inf
+    return float(np.log(np.max(slow / (CALM * weight_and_torque(vehicle))))) if slow else -np.inf
 
 
 def transient_disturbances(
@@ -99,8 +97,7 @@ def transient_disturbances(
     inner = np.concatenate([rows[edge : len(rows) - edge] for rows in flights.runs])
     if not inner.size:
         return []
-    weight = flights.vehicle.weight
-    least = LEAST_TRANSIENT * weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
+    least = LEAST_TRANSIENT * flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
     largest: dict[str, tuple[float, TransientDisturbance]] = {}
     for cutoff in CUTOFFS.transient_hz:
         slow = flights.low_passed(residual, cutoff)

@@ -78,9 +78,7 @@ def _predicted(pieces: Seen, rotors: list[Array]) -> list[Array]:
     x = np.concatenate([_known_before(track, now) for (_, track), now in each])
     later = [now[LAGS:] for now in rotors]
     y = np.concatenate(later)
-    mean = x.mean(axis=0)
-    size = np.maximum(x.std(axis=0), 1e-12)
-    z = np.column_stack([(x - mean) / size, np.ones(len(x))])
+    z = np.column_stack([(x - x.mean(axis=0)) / np.maximum(x.std(axis=0), 1e-12), np.ones(len(x))])
     normal = z.T @ z
     # against columns nearly alike, and constant ones: all others have a square of one
     normal += 1e-6 * len(z) * np.eye(len(normal))

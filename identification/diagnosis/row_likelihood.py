@@ -86,8 +86,7 @@ class RowLikelihood:
         for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
-            z = noise.white(y)[use].ravel()
-            mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
+            mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ noise.white(y)[use].ravel())
             left = y - X[:, :, :known] @ mode[:known]
             noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
         return noise, X[:, :, : len(own)] @ mode[: len(own)]
@@ -126,7 +125,7 @@ class RowLikelihood:
             columns |= self._dictionary(setting)
         x = self._white(np.stack([*columns.values(), residual], axis=2))
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
-        parts = [p.reshape(-1, p.shape[2]) for p in np.split(x, ends)]
+        parts = (p.reshape(-1, x.shape[2]) for p in np.split(x, ends))
         blocks = np.array([p.T @ p for p in parts])
         return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
 
@@ -164,7 +163,7 @@ class RowLikelihood:
         integrated out.
         """
         base = self.base(setting, {}, ())
-        m = base.marginal(base.at(()), base.plain, power=self.power)
+        m = base.marginal((), base.plain, self.power).quadratic
         off = [
             (setting[c[0]].get(c[1], 0.0) - declared(c, self.flights)) / prior_size(c, self.flights)
             for c in self.flights.columns_of(setting)

@@ -69,8 +69,7 @@ class Rows:
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
         self._inertias = flights.inertias
-        least = LEAST * weight_and_torque(flights.vehicle) / flights.inertias
-        force, torque = np.split(least, 2)
+        force, torque = np.split(LEAST * weight_and_torque(flights.vehicle) / flights.inertias, 2)
         self.least = np.concatenate(
             [force] * (1 + self.has_accelerometer) + [torque] * self.with_torques
         )

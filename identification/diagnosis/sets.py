@@ -19,7 +19,6 @@ from .evidence import (
     Marginal,
     SetEvidence,
     evidence_of_one_more,
-    set_evidence,
     tempering,
 )
 from .priors import (
@@ -176,12 +175,10 @@ class Posterior:
     def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
         base = self.bases[number]
         asked = base.at(base.asked)
-        at = {c: i for i, c in enumerate(base.asked)}
         # integrated out: everything any flight may have, and a little of every effect
-        little = np.concatenate([np.ones(len(base.plain)), self._negligible(base, asked)])
-        m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
-        low = base.low[asked]
-        high = base.high[asked]
+        little = np.append(np.ones(len(base.plain)), self._negligible(base, asked))
+        m = base.marginal(base.asked, np.append(base.plain, asked), self.power, little)
+        at = m.place
         variants = self._variants(base)
         ways = Counter(v[0][0] for v in variants)
         p = self.inclusion
@@ -195,9 +192,9 @@ class Posterior:
                 index = [at[c] for v in some for c in v]
                 base.tried[self.power, some] = None
                 with suppress(np.linalg.LinAlgError):
-                    first_evidence = set_evidence(m, index, low, high)
-                    if self._possible(_Candidate(base, some, first_evidence)):
-                        base.tried[self.power, some] = first_evidence
+                    new = _Candidate(base, some, m.evidence(index))
+                    if self._possible(new):
+                        base.tried[self.power, some] = new.evidence
             if (evidence := base.tried[self.power, some]) is None:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)
@@ -252,8 +249,8 @@ class Posterior:
         for base in (self.bases[-1], *((quieter,) if quieter else ())):
             m = self._dictionary_beside_best(base)
             groups: dict[str, list[int]] = {}
-            for i, at in enumerate(base.dictionary.tolist()):
-                groups.setdefault(base.names[at][1].split(": ")[0], []).append(i)
+            for i, (_, name) in enumerate(base.dictionary):
+                groups.setdefault(name.split(": ")[0], []).append(i)
             factors = [evidence_of_one_more(m, i, UNKNOWN_SIZES) for i in groups.values()]
             none.append(m.constant)
             more.append(m.constant + float(logsumexp(factors)) - math.log(len(factors)))
@@ -268,7 +265,7 @@ class Posterior:
         coefficients = m.right / m.own
         gains = m.right * coefficients
         best = int(np.argmax(gains))
-        return base.names[base.dictionary[best]], float(coefficients[best]), float(gains[best])
+        return base.dictionary[best], float(coefficients[best]), float(gains[best])
 
     def log_bayes_factor(self, effect: str) -> float:
         """Return the log-likelihood ratio of the likeliest set with an effect to the likeliest
@@ -277,29 +274,23 @@ class Posterior:
         each = math.log(self.inclusion / (1.0 - self.inclusion))
         value = {key: x - each * len(key) for key, x in self.scores.items()}
         have = max(x for key, x in value.items() if effect in key)
-        lack = max((x for key, x in value.items() if effect not in key), default=-math.inf)
-        return have - lack
+        return have - max((x for key, x in value.items() if effect not in key), default=-math.inf)
 
     def factor_in_set(self, effect: str) -> float:
         """Return the logarithm of the Bayes factor of the likeliest set over the same without an
         effect, with nothing in its place.
         """
         base, best = self._likeliest()
-        asked = base.at(base.asked)
-        m = base.marginal(asked, base.plain, power=self.power)
-        low = base.low[asked]
-        high = base.high[asked]
-        place = {c: i for i, c in enumerate(base.asked)}
+        m = base.marginal(base.asked, base.plain, self.power)
         whole, rest = (
-            set_evidence(m, [place[c] for c in best.columns if c[0] != out], low, high)
-            for out in ("", effect)
+            m.evidence([m.place[c] for c in best.columns if c[0] != out]) for out in ("", effect)
         )
         return whole.log_evidence - rest.log_evidence
 
     def left(self) -> float:
         """Return the deviance left by the likeliest set, with the nuisances integrated out."""
         base, best = self._likeliest()
-        m = base.marginal(base.at(best.columns), base.plain, power=self.power)
+        m = base.marginal(best.columns, base.plain, self.power).quadratic
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
@@ -311,17 +302,15 @@ class Posterior:
         base = next(x for x in self.bases if x.effects == given)
         asked = [c for c in base.asked if c[0] not in given]
         always = base.at(c for c in base.asked if c[0] in given)
-        at = base.at(asked)
-        index = {c: i for i, c in enumerate(asked)}
-        m = base.marginal(at, np.append(base.plain, always), power=self.power)
-        normal = m.normal + np.eye(len(asked))
-        whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
+        m = base.marginal(asked, np.append(base.plain, always), self.power)
+        right = m.quadratic.right
+        normal = m.quadratic.normal + np.eye(len(asked))
+        whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
         out: NamedNumbers = {}
         for columns in self._variants(base):
             if (effect := columns[0][0]) not in given:
-                own = [index[c] for c in columns]
-                z = set_evidence(m, own, base.low[at], base.high[at]).mode
-                out[effect] = max(out.get(effect, 0.0), m.explained(own, z) / whole)
+                gained = m.explained([m.place[c] for c in columns])
+                out[effect] = max(out.get(effect, 0.0), gained / whole)
         return out
 
     def nuisances(self) -> dict[Column, Pair]:
@@ -338,17 +327,17 @@ class Posterior:
         """
         base, best = self._likeliest()
         others = np.append(np.setdiff1d(base.plain, base.at(known)), base.at(best.columns))
-        m = base.marginal(base.at(base.asked), others, power=self.power)
-        index = {c: i for i, c in enumerate(base.asked)}
+        m = base.marginal(base.asked, others, self.power)
         out: NamedNumbers = {}
         for columns in self._variants(base):
             (effect, name), *_ = columns
-            if name.startswith(START_PREFIX) or effect in {v[0][0] for v in best.variants}:
+            if name.startswith(START_PREFIX) or effect in {e for e, _ in best.columns}:
                 continue
             sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
-            i = [index[c] for c in columns]
-            out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
+            i = [m.place[c] for c in columns]
+            change = float(z @ m.quadratic.normal[np.ix_(i, i)] @ z)
+            out[effect] = max(change, out.get(effect, 0.0))
         return out
 
     def _dictionary_beside_best(self, base: Base) -> Marginal:
@@ -365,7 +354,8 @@ class Posterior:
         chosen = np.concatenate([base.plain, own, asked, changing])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
         power = self.power * (1.0 if varied else ROUNDED)
-        return base.marginal(base.dictionary, chosen, np.concatenate([ones, little, wrong]), power)
+        size = np.concatenate([ones, little, wrong])
+        return base.marginal(base.dictionary, chosen, power, size).quadratic
 
     def best_setting(self, most: int = MOST_EFFECTS) -> Setting:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""

@@ -76,8 +76,7 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     units = np.array([1.0, 1.0 / period, 1.0 / period**2])
     for i in range(2):
         for j in range(2):
-            ratio = pose[..., i] / pose[..., j]
-            at = K[..., 3 * i : 3 * i + 3, j] * ratio[..., None] * units
+            at = K[..., 3 * i : 3 * i + 3, j] * (pose[..., i] / pose[..., j])[..., None] * units
             gain[..., PAIRS[:, i], :, int(i != j)] = np.moveaxis(at, -2, 0)
             covariance[..., PAIRS[:, i], PAIRS[:, j]] = S[..., i, j] * pose[..., i] * pose[..., j]
     return SteadyFilter(gain, keep, covariance)

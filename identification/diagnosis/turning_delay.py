@@ -99,8 +99,7 @@ def turning_delay(
     std = float(np.sqrt(2.0 / max(bend, 1e-6)))
     # a lag delays each frequency differently, and the frequencies shown by the loop are not known
     omega = spectra[0].omega
-    spread = float(np.std(behind(omega, 0.0) / omega))
-    std = math.hypot(std, spread, 0.5 * held / math.sqrt(12.0))
+    std = math.hypot(std, float(np.std(behind(omega, 0.0) / omega)), 0.5 * held / math.sqrt(12.0))
     clear = -least > LEAST_LOG_LIKELIHOOD_RATIO and seconds - 0.25 * held > 2.0 * std
     return (seconds, std, -least) if clear else None
 

@@ -45,8 +45,7 @@ def worth(
         less = without(setting, effect)
         part = rows.residual(less) - left
         # a drag acts otherwise in still air than in a wind
-        still = get(effect).sets_wind
-        others = rows.columns(less, flights.columns_of(less)) if still else columns
+        others = rows.columns(less, flights.columns_of(less)) if get(effect).sets_wind else columns
         # of every set, or of another family
         own = [
             x * prior_size(c, flights)
