@@ -93,17 +93,12 @@ class Likelihood:
         self.flights = flights
         self.setting = setting
         self.vehicle = flights.amended(setting)
-        self.pieces: list[Poses]
         self.tracks: list[Track]
         self.known: list[Array]
-        self._fit: list[Mask]  # (n,) samples open to the fit
-        if near is not None and sensing_of(near.vehicle) == sensing_of(self.vehicle):
-            self.pieces = near.pieces
-            self._fit = near._fit
-        else:
+        if near is None or sensing_of(near.vehicle) != sensing_of(self.vehicle):
             finer = iter(near.finer if near else ())
-            self.pieces = []
-            self._fit = []
+            self.pieces: list[Poses] = []
+            self._fit: list[Mask] = []  # (n,) samples open to the fit
             for i, log in enumerate(flights.logs):
                 rows = flights.log == i
                 if not flights.fit_rows[rows].any():  # a test log
@@ -112,6 +107,9 @@ class Likelihood:
                     at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
                     self.pieces.append(piece)
                     self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
+        else:
+            self.pieces = near.pieces
+            self._fit = near._fit
         self.period = self.pieces[0].period
         lengths = [len(piece.t) for piece in self.pieces]
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
@@ -135,9 +133,7 @@ class Likelihood:
             self._run(self.steady, self._said(self._jumps(), self.gains))
         else:
             self._search_noise()
-        self.signals = [
-            _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
-        ]
+        self.signals = [_signals(piece, track) for piece, track in self._seen]
         self._base = self._accelerations(setting, self.signals)
         # the effect of a unit of each column on the accelerations, or on the measured pose (n, 6),
         # of all pieces in turn, kept once computed. Columns any flight may have change little with
@@ -152,19 +148,21 @@ class Likelihood:
         if not self._acting:
             self._add_what_any_flight_may_have()
 
+    @property
+    def _seen(self) -> list[tuple[Poses, Track]]:
+        return list(zip(self.pieces, self.tracks, strict=True))
+
     def _see_rotors(self) -> None:
         nothing = [np.zeros((len(piece.t), 6, 3)) for piece in self.pieces]
         self._run(self.steady, nothing)
-        seen = list(zip(self.pieces, self.tracks, strict=True))
         if self._rounding_std:
-            self.finer = unrounded(seen, self.vehicle.omega_lsb)
+            self.finer = unrounded(self._seen, self.vehicle.omega_lsb)
             self.pieces = [
                 replace(piece, rotor_speeds=piece.rotor_speeds + x)
                 for piece, x in zip(self.pieces, self.finer, strict=True)
             ]
             self._run(self.steady, nothing)
-            seen = list(zip(self.pieces, self.tracks, strict=True))
-        self.answers = rotor_innovations(seen)
+        self.answers = rotor_innovations(self._seen)
 
     @property
     def steady(self) -> SteadyFilter:
@@ -280,14 +278,9 @@ class Likelihood:
         turning = np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T
         return np.column_stack([wrench[:, :3] / self.flights.vehicle.mass, turning])
 
-    def _change(
-        self, setting: Setting, step: float = 1.0, signals: Iterable[Signals] | None = None
-    ) -> Array:
-        """Return the change of the acceleration (n, 6) with another setting and other signals, over
-        a step.
-        """
-        there = self._accelerations(setting, self.signals if signals is None else signals)
-        return (there - self._base) / step
+    def _change(self, setting: Setting) -> Array:
+        """Return the change of the acceleration (n, 6) with another setting."""
+        return self._accelerations(setting, self.signals) - self._base
 
     def _add(self, column: Column) -> None:
         """Add a coefficient's column, unless it is there already or no such vehicle is possible."""
@@ -307,7 +300,7 @@ class Likelihood:
         value, delta = self.flights.step(self.setting, (effect, name))
         there = {**self.setting, effect: {**own, name: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
-            change = self._change(there, delta)
+            change = self._change(there) / delta
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
             self._acting[column] = change
@@ -320,7 +313,7 @@ class Likelihood:
         delta = STEP * typical_size(column, self.flights.vehicle)
         vehicle = replace(self.flights.vehicle, effects=(EffectSetting(effect, {name: delta}),))
         out = []
-        for piece, track in zip(self.pieces, self.tracks, strict=True):
+        for piece, track in self._seen:
             log = FlightLog(
                 piece.t, track.predicted[:, :3], track.predicted[:, 3:], piece.rotor_speeds
             )
@@ -363,7 +356,7 @@ class Likelihood:
                 moved = [x * self._moved((effect, name)) for name, x in own.items()]
                 poses[effect] = np.sum(moved, axis=0)
             else:
-                parts[effect] = self._change(without(self.setting, effect), -1.0)
+                parts[effect] = -self._change(without(self.setting, effect))
         followed = variables(joined(self.tracks)[0])
         self._acting |= changing_columns(parts, followed)
         self._posed |= changing_columns(poses, followed)
@@ -377,7 +370,7 @@ class Likelihood:
             u = s.rotor_speeds.copy()
             u[2:] += np.diff(s.rotor_speeds, 2, axis=0)
             bent.append(replace(s, rotor_speeds=u))
-        self._acting["", BETWEEN] = self._change(self.setting, signals=bent)
+        self._acting["", BETWEEN] = self._accelerations(self.setting, bent) - self._base
         self._add_model_errors()
         self._add_answers()
         moved = []

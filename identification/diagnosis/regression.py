@@ -331,7 +331,8 @@ class RegressedFlights:
         if is_nonlinear(effect):
             setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
             return [self.residual({}) - self.residual(setting)]
-        columns = self.columns({}, [c for c in own if c[1] != CENTRAL], LARGE_STEP)
+        wanted = (c for c in own if c[1] != CENTRAL)
+        columns = self.columns({}, wanted, self.residual, LARGE_STEP)
         return [typical_size(c, self.vehicle) * x for c, x in columns.items()]
 
     def _in_own_axes(self, x: Array, noisy: "RegressedFlights") -> Array:
@@ -416,10 +417,7 @@ class RegressedFlights:
         return pieces
 
     def _piece(self, log: int, signals: Signals, rows: Index) -> FlightPiece:
-        needed = needed_wrench(signals, self.vehicle)
-        if self.commanded:
-            needed[:, 3:] = 0.0
-        needed = _smooth(needed, signals)[rows]
+        needed = _smooth(needed_wrench(signals, self.vehicle), signals)[rows]
         felt = None
         if not self.inertial and (read := _accelerometer(self.logs[log])):
             at = resampled(signals.t, *read)
@@ -496,31 +494,28 @@ class RegressedFlights:
         key = tuple((name, *sorted(values.items())) for name, values in setting.items())
 
         def made() -> Array:
-            vehicle = self.amended(setting)
-            left = []
-            for piece in self.pieces(setting):
-                acting = self.acting(piece.signals, setting, piece.log, vehicle)
-                if self.commanded:
-                    acting[:, 3:] = 0.0
-                left.append(piece.needed - piece.smooth(acting))
-            out = np.concatenate(left)
+            out = np.concatenate(
+                [
+                    piece.needed - piece.smooth(self.acting(piece.signals, setting, piece.log))
+                    for piece in self.pieces(setting)
+                ]
+            )
+            if self.commanded:
+                out[:, 3:] = 0.0
             out.setflags(write=False)
             return out
 
         # a fit asks several times for the residual at its setting
         return _kept(self._residuals, key, made, 16)
 
-    def acting(
-        self, signals: Signals, setting: Setting, log: int = 0, vehicle: Vehicle | None = None
-    ) -> Array:
-        """Return these effects' force and torque (n, 6) on the vehicle along signals of a log;
-        ``vehicle`` is the amended one, if at hand.
+    def acting(self, signals: Signals, setting: Setting, log: int = 0) -> Array:
+        """Return these effects' force and torque (n, 6) on the vehicle along signals of a log.
 
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
         like the residual.
         """
-        vehicle = vehicle or self.amended(setting)
-        offsets = setting.get(ROTOR_TIME_OFFSET[0], {})
+        vehicle = self.amended(setting)
+        offsets = setting.get("", {})
         s = with_time_offsets(signals, offsets)
         s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
         wrench, _ = acting_wrench(s, vehicle, self.vehicle)
@@ -552,19 +547,18 @@ class RegressedFlights:
         self,
         setting: Setting,
         wanted: Iterable[Column],
+        residual: Callable[[Setting], Array],
         step: float = STEP,
-        residual: Callable[[Setting], Array] | None = None,
     ) -> dict[Column, Array]:
         """Return the columns of coefficients, for a residual (rows, 6) of these flights.
 
         So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
         typical sizes.
         """
-        left = residual or self.residual
-        return {column: self._slope(setting, column, step, left) for column in wanted}
+        return {column: self._slope(setting, column, residual, step) for column in wanted}
 
     def _slope(
-        self, setting: Setting, column: Column, step: float, residual: Callable[[Setting], Array]
+        self, setting: Setting, column: Column, residual: Callable[[Setting], Array], step: float
     ) -> Array:
         effect, name = column
         own = self.coefficients(setting, effect)

@@ -75,12 +75,12 @@ class Rows:
         )
         self.rotation = flights.at_rows("rotation")
 
-    def from_world(
-        self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
-    ) -> Array:
-        """Return rows of accelerations in the world frame; arguments as of ``from_body``."""
-        felt = None if accelerometer is None else in_body(accelerometer, self.rotation)
-        return self.from_body(in_body(pose, self.rotation), felt, torque)
+    def from_world(self, x: Array, felt: bool = True) -> Array:
+        """Return rows of accelerations (samples, 6): m/s2 in the world frame, and rad/s2 in body
+        axes; ``felt``: whether an accelerometer reads them as well.
+        """
+        pose = in_body(x[:, :3], self.rotation)
+        return self.from_body(pose, felt * pose, x[:, 3:])
 
     def from_body(
         self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
@@ -120,9 +120,8 @@ class Rows:
 
     def noise(self) -> Array:
         """Return rows of the sensors' noise, as far as visible in the logs."""
-        noise = self.flights.visible_noise / self._inertias
-        return self.from_world(noise[:, :3], np.zeros_like(noise[:, :3]), noise[:, 3:])
+        return self.from_world(self.flights.visible_noise / self._inertias, felt=False)
 
     def columns(self, setting: Setting, wanted: Iterable[Column]) -> dict[Column, Array]:
         """Return the columns of coefficients (n, channels), by differences."""
-        return self.flights.columns({**self.fixed, **setting}, wanted, residual=self.residual)
+        return self.flights.columns({**self.fixed, **setting}, wanted, self.residual)
