@@ -70,12 +70,11 @@ def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
     knows this.
     """
     seen = flights.fit_rows
-    vehicle = flights.vehicle
-    thrust = vehicle.rotor_wrench(flights.at_rows("rotor_speeds"))[:, 0]
+    thrust = flights.vehicle.rotor_wrench(flights.at_rows("rotor_speeds"))[:, 0]
     for name, unit, values in (
         ("the speed", "m/s", np.linalg.norm(flights.at_rows("velocity"), axis=1)),
         ("the turn rate", "rad/s", np.linalg.norm(flights.at_rows("angular_velocity"), axis=1)),
-        ("the thrust", "weights", thrust / vehicle.weight),
+        ("the thrust", "weights", thrust / flights.vehicle.weight),
     ):
         most = float(np.quantile(values[seen], KNOWN))
         beyond = values[~seen] > most

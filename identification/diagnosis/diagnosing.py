@@ -113,7 +113,6 @@ def diagnose(
     said = Judged(flights, [n for n in names() if n not in without], settings, report)
     effects = said.effects
     residuals = said.balance
-    setting = said.setting
     sure = said.remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
@@ -122,7 +121,7 @@ def diagnose(
     else:
         verdict = "nothing to explain" if sure else "unexplained"
     report("predicting the flights")
-    named = {e: x for e, x in setting.items() if e}
+    named = {e: x for e, x in said.setting.items() if e}
     amended = flights.amended(named) if named else vehicle
     notes += [*said.notes, *outside_the_fit(flights)]
     segments = _segments(flights)
@@ -145,7 +144,7 @@ def diagnose(
         candidates=said.candidates,
         traces=tuple(said.traces()),
         signatures=tuple(
-            signature(flights, setting, e.name, said.parts[e.name], residuals.after)
+            signature(flights, said.setting, e.name, said.parts[e.name], residuals.after)
             for e in effects
         ),
         structure=said.structure,
@@ -203,7 +202,7 @@ class Judged:
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
         self.ranking = fitted.ranking
-        best = fitted.ranking.sets[0]
+        best = self._best = fitted.ranking.sets[0]
         self.setting = {e: dict(x) for e, x in {**given.fixed, **fitted.setting}.items()}
         if fitted.sensors:
             self.setting[""] = {name: value for name, (value, _) in fitted.sensors.items()}
@@ -217,7 +216,6 @@ class Judged:
         self.pushes = tuple(transient_disturbances(flights, self.setting))
         known = {e: self._differs(e) for e in given.first if e in best.effects}
         named = [e for e in fitted.setting if known.get(e, 1.0) >= rule.least_sure_probability]
-        disturbed = beyond_calm(self.gusts, flights.vehicle)
         structure = fitted.ranking.structure
         strange = unknown(structure, bool(self.pushes))
         rivals = {e: self._rivals(e) for e in named}
@@ -243,7 +241,8 @@ class Judged:
             column, _, channel = what.rpartition(" in ")
             where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
             self.structure = (Structure(group, where, gained / fitted.posterior.left()),)
-        some = self.balance.noisy or disturbed > 0.0 or bool(self.pushes)
+        disturbed = beyond_calm(self.gusts, flights.vehicle) > 0.0
+        some = self.balance.noisy or disturbed or self.pushes
         self.remainder = "structured" if structured else "random" if some else "none"
         by_bias = fitted.posterior.shown([("", f"{NUISANCE}{name}") for _, name in flights.biases])
         unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
@@ -268,11 +267,9 @@ class Judged:
         """Return the standard deviations of an effect in the likeliest set. For a factor on the
         thrust of commands, they include the spread of thrust from flight to flight.
         """
-        flights = self._flights
-        std = self.ranking.sets[0].std[effect]
-        if not flights.commanded or get(effect).role not in THRUST_FACTORS:
-            return dict(std)
-        return self._widened(effect, std, THRUST_STD / math.sqrt(len(flights.logs)))
+        spread = self._flights.commanded and get(effect).role in THRUST_FACTORS
+        each = THRUST_STD / math.sqrt(len(self._flights.logs))
+        return self._widened(effect, self._best.std[effect], spread * each)
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
         """Return standard deviations of coefficients with a relative one besides."""
@@ -285,17 +282,13 @@ class Judged:
         """Return the probability of a calibration, in every set, to differ from the vehicle's
         statement; 0 where the difference is too small for a name.
         """
-        flights = self._flights
-        best = self.ranking.sets[0]
-        own = flights.coefficients({}, effect)
-        stds = self._std(effect)
-        most = 0.0
-        for name, value in best.coefficients[effect].items():
-            off = abs(value - own.get(name, 0.0))
-            std = stds.get(name, 0.0)
-            if off > LEAST_SIZE * typical_size((effect, name), flights.vehicle) and std:
-                most = max(most, _apart(off, std))
-        return most
+        own = self._flights.coefficients({}, effect)
+        apart = [0.0]
+        for name, std in self._std(effect).items():
+            off = abs(self._best.coefficients[effect][name] - own.get(name, 0.0))
+            if off > LEAST_SIZE * typical_size((effect, name), self._flights.vehicle) and std:
+                apart.append(_apart(off, std))
+        return max(apart)
 
     def _rivals(self, effect: str) -> Names:
         """Return the effects with nearly the likelihood of one in the likeliest set, in its
@@ -304,22 +297,20 @@ class Judged:
         if effect in self._given.first:
             factors = playing(*THRUST_FACTORS)
             return tuple(x for x in factors if x != effect) if effect in factors else ()
-        best = self.ranking.sets[0]
-        rest = set(best.effects) - {effect}
-        least = LEAST_RIVAL * best.probability
-        more = [
-            set(x.effects) - rest
+        rest = {*self._best.effects} - {effect}
+        least = LEAST_RIVAL * self._best.probability
+        return tuple(
+            e
             for x in self.ranking.sets
-            if rest < set(x.effects) and x.probability > least
-        ]
-        return tuple(e for one in more if len(one) == 1 and effect not in one for e in one)
+            if rest < {*x.effects} and len(x.effects) == len(rest) + 1 and x.probability > least
+            for e in {*x.effects} - rest - {effect}
+        )
 
     def _doubts(self, named: Sequence[str], strange: float) -> dict[str, Names]:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
         flights = self._flights
         rule = self._rule
-        fitted = self._fitted
-        alike = composites(flights.vehicle, fitted.setting, self.ranking.sets[0].std)
+        alike = composites(flights.vehicle, self._fitted.setting, self._best.std)
         doubts = {"composite": tuple(alike)}
         if strange > rule.most_unknown:
             doubts["unknown"] = (
@@ -342,7 +333,7 @@ class Judged:
         doubts["hidden cause"] = tuple(
             f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like it. "
             "Log the pose to tell them apart"
-            for effect, hidden in fitted.behind.items()
+            for effect, hidden in self._fitted.behind.items()
         )
         if flights.thrust_std > 0.0:
             doubts["assumed thrust"] = tuple(
@@ -357,7 +348,6 @@ class Judged:
         self, effect: str, probability: float, size: float, unsure: bool, others: Names
     ) -> NamedEffect:
         flights = self._flights
-        rule = self._rule
         fitted = self._fitted
         std = self._std(effect)
         # the point of action of an effect at the rotors, as declared, is nothing to report
@@ -388,8 +378,8 @@ class Judged:
             units={name: coefficient((effect, name)).unit for name in values},
             tentative=unsure
             or uncertain
-            or probability < rule.least_sure_probability
-            or size < rule.least_worth,
+            or probability < self._rule.least_sure_probability
+            or size < self._rule.least_worth,
             indistinguishable_from=others,
             evidence={
                 "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
@@ -403,14 +393,13 @@ class Judged:
     def traces(self) -> Iterator[Trace]:
         """Yield the residual of each piece of flight over time."""
         flights = self._flights
-        residuals = self.balance
         for rows in flights.runs:
             yield Trace(
                 flights.logs[flights.log[rows[0]]].name,
                 flights.period,
                 flights.t[rows],
-                residuals.before[rows],
-                residuals.after[rows],
+                self.balance.before[rows],
+                self.balance.after[rows],
                 ~flights.fit_rows[rows],
                 {effect: part[rows] for effect, part in self.parts.items()},
             )

@@ -88,7 +88,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     body = in_body(whole.velocity, rotation)
     above = position[:, 2] - position[:, 2].min()
     shapes = []  # group, name, variable, channels
-    every = tuple(range(6))
+    every = range(6)
     for i, axis in enumerate("xyz"):
         shapes += [
             ("velocity", f"velocity {axis}", body[:, i], every),
@@ -120,11 +120,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
         z = _resonance(rotors[:, 1 + i], hertz, period, ends)
         shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
     size = weight_and_torque(flights.vehicle) / flights.inertias
-    out = {}
-
-    def add(group: str, name: str, column: Array | Product) -> None:
-        out["", f"{UNKNOWN}{group}: {name}"] = column
-
+    out: Columns = {}
     for group, name, x, channels in shapes:
         z = _scaled(x)
         for channel in channels if z.any() else ():
@@ -132,15 +128,16 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
                 made = Product(size[0], z, rotation[:, :, channel], slice(3))
             else:
                 made = Product(size[channel], z, None, slice(channel, channel + 1))
-            add(group, f"{name} in {channel}", made)
+            out["", f"{UNKNOWN}{group}: {name} in {channel}"] = made
     for channel in every:
         made = Product(size[channel], np.ones(len(t)), None, slice(channel, channel + 1))
-        add("constant", f"a constant in {channel}", made)
+        out["", f"{UNKNOWN}constant: a constant in {channel}"] = made
     for hertz in LOAD_HZ:
         column = np.zeros((len(t), 6))
         column[:, :2] = _resonance(whole.acceleration[:, :2], hertz, period, ends)
         column *= size[0] / max(float(column[:, :2].std()), 1e-9)
-        add("resonance", f"a load that swings at {hertz:g} Hz in 0", column)
+        name = f"a load that swings at {hertz:g} Hz in 0"
+        out["", f"{UNKNOWN}resonance: {name}"] = column
     return out
 
 
@@ -163,14 +160,12 @@ def variables(whole: FlightState) -> NamedArrays:
     deviation one.
     """
     position = whole.position
-    rotation = whole.rotation
-    velocity = whole.velocity
-    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    speed = np.linalg.norm(velocity, axis=1)
+    heading = np.arctan2(whole.rotation[:, 1, 0], whole.rotation[:, 0, 0])
+    speed = np.linalg.norm(whole.velocity, axis=1)
     raw = {
         "speed": speed,
         "speed, squared": speed**2,
-        "climb rate": velocity[:, 2],
+        "climb rate": whole.velocity[:, 2],
         "height": position[:, 2],
         "position x": position[:, 0],
         "position y": position[:, 1],

@@ -261,12 +261,12 @@ class Likelihood:
         answers most of a gust's torque before the pose shows any.
         """
         out = []
-        sizes = self.flights.inertias * self.noise.disturbance
-        times = self.noise.time.tolist()
-        for axis, (size, time) in enumerate(zip(sizes.tolist(), times, strict=True)):
+        own = (self.flights.inertias, self.noise.disturbance, self.noise.time)
+        for axis, (inertia, std, time) in enumerate(np.transpose(own).tolist()):
             keep = math.exp(-self.period / time)
             shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
-            said = float(self.flights.inertias[axis] * np.concatenate(shown).std())
+            size = inertia * std
+            said = inertia * float(np.concatenate(shown).std())
             out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
         return tuple(out)
 
@@ -503,10 +503,9 @@ class Likelihood:
         return out
 
     def _products(self, starts: Starts) -> Base:
-        acting = self._acting
         moved = self._posed
         steady = self.steady
-        asked = (*(c for c in acting if c not in moved), *moved)
+        asked = (*(c for c in self._acting if c not in moved), *moved)
         # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
         names = (*asked, *drives)
@@ -524,7 +523,7 @@ class Likelihood:
             for at in self._blocks(track):
                 rows = at.stop - at.start
                 here = slice(first + at.start, first + at.stop)
-                x = np.stack([acting.get(c, still)[here] for c in asked], axis=2)
+                x = np.stack([self._acting.get(c, still)[here] for c in asked], axis=2)
                 y = np.stack([column[here] for column in moved.values()], axis=2)
                 driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
                 driven[:, :3, 0] = jumps[at, :3, : len(STATES)]

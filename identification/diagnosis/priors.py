@@ -64,6 +64,7 @@ class PriorSettings:
 PRIORS = PriorSettings()
 # columns of one variant of an effect: all coefficients, or one of its starting points
 Variant = tuple[Column, ...]
+Variants = tuple[Variant, ...]  # of a set, one of each effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,7 @@ class Base:
     dictionary: Sequence[Column]  # columns of the discrepancy
     starts: Starts
     # the evidence of sets, by the likelihood's power and their columns; None for an impossible set
-    tried: dict[tuple[float, tuple[Variant, ...]], SetEvidence | None] = field(default_factory=dict)
+    tried: dict[tuple[float, Variants], SetEvidence | None] = field(default_factory=dict)
 
     @cached_property
     def columns(self) -> dict[Column, int]:

@@ -133,15 +133,17 @@ class RowLikelihood:
         """Return the dictionary's columns, changing coefficients among them."""
         rows = self.rows
         flights = self.flights
-        vehicle = self.flights.vehicle
         pieces = flights.pieces({})
         states = []
         for s in (p.signals for p in pieces):
-            rotors = delivered(s, vehicle) / flights.inertias[2:]
+            rotors = delivered(s, self.flights.vehicle) / flights.inertias[2:]
             # the acceleration is the rotors' alone, without disturbances
             push = rotors[:, :1] * s.rotation[:, :, 2]
-            rate = s.angular_velocity
-            states.append(FlightState(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
+            states.append(
+                FlightState(
+                    s.t, s.position, s.rotation, s.velocity, s.angular_velocity, push, rotors
+                )
+            )
         whole, ends = joined(states)
         out = {}
         for column, made in discrepancy_columns(whole, ends, flights).items():

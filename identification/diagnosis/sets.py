@@ -27,6 +27,7 @@ from .priors import (
     Base,
     Setting,
     Variant,
+    Variants,
     bare,
     declared,
     variants_of,
@@ -59,7 +60,7 @@ ROUNDED = 0.25
 @dataclass(frozen=True, eq=False)
 class _Candidate:
     base: Base
-    variants: tuple[Variant, ...]
+    variants: Variants
     evidence: SetEvidence
 
     @property
@@ -172,24 +173,22 @@ class Posterior:
                     out.append(columns)
         return out
 
-    def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
+    def _search(self, number: int, asked_sets: Sequence[Variants] | None = None) -> None:
         base = self.bases[number]
         asked = base.at(base.asked)
         # integrated out: everything any flight may have, and a little of every effect
         little = np.append(np.ones(len(base.plain)), self._negligible(base, asked))
         m = base.marginal(base.asked, np.append(base.plain, asked), self.power, little)
-        at = m.place
         variants = self._variants(base)
         ways = Counter(v[0][0] for v in variants)
-        p = self.inclusion
         always = len(self.given or ())
 
-        def score(some: tuple[Variant, ...]) -> float:
+        def score(some: Variants) -> float:
             key = frozenset(v[0][0] for v in some)
             if not self._counts(number, key):
                 return -math.inf
             if (self.power, some) not in base.tried:
-                index = [at[c] for v in some for c in v]
+                index = [m.place[c] for v in some for c in v]
                 base.tried[self.power, some] = None
                 with suppress(np.linalg.LinAlgError):
                     new = _Candidate(base, some, m.evidence(index))
@@ -199,7 +198,9 @@ class Posterior:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)
             more = len(some) - always
-            total += more * math.log(p) + (self.asked_about - more) * math.log1p(-p)
+            total += more * math.log(self.inclusion) + (self.asked_about - more) * math.log1p(
+                -self.inclusion
+            )
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
                 self.known[key] = _Candidate(base, some, evidence)
@@ -208,14 +209,14 @@ class Posterior:
         first = tuple(v for v in variants if self.given is not None and v[0][0] in base.effects)
         score(first)
         for some in asked_sets or ():
-            if all(c in at for v in some for c in v):
+            if all(c in m.place for v in some for c in v):
                 score(some)
         level = [(*first, v) for v in variants if v not in first]
         begun = len(first) + 1
         most = MOST_EFFECTS + always
         for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
             level.sort(key=score, reverse=True)
-            grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
+            grown: dict[frozenset[Variant], Variants] = {}
             for some in level[: KEPT_SETS * (2 if size == begun else 1)]:
                 for v in variants:
                     if v[0][0] not in {x[0][0] for x in some}:
@@ -387,10 +388,9 @@ class Posterior:
     def _at_mode(self, candidate: _Candidate) -> tuple[Setting, Setting]:
         """Return the coefficients of a set at the mode, and their standard deviations."""
         base = candidate.base
-        evidence = candidate.evidence
         setting = {}
         std = {}
-        modes = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
+        modes = zip(candidate.evidence.mode.tolist(), candidate.evidence.std.tolist(), strict=True)
         for columns in candidate.variants:
             effect = columns[0][0]
             own = dict(self.flights.coefficients({}, effect))

@@ -42,11 +42,13 @@ def starting_points(
     assert declared is not None, f"{effect} declares no starting points"
     position = flights.at_rows("position")
     seen = flights.fit_rows
-    vehicle = flights.vehicle
     starts = declared(
         Unexplained(
-            vehicle,
-            {c.name: typical_size((effect, c.name), vehicle) for c in get(effect).coefficients},
+            flights.vehicle,
+            {
+                c.name: typical_size((effect, c.name), flights.vehicle)
+                for c in get(effect).coefficients
+            },
             stated,
             frozenset(get(e).family for e in beside),
             position.mean(axis=0),

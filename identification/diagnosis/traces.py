@@ -104,9 +104,8 @@ def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[
     if get(effect).kind == "sensing":
         yield from ("position", "attitude")
         return
-    vehicle = flights.vehicle
     less = without(setting, effect)
-    unit = vehicle.weight * np.repeat([1.0, vehicle.arm_l], 3)
+    unit = flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
 
     def added(s: Signals) -> Array:
         """Return the effect's wrench (n, 6) in body axes, over the weight and the weight times the
