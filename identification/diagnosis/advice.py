@@ -76,7 +76,7 @@ def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
         ("the turn rate", "rad/s", np.linalg.norm(flights.at_rows("angular_velocity"), axis=1)),
         ("the thrust", "weights", thrust / flights.vehicle.weight),
     ):
-        most = float(np.quantile(values[seen], KNOWN))
+        most = np.quantile(values[seen], KNOWN)
         beyond = values[~seen] > most
         if beyond.mean() > OUTSIDE:
             yield (

@@ -87,7 +87,7 @@ def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> T
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
     out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
     measured = (poses.rotor_speeds, poses.voltage, poses.position, poses.quaternion)
-    begun = np.concatenate([poses.velocity, poses.angular_velocity])
+    begun = np.append(poses.velocity, poses.angular_velocity)
     models = loaded_model(vehicle)[0].copy()
     _core.run_causal_filter(
         models.ctypes.data,

@@ -70,7 +70,7 @@ def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Array]:
 
 def _scaled(x: Array) -> Array:
     x = x - x.mean()
-    size = float(np.sqrt(np.mean(np.square(x))))
+    size = np.sqrt(np.mean(np.square(x)))
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
@@ -113,7 +113,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
     places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
     shapes += [("place", name, x, every) for name, x in places]
-    along = np.pi * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
+    along = np.pi * (t - t[0]) / max(t[-1] - t[0], 1e-9)
     shapes += [("time", f"time {i}", np.cos(i * along), every) for i in (1, 2, 3)]
     period = median_step(t)
     for hertz, i in itertools.product(MOUNT_HZ, range(3)):
@@ -135,7 +135,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     for hertz in LOAD_HZ:
         column = np.zeros((len(t), 6))
         column[:, :2] = _resonance(whole.acceleration[:, :2], hertz, period, ends)
-        column *= size[0] / max(float(column[:, :2].std()), 1e-9)
+        column *= size[0] / max(column[:, :2].std(), 1e-9)
         name = f"a load that swings at {hertz:g} Hz in 0"
         out["", f"{UNKNOWN}resonance: {name}"] = column
     return out

@@ -226,8 +226,9 @@ class Likelihood:
                 if explained is not None:
                     pose = explained[i][:, 0, :, None]
                     force = explained[i][:, 1, :, None]
-                    change = self._changes(track, steady, force, pose)[:, :, 0]
-                    track = replace(track, innovations=track.innovations - change)
+                    begun = np.zeros((6, 3, 1))
+                    change = self._changes(track, steady, slice(None), begun, force, pose)
+                    track = replace(track, innovations=track.innovations - change[:, :, 0])
                 if slopes is None:
                     yield track.innovations[counts], none[counts]
                     continue
@@ -235,7 +236,7 @@ class Likelihood:
                 for at in self._blocks(track):
                     own = (jumps[i][at, :, None] * OWN[:, :, None]).reshape(-1, 6, gains.size)
                     changes = self._changes(
-                        track, steady, none[at], none[at], at, own, state, slopes
+                        track, steady, at, state, none[at], none[at], own, slopes
                     )
                     yield track.innovations[at][counts[at]], changes[counts[at]]
 
@@ -470,12 +471,12 @@ class Likelihood:
         )
         disturbed = np.array([gust.rms for gust in self.gusts()]) / self.flights.inertias
         for axis, rotors, own in zip(DRIVEN, whole.rotors.T, states, strict=True):
-            size = max(float(rotors.std()), 1e-9)
+            size = max(rotors.std(), 1e-9)
             answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
             change = np.diff(rotors, prepend=rotors[:1])
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
                 column = np.zeros((len(x), 6))
-                along = answer * x / max(float(x.std()), 1e-9)
+                along = answer * x / max(x.std(), 1e-9)
                 if axis == DRIVEN[0]:
                     column[:, :3] = along[:, None] * whole.rotation[:, :, 2]
                 else:
@@ -530,7 +531,7 @@ class Likelihood:
                 for j in range(1, len(DRIVEN)):
                     driven[:, 2 + j, j] = jumps[at, 2 + j, len(STATES) : 2 * len(STATES)]
                 out = np.empty((rows, 6, len(names) + 1))
-                changes = self._changes(track, steady, x, y, at, driven.reshape(rows, 6, -1), state)
+                changes = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
                 out[:, :, :-1] = changes
                 out[:, :, -1] = track.innovations[at]
                 kept = (inverse @ out[counts[at]]).reshape(-1, out.shape[2])
@@ -546,11 +547,11 @@ class Likelihood:
         self,
         track: Track,
         steady: SteadyFilter,
+        at: slice,
+        state: Array,
         acting: Array,
         moved: Array,
-        at: slice = slice(None),
         jumps: Array | None = None,
-        state: Array | None = None,
         slopes: Array | None = None,
     ) -> Array:
         """Return the change of the predictions (n, 6, c) of a part of a piece with each column.
@@ -558,23 +559,20 @@ class Likelihood:
         Args:
             track: the piece.
             steady: the filter.
+            at: the part.
+            state: (6, 3, c) carried from one part to the next.
             acting: (n, 6, a) acceleration of the model by a unit of the first ``a`` columns.
             moved: (n, 6, b) shift of the measured pose by a unit of the last ``b`` of these.
-            at: the part.
             jumps: (n, 6, e) jump of one state of each axis, of the states in turn, by a unit of
                 the next columns, before the pose of a sample is read; default: none.
-            state: carried from one part to the next; default: none.
             slopes: (6, 7, m) change of the gains of each axis, in the order of
                 ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns; default:
                 none.
         """
         jumps = np.empty((len(acting), 6, 0)) if jumps is None else jumps
         slopes = np.empty((6, 7, 0)) if slopes is None else slopes
-        e = jumps.shape[2]
         disturbance = track.disturbance[at].copy()
         disturbance[:, 3:] = level(track.heading[at], disturbance[:, 3:])
-        if state is None:
-            state = np.zeros((6, 3, acting.shape[2] + e + slopes.shape[2]))
         out = np.empty((len(acting), 6, state.shape[2]))
         _core.sensitivities(
             self.period,
@@ -587,7 +585,7 @@ class Likelihood:
             acting,
             moved,
             jumps,
-            np.resize(STATES, e),
+            np.resize(STATES, jumps.shape[2]),
             slopes,
             track.innovations[at],
             disturbance,

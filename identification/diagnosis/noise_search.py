@@ -70,7 +70,7 @@ class NoiseSearch:
         for _ in range(STEPS):
             damped = normal + np.diag(damping * np.diagonal(normal) + 1e-9)
             step = bounded_mode(damped, right, low - at, high - at)
-            if 0.5 * float(right @ step) < TOLERANCE:
+            if 0.5 * right @ step < TOLERANCE:
                 break
             better = self._height(at + step) < height
             damping *= 0.2 if better else 8.0

@@ -315,8 +315,8 @@ class RegressedFlights:
             pairs = zip(self._typical_parts(effect), noisy._typical_parts(effect), strict=True)
             for quiet, loud in pairs:
                 turned = loud if noisy._drift is None else self._in_own_axes(loud, noisy)
-                noise += float(weight @ mean_square(turned - quiet))
-                whole += float(weight @ mean_square(quiet))
+                noise += weight @ mean_square(turned - quiet)
+                whole += weight @ mean_square(quiet)
             most = MOST_NOISE_SHARE ** (2 if get(effect).scales_noise else 1)
             if self.inertial and whole == 0.0:
                 traceless.add(effect)
@@ -371,7 +371,7 @@ class RegressedFlights:
     @cached_property
     def speed(self) -> float:
         """RMS of the speed, m/s."""
-        return float(np.sqrt(np.mean(np.sum(np.square(self.at_rows("velocity")), axis=1))))
+        return math.sqrt(np.mean(np.sum(np.square(self.at_rows("velocity")), axis=1)))
 
     @property
     def inertias(self) -> Array:
@@ -597,7 +597,7 @@ def _accelerometer(log: FlightLog) -> ArrayPair | None:
     times = log.t[read]
     values = log.accelerometer[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
-    if not len(times) or float(np.diff(ends).max()) >= LONGEST_GAP:
+    if not len(times) or np.diff(ends).max() >= LONGEST_GAP:
         return None
     period = median_step(times)
     even = np.arange(times[0], times[-1], period)

@@ -106,7 +106,7 @@ def transient_disturbances(
         for i, channel in enumerate(CHANNELS):
             row = inner[np.argmax(size[:, i])]
             peak = float(slow[row, i])
-            above = abs(peak) / max(float(std[i]), 1e-30)
+            above = abs(peak) / max(std[i], 1e-30)
             before, _ = largest.get(channel, (LEAST_SIGNIFICANCE, None))
             if above > before and abs(peak) > least[i]:
                 log = flights.logs[flights.log[row]].name

@@ -175,7 +175,7 @@ class RowLikelihood:
             base = self.base(setting, {}, setting)
             return linearised(self.flights, base, setting, self.power)[1]()
 
-        return 0.5 * float(np.square(off).sum()) - m.constant, target
+        return 0.5 * np.square(off).sum() - m.constant, target
 
     def objective(self, setting: Setting) -> float:
         """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
@@ -202,7 +202,7 @@ class RowLikelihood:
     def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
         """Return the effects of a setting, among some, without any effect there."""
         here = self.rows.residual(setting)
-        least = 1e-6 * float(np.abs(here).max())
+        least = 1e-6 * np.abs(here).max()
         return {
             effect
             for effect in among

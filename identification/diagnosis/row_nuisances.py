@@ -75,7 +75,7 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     flights = rows.flights
     up = thrust * AXES["z"]
     t = flights.t[here[:, 0] > 0.0]
-    w = 2.0 * (flights.t[:, None] - t[0]) / max(float(t[-1] - t[0]), 1e-9) - 1.0
+    w = 2.0 * (flights.t[:, None] - t[0]) / max(t[-1] - t[0], 1e-9) - 1.0
     out = {
         "thrust": rows.from_body(THRUST_STD * up),
         "drift": rows.from_body(DRIFT_STD * w * up),
@@ -132,7 +132,7 @@ def followers(rows: Rows) -> Followers:
         return out
     delivered = flights.rotor_wrench({}) / flights.inertias[2:]
     change = np.concatenate([np.gradient(delivered[run, 0]) for run in flights.runs])
-    change *= delivered[:, 0].std() / max(float(change.std()), 1e-12)
+    change *= delivered[:, 0].std() / max(change.std(), 1e-12)
     wrench = rows.at_rows(np.column_stack([delivered, change]))
     turned = [p.smooth(p.signals.angular_velocity) for p in flights.pieces({})]
     rates = rows.at_rows(np.concatenate(turned) / STOPPED_WITHIN)
@@ -156,7 +156,7 @@ def answered(rows: Rows, signals: Followers, disturbance: Array) -> NamedArrays:
     for name, (signal, channels) in signals.items():
         size = signal - signal[rows.fit].mean()
         own = disturbance[rows.fit][:, channels]
-        share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
+        share = min(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12), 1.0)
         column = out[f"answer by {name}"] = np.zeros((len(size), rows.channels))
         column[:, channels] = share * size[:, None]
     return out

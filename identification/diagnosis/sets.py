@@ -15,7 +15,6 @@ from ..findings import RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
-    Index,
     Marginal,
     SetEvidence,
     evidence_of_one_more,
@@ -148,12 +147,12 @@ class Posterior:
         fitted = np.sort(np.append(base.plain, base.at(best.columns)))
         return tempering(base.blocks, np.searchsorted(base.single, fitted))
 
-    def _negligible(self, base: Base, asked: Index) -> Array:
-        """Return the share (len(asked),) of each column in any flight."""
-        little = PRIORS.negligible * base.typical[asked]
+    def _negligible(self, base: Base) -> Array:
+        """Return the share (len(base.asked),) of each column in any flight."""
+        little = PRIORS.negligible * base.typical[base.at(base.asked)]
         # a start of another base is no small effect
         if self.given is not None:
-            little[[base.names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
+            little[[name.startswith(START_PREFIX) for _, name in base.asked]] = 0.0
         return little
 
     def _counts(self, number: int, key: Effects) -> bool:
@@ -175,10 +174,11 @@ class Posterior:
 
     def _search(self, number: int, asked_sets: Sequence[Variants] | None = None) -> None:
         base = self.bases[number]
-        asked = base.at(base.asked)
         # integrated out: everything any flight may have, and a little of every effect
-        little = np.append(np.ones(len(base.plain)), self._negligible(base, asked))
-        m = base.marginal(base.asked, np.append(base.plain, asked), self.power, little)
+        little = np.append(np.ones(len(base.plain)), self._negligible(base))
+        m = base.marginal(
+            base.asked, np.append(base.plain, base.at(base.asked)), self.power, little
+        )
         variants = self._variants(base)
         ways = Counter(v[0][0] for v in variants)
         always = len(self.given or ())
@@ -337,7 +337,7 @@ class Posterior:
             sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
             i = [m.place[c] for c in columns]
-            change = float(z @ m.quadratic.normal[np.ix_(i, i)] @ z)
+            change = z @ m.quadratic.normal[np.ix_(i, i)] @ z
             out[effect] = max(change, out.get(effect, 0.0))
         return out
 
@@ -346,16 +346,14 @@ class Posterior:
         set.
         """
         own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
-        asked = base.at(base.asked)
         # an effect of the set is true to some per cent, whatever makes it change
         changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
         wrong = np.full(len(changing), EFFECT_ERROR / SHARE_OF_EFFECT)
-        little = self._negligible(base, asked)
         ones = np.ones(len(base.plain) + len(own))
-        chosen = np.concatenate([base.plain, own, asked, changing])
+        chosen = np.concatenate([base.plain, own, base.at(base.asked), changing])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
         power = self.power * (1.0 if varied else ROUNDED)
-        size = np.concatenate([ones, little, wrong])
+        size = np.concatenate([ones, self._negligible(base), wrong])
         return base.marginal(base.dictionary, chosen, power, size).quadratic
 
     def best_setting(self, most: int = MOST_EFFECTS) -> Setting:

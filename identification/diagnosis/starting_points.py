@@ -86,7 +86,7 @@ def starting_points(
     likeness = []
     for i, start in enumerate(starts):
         shape = acting({effect: start}) - base
-        size = float(np.sum(shape * shape))
+        size = np.sum(shape * shape)
         if size > 0.0:
-            likeness.append((float(np.sum(shape * target * scale)) / math.sqrt(size), i))
+            likeness.append((np.sum(shape * target * scale) / math.sqrt(size), i))
     return [starts[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]

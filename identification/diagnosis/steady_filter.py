@@ -58,17 +58,15 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     shape = (*pose.shape[:-1], 6, 6)
     F = np.zeros(shape)
     Q = np.zeros(shape)
-    H = np.zeros((2, 6))
     for i in range(2):
         at = slice(3 * i, 3 * i + 3)
         F[..., at, at] = [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]]
         F[..., 3 * i + 2, 3 * i + 2] = decay[..., i]
         Q[..., at, at] = white[..., i, None, None] * np.outer(half, half)
         Q[..., 3 * i + 2, 3 * i + 2] = drift[..., i]
-        H[i, 3 * i] = 1.0
     pull = gravity * PULL * unit[..., 0] * pose[..., 1]
     F[..., :3, 3:6] = pull[..., None, None] * np.outer(half, [1.0, 0.5, 0.0])
-    P = _riccati(F, Q, H)
+    P = _riccati(F, Q)
     S = P[..., ::3, ::3] + np.eye(2)
     K = P[..., :, ::3] @ np.linalg.inv(S)
     gain = np.empty((*keep.shape, 3, 2))
@@ -82,13 +80,13 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     return SteadyFilter(gain, keep, covariance)
 
 
-def _riccati(F: Array, Q: Array, H: Array) -> Array:
-    """Return the steady covariance of the prediction, for measurements with unit noise, by doubling
+def _riccati(F: Array, Q: Array) -> Array:
+    """Return the steady covariance of the prediction, for poses with unit noise, by doubling
     (B. D. O. Anderson, International Journal of Control 28 (1978), 295-306).
     """
     A = np.swapaxes(F, -1, -2)
     X = Q
-    G = np.broadcast_to(H.T @ H, F.shape)
+    G = np.broadcast_to(np.diag([1.0, 0.0, 0.0] * 2), F.shape)
     for _ in range(40):
         W = np.linalg.inv(np.eye(F.shape[-1]) + G @ X)
         further = np.swapaxes(A, -1, -2) @ X @ W @ A

@@ -51,7 +51,7 @@ def signature(
     y = share[:, channel]
     name, x = max(
         _explanatory_variables(flights, setting),
-        key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0,
+        key=lambda d: abs(np.corrcoef(d[1], y)[0, 1]) if y.std() > 1e-9 else 0.0,
     )
     return Signature(effect, CHANNELS[channel], name, x, y + after[:, channel], y)
 

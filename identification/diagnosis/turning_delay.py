@@ -52,7 +52,7 @@ class _Spectra:
         # the gain changes its own weights, the noise
         noise = self.turning
         for _ in range(6):
-            gain = max(float(np.sum(along / noise) / np.sum(power / noise)), 0.0)
+            gain = max(np.sum(along / noise) / np.sum(power / noise), 0.0)
             noise = self.turning - 2.0 * gain * along + gain**2 * power
         return 2.0 * self.count * float(np.sum(np.log(noise / self.turning)))
 
@@ -96,10 +96,10 @@ def turning_delay(
     least = float(best.fun)
     near = 0.1 * step
     bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
-    std = float(np.sqrt(2.0 / max(bend, 1e-6)))
+    std = math.sqrt(2.0 / max(bend, 1e-6))
     # a lag delays each frequency differently, and the frequencies shown by the loop are not known
     omega = spectra[0].omega
-    std = math.hypot(std, float(np.std(behind(omega, 0.0) / omega)), 0.5 * held / math.sqrt(12.0))
+    std = math.hypot(std, np.std(behind(omega, 0.0) / omega), 0.5 * held / math.sqrt(12.0))
     clear = -least > LEAST_LOG_LIKELIHOOD_RATIO and seconds - 0.25 * held > 2.0 * std
     return (seconds, std, -least) if clear else None
 
