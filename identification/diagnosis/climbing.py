@@ -61,7 +61,7 @@ def linearised(
     size = base.size[m.at]
     here = [setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]
     z = np.array(here) / size
-    value = 0.5 * (z @ z - m.quadratic.explained(every, z)) - m.quadratic.constant
+    value = 0.5 * (float(z @ z) - m.quadratic.explained(every, z)) - m.quadratic.constant
 
     def target() -> Setting:
         best = m.evidence(every).mode * size

@@ -178,8 +178,8 @@ class Likelihood:
     @staticmethod
     def _said(jumps: Iterable[Array], gains: Array) -> list[Array]:
         """Return the jumps of each piece's states (n, 6, 3) by the rotors' innovations."""
-        said = [np.split(x * (OWN @ gains), len(JUMP_STATE) // len(STATES), axis=2) for x in jumps]
-        return [np.add.reduce(parts) for parts in said]
+        said = (x * (OWN @ gains) for x in jumps)
+        return [x.reshape(len(x), 6, -1, len(STATES)).sum(axis=2) for x in said]
 
     # Noise
 

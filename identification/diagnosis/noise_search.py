@@ -77,16 +77,13 @@ class NoiseSearch:
             if better:
                 at = at + step
                 height, normal, right = self._slopes(at)
-        return self._noise(at), self._gains(at)
+        return _noise(at), self._gains(at)
 
     def _gains(self, at: Array) -> Array:
         return at[:-SEARCHED].reshape(len(PAIRS), -1)
 
-    def _noise(self, at: Array) -> PoseNoise:
-        return _noise(at[-SEARCHED:].reshape(6, 4))
-
     def _filter(self, at: Array) -> SteadyFilter:
-        return steady_filter(self._noise(at), self.period, self.gravity)
+        return steady_filter(_noise(at), self.period, self.gravity)
 
     def _height(self, at: Array) -> float:
         """Return minus the logarithm of the likelihood and the prior, up to a constant."""
@@ -129,7 +126,7 @@ class NoiseSearch:
         """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
         covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
         """
-        noise = [self._noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in range(SEARCHED)]
+        noise = [_noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in range(SEARCHED)]
         moved = PoseNoise(*(np.stack(each) for each in zip(*map(astuple, noise), strict=True)))
         there = steady_filter(moved, self.period, self.gravity)
         gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
@@ -147,6 +144,7 @@ def _free(noise: PoseNoise) -> Array:
     return np.stack([*logs, np.square(noise.white / noise.disturbance)], axis=-1)
 
 
-def _noise(x: Array) -> PoseNoise:
-    pose, disturbance, time = np.moveaxis(np.exp(x[..., :3]), -1, 0)
-    return PoseNoise(pose, disturbance, time, disturbance * np.sqrt(x[..., 3]))
+def _noise(at: Array) -> PoseNoise:
+    x = at[-SEARCHED:].reshape(6, 4)
+    pose, disturbance, time = np.exp(x[:, :3]).T
+    return PoseNoise(pose, disturbance, time, disturbance * np.sqrt(x[:, 3]))

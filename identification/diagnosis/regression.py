@@ -315,8 +315,8 @@ class RegressedFlights:
             pairs = zip(self._typical_parts(effect), noisy._typical_parts(effect), strict=True)
             for quiet, loud in pairs:
                 turned = loud if noisy._drift is None else self._in_own_axes(loud, noisy)
-                noise += weight @ mean_square(turned - quiet)
-                whole += weight @ mean_square(quiet)
+                noise += float(weight @ mean_square(turned - quiet))
+                whole += float(weight @ mean_square(quiet))
             most = MOST_NOISE_SHARE ** (2 if get(effect).scales_noise else 1)
             if self.inertial and whole == 0.0:
                 traceless.add(effect)

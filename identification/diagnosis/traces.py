@@ -58,8 +58,9 @@ def signature(
 
 def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[tuple[str, Array]]:
     """Return the explanatory variables of a force at the rows, named with their units."""
-    names = ("t", "position", "rotation", "velocity")
-    t, position, rotation, velocity = (flights.at_rows(name, setting) for name in names)
+    position, rotation, velocity = (
+        flights.at_rows(name, setting) for name in ("position", "rotation", "velocity")
+    )
     pieces = flights.pieces(setting)
     rate = np.concatenate([p.smooth(p.signals.angular_velocity) for p in pieces])
     body = in_body(velocity, rotation)
@@ -72,7 +73,7 @@ def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[
         ("height (m)", position[:, 2]),
         ("sine of the heading", np.sin(heading)),
         ("cosine of the heading", np.cos(heading)),
-        ("time (s)", t),
+        ("time (s)", flights.at_rows("t", setting)),
     ]
     if flights.rotor_speeds_vary:
         named.append(("thrust (N)", flights.rotor_wrench(setting)[:, 0]))
