@@ -72,7 +72,7 @@ def diagnose(
     vehicle: Vehicle,
     test: Logs = (),
     without: Sequence[str] = (),
-    report: Report | None = None,
+    report: Report = lambda text: None,
     settings: DiagnosisSettings = DIAGNOSIS,
 ) -> Diagnosis:
     """Return the findings of one vehicle's logs about its model.
@@ -92,7 +92,6 @@ def diagnose(
     for name in without:
         if name not in names():
             raise unknown_name("effect", name, names(), "--without")
-    report = report or (lambda text: None)
     if not logs:
         raise InputError("diagnose: no log was given; expected at least one")
     report("looking at the logs")

@@ -90,12 +90,14 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     shapes = []  # group, name, variable, channels
     every = range(6)
     for i, axis in enumerate("xyz"):
+        along = body[:, i]
+        torque = rotors[:, 1 + i]
         shapes += [
-            ("velocity", f"velocity {axis}", body[:, i], every),
-            ("velocity", f"squared velocity {axis}", body[:, i] * np.abs(body[:, i]), every),
+            ("velocity", f"velocity {axis}", along, every),
+            ("velocity", f"squared velocity {axis}", along * np.abs(along), every),
             ("rotors", f"angular velocity {axis}", rate[:, i], every),
-            ("rotors", f"torque {axis}", rotors[:, 1 + i], (3, 4, 5)),
-            ("rotors", f"change of torque {axis}", _change(rotors[:, 1 + i]), (3 + i,)),
+            ("rotors", f"torque {axis}", torque, (3, 4, 5)),
+            ("rotors", f"change of torque {axis}", _change(torque), (3 + i,)),
         ]
     shapes += [
         ("rotors", "thrust", rotors[:, 0], every),
@@ -113,8 +115,8 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
     places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
     shapes += [("place", name, x, every) for name, x in places]
-    along = np.pi * (t - t[0]) / max(t[-1] - t[0], 1e-9)
-    shapes += [("time", f"time {i}", np.cos(i * along), every) for i in (1, 2, 3)]
+    turn = np.pi * (t - t[0]) / max(t[-1] - t[0], 1e-9)
+    shapes += [("time", f"time {i}", np.cos(i * turn), every) for i in (1, 2, 3)]
     period = median_step(t)
     for hertz, i in itertools.product(MOUNT_HZ, range(3)):
         z = _resonance(rotors[:, 1 + i], hertz, period, ends)

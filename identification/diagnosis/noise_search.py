@@ -113,13 +113,14 @@ class NoiseSearch:
         normal = whole[:-1, :-1]
         right = whole[:-1, -1]
         held = np.tile(self.held, len(PAIRS))
-        normal[range(len(held)), range(len(held))] += held**-2
-        right[: len(held)] -= at[: len(held)] / held**2
+        count = len(held)
+        normal[range(count), range(count)] += held**-2
+        right[:count] -= at[:count] / held**2
         # by the innovations' covariance
         share = np.linalg.solve(steady.covariance, change)  # (m, 6, 6)
         left = np.linalg.solve(steady.covariance, own) - n * np.eye(6)
-        normal[len(held) :, len(held) :] += 0.5 * n * np.einsum("mij,lji->ml", share, share)
-        right[len(held) :] += 0.5 * np.einsum("mij,ji->m", share, left)
+        normal[count:, count:] += 0.5 * n * np.einsum("mij,lji->ml", share, share)
+        right[count:] += 0.5 * np.einsum("mij,ji->m", share, left)
         return self._deviance(own, steady.covariance, at, n), normal, right
 
     def _filter_slopes(self, at: Array, here: SteadyFilter) -> ArrayPair:

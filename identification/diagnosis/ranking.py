@@ -193,14 +193,14 @@ def rank_by_rows(
             near = fitted[max(fitted, key=lambda other: len(other & key))]
             begun = {e: near.get(e, x) for e, x in setting.items()}
             setting = min(setting, begun, key=likelihood.objective)
-        fitted[key] = likelihood.fitted(setting)
-        own = set(fitted[key]) - given
-        if likelihood.idle(fitted[key], own) or not all(
-            is_possible(flights, fitted[key], {}, e, plausible=True) for e in own
+        fitted[key] = best = likelihood.fitted(setting)
+        own = key - given
+        if likelihood.idle(best, own) or not all(
+            is_possible(flights, best, {}, e, plausible=True) for e in own
         ):
             idle.add(key)
-            return
-        bases[key] = base(fitted[key])
+        else:
+            bases[key] = base(best)
 
     for effect in library:
         if not flights.is_nonlinear(effect) or effect in given:
