@@ -109,7 +109,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
             ("velocity", f"velocities {axes}", body[:, a] * body[:, b], every),
             ("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], (3, 4, 5)),
         ]
-    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    heading = heading_of(rotation)
     places = list(zip(("x", "y", "height"), position.T, strict=True))
     places += [(f"height below {h:g} m", np.exp(-above / h)) for h in HEIGHTS]
     places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
@@ -143,6 +143,11 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     return out
 
 
+def heading_of(rotation: Array) -> Array:
+    """Return the headings (n,), rad, of attitudes (n, 3, 3)."""
+    return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+
+
 def _change(x: Array) -> Array:
     """Return differences from the sample before: later samples hold the poses' noise."""
     return np.diff(x, prepend=x[:1])
@@ -162,7 +167,7 @@ def variables(whole: FlightState) -> NamedArrays:
     deviation one.
     """
     position = whole.position
-    heading = np.arctan2(whole.rotation[:, 1, 0], whole.rotation[:, 0, 0])
+    heading = heading_of(whole.rotation)
     speed = np.linalg.norm(whole.velocity, axis=1)
     raw = {
         "speed": speed,

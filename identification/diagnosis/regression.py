@@ -279,6 +279,7 @@ class RegressedFlights:
         """
         linear = [e for e in names() if not is_nonlinear(e)]
         lost, _ = self._noisy_columns(noisy, linear)
+        unsaid: Effects = needing(*NOT_COMMANDED) if self.commanded else frozenset()
         if self.inertial:
             # a column also depends on states the IMU hardly shows
             quietly = lost  # lost in sensor noise alone
@@ -287,14 +288,11 @@ class RegressedFlights:
             lost, self.without_trace = self._noisy_columns(
                 noisy, [*linear, *filter(is_nonlinear, names())]
             )
-            lacking: Effects = frozenset()  # effects a pose would not show either
+            lacking = unsaid  # effects a pose would not show either
             if all(log.voltage is None for log in self.logs):
                 lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
-            if self.commanded:
-                lacking |= needing(*NOT_COMMANDED)
             self.needs_pose = lost - (quietly - self.without_trace) - lacking
-        if self.commanded:
-            lost |= needing(*NOT_COMMANDED)
+        lost |= unsaid
         if self.filtered:
             lost |= needing(Need.FAST_MOTION)
         if not self.rotor_speeds_vary:

@@ -16,6 +16,7 @@ from ..findings import CHANNELS, Signature
 from ..logs.table import Array, Names
 from ..motion.signals import Signals, in_body
 from ..motion.smoothing import mean_square
+from .discrepancy import heading_of
 from .regression import RegressedFlights, Setting, without
 
 # least shares for a channel to carry an effect: of its deviance, in the forces or in the torques,
@@ -65,7 +66,7 @@ def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[
     rate = np.concatenate([p.smooth(p.signals.angular_velocity) for p in pieces])
     body = in_body(velocity, rotation)
     speed = np.linalg.norm(body, axis=1)
-    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    heading = heading_of(rotation)
     named = [
         *((f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")),
         ("speed (m/s)", speed),
