@@ -113,12 +113,9 @@ def late_rotors(
     least = max(LEAST_ROTOR_TIME_OFFSET, BY_CHANCE * std)
     if flights.inertial or any(map(moves_time, effects)) or abs(offset) < least:
         return
-    pose = ", or the filter of the pose delays it by as much"
-    yield (
-        f"the rotor speeds act {abs(1000 * offset):.1f} ms "
-        f"{'later' if offset > 0 else 'earlier'} than they are logged"
-        f"{pose if flights.filtered and offset > 0 else ''}"
-    )
+    pose = ", or the filter of the pose delays it by as much" if flights.filtered else ""
+    way = f"later than they are logged{pose}" if offset > 0 else "earlier than they are logged"
+    yield f"the rotor speeds act {abs(1000 * offset):.1f} ms {way}"
 
 
 def advice(

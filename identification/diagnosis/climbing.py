@@ -59,13 +59,12 @@ def linearised(
     m = base.marginal(base.asked, base.plain, power)
     every = range(len(m.at))
     size = base.size[m.at]
-    here = [setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]
-    z = np.array(here) / size
+    z = np.array([setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]) / size
     value = 0.5 * (float(z @ z) - m.quadratic.explained(every, z)) - m.quadratic.constant
 
     def target() -> Setting:
-        best = m.evidence(every).mode * size
         out = {e: dict(values) for e, values in setting.items()}
+        best = m.evidence(every).mode * size
         for c, x in zip(base.asked, best.tolist(), strict=True):
             limits = coefficient(c)
             out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)

@@ -55,8 +55,8 @@ def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     if not carried.size:
         return log
     first, last = carried[[0, -1]]
-    begin = log.t[first] + TAKE_OFF * (first > 0)
     end = log.t[last] - TAKE_OFF * (last < len(thrust) - 1)
+    begin = log.t[first] + TAKE_OFF * (first > 0)
     keep = (log.t >= begin) & (log.t <= end)
     return with_rows(log, keep) if keep.any() else log
 

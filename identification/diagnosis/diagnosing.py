@@ -52,7 +52,7 @@ from .regression import (
     unit_of_change,
     without,
 )
-from .residuals import balance, beyond_calm, transient_disturbances
+from .residuals import balance, is_beyond_calm, transient_disturbances
 from .row_nuisances import THRUST_STD
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .traces import carrying_channels, signature
@@ -240,8 +240,7 @@ class Judged:
             column, _, channel = what.rpartition(" in ")
             where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
             self.structure = (Structure(group, where, gained / fitted.posterior.left()),)
-        disturbed = beyond_calm(self.gusts, flights.vehicle) > 0.0
-        some = self.balance.noisy or disturbed or self.pushes
+        some = self.balance.noisy or is_beyond_calm(self.gusts, flights.vehicle) or self.pushes
         self.remainder = "structured" if structured else "random" if some else "none"
         by_bias = fitted.posterior.shown([("", f"{NUISANCE}{name}") for _, name in flights.biases])
         unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
@@ -266,9 +265,10 @@ class Judged:
         """Return the standard deviations of an effect in the likeliest set. For a factor on the
         thrust of commands, they include the spread of thrust from flight to flight.
         """
-        spread = self._flights.commanded and get(effect).role in THRUST_FACTORS
-        each = THRUST_STD / math.sqrt(len(self._flights.logs))
-        return self._widened(effect, self._best.std[effect], spread * each)
+        flights = self._flights
+        varies = flights.commanded and get(effect).role in THRUST_FACTORS
+        spread = varies * THRUST_STD / math.sqrt(len(flights.logs))
+        return self._widened(effect, self._best.std[effect], spread)
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
         """Return standard deviations of coefficients with a relative one besides."""

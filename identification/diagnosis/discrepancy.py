@@ -63,9 +63,8 @@ def weight_and_torque(vehicle: Vehicle) -> Array:
 
 def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Array]:
     """Return all pieces, one after the other, and their ends without the last."""
-    ends = np.cumsum([len(track.position) for track in tracks])[:-1]
     columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(FlightState))
-    return FlightState(*columns), ends
+    return FlightState(*columns), np.cumsum([len(track.position) for track in tracks])[:-1]
 
 
 def _scaled(x: Array) -> Array:

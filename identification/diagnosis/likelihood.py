@@ -319,9 +319,8 @@ class Likelihood:
                 piece.t, track.predicted[:, :3], track.predicted[:, 3:], piece.rotor_speeds
             )
             undone = undo_log_sensing(log, vehicle)
-            shift = undone.position - track.predicted[:, :3]
             turn = turn_between(track.predicted[:, 3:], undone.quaternion)
-            out.append(np.column_stack([shift, turn]) / delta)
+            out.append(np.column_stack([undone.position - track.predicted[:, :3], turn]) / delta)
         return np.concatenate(out)
 
     def base(self, library: Iterable[str], starts: Starts, unknown: bool = False) -> Base:

@@ -238,9 +238,13 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
-    sensors = likelihood.sensors(best)
-    behind = _behind(likelihood, best)
-    return FittedPosterior(last, last.ranking(), best, sensors=sensors, behind=behind)
+    return FittedPosterior(
+        last,
+        last.ranking(),
+        best,
+        sensors=likelihood.sensors(best),
+        behind=_behind(likelihood, best),
+    )
 
 
 def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:

@@ -330,8 +330,7 @@ class RegressedFlights:
         if is_nonlinear(effect):
             setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
             return [self.residual({}) - self.residual(setting)]
-        wanted = (c for c in own if c[1] != CENTRAL)
-        columns = self.columns({}, wanted, self.residual, LARGE_STEP)
+        columns = self.columns({}, (c for c in own if c[1] != CENTRAL), self.residual, LARGE_STEP)
         return [typical_size(c, self.vehicle) * x for c, x in columns.items()]
 
     def _in_own_axes(self, x: Array, noisy: "RegressedFlights") -> Array:
@@ -349,8 +348,9 @@ class RegressedFlights:
         vehicle's lag and its like, low-passed.
         """
         vehicle = self.amended(setting)
-        pieces = self.pieces(setting)
-        return np.concatenate([p.smooth(delivered(p.signals, vehicle)) for p in pieces])
+        return np.concatenate(
+            [p.smooth(delivered(p.signals, vehicle)) for p in self.pieces(setting)]
+        )
 
     def at_rows(self, name: str, setting: Setting | None = None) -> Array:
         """Return a signal (rows, ...) of ``Signals``, by its name, at the rows."""

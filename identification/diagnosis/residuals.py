@@ -74,12 +74,11 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     )
 
 
-def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:
-    """Return the logarithm of the largest unanswered disturbance of the six channels over a
-    negligible one; ``-inf`` without a fitted disturbance.
-    """
-    slow = [x.unanswered_below(CUTOFFS.calm_hz) for x in disturbances]
-    return float(np.log(np.max(slow / (CALM * weight_and_torque(vehicle))))) if slow else -np.inf
+def is_beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> bool:
+    """Return whether an unanswered disturbance of the six channels is above a negligible one."""
+    calm = CALM * weight_and_torque(vehicle)
+    each = zip(disturbances, calm, strict=False)  # without a fitted disturbance none
+    return any(x.unanswered_below(CUTOFFS.calm_hz) > most for x, most in each)
 
 
 def transient_disturbances(
@@ -110,8 +109,8 @@ def transient_disturbances(
             before, _ = largest.get(channel, (LEAST_SIGNIFICANCE, None))
             if above > before and abs(peak) > least[i]:
                 log = flights.logs[flights.log[row]].name
-                t = float(flights.t[row])
-                largest[channel] = above, TransientDisturbance(channel, log, t, peak)
+                push = TransientDisturbance(channel, log, float(flights.t[row]), peak)
+                largest[channel] = above, push
     return [transient for _, transient in sorted(largest.values(), key=lambda x: -x[0])]
 
 

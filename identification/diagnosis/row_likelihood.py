@@ -150,8 +150,7 @@ class RowLikelihood:
             x = made[:]
             if rows.with_torques or x[:, :3].any():
                 parts = zip(np.split(x, ends), pieces, strict=True)
-                sampled = np.concatenate([p.smooth(part) for part, p in parts])
-                out[column] = rows.from_world(sampled)
+                out[column] = rows.from_world(np.concatenate([p.smooth(part) for part, p in parts]))
         here = rows.residual(setting)
         own = {e: rows.residual(without(setting, e)) - here for e in setting}
         at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])

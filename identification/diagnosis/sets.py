@@ -337,8 +337,7 @@ class Posterior:
             sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
             i = [m.place[c] for c in columns]
-            change = float(z @ m.quadratic.normal[np.ix_(i, i)] @ z)
-            out[effect] = max(change, out.get(effect, 0.0))
+            out[effect] = max(float(z @ m.quadratic.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
 
     def _dictionary_beside_best(self, base: Base) -> Marginal:

@@ -55,9 +55,8 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     unit = period * period / pose
     half = np.array([0.5, 1.0, 0.0])
     white = np.square(noise.white[..., PAIRS] * unit)
-    drift = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
     Q = np.repeat(white, 3, axis=-1)[..., None] * np.kron(np.eye(2), np.outer(half, half))
-    Q[..., LAST, LAST] = drift
+    Q[..., LAST, LAST] = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
     F = np.zeros_like(Q)
     F += np.kron(np.eye(2), [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
     F[..., LAST, LAST] = decay
