@@ -25,10 +25,12 @@ FILTERED = (
 LEAST_ROTOR_TIME_OFFSET = 0.001  # s, worth a note
 # when two changes are alike: most standard deviations between any two components, and the share of
 # the changes to which effect models agree
-MOST_APART, SHARE = 2.5, 0.1
+MOST_APART = 2.5
+SHARE = 0.1
 # quantile of the fitted rows up to which the fit knows a quantity, and the least share of other
 # rows beyond it for a note
-KNOWN, OUTSIDE = 0.995, 0.05
+KNOWN = 0.995
+OUTSIDE = 0.05
 
 
 def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str]:
@@ -49,8 +51,7 @@ def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str
             (x, dx), (y, dy) = (_relative(vehicle, e, setting[e], std[e]) for e in (a, b))
             off = np.subtract.outer(x, y)
             alike = SHARE * np.maximum.outer(np.abs(x), np.abs(y))
-            size = np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)
-            if np.all(np.abs(off) < MOST_APART * size):
+            if np.all(np.abs(off) < MOST_APART * np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)):
                 other = " or ".join(playing(third))
                 yield f"{a} and {b} change alike: {other} may be the one cause"
 
@@ -59,8 +60,7 @@ def _relative(vehicle: Vehicle, effect: str, values: Values, std: Values) -> Arr
     """Return the relative changes by an effect, and their standard deviations."""
     names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
     unit = np.array([unit_of_change((effect, name), vehicle) for name in names])
-    both = np.array([[values[name], std.get(name, 0.0)] for name in names])
-    return np.asarray(both.T / unit)
+    return np.asarray(np.array([[values[name], std.get(name, 0.0)] for name in names]).T / unit)
 
 
 def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
@@ -69,14 +69,14 @@ def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
     A coefficient fitted at 6 m/s holds at 14 m/s only if the effect's form holds so far. No fit
     knows this.
     """
-    seen, vehicle = flights.fit_rows, flights.vehicle
-    thrust = vehicle.rotor_wrench(flights.at_rows("rotor_speeds"))[:, 0]
+    seen = flights.fit_rows
+    thrust = flights.vehicle.rotor_wrench(flights.at_rows("rotor_speeds"))[:, 0]
     for name, unit, values in (
         ("the speed", "m/s", np.linalg.norm(flights.at_rows("velocity"), axis=1)),
         ("the turn rate", "rad/s", np.linalg.norm(flights.at_rows("angular_velocity"), axis=1)),
-        ("the thrust", "weights", thrust / vehicle.weight),
+        ("the thrust", "weights", thrust / flights.vehicle.weight),
     ):
-        most = float(np.quantile(values[seen], KNOWN))
+        most = np.quantile(values[seen], KNOWN)
         beyond = values[~seen] > most
         if beyond.mean() > OUTSIDE:
             yield (
@@ -113,12 +113,9 @@ def late_rotors(
     least = max(LEAST_ROTOR_TIME_OFFSET, BY_CHANCE * std)
     if flights.inertial or any(map(moves_time, effects)) or abs(offset) < least:
         return
-    pose = ", or the filter of the pose delays it by as much"
-    yield (
-        f"the rotor speeds act {abs(1000 * offset):.1f} ms "
-        f"{'later' if offset > 0 else 'earlier'} than they are logged"
-        f"{pose if flights.filtered and offset > 0 else ''}"
-    )
+    pose = ", or the filter of the pose delays it by as much" if flights.filtered else ""
+    way = f"later than they are logged{pose}" if offset > 0 else "earlier than they are logged"
+    yield f"the rotor speeds act {abs(1000 * offset):.1f} ms {way}"
 
 
 def advice(

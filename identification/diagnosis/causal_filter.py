@@ -66,8 +66,10 @@ def level(heading: Array, x: Array) -> Array:
     """Return vectors (n, 3) in body axes about three others: the world's x and y, turned with the
     heading (n, 2), and body z.
     """
-    (c, s), out = heading.T, x.copy()
-    out[:, 0], out[:, 1] = c * x[:, 0] - s * x[:, 1], s * x[:, 0] + c * x[:, 1]
+    c, s = heading.T
+    out = x.copy()
+    out[:, 0] = c * x[:, 0] - s * x[:, 1]
+    out[:, 1] = s * x[:, 0] + c * x[:, 1]
     return out
 
 
@@ -85,7 +87,7 @@ def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> T
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
     out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
     measured = (poses.rotor_speeds, poses.voltage, poses.position, poses.quaternion)
-    begun = np.concatenate([poses.velocity, poses.angular_velocity])
+    begun = np.append(poses.velocity, poses.angular_velocity)
     models = loaded_model(vehicle)[0].copy()
     _core.run_causal_filter(
         models.ctypes.data,

@@ -6,7 +6,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ...runtime.errors import InputError
-from .evidence import set_evidence
 from .priors import Base, Setting, declared
 from .regression import RegressedFlights, coefficient
 
@@ -23,7 +22,8 @@ def mode(start: Setting, at: Callable[[Setting], Height]) -> Setting:
     """Return the mode of the posterior from a setting on (damped Gauss-Newton); ``at`` raises an
     error for an impossible vehicle.
     """
-    here, (value, target) = start, height(start, at)
+    here = start
+    value, target = height(start, at)
     for _ in range(ROUNDS):
         there = target()
         for share in SHARES:
@@ -56,15 +56,15 @@ def linearised(
     """Return the height of a quadratic likelihood at the setting of its linearisation, and its mode
     within the limits of the coefficients.
     """
-    at, every = base.at(base.asked), range(len(base.asked))
-    m = base.marginal(at, base.plain, power=power)
-    here = [setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]
-    z = np.array(here) / base.size[at]
-    value = 0.5 * (float(z @ z) - m.explained(every, z)) - m.constant
+    m = base.marginal(base.asked, base.plain, power)
+    every = range(len(m.at))
+    size = base.size[m.at]
+    z = np.array([setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]) / size
+    value = 0.5 * (float(z @ z) - m.quadratic.explained(every, z)) - m.quadratic.constant
 
     def target() -> Setting:
-        best = set_evidence(m, every, base.low[at], base.high[at]).mode * base.size[at]
         out = {e: dict(values) for e, values in setting.items()}
+        best = m.evidence(every).mode * size
         for c, x in zip(base.asked, best.tolist(), strict=True):
             limits = coefficient(c)
             out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)

@@ -54,10 +54,9 @@ def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     carried = np.flatnonzero(thrust > CARRYING_SHARE * usual_thrust(thrust))
     if not carried.size:
         return log
-    first, last = carried[0], carried[-1]
-    begin, end = log.t[first], log.t[last]
-    begin += TAKE_OFF if first > 0 else 0.0
-    end -= TAKE_OFF if last < len(thrust) - 1 else 0.0
+    first, last = carried[[0, -1]]
+    end = log.t[last] - TAKE_OFF * (last < len(thrust) - 1)
+    begin = log.t[first] + TAKE_OFF * (first > 0)
     keep = (log.t >= begin) & (log.t <= end)
     return with_rows(log, keep) if keep.any() else log
 

@@ -59,13 +59,11 @@ def what_commands_show(flights: RegressedFlights, library: Sequence[str]) -> Giv
             )
     thrust = playing(Role.THRUST, among=library) or playing(Role.MASS, among=library)
     roles = (Role.THRUST_CURVE, Role.THRUST_OVER_VOLTAGE, Role.THRUST_OVER_TIME)
-    calibrations = [*thrust, *playing(*roles, among=library)]
     first = {
         e: {c.name: 0.0 for c in get(e).coefficients if c.name != CENTRAL}
         | dict(flights.coefficients({}, e))
-        for e in (*calibrations, *(e for e in library if e == delay))
+        for e in (*thrust, *playing(*roles, among=library), *(e for e in library if e == delay))
     }
     if thrust:  # only thrust over mass is known
         library = [e for e in library if e in first or get(e).role not in THRUST_FACTORS]
-    fixed = {late.name: dict(late.coefficients)} if late else {}
-    return Given(library, first, fixed, late)
+    return Given(library, first, {late.name: dict(late.coefficients)} if late else {}, late)

@@ -52,7 +52,7 @@ from .regression import (
     unit_of_change,
     without,
 )
-from .residuals import balance, beyond_calm, transient_disturbances
+from .residuals import balance, is_beyond_calm, transient_disturbances
 from .row_nuisances import THRUST_STD
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .traces import carrying_channels, signature
@@ -72,7 +72,7 @@ def diagnose(
     vehicle: Vehicle,
     test: Logs = (),
     without: Sequence[str] = (),
-    report: Report | None = None,
+    report: Report = lambda text: None,
     settings: DiagnosisSettings = DIAGNOSIS,
 ) -> Diagnosis:
     """Return the findings of one vehicle's logs about its model.
@@ -92,7 +92,6 @@ def diagnose(
     for name in without:
         if name not in names():
             raise unknown_name("effect", name, names(), "--without")
-    report = report or (lambda text: None)
     if not logs:
         raise InputError("diagnose: no log was given; expected at least one")
     report("looking at the logs")
@@ -111,7 +110,8 @@ def diagnose(
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
     said = Judged(flights, [n for n in names() if n not in without], settings, report)
-    effects, residuals, setting = said.effects, said.balance, said.setting
+    effects = said.effects
+    residuals = said.balance
     sure = said.remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
@@ -120,7 +120,7 @@ def diagnose(
     else:
         verdict = "nothing to explain" if sure else "unexplained"
     report("predicting the flights")
-    named = {e: x for e, x in setting.items() if e}
+    named = {e: x for e, x in said.setting.items() if e}
     amended = flights.amended(named) if named else vehicle
     notes += [*said.notes, *outside_the_fit(flights)]
     segments = _segments(flights)
@@ -143,7 +143,7 @@ def diagnose(
         candidates=said.candidates,
         traces=tuple(said.traces()),
         signatures=tuple(
-            signature(flights, setting, e.name, said.parts[e.name], residuals.after)
+            signature(flights, said.setting, e.name, said.parts[e.name], residuals.after)
             for e in effects
         ),
         structure=said.structure,
@@ -190,7 +190,8 @@ class Judged:
         rule: DiagnosisSettings,
         report: Report,
     ) -> None:
-        self._flights, self._rule = flights, rule
+        self._flights = flights
+        self._rule = rule
         library = [e for e in library if e not in flights.not_identifiable]
         given = self._given = what_commands_show(flights, library)
         report("asking how probable each effect is")
@@ -199,7 +200,8 @@ class Judged:
             if flights.has_raw_poses
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
-        self.ranking, best = fitted.ranking, fitted.ranking.sets[0]
+        self.ranking = fitted.ranking
+        best = self._best = fitted.ranking.sets[0]
         self.setting = {e: dict(x) for e, x in {**given.fixed, **fitted.setting}.items()}
         if fitted.sensors:
             self.setting[""] = {name: value for name, (value, _) in fitted.sensors.items()}
@@ -213,7 +215,6 @@ class Judged:
         self.pushes = tuple(transient_disturbances(flights, self.setting))
         known = {e: self._differs(e) for e in given.first if e in best.effects}
         named = [e for e in fitted.setting if known.get(e, 1.0) >= rule.least_sure_probability]
-        disturbed = beyond_calm(self.gusts, flights.vehicle)
         structure = fitted.ranking.structure
         strange = unknown(structure, bool(self.pushes))
         rivals = {e: self._rivals(e) for e in named}
@@ -239,10 +240,9 @@ class Judged:
             column, _, channel = what.rpartition(" in ")
             where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
             self.structure = (Structure(group, where, gained / fitted.posterior.left()),)
-        some = self.balance.noisy or disturbed > 0.0 or bool(self.pushes)
+        some = self.balance.noisy or is_beyond_calm(self.gusts, flights.vehicle) or self.pushes
         self.remainder = "structured" if structured else "random" if some else "none"
-        biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
-        by_bias = fitted.posterior.shown(biases)
+        by_bias = fitted.posterior.shown([("", f"{NUISANCE}{name}") for _, name in flights.biases])
         unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
         self.hidden = {e for e in unseen if by_bias[e] >= LEAST_SHOWN}
         self.unseen = unseen - self.hidden
@@ -265,10 +265,10 @@ class Judged:
         """Return the standard deviations of an effect in the likeliest set. For a factor on the
         thrust of commands, they include the spread of thrust from flight to flight.
         """
-        flights, std = self._flights, self.ranking.sets[0].std[effect]
-        if not flights.commanded or get(effect).role not in THRUST_FACTORS:
-            return dict(std)
-        return self._widened(effect, std, THRUST_STD / math.sqrt(len(flights.logs)))
+        flights = self._flights
+        varies = flights.commanded and get(effect).role in THRUST_FACTORS
+        spread = varies * THRUST_STD / math.sqrt(len(flights.logs))
+        return self._widened(effect, self._best.std[effect], spread)
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
         """Return standard deviations of coefficients with a relative one besides."""
@@ -281,14 +281,13 @@ class Judged:
         """Return the probability of a calibration, in every set, to differ from the vehicle's
         statement; 0 where the difference is too small for a name.
         """
-        flights, best = self._flights, self.ranking.sets[0]
-        own, stds, most = flights.coefficients({}, effect), self._std(effect), 0.0
-        for name, value in best.coefficients[effect].items():
-            off, std = abs(value - own.get(name, 0.0)), stds.get(name, 0.0)
-            least = LEAST_SIZE * typical_size((effect, name), flights.vehicle)
-            if off > least and std:
-                most = max(most, _apart(off, std))
-        return most
+        own = self._flights.coefficients({}, effect)
+        apart = [0.0]
+        for name, std in self._std(effect).items():
+            off = abs(self._best.coefficients[effect][name] - own.get(name, 0.0))
+            if off > LEAST_SIZE * typical_size((effect, name), self._flights.vehicle) and std:
+                apart.append(_apart(off, std))
+        return max(apart)
 
     def _rivals(self, effect: str) -> Names:
         """Return the effects with nearly the likelihood of one in the likeliest set, in its
@@ -297,19 +296,20 @@ class Judged:
         if effect in self._given.first:
             factors = playing(*THRUST_FACTORS)
             return tuple(x for x in factors if x != effect) if effect in factors else ()
-        best = self.ranking.sets[0]
-        rest, least = set(best.effects) - {effect}, LEAST_RIVAL * best.probability
-        more = [
-            set(x.effects) - rest
+        rest = {*self._best.effects} - {effect}
+        least = LEAST_RIVAL * self._best.probability
+        return tuple(
+            e
             for x in self.ranking.sets
-            if rest < set(x.effects) and x.probability > least
-        ]
-        return tuple(e for one in more if len(one) == 1 and effect not in one for e in one)
+            if rest < {*x.effects} and len(x.effects) == len(rest) + 1 and x.probability > least
+            for e in {*x.effects} - rest - {effect}
+        )
 
     def _doubts(self, named: Sequence[str], strange: float) -> dict[str, Names]:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
-        flights, rule, fitted = self._flights, self._rule, self._fitted
-        alike = composites(flights.vehicle, fitted.setting, self.ranking.sets[0].std)
+        flights = self._flights
+        rule = self._rule
+        alike = composites(flights.vehicle, self._fitted.setting, self._best.std)
         doubts = {"composite": tuple(alike)}
         if strange > rule.most_unknown:
             doubts["unknown"] = (
@@ -332,7 +332,7 @@ class Judged:
         doubts["hidden cause"] = tuple(
             f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like it. "
             "Log the pose to tell them apart"
-            for effect, hidden in fitted.behind.items()
+            for effect, hidden in self._fitted.behind.items()
         )
         if flights.thrust_std > 0.0:
             doubts["assumed thrust"] = tuple(
@@ -346,7 +346,8 @@ class Judged:
     def _named(
         self, effect: str, probability: float, size: float, unsure: bool, others: Names
     ) -> NamedEffect:
-        flights, rule, fitted = self._flights, self._rule, self._fitted
+        flights = self._flights
+        fitted = self._fitted
         std = self._std(effect)
         # the point of action of an effect at the rotors, as declared, is nothing to report
         values = {
@@ -363,7 +364,8 @@ class Judged:
             if name != CENTRAL
         ]
         # shares of the residual's energy without it, each channel over its sensors' noise
-        after, over = self.balance.after, mean_square(flights.visible_noise) ** 0.5
+        after = self.balance.after
+        over = mean_square(flights.visible_noise) ** 0.5
         left, whole = (
             float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
             for x in (after, after + self.parts[effect])
@@ -375,8 +377,8 @@ class Judged:
             units={name: coefficient((effect, name)).unit for name in values},
             tentative=unsure
             or uncertain
-            or probability < rule.least_sure_probability
-            or size < rule.least_worth,
+            or probability < self._rule.least_sure_probability
+            or size < self._rule.least_worth,
             indistinguishable_from=others,
             evidence={
                 "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
@@ -389,14 +391,14 @@ class Judged:
 
     def traces(self) -> Iterator[Trace]:
         """Yield the residual of each piece of flight over time."""
-        flights, residuals = self._flights, self.balance
+        flights = self._flights
         for rows in flights.runs:
             yield Trace(
                 flights.logs[flights.log[rows[0]]].name,
                 flights.period,
                 flights.t[rows],
-                residuals.before[rows],
-                residuals.after[rows],
+                self.balance.before[rows],
+                self.balance.after[rows],
                 ~flights.fit_rows[rows],
                 {effect: part[rows] for effect, part in self.parts.items()},
             )
@@ -418,21 +420,16 @@ def _predicted(
     flights: RegressedFlights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]]
 ) -> Pair:
     """Return how far a model's predictions of the held-out stretches are off: NIS, and m RMS."""
-    nis, distance, weight = [], [], []
+    each = []
     for i, log in enumerate(flights.logs):
-        own = [(a, b) for k, a, b in segments if k == i]
-        if own:
-            nis.append(nis_without_wrench_state(log, vehicle, own))
-            distance.append(rollout_error(log, vehicle, own))
-            weight.append(sum(b - a for a, b in own))
-    squares = np.square(distance)
-    return _mean(np.array(nis), weight), float(np.sqrt(_mean(squares, weight)))
+        if own := [(a, b) for k, a, b in segments if k == i]:
+            distance = rollout_error(log, vehicle, own)
+            seconds = sum(b - a for a, b in own)
+            each.append((nis_without_wrench_state(log, vehicle, own), distance * distance, seconds))
+    nis, squares, weight = np.array(each).reshape(-1, 3).T
+    return _mean(nis, weight), math.sqrt(_mean(squares, weight))
 
 
-def _mean(values: Array, weight: Sequence[float]) -> float:
+def _mean(values: Array, weight: Array) -> float:
     good = np.isfinite(values)
-    return (
-        float(np.average(values[good], weights=np.array(weight)[good]))
-        if good.any()
-        else float("nan")
-    )
+    return float(np.average(values[good], weights=weight[good])) if good.any() else math.nan

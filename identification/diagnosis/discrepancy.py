@@ -63,14 +63,13 @@ def weight_and_torque(vehicle: Vehicle) -> Array:
 
 def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Array]:
     """Return all pieces, one after the other, and their ends without the last."""
-    ends = np.cumsum([len(track.position) for track in tracks])[:-1]
     columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(FlightState))
-    return FlightState(*columns), ends
+    return FlightState(*columns), np.cumsum([len(track.position) for track in tracks])[:-1]
 
 
 def _scaled(x: Array) -> Array:
     x = x - x.mean()
-    size = float(np.sqrt(np.mean(np.square(x))))
+    size = np.sqrt(np.mean(np.square(x)))
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
@@ -84,17 +83,20 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
         flights: the vehicle's flights.
     """
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
-    rate, body = whole.angular_velocity, in_body(whole.velocity, rotation)
+    rate = whole.angular_velocity
+    body = in_body(whole.velocity, rotation)
     above = position[:, 2] - position[:, 2].min()
     shapes = []  # group, name, variable, channels
-    every = tuple(range(6))
+    every = range(6)
     for i, axis in enumerate("xyz"):
+        along = body[:, i]
+        torque = rotors[:, 1 + i]
         shapes += [
-            ("velocity", f"velocity {axis}", body[:, i], every),
-            ("velocity", f"squared velocity {axis}", body[:, i] * np.abs(body[:, i]), every),
+            ("velocity", f"velocity {axis}", along, every),
+            ("velocity", f"squared velocity {axis}", along * np.abs(along), every),
             ("rotors", f"angular velocity {axis}", rate[:, i], every),
-            ("rotors", f"torque {axis}", rotors[:, 1 + i], (3, 4, 5)),
-            ("rotors", f"change of torque {axis}", _change(rotors[:, 1 + i]), (3 + i,)),
+            ("rotors", f"torque {axis}", torque, (3, 4, 5)),
+            ("rotors", f"change of torque {axis}", _change(torque), (3 + i,)),
         ]
     shapes += [
         ("rotors", "thrust", rotors[:, 0], every),
@@ -106,24 +108,20 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
             ("velocity", f"velocities {axes}", body[:, a] * body[:, b], every),
             ("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], (3, 4, 5)),
         ]
-    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    heading = heading_of(rotation)
     places = list(zip(("x", "y", "height"), position.T, strict=True))
     places += [(f"height below {h:g} m", np.exp(-above / h)) for h in HEIGHTS]
     places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
     places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
     shapes += [("place", name, x, every) for name, x in places]
-    along = np.pi * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)
-    shapes += [("time", f"time {i}", np.cos(i * along), every) for i in (1, 2, 3)]
+    turn = np.pi * (t - t[0]) / max(t[-1] - t[0], 1e-9)
+    shapes += [("time", f"time {i}", np.cos(i * turn), every) for i in (1, 2, 3)]
     period = median_step(t)
     for hertz, i in itertools.product(MOUNT_HZ, range(3)):
         z = _resonance(rotors[:, 1 + i], hertz, period, ends)
         shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
     size = weight_and_torque(flights.vehicle) / flights.inertias
-    out = {}
-
-    def add(group: str, name: str, column: Array | Product) -> None:
-        out["", f"{UNKNOWN}{group}: {name}"] = column
-
+    out: Columns = {}
     for group, name, x, channels in shapes:
         z = _scaled(x)
         for channel in channels if z.any() else ():
@@ -131,16 +129,22 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
                 made = Product(size[0], z, rotation[:, :, channel], slice(3))
             else:
                 made = Product(size[channel], z, None, slice(channel, channel + 1))
-            add(group, f"{name} in {channel}", made)
+            out["", f"{UNKNOWN}{group}: {name} in {channel}"] = made
     for channel in every:
         made = Product(size[channel], np.ones(len(t)), None, slice(channel, channel + 1))
-        add("constant", f"a constant in {channel}", made)
+        out["", f"{UNKNOWN}constant: a constant in {channel}"] = made
     for hertz in LOAD_HZ:
         column = np.zeros((len(t), 6))
         column[:, :2] = _resonance(whole.acceleration[:, :2], hertz, period, ends)
-        column *= size[0] / max(float(column[:, :2].std()), 1e-9)
-        add("resonance", f"a load that swings at {hertz:g} Hz in 0", column)
+        column *= size[0] / max(column[:, :2].std(), 1e-9)
+        name = f"a load that swings at {hertz:g} Hz in 0"
+        out["", f"{UNKNOWN}resonance: {name}"] = column
     return out
+
+
+def heading_of(rotation: Array) -> Array:
+    """Return the headings (n,), rad, of attitudes (n, 3, 3)."""
+    return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
 
 
 def _change(x: Array) -> Array:
@@ -161,13 +165,13 @@ def variables(whole: FlightState) -> NamedArrays:
     """Return the variables (n,) of a changing coefficient by name, of mean zero and standard
     deviation one.
     """
-    position, rotation, velocity = whole.position, whole.rotation, whole.velocity
-    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    speed = np.linalg.norm(velocity, axis=1)
+    position = whole.position
+    heading = heading_of(whole.rotation)
+    speed = np.linalg.norm(whole.velocity, axis=1)
     raw = {
         "speed": speed,
         "speed, squared": speed**2,
-        "climb rate": velocity[:, 2],
+        "climb rate": whole.velocity[:, 2],
         "height": position[:, 2],
         "position x": position[:, 0],
         "position y": position[:, 1],
@@ -177,8 +181,7 @@ def variables(whole: FlightState) -> NamedArrays:
         "thrust": whole.rotors[:, 0],
         "yaw rate": whole.angular_velocity[:, 2],
     }
-    scaled = {name: _scaled(x) for name, x in raw.items()}
-    return {name: x for name, x in scaled.items() if x.any()}
+    return {name: z for name, x in raw.items() if (z := _scaled(x)).any()}
 
 
 def changing_columns(parts: ArrayMap, followed: ArrayMap) -> Columns:

@@ -43,8 +43,7 @@ class Marginal:
 
     def explained(self, index: Sequence[int], z: Array) -> float:
         """Return the deviance explained by some columns at coefficients ``z``."""
-        right, normal = self.right[index], self.normal[np.ix_(index, index)]
-        return float(2.0 * right @ z - z @ normal @ z)
+        return float(2.0 * self.right[index] @ z - z @ self.normal[np.ix_(index, index)] @ z)
 
 
 def marginal(products: Array, asked: Index, others: Index, size: Array) -> Marginal:
@@ -60,8 +59,7 @@ def marginal(products: Array, asked: Index, others: Index, size: Array) -> Margi
     kept = np.append(asked, len(products) - 1)
     inner = products[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
     factor = np.linalg.cholesky(inner)
-    cross = products[np.ix_(others, kept)] * size[:, None]
-    known = solve_triangular(factor, cross, lower=True)
+    known = solve_triangular(factor, products[np.ix_(others, kept)] * size[:, None], lower=True)
     left = products[np.ix_(kept, kept)] - known.T @ known
     volume = float(np.log(np.diagonal(factor)).sum())
     return Marginal(left[:-1, :-1], left[:-1, -1], float(left[-1, -1]), volume)
@@ -93,8 +91,7 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
     """
     at = np.array(index, dtype=np.intp)
     mode, std = np.empty((2, len(at)))
-    asked = m.normal[np.ix_(at, at)], m.right[at], low[at], high[at]
-    value = _core.evidence(*asked, mode, std)
+    value = _core.evidence(*(m.normal[np.ix_(at, at)], m.right[at], low[at], high[at]), mode, std)
     if math.isnan(value):
         raise np.linalg.LinAlgError("no prior tells columns of the set apart")
     return SetEvidence(m.constant + value, mode, std)
@@ -128,8 +125,7 @@ def tempering(blocks: Array, chosen: Index) -> float:
         chosen: the fitted columns.
     """
     total = blocks.sum(axis=0)
-    normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
-    mode = np.linalg.solve(normal, total[chosen, -1])
+    mode = np.linalg.solve(total[np.ix_(chosen, chosen)] + np.eye(len(chosen)), total[chosen, -1])
     scores = blocks[:, chosen, -1] - blocks[:, chosen[:, None], chosen] @ mode
     known = np.diagonal(total)[chosen] > 1.0  # columns better known by the flight than by the prior
     if not known.any():
@@ -139,8 +135,7 @@ def tempering(blocks: Array, chosen: Index) -> float:
     keep = size > 1e-6 * size[-1]
     ratio = np.square(scores[:, known] @ axes[:, keep]).sum(axis=0) / size[keep]
     # a fit brings their sum over all blocks to zero: the cost is one block of all
-    spread = float(np.mean(ratio)) * len(blocks) / max(len(blocks) - 1, 1)
-    return 1.0 / max(1.0, spread)
+    return 1.0 / max(1.0, float(np.mean(ratio)) * len(blocks) / max(len(blocks) - 1, 1))
 
 
 def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[float]) -> float:
@@ -155,7 +150,8 @@ def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[floa
         tried: the possible ones of these columns.
         sizes: possible standard deviations of their coefficients.
     """
-    square, left = np.square(sizes)[:, None], m.own[tried]
+    square = np.square(sizes)[:, None]
+    left = m.own[tried]
     gained = 0.5 * square * np.square(m.right[tried]) / (1.0 + square * left)
     factors = gained - 0.5 * np.log1p(square * left)
     return float(logsumexp(factors)) - math.log(factors.size)

@@ -90,17 +90,15 @@ class Likelihood:
         near: "Likelihood | None" = None,
         same_noise: bool = False,
     ) -> None:
-        self.flights, self.setting = flights, setting
+        self.flights = flights
+        self.setting = setting
         self.vehicle = flights.amended(setting)
-        self.pieces: list[Poses]
         self.tracks: list[Track]
         self.known: list[Array]
-        self._fit: list[Mask]  # (n,) samples open to the fit
-        if near is not None and sensing_of(near.vehicle) == sensing_of(self.vehicle):
-            self.pieces, self._fit = near.pieces, near._fit
-        else:
+        if near is None or sensing_of(near.vehicle) != sensing_of(self.vehicle):
             finer = iter(near.finer if near else ())
-            self.pieces, self._fit = [], []
+            self.pieces: list[Poses] = []
+            self._fit: list[Mask] = []  # (n,) samples open to the fit
             for i, log in enumerate(flights.logs):
                 rows = flights.log == i
                 if not flights.fit_rows[rows].any():  # a test log
@@ -109,6 +107,9 @@ class Likelihood:
                     at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
                     self.pieces.append(piece)
                     self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
+        else:
+            self.pieces = near.pieces
+            self._fit = near._fit
         self.period = self.pieces[0].period
         lengths = [len(piece.t) for piece in self.pieces]
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
@@ -122,17 +123,17 @@ class Likelihood:
         self.finer: list[Array] = []
         self.answers: list[Array] = []
         if near:
-            self.finer, self.answers = near.finer, near.answers
-            self.known, self.tracks = near.known, near.tracks
+            self.finer = near.finer
+            self.answers = near.answers
+            self.known = near.known
+            self.tracks = near.tracks
         else:
             self._see_rotors()
         if same:
             self._run(self.steady, self._said(self._jumps(), self.gains))
         else:
             self._search_noise()
-        self.signals = [
-            _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
-        ]
+        self.signals = [_signals(piece, track) for piece, track in self._seen]
         self._base = self._accelerations(setting, self.signals)
         # the effect of a unit of each column on the accelerations, or on the measured pose (n, 6),
         # of all pieces in turn, kept once computed. Columns any flight may have change little with
@@ -147,19 +148,21 @@ class Likelihood:
         if not self._acting:
             self._add_what_any_flight_may_have()
 
+    @property
+    def _seen(self) -> list[tuple[Poses, Track]]:
+        return list(zip(self.pieces, self.tracks, strict=True))
+
     def _see_rotors(self) -> None:
         nothing = [np.zeros((len(piece.t), 6, 3)) for piece in self.pieces]
         self._run(self.steady, nothing)
-        seen = list(zip(self.pieces, self.tracks, strict=True))
         if self._rounding_std:
-            self.finer = unrounded(seen, self.vehicle.omega_lsb)
+            self.finer = unrounded(self._seen, self.vehicle.omega_lsb)
             self.pieces = [
                 replace(piece, rotor_speeds=piece.rotor_speeds + x)
                 for piece, x in zip(self.pieces, self.finer, strict=True)
             ]
             self._run(self.steady, nothing)
-            seen = list(zip(self.pieces, self.tracks, strict=True))
-        self.answers = rotor_innovations(seen)
+        self.answers = rotor_innovations(self._seen)
 
     @property
     def steady(self) -> SteadyFilter:
@@ -175,8 +178,8 @@ class Likelihood:
     @staticmethod
     def _said(jumps: Iterable[Array], gains: Array) -> list[Array]:
         """Return the jumps of each piece's states (n, 6, 3) by the rotors' innovations."""
-        said = [np.split(x * (OWN @ gains), len(JUMP_STATE) // len(STATES), axis=2) for x in jumps]
-        return [np.add.reduce(parts) for parts in said]
+        said = (x * (OWN @ gains) for x in jumps)
+        return [x.reshape(len(x), 6, -1, len(STATES)).sum(axis=2) for x in said]
 
     # Noise
 
@@ -202,11 +205,9 @@ class Likelihood:
         speeds = np.concatenate([p.rotor_speeds for p in self.pieces]).mean(axis=0)
         off = self._rounding_std * np.vstack([np.zeros(4), np.eye(4)])
         wrenches = self.vehicle.rotor_wrench(speeds + off)
-        steps = wrenches[1:] - wrenches[0]
         # between two samples the mean of both counts
-        wrench = np.sqrt(np.sum(np.square(steps), axis=0) / 2.0)
-        out = np.array([0.0, 0.0, *wrench]) / self.flights.inertias
-        return np.maximum(out, 1e-9)
+        wrench = np.sqrt(np.sum(np.square(wrenches[1:] - wrenches[0]), axis=0) / 2.0)
+        return np.maximum(np.array([0.0, 0.0, *wrench]) / self.flights.inertias, 1e-9)
 
     def _search_noise(self, explained: Sequence[Array] | None = None) -> None:
         """Take the likeliest noise, and the likeliest gains on the rotors' innovations.
@@ -220,11 +221,14 @@ class Likelihood:
         def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
             self._run(steady, self._said(jumps, gains))
             for i, track in enumerate(self.tracks):
-                none, counts = np.empty((len(track.t), 6, 0)), self._counts(i)
+                none = np.empty((len(track.t), 6, 0))
+                counts = self._counts(i)
                 if explained is not None:
-                    pose, force = explained[i][:, 0, :, None], explained[i][:, 1, :, None]
-                    change = self._changes(track, steady, force, pose)[:, :, 0]
-                    track = replace(track, innovations=track.innovations - change)
+                    pose = explained[i][:, 0, :, None]
+                    force = explained[i][:, 1, :, None]
+                    begun = np.zeros((6, 3, 1))
+                    change = self._changes(track, steady, slice(None), begun, force, pose)
+                    track = replace(track, innovations=track.innovations - change[:, :, 0])
                 if slopes is None:
                     yield track.innovations[counts], none[counts]
                     continue
@@ -232,7 +236,7 @@ class Likelihood:
                 for at in self._blocks(track):
                     own = (jumps[i][at, :, None] * OWN[:, :, None]).reshape(-1, 6, gains.size)
                     changes = self._changes(
-                        track, steady, none[at], none[at], at, own, state, slopes
+                        track, steady, at, state, none[at], none[at], own, slopes
                     )
                     yield track.innovations[at][counts[at]], changes[counts[at]]
 
@@ -243,7 +247,8 @@ class Likelihood:
 
     def _blocks(self, track: Track) -> Iterator[slice]:
         """Return the parts of a piece. One part's columns are in memory at a time."""
-        length, n = round(BLOCK / self.period), len(track.t)
+        length = round(BLOCK / self.period)
+        n = len(track.t)
         return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
 
     def _counts(self, piece: int) -> Mask:
@@ -257,11 +262,12 @@ class Likelihood:
         answers most of a gust's torque before the pose shows any.
         """
         out = []
-        sizes, times = self.flights.inertias * self.noise.disturbance, self.noise.time.tolist()
-        for axis, (size, time) in enumerate(zip(sizes.tolist(), times, strict=True)):
+        own = (self.flights.inertias, self.noise.disturbance, self.noise.time)
+        for axis, (inertia, std, time) in enumerate(np.transpose(own).tolist()):
             keep = math.exp(-self.period / time)
             shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
-            said = float(self.flights.inertias[axis] * np.concatenate(shown).std())
+            size = inertia * std
+            said = inertia * float(np.concatenate(shown).std())
             out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
         return tuple(out)
 
@@ -273,14 +279,9 @@ class Likelihood:
         turning = np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T
         return np.column_stack([wrench[:, :3] / self.flights.vehicle.mass, turning])
 
-    def _change(
-        self, setting: Setting, step: float = 1.0, signals: Iterable[Signals] | None = None
-    ) -> Array:
-        """Return the change of the acceleration (n, 6) with another setting and other signals, over
-        a step.
-        """
-        there = self._accelerations(setting, self.signals if signals is None else signals)
-        return (there - self._base) / step
+    def _change(self, setting: Setting) -> Array:
+        """Return the change of the acceleration (n, 6) with another setting."""
+        return self._accelerations(setting, self.signals) - self._base
 
     def _add(self, column: Column) -> None:
         """Add a coefficient's column, unless it is there already or no such vehicle is possible."""
@@ -300,7 +301,7 @@ class Likelihood:
         value, delta = self.flights.step(self.setting, (effect, name))
         there = {**self.setting, effect: {**own, name: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
-            change = self._change(there, delta)
+            change = self._change(there) / delta
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
             self._acting[column] = change
@@ -311,17 +312,15 @@ class Likelihood:
         """
         effect, name = column
         delta = STEP * typical_size(column, self.flights.vehicle)
-        own = EffectSetting(effect, {name: delta})
-        vehicle = replace(self.flights.vehicle, effects=(own,))
+        vehicle = replace(self.flights.vehicle, effects=(EffectSetting(effect, {name: delta}),))
         out = []
-        for piece, track in zip(self.pieces, self.tracks, strict=True):
+        for piece, track in self._seen:
             log = FlightLog(
                 piece.t, track.predicted[:, :3], track.predicted[:, 3:], piece.rotor_speeds
             )
             undone = undo_log_sensing(log, vehicle)
-            shift = undone.position - track.predicted[:, :3]
             turn = turn_between(track.predicted[:, 3:], undone.quaternion)
-            out.append(np.column_stack([shift, turn]) / delta)
+            out.append(np.column_stack([undone.position - track.predicted[:, :3], turn]) / delta)
         return np.concatenate(out)
 
     def base(self, library: Iterable[str], starts: Starts, unknown: bool = False) -> Base:
@@ -350,13 +349,14 @@ class Likelihood:
 
     def _add_changing_coefficients(self) -> None:
         """Add the dictionary's columns: effects of the setting with changing coefficients."""
-        parts, poses = {}, {}
+        parts = {}
+        poses = {}
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
                 moved = [x * self._moved((effect, name)) for name, x in own.items()]
                 poses[effect] = np.sum(moved, axis=0)
             else:
-                parts[effect] = self._change(without(self.setting, effect), -1.0)
+                parts[effect] = -self._change(without(self.setting, effect))
         followed = variables(joined(self.tracks)[0])
         self._acting |= changing_columns(parts, followed)
         self._posed |= changing_columns(poses, followed)
@@ -370,7 +370,7 @@ class Likelihood:
             u = s.rotor_speeds.copy()
             u[2:] += np.diff(s.rotor_speeds, 2, axis=0)
             bent.append(replace(s, rotor_speeds=u))
-        self._acting["", BETWEEN] = self._change(self.setting, signals=bent)
+        self._acting["", BETWEEN] = self._accelerations(self.setting, bent) - self._base
         self._add_model_errors()
         self._add_answers()
         moved = []
@@ -425,8 +425,7 @@ class Likelihood:
         change[:, :3] = 0.0
         axis = [c.name for c in get(column[0]).coefficients].index(column[1])
         (marker,) = playing(Role.MARKER)
-        place = self._moved((marker, get(marker).coefficients[axis].name))
-        self._posed[column] = -place
+        self._posed[column] = -self._moved((marker, get(marker).coefficients[axis].name))
 
     def _add_model_errors(self) -> None:
         """Add the columns of slightly larger forces and torques, and of the torques expected from
@@ -435,7 +434,8 @@ class Likelihood:
         Rounding biases an expected torque low, by its share of the variance (errors in variables):
         a hover holds little torque, and rounding hides it.
         """
-        rounded, (whole, _) = 2.0 * np.square(self._rounding()[3:]), joined(self.tracks)
+        rounded = 2.0 * np.square(self._rounding()[3:])
+        whole, _ = joined(self.tracks)
         expected = whole.rotors[:, 1:] - np.concatenate(self.answers)[:, 1:]
         share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
@@ -459,7 +459,8 @@ class Likelihood:
         (Unknown linear feedback: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
         """
         whole, _ = joined(self.tracks)
-        rate, body = whole.angular_velocity, in_body(whole.velocity, whole.rotation)
+        rate = whole.angular_velocity
+        body = in_body(whole.velocity, whole.rotation)
         tilt = whole.rotation[:, 2]
         states = (
             (body[:, 2],),
@@ -469,11 +470,12 @@ class Likelihood:
         )
         disturbed = np.array([gust.rms for gust in self.gusts()]) / self.flights.inertias
         for axis, rotors, own in zip(DRIVEN, whole.rotors.T, states, strict=True):
-            size = max(float(rotors.std()), 1e-9)
+            size = max(rotors.std(), 1e-9)
             answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
             change = np.diff(rotors, prepend=rotors[:1])
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
-                column, along = np.zeros((len(x), 6)), answer * x / max(float(x.std()), 1e-9)
+                column = np.zeros((len(x), 6))
+                along = answer * x / max(x.std(), 1e-9)
                 if axis == DRIVEN[0]:
                     column[:, :3] = along[:, None] * whole.rotation[:, :, 2]
                 else:
@@ -501,29 +503,36 @@ class Likelihood:
         return out
 
     def _products(self, starts: Starts) -> Base:
-        acting, moved, steady = self._acting, self._posed, self.steady
-        asked = (*(c for c in acting if c not in moved), *moved)
+        moved = self._posed
+        steady = self.steady
+        asked = (*(c for c in self._acting if c not in moved), *moved)
         # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
         names = (*asked, *drives)
         root = np.linalg.cholesky(steady.covariance)
         inverse = np.linalg.inv(root)
-        samples, first, still = 0, 0, np.zeros_like(self._base)
+        samples = 0
+        first = 0
+        still = np.zeros_like(self._base)
         most = sum(len([*self._blocks(track)]) for track in self.tracks)
-        products, count = np.empty((most, len(names) + 1, len(names) + 1)), 0
+        products = np.empty((most, len(names) + 1, len(names) + 1))
+        count = 0
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
-            state, counts = np.zeros((6, 3, len(names))), self._counts(i)
+            state = np.zeros((6, 3, len(names)))
+            counts = self._counts(i)
             for at in self._blocks(track):
-                rows, here = at.stop - at.start, slice(first + at.start, first + at.stop)
-                x = np.stack([acting.get(c, still)[here] for c in asked], axis=2)
+                rows = at.stop - at.start
+                here = slice(first + at.start, first + at.stop)
+                x = np.stack([self._acting.get(c, still)[here] for c in asked], axis=2)
                 y = np.stack([column[here] for column in moved.values()], axis=2)
                 driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
                 driven[:, :3, 0] = jumps[at, :3, : len(STATES)]
                 for j in range(1, len(DRIVEN)):
                     driven[:, 2 + j, j] = jumps[at, 2 + j, len(STATES) : 2 * len(STATES)]
                 out = np.empty((rows, 6, len(names) + 1))
-                changes = self._changes(track, steady, x, y, at, driven.reshape(rows, 6, -1), state)
-                out[:, :, :-1], out[:, :, -1] = changes, track.innovations[at]
+                changes = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
+                out[:, :, :-1] = changes
+                out[:, :, -1] = track.innovations[at]
                 kept = (inverse @ out[counts[at]]).reshape(-1, out.shape[2])
                 samples += int(counts[at].sum())
                 if len(kept):
@@ -531,18 +540,17 @@ class Likelihood:
                     count += 1
             first += len(track.position)
         penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
-        blocks = products[:count]
-        return in_prior_units(self.flights, names, blocks, penalty, self.setting, starts)
+        return in_prior_units(self.flights, names, products[:count], penalty, self.setting, starts)
 
     def _changes(
         self,
         track: Track,
         steady: SteadyFilter,
+        at: slice,
+        state: Array,
         acting: Array,
         moved: Array,
-        at: slice = slice(None),
         jumps: Array | None = None,
-        state: Array | None = None,
         slopes: Array | None = None,
     ) -> Array:
         """Return the change of the predictions (n, 6, c) of a part of a piece with each column.
@@ -550,22 +558,20 @@ class Likelihood:
         Args:
             track: the piece.
             steady: the filter.
+            at: the part.
+            state: (6, 3, c) carried from one part to the next.
             acting: (n, 6, a) acceleration of the model by a unit of the first ``a`` columns.
             moved: (n, 6, b) shift of the measured pose by a unit of the last ``b`` of these.
-            at: the part.
             jumps: (n, 6, e) jump of one state of each axis, of the states in turn, by a unit of
                 the next columns, before the pose of a sample is read; default: none.
-            state: carried from one part to the next; default: none.
             slopes: (6, 7, m) change of the gains of each axis, in the order of
                 ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns; default:
                 none.
         """
         jumps = np.empty((len(acting), 6, 0)) if jumps is None else jumps
         slopes = np.empty((6, 7, 0)) if slopes is None else slopes
-        e, disturbance = jumps.shape[2], track.disturbance[at].copy()
+        disturbance = track.disturbance[at].copy()
         disturbance[:, 3:] = level(track.heading[at], disturbance[:, 3:])
-        if state is None:
-            state = np.zeros((6, 3, acting.shape[2] + e + slopes.shape[2]))
         out = np.empty((len(acting), 6, state.shape[2]))
         _core.sensitivities(
             self.period,
@@ -578,7 +584,7 @@ class Likelihood:
             acting,
             moved,
             jumps,
-            np.resize(STATES, e),
+            np.resize(STATES, jumps.shape[2]),
             slopes,
             track.innovations[at],
             disturbance,

@@ -88,10 +88,9 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
     ]
     if asymmetry == 0.0 or not any(lags):
         return signals
-    u = signals.rotor_speeds
-    followed = lagged(u, max(lags), signals.period)
+    followed = lagged(signals.rotor_speeds, max(lags), signals.period)
     rate = np.abs(np.diff(followed, axis=0, prepend=followed[:1])) / signals.period
-    return replace(signals, rotor_speeds=u + asymmetry * rate)
+    return replace(signals, rotor_speeds=signals.rotor_speeds + asymmetry * rate)
 
 
 def with_time_offsets(signals: Signals, offsets: Values) -> Signals:

@@ -56,34 +56,34 @@ class NoiseSearch:
             gains: (3, e) at its start.
         """
         x = _free(near)
-        low, high = x - 16.0, x + 16.0
+        low = x - 16.0
+        high = x + 16.0
         low[:, 0] = math.log(LEAST_POSE)
-        low[:, 2:], high[:, 2:] = (math.log(TIMES[0]), 0.0), (math.log(TIMES[1]), 1e4)
+        low[:, 2:] = (math.log(TIMES[0]), 0.0)
+        high[:, 2:] = (math.log(TIMES[1]), 1e4)
         none = np.full(gains.size, np.inf)
-        low, high = np.append(-none, low), np.append(none, high)
+        low = np.append(-none, low)
+        high = np.append(none, high)
         at = np.clip(np.append(gains, x), low, high)
         height, normal, right = self._slopes(at)
         damping = DAMPING
         for _ in range(STEPS):
             damped = normal + np.diag(damping * np.diagonal(normal) + 1e-9)
             step = bounded_mode(damped, right, low - at, high - at)
-            if 0.5 * float(right @ step) < TOLERANCE:
+            if 0.5 * right @ step < TOLERANCE:
                 break
             better = self._height(at + step) < height
             damping *= 0.2 if better else 8.0
             if better:
                 at = at + step
                 height, normal, right = self._slopes(at)
-        return self._noise(at), self._gains(at)
+        return _noise(at), self._gains(at)
 
     def _gains(self, at: Array) -> Array:
         return at[:-SEARCHED].reshape(len(PAIRS), -1)
 
-    def _noise(self, at: Array) -> PoseNoise:
-        return _noise(at[-SEARCHED:].reshape(6, 4))
-
     def _filter(self, at: Array) -> SteadyFilter:
-        return steady_filter(self._noise(at), self.period, self.gravity)
+        return steady_filter(_noise(at), self.period, self.gravity)
 
     def _height(self, at: Array) -> float:
         """Return minus the logarithm of the likelihood and the prior, up to a constant."""
@@ -100,31 +100,34 @@ class NoiseSearch:
         """Return the height, Fisher's information (c, c), and minus the height's gradient (c,)."""
         steady = self._filter(at)
         slopes, change = self._filter_slopes(at, steady)
-        size, n = len(at), 0
+        size = len(at)
+        n = 0
         whiten = np.linalg.inv(np.linalg.cholesky(steady.covariance))
-        whole, own = np.zeros((size + 1, size + 1)), np.zeros((6, 6))
+        whole = np.zeros((size + 1, size + 1))
+        own = np.zeros((6, 6))
         for e, changes in self.see(steady, self._gains(at), slopes):
             rows = (whiten @ np.dstack([changes, e])).reshape(-1, size + 1)
             whole += rows.T @ rows
             own += e.T @ e
             n += len(e)
-        normal, right = whole[:-1, :-1], whole[:-1, -1]
+        normal = whole[:-1, :-1]
+        right = whole[:-1, -1]
         held = np.tile(self.held, len(PAIRS))
-        normal[range(len(held)), range(len(held))] += held**-2
-        right[: len(held)] -= at[: len(held)] / held**2
+        count = len(held)
+        normal[range(count), range(count)] += held**-2
+        right[:count] -= at[:count] / held**2
         # by the innovations' covariance
         share = np.linalg.solve(steady.covariance, change)  # (m, 6, 6)
         left = np.linalg.solve(steady.covariance, own) - n * np.eye(6)
-        normal[len(held) :, len(held) :] += 0.5 * n * np.einsum("mij,lji->ml", share, share)
-        right[len(held) :] += 0.5 * np.einsum("mij,ji->m", share, left)
+        normal[count:, count:] += 0.5 * n * np.einsum("mij,lji->ml", share, share)
+        right[count:] += 0.5 * np.einsum("mij,ji->m", share, left)
         return self._deviance(own, steady.covariance, at, n), normal, right
 
     def _filter_slopes(self, at: Array, here: SteadyFilter) -> ArrayPair:
         """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
         covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
         """
-        numbers = range(SEARCHED)
-        noise = [self._noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in numbers]
+        noise = [_noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in range(SEARCHED)]
         moved = PoseNoise(*(np.stack(each) for each in zip(*map(astuple, noise), strict=True)))
         there = steady_filter(moved, self.period, self.gravity)
         gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
@@ -142,6 +145,7 @@ def _free(noise: PoseNoise) -> Array:
     return np.stack([*logs, np.square(noise.white / noise.disturbance)], axis=-1)
 
 
-def _noise(x: Array) -> PoseNoise:
-    pose, disturbance, time = np.moveaxis(np.exp(x[..., :3]), -1, 0)
-    return PoseNoise(pose, disturbance, time, disturbance * np.sqrt(x[..., 3]))
+def _noise(at: Array) -> PoseNoise:
+    x = at[-SEARCHED:].reshape(6, 4)
+    pose, disturbance, time = np.exp(x[:, :3]).T
+    return PoseNoise(pose, disturbance, time, disturbance * np.sqrt(x[:, 3]))

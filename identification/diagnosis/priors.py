@@ -12,8 +12,7 @@ import numpy as np
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
 from ..logs.table import Array, NamedNumbers, Pair, Values
-from .evidence import Index, Marginal, SetEvidence, marginal
-from .log_offsets import TIMINGS
+from .evidence import Index, Marginal, SetEvidence, marginal, set_evidence
 from .regression import (
     CENTRAL,
     START_PREFIX,
@@ -65,6 +64,7 @@ class PriorSettings:
 PRIORS = PriorSettings()
 # columns of one variant of an effect: all coefficients, or one of its starting points
 Variant = tuple[Column, ...]
+Variants = tuple[Variant, ...]  # of a set, one of each effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,10 +82,10 @@ class Base:
     effects: Effects  # of the setting
     plain: Index  # nuisances of any flight
     typical: Array  # (c,) typical sizes in prior standard deviations
-    dictionary: Index  # columns of the discrepancy
+    dictionary: Sequence[Column]  # columns of the discrepancy
     starts: Starts
     # the evidence of sets, by the likelihood's power and their columns; None for an impossible set
-    tried: dict[tuple[float, tuple[Variant, ...]], SetEvidence | None] = field(default_factory=dict)
+    tried: dict[tuple[float, Variants], SetEvidence | None] = field(default_factory=dict)
 
     @cached_property
     def columns(self) -> dict[Column, int]:
@@ -102,14 +102,20 @@ class Base:
         return [c for c in self.columns if c[0]]
 
     def marginal(
-        self, asked: Index, others: Index, size: Array | None = None, power: float = 1.0
-    ) -> Marginal:
+        self,
+        asked: Sequence[Column],
+        others: Index,
+        power: float = 1.0,
+        size: Array | None = None,
+    ) -> "Asked":
         """Return the likelihood, to a power, of the columns asked about, with others integrated
         out; ``size``: standard deviations of their prior, if not their own.
         """
         products = power * self.total
         products[-1, -1] += power * self.penalty
-        return marginal(products, asked, others, np.ones(len(others)) if size is None else size)
+        at = self.at(asked)
+        size = np.ones(len(others)) if size is None else size
+        return Asked(self, asked, at, marginal(products, at, others, size))
 
     def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, Pair]:
         """Return the coefficients of some columns at the mode without all others, and their
@@ -123,6 +129,29 @@ class Base:
         return {self.names[i]: (x, s) for i, x, s in modes}
 
 
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """The likelihood of some columns of a base, with all others integrated out."""
+
+    base: Base
+    columns: Sequence[Column]
+    at: Index  # in the base
+    quadratic: Marginal
+
+    @cached_property
+    def place(self) -> dict[Column, int]:
+        """The index of each column."""
+        return {c: i for i, c in enumerate(self.columns)}
+
+    def evidence(self, index: Sequence[int]) -> SetEvidence:
+        """Return the evidence of some of the columns, by their index."""
+        return set_evidence(self.quadratic, index, self.base.low[self.at], self.base.high[self.at])
+
+    def explained(self, index: Sequence[int]) -> float:
+        """Return the deviance explained by some of the columns, by their index."""
+        return self.quadratic.explained(index, self.evidence(index).mode)
+
+
 def bare(column: Column) -> Column:
     """Return a column's coefficient, without the mark of a whole effect."""
     return column[0], column[1].removeprefix(WHOLE_PREFIX)
@@ -134,7 +163,8 @@ def variants_of(
     """Return the variants of an effect beside the effects of a setting, without coefficients fixed
     by the vehicle's file.
     """
-    own, wholes = tuple(flights.columns_of([effect])), [(c,) for c in starts if c[0] == effect]
+    own = tuple(flights.columns_of([effect]))
+    wholes = [(c,) for c in starts if c[0] == effect]
     if moves_time(effect) and effect not in setting:
         return [own, *wholes]
     if flights.is_nonlinear(effect) and effect not in setting:
@@ -149,14 +179,13 @@ def variants_of(
 def prior_size(column: Column, flights: RegressedFlights) -> float:
     """Return the standard deviation of a column's coefficient before a flight is seen."""
     effect, name = column
-    if column in TIMINGS:
-        return TIMINGS[column].size
     if not effect:
         if name == BETWEEN:
             return PRIORS.between_samples
         if name.startswith(GAIN):
             return PRIORS.gains[int(name[-1])]
-        return PRIORS.model_error if name.startswith(MODEL_ERROR) else 1.0
+        is_error = name.startswith(MODEL_ERROR)
+        return PRIORS.model_error if is_error else typical_size(column, flights.vehicle)
     if name.startswith(START_PREFIX) or name == CENTRAL:
         return 1.0
     factor = PRIORS.any_size if get(effect).any_size else 1.0
@@ -171,7 +200,8 @@ def _bounds(column: Column, flights: RegressedFlights) -> Pair:
     if name.startswith(START_PREFIX):
         return PRIORS.near_start if moves_time(effect) else (0.0, math.inf)
     c = coefficient(bare(column))
-    low, high = c.minimum, min(c.maximum, c.plausible)
+    low = c.minimum
+    high = min(c.maximum, c.plausible)
     if get(effect).role == Role.MASS:
         low = max(low, -PRIORS.most_missing_mass * unit_of_change(column, flights.vehicle))
     own = declared(column, flights)
@@ -218,11 +248,11 @@ def in_prior_units(
     blocks *= scale[:, None]
     blocks *= scale
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
-    plain = [i for i, c in enumerate(names) if not c[0] and not c[1].startswith(UNKNOWN)]
-    dictionary = [i for i, c in enumerate(names) if not c[0] and c[1].startswith(UNKNOWN)]
     typical = np.array([typical_size(c, flights.vehicle) for c in own])
     total = blocks.sum(axis=0)
-    single = np.delete(np.arange(len(names)), dictionary)
+    free = np.array([not effect for effect, _ in names], dtype=np.bool_)
+    unknown = np.array([name.startswith(UNKNOWN) for _, name in names], dtype=np.bool_)
+    single = np.flatnonzero(~unknown)
     held = np.append(single, len(names))
     return Base(
         names,
@@ -234,8 +264,8 @@ def in_prior_units(
         single,
         penalty,
         frozenset(k for k in setting if k),
-        np.array(plain, dtype=np.intp),
+        np.flatnonzero(free & ~unknown),
         typical / size,
-        np.array(dictionary, dtype=np.intp),
+        [c for c in names if c[1].startswith(UNKNOWN)],
         starts,
     )

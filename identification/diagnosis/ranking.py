@@ -21,7 +21,6 @@ from ...dynamics.effects import get
 from ..findings import Disturbance, Ranking
 from ..logs.table import Array, Names, Pair, Values
 from .climbing import Height, linearised, mode
-from .evidence import set_evidence
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts, prior_size
 from .regression import (
@@ -78,15 +77,15 @@ def rank(
     """
 
     def height(x: Setting, near: Likelihood) -> Height:
-        base = Likelihood(flights, x, near, same_noise=True).base(x, {})
-        return linearised(flights, base, x)
+        return linearised(flights, Likelihood(flights, x, near, same_noise=True).base(x, {}), x)
 
     def fitted(setting: Setting, near: Likelihood) -> Likelihood:
         report(f"trying {', '.join(setting)}")
         tried[frozenset(setting)] = setting
         # a slow disturbance does much of what a steady effect does: each is fitted beside the other
         for _ in range(ROUNDS):
-            near, begun = Likelihood(flights, setting, near), setting
+            near = Likelihood(flights, setting, near)
+            begun = setting
             setting = mode(begun, partial(height, near=near))
             moved = (
                 abs(x - begun[e].get(n, 0.0)) / prior_size((e, n), flights)
@@ -107,7 +106,8 @@ def rank(
         return scores.get(frozenset(best.setting), -math.inf)
 
     def first() -> tuple[Likelihood, Starts, Base]:
-        nothing, starts = Likelihood(flights, {}), starts_of(flights, library, {})
+        nothing = Likelihood(flights, {})
+        starts = starts_of(flights, library, {})
         return nothing, starts, nothing.base(library, starts)
 
     # made anew at the end if no set is likeliest: its columns of ten minutes take 0.5 GB
@@ -193,14 +193,14 @@ def rank_by_rows(
             near = fitted[max(fitted, key=lambda other: len(other & key))]
             begun = {e: near.get(e, x) for e, x in setting.items()}
             setting = min(setting, begun, key=likelihood.objective)
-        fitted[key] = likelihood.fitted(setting)
-        own = set(fitted[key]) - given
-        if likelihood.idle(fitted[key], own) or not all(
-            is_possible(flights, fitted[key], {}, e, plausible=True) for e in own
+        fitted[key] = best = likelihood.fitted(setting)
+        own = key - given
+        if likelihood.idle(best, own) or not all(
+            is_possible(flights, best, {}, e, plausible=True) for e in own
         ):
             idle.add(key)
-            return
-        bases[key] = base(fitted[key])
+        else:
+            bases[key] = base(best)
 
     for effect in library:
         if not flights.is_nonlinear(effect) or effect in given:
@@ -238,8 +238,13 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
-    sensors, behind = likelihood.sensors(best), _behind(likelihood, best)
-    return FittedPosterior(last, last.ranking(), best, sensors=sensors, behind=behind)
+    return FittedPosterior(
+        last,
+        last.ranking(),
+        best,
+        sensors=likelihood.sensors(best),
+        behind=_behind(likelihood, best),
+    )
 
 
 def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
@@ -252,12 +257,10 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     if not hidden or not best:
         return {}
     base = likelihood.base(best, {}, [*best, *hidden])
-    at = base.at(base.asked)
-    m = base.marginal(at, base.plain, power=likelihood.power)
+    m = base.marginal(base.asked, base.plain, likelihood.power)
 
     def explained(effects: set[str]) -> float:
-        index = [i for i, (effect, _) in enumerate(base.asked) if effect in effects]
-        return m.explained(index, set_evidence(m, index, base.low[at], base.high[at]).mode)
+        return m.explained([i for c, i in m.place.items() if c[0] in effects])
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)

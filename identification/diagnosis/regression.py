@@ -74,9 +74,11 @@ NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 
 # typical sizes, the steps of derivatives by a coefficient: in a fit, and in a column examined for
 # its noise (there a signal moves in time by a sample, not by a part of one)
-STEP, LARGE_STEP = 0.1, 0.5
+STEP = 0.1
+LARGE_STEP = 0.5
 # coefficients by effect, beside the declared vehicle
 Setting = Mapping[str, Values]
+Residual = Callable[[Setting], Array]  # of flights with a setting (rows, channels)
 Effects = frozenset[str]
 # an effect's coefficient
 Column = tuple[str, str]
@@ -220,7 +222,8 @@ class RegressedFlights:
         self.sensor_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6)
         # effects whose columns are sensor noise to a large part
         self.not_identifiable = self._lost_in_noise(noisy)
-        rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
+        rotors = self.rotor_wrench({})
+        more = noisy.rotor_wrench({})
         # (4,) its share of the variance of what the rotors deliver: thrust and torque
         self.rotor_noise = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
 
@@ -276,6 +279,7 @@ class RegressedFlights:
         """
         linear = [e for e in names() if not is_nonlinear(e)]
         lost, _ = self._noisy_columns(noisy, linear)
+        unsaid: Effects = needing(*NOT_COMMANDED) if self.commanded else frozenset()
         if self.inertial:
             # a column also depends on states the IMU hardly shows
             quietly = lost  # lost in sensor noise alone
@@ -284,14 +288,11 @@ class RegressedFlights:
             lost, self.without_trace = self._noisy_columns(
                 noisy, [*linear, *filter(is_nonlinear, names())]
             )
-            lacking: Effects = frozenset()  # effects a pose would not show either
+            lacking = unsaid  # effects a pose would not show either
             if all(log.voltage is None for log in self.logs):
                 lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
-            if self.commanded:
-                lacking |= needing(*NOT_COMMANDED)
             self.needs_pose = lost - (quietly - self.without_trace) - lacking
-        if self.commanded:
-            lost |= needing(*NOT_COMMANDED)
+        lost |= unsaid
         if self.filtered:
             lost |= needing(Need.FAST_MOTION)
         if not self.rotor_speeds_vary:
@@ -305,7 +306,8 @@ class RegressedFlights:
         in an IMU.
         """
         weight = 1.0 / (mean_square(self.sensor_noise) + 1e-30)
-        lost, traceless = set(), set()
+        lost = set()
+        traceless = set()
         for effect in effects:
             noise = whole = 0.0
             pairs = zip(self._typical_parts(effect), noisy._typical_parts(effect), strict=True)
@@ -328,7 +330,7 @@ class RegressedFlights:
         if is_nonlinear(effect):
             setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
             return [self.residual({}) - self.residual(setting)]
-        columns = self.columns({}, [c for c in own if c[1] != CENTRAL], LARGE_STEP)
+        columns = self.columns({}, (c for c in own if c[1] != CENTRAL), self.residual, LARGE_STEP)
         return [typical_size(c, self.vehicle) * x for c, x in columns.items()]
 
     def _in_own_axes(self, x: Array, noisy: "RegressedFlights") -> Array:
@@ -345,8 +347,10 @@ class RegressedFlights:
         """Return thrust (N) and torque (Nm, body) of the rotors at the rows (rows, 4), behind the
         vehicle's lag and its like, low-passed.
         """
-        vehicle, pieces = self.amended(setting), self.pieces(setting)
-        return np.concatenate([p.smooth(delivered(p.signals, vehicle)) for p in pieces])
+        vehicle = self.amended(setting)
+        return np.concatenate(
+            [p.smooth(delivered(p.signals, vehicle)) for p in self.pieces(setting)]
+        )
 
     def at_rows(self, name: str, setting: Setting | None = None) -> Array:
         """Return a signal (rows, ...) of ``Signals``, by its name, at the rows."""
@@ -365,7 +369,7 @@ class RegressedFlights:
     @cached_property
     def speed(self) -> float:
         """RMS of the speed, m/s."""
-        return float(np.sqrt(np.mean(np.sum(np.square(self.at_rows("velocity")), axis=1))))
+        return math.sqrt(np.mean(np.sum(np.square(self.at_rows("velocity")), axis=1)))
 
     @property
     def inertias(self) -> Array:
@@ -412,10 +416,8 @@ class RegressedFlights:
         return pieces
 
     def _piece(self, log: int, signals: Signals, rows: Index) -> FlightPiece:
-        needed = needed_wrench(signals, self.vehicle)
-        if self.commanded:
-            needed[:, 3:] = 0.0
-        needed, felt = _smooth(needed, signals)[rows], None
+        needed = _smooth(needed_wrench(signals, self.vehicle), signals)[rows]
+        felt = None
         if not self.inertial and (read := _accelerometer(self.logs[log])):
             at = resampled(signals.t, *read)
             force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, at)
@@ -463,8 +465,7 @@ class RegressedFlights:
         the file states some. All may have changed where it states all.
         """
         own = self._declared.get(effect, {})
-        every = {c.name for c in get(effect).coefficients} - {CENTRAL}
-        return own if every - set(own) else {}
+        return own if {c.name for c in get(effect).coefficients} - {CENTRAL, *own} else {}
 
     def columns_of(self, effects: Iterable[str]) -> list[Column]:
         """Return the columns of effects: their coefficients except for the fixed ones, and for
@@ -481,8 +482,7 @@ class RegressedFlights:
         """Return whether an effect's force is not linear in its coefficients, with no values of all
         of them in a file to linearise about.
         """
-        whole = effect in self._declared and not self.stated(effect)
-        return is_nonlinear(effect) and not whole
+        return is_nonlinear(effect) and not (effect in self._declared and not self.stated(effect))
 
     def residual(self, setting: Setting) -> Array:
         """Return the residual (rows, 6) with these effects.
@@ -493,29 +493,28 @@ class RegressedFlights:
         key = tuple((name, *sorted(values.items())) for name, values in setting.items())
 
         def made() -> Array:
-            vehicle, left = self.amended(setting), []
-            for piece in self.pieces(setting):
-                acting = self.acting(piece.signals, setting, piece.log, vehicle)
-                if self.commanded:
-                    acting[:, 3:] = 0.0
-                left.append(piece.needed - piece.smooth(acting))
-            out = np.concatenate(left)
+            out = np.concatenate(
+                [
+                    piece.needed - piece.smooth(self.acting(piece.signals, setting, piece.log))
+                    for piece in self.pieces(setting)
+                ]
+            )
+            if self.commanded:
+                out[:, 3:] = 0.0
             out.setflags(write=False)
             return out
 
         # a fit asks several times for the residual at its setting
         return _kept(self._residuals, key, made, 16)
 
-    def acting(
-        self, signals: Signals, setting: Setting, log: int = 0, vehicle: Vehicle | None = None
-    ) -> Array:
-        """Return these effects' force and torque (n, 6) on the vehicle along signals of a log;
-        ``vehicle`` is the amended one, if at hand.
+    def acting(self, signals: Signals, setting: Setting, log: int = 0) -> Array:
+        """Return these effects' force and torque (n, 6) on the vehicle along signals of a log.
 
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
         like the residual.
         """
-        vehicle, offsets = vehicle or self.amended(setting), setting.get(ROTOR_TIME_OFFSET[0], {})
+        vehicle = self.amended(setting)
+        offsets = setting.get("", {})
         s = with_time_offsets(signals, offsets)
         s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
         wrench, _ = acting_wrench(s, vehicle, self.vehicle)
@@ -547,20 +546,17 @@ class RegressedFlights:
         self,
         setting: Setting,
         wanted: Iterable[Column],
+        residual: Residual,
         step: float = STEP,
-        residual: Callable[[Setting], Array] | None = None,
     ) -> dict[Column, Array]:
         """Return the columns of coefficients, for a residual (rows, 6) of these flights.
 
         So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
         typical sizes.
         """
-        left = residual or self.residual
-        return {column: self._slope(setting, column, step, left) for column in wanted}
+        return {column: self._slope(setting, column, residual, step) for column in wanted}
 
-    def _slope(
-        self, setting: Setting, column: Column, step: float, residual: Callable[[Setting], Array]
-    ) -> Array:
+    def _slope(self, setting: Setting, column: Column, residual: Residual, step: float) -> Array:
         effect, name = column
         own = self.coefficients(setting, effect)
         value, delta = self.step(setting, column, step)
@@ -571,7 +567,8 @@ class RegressedFlights:
         # moving signals in time moves their noise too, and a one-sided step would seem to reduce
         # the noise: the difference is two-sided
         if effect and moves_time(effect) and abs(value) > abs(delta):
-            c, far = coefficient(column), abs(delta)
+            c = coefficient(column)
+            far = abs(delta)
             if c.minimum <= value - far and value + far <= c.maximum:
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
         return (residual(setting) - at(value + delta)) / delta
@@ -595,9 +592,10 @@ def _accelerometer(log: FlightLog) -> ArrayPair | None:
     if log.accelerometer is None:
         return None
     read = finite_rows(log.accelerometer)
-    times, values = log.t[read], log.accelerometer[read]
+    times = log.t[read]
+    values = log.accelerometer[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
-    if not len(times) or float(np.diff(ends).max()) >= LONGEST_GAP:
+    if not len(times) or np.diff(ends).max() >= LONGEST_GAP:
         return None
     period = median_step(times)
     even = np.arange(times[0], times[-1], period)

@@ -59,8 +59,8 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     quiet = CALM * weight_and_torque(flights.vehicle)[[0, 3]]
     least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
     noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
-    old, new = np.square(before[held_out]), np.square(after[held_out])
-    change = np.mean((new - old) / (old.mean(axis=0) + 1e-30), axis=1)
+    old = np.square(before[held_out])
+    change = np.mean((np.square(after[held_out]) - old) / (old.mean(axis=0) + 1e-30), axis=1)
     block = flights.block[held_out]
     blocks = np.array([change[block == b].mean() for b in np.unique(block)])
     return Balance(
@@ -74,13 +74,11 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     )
 
 
-def beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> float:
-    """Return the logarithm of the largest unanswered disturbance of the six channels over a
-    negligible one; ``-inf`` without a fitted disturbance.
-    """
-    slow = [x.unanswered_below(CUTOFFS.calm_hz) for x in disturbances]
+def is_beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> bool:
+    """Return whether an unanswered disturbance of the six channels is above a negligible one."""
     calm = CALM * weight_and_torque(vehicle)
-    return float(np.log(np.max(slow / calm))) if slow else -np.inf
+    each = zip(disturbances, calm, strict=False)  # without a fitted disturbance none
+    return any(x.unanswered_below(CUTOFFS.calm_hz) > most for x, most in each)
 
 
 def transient_disturbances(
@@ -93,12 +91,12 @@ def transient_disturbances(
     noise of one strength, however fast, has peaks of about four standard deviations in a minute. A
     transient has more, in terms of the median.
     """
-    residual, edge = flights.residual(setting), round(MARGIN / flights.period)
+    residual = flights.residual(setting)
+    edge = round(MARGIN / flights.period)
     inner = np.concatenate([rows[edge : len(rows) - edge] for rows in flights.runs])
     if not inner.size:
         return []
-    weight = flights.vehicle.weight
-    least = LEAST_TRANSIENT * weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
+    least = LEAST_TRANSIENT * flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
     largest: dict[str, tuple[float, TransientDisturbance]] = {}
     for cutoff in CUTOFFS.transient_hz:
         slow = flights.low_passed(residual, cutoff)
@@ -107,11 +105,12 @@ def transient_disturbances(
         for i, channel in enumerate(CHANNELS):
             row = inner[np.argmax(size[:, i])]
             peak = float(slow[row, i])
-            above = abs(peak) / max(float(std[i]), 1e-30)
+            above = abs(peak) / max(std[i], 1e-30)
             before, _ = largest.get(channel, (LEAST_SIGNIFICANCE, None))
             if above > before and abs(peak) > least[i]:
-                log, t = flights.logs[flights.log[row]].name, float(flights.t[row])
-                largest[channel] = above, TransientDisturbance(channel, log, t, peak)
+                log = flights.logs[flights.log[row]].name
+                push = TransientDisturbance(channel, log, float(flights.t[row]), peak)
+                largest[channel] = above, push
     return [transient for _, transient in sorted(largest.values(), key=lambda x: -x[0])]
 
 

@@ -38,10 +38,10 @@ def rotor_innovations(pieces: Seen) -> list[Array]:
         pieces: as measured, and as the filter sees them.
     """
     rotors = [_accelerations(poses, track) for poses, track in pieces]
-    out = [np.zeros_like(now) for now in rotors]
-    for innovations, now, predicted in zip(out, rotors, _predicted(pieces, rotors), strict=True):
-        innovations[LAGS:] = now[LAGS:] - predicted
-    return out
+    return [
+        np.pad(now[LAGS:] - expected, ((len(now) - len(expected), 0), (0, 0)))
+        for now, expected in zip(rotors, _predicted(pieces, rotors), strict=True)
+    ]
 
 
 def unrounded(pieces: Seen, step: float) -> list[Array]:
@@ -54,7 +54,8 @@ def unrounded(pieces: Seen, step: float) -> list[Array]:
     Statistical Society B 43 (1981), 41-45).
     """
     logged = [poses.rotor_speeds for poses, _ in pieces]
-    speeds, variance = [x.copy() for x in logged], [np.zeros_like(x) for x in logged]
+    speeds = [x.copy() for x in logged]
+    variance = [np.zeros_like(x) for x in logged]
     for _ in range(ROUNDS):
         each = list(zip(logged, speeds, variance, _predicted(pieces, speeds), strict=True))
         left = [np.square(now[LAGS:] - z) + v[LAGS:] for _, now, v, z in each]
@@ -73,12 +74,11 @@ def unrounded(pieces: Seen, step: float) -> list[Array]:
 
 def _predicted(pieces: Seen, rotors: list[Array]) -> list[Array]:
     """Return the least-squares predictions (n - LAGS, 4) of each piece's rotors (n, 4)."""
-    each = list(zip(pieces, rotors, strict=True))
+    each = zip(pieces, rotors, strict=True)
     x = np.concatenate([_known_before(track, now) for (_, track), now in each])
     later = [now[LAGS:] for now in rotors]
     y = np.concatenate(later)
-    mean, size = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
-    z = np.column_stack([(x - mean) / size, np.ones(len(x))])
+    z = np.column_stack([(x - x.mean(axis=0)) / np.maximum(x.std(axis=0), 1e-12), np.ones(len(x))])
     normal = z.T @ z
     # against columns nearly alike, and constant ones: all others have a square of one
     normal += 1e-6 * len(z) * np.eye(len(normal))
@@ -104,13 +104,16 @@ def _known_before(track: Track, rotors: Array) -> Array:
     count = max(len(rotors) - LAGS, 0)
     known = [rotors[i : i + count] for i in reversed(range(LAGS))]
     before = slice(LAGS - 1, LAGS - 1 + count)
+    tilt = track.rotation[before][:, 2, :2]
     body = in_body(track.velocity[before], track.rotation[before])
     rate = track.angular_velocity[before]
+    state = np.hstack([tilt, body, rate])
+    i, j = np.triu_indices(state.shape[1])
     # along the heading and to its left, and about the body's axes
     back = track.heading * [1.0, -1.0]
     seen = np.hstack([level(back, x) for x in np.hsplit(track.innovations, 2)])
     known += [
-        track.rotation[before][:, 2, :2],
+        tilt,
         body,
         track.position[before],
         rate,
@@ -118,12 +121,6 @@ def _known_before(track: Track, rotors: Array) -> Array:
         seen[before],
         # the loop may have read this sample's pose before the rotors were logged
         seen[LAGS:],
-        _products(np.hstack([track.rotation[before][:, 2, :2], body, rate])),
+        state[:, i] * state[:, j],
     ]
     return np.column_stack(known)
-
-
-def _products(x: Array) -> Array:
-    """Return the products (n, k) of all pairs of columns."""
-    i, j = np.triu_indices(x.shape[1])
-    return np.asarray(x[:, i] * x[:, j])

@@ -42,7 +42,8 @@ class RowLikelihood:
     def __init__(
         self, flights: RegressedFlights, library: Sequence[str], first: Setting, fixed: Setting
     ) -> None:
-        self.flights, self.library = flights, list(library)
+        self.flights = flights
+        self.library = list(library)
         self.rows = Rows(flights, fixed)
         self.nuisances = _named(row_nuisances(self.rows))
         self.power = 1.0
@@ -57,7 +58,8 @@ class RowLikelihood:
         traced = {c[0] for c, x in columns.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
         own = [x * prior_size(c, self.flights) for c, x in columns.items() if c[0] in traced]
-        signals, explained = followers(rows), np.zeros_like(y)
+        signals = followers(rows)
+        explained = np.zeros_like(y)
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
@@ -84,8 +86,7 @@ class RowLikelihood:
         for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
-            z = noise.white(y)[use].ravel()
-            mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ z)
+            mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ noise.white(y)[use].ravel())
             left = y - X[:, :, :known] @ mode[:known]
             noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
         return noise, X[:, :, : len(own)] @ mode[: len(own)]
@@ -108,7 +109,9 @@ class RowLikelihood:
             effects: effects to ask about; default: all of the library.
             unknown: whether the dictionary's columns are among them.
         """
-        rows, flights, residual = self.rows, self.flights, self.rows.residual(setting)
+        rows = self.rows
+        flights = self.flights
+        residual = self.rows.residual(setting)
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
         columns = dict(self.nuisances)
@@ -122,27 +125,32 @@ class RowLikelihood:
             columns |= self._dictionary(setting)
         x = self._white(np.stack([*columns.values(), residual], axis=2))
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
-        parts = [p.reshape(-1, p.shape[2]) for p in np.split(x, ends)]
+        parts = (p.reshape(-1, x.shape[2]) for p in np.split(x, ends))
         blocks = np.array([p.T @ p for p in parts])
         return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns, changing coefficients among them."""
-        rows, flights, vehicle = self.rows, self.flights, self.flights.vehicle
-        pieces, states = flights.pieces({}), []
+        rows = self.rows
+        flights = self.flights
+        pieces = flights.pieces({})
+        states = []
         for s in (p.signals for p in pieces):
-            rotors = delivered(s, vehicle) / flights.inertias[2:]
+            rotors = delivered(s, self.flights.vehicle) / flights.inertias[2:]
             # the acceleration is the rotors' alone, without disturbances
-            push, rate = rotors[:, :1] * s.rotation[:, :, 2], s.angular_velocity
-            states.append(FlightState(s.t, s.position, s.rotation, s.velocity, rate, push, rotors))
+            push = rotors[:, :1] * s.rotation[:, :, 2]
+            states.append(
+                FlightState(
+                    s.t, s.position, s.rotation, s.velocity, s.angular_velocity, push, rotors
+                )
+            )
         whole, ends = joined(states)
         out = {}
         for column, made in discrepancy_columns(whole, ends, flights).items():
             x = made[:]
             if rows.with_torques or x[:, :3].any():
                 parts = zip(np.split(x, ends), pieces, strict=True)
-                sampled = np.concatenate([p.smooth(part) for part, p in parts])
-                out[column] = rows.from_world(sampled[:, :3], torque=sampled[:, 3:])
+                out[column] = rows.from_world(np.concatenate([p.smooth(part) for part, p in parts]))
         here = rows.residual(setting)
         own = {e: rows.residual(without(setting, e)) - here for e in setting}
         at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
@@ -156,7 +164,7 @@ class RowLikelihood:
         integrated out.
         """
         base = self.base(setting, {}, ())
-        m = base.marginal(base.at(()), base.plain, power=self.power)
+        m = base.marginal((), base.plain, self.power).quadratic
         off = [
             (setting[c[0]].get(c[1], 0.0) - declared(c, self.flights)) / prior_size(c, self.flights)
             for c in self.flights.columns_of(setting)
@@ -166,7 +174,7 @@ class RowLikelihood:
             base = self.base(setting, {}, setting)
             return linearised(self.flights, base, setting, self.power)[1]()
 
-        return 0.5 * float(np.square(off).sum()) - m.constant, target
+        return 0.5 * np.square(off).sum() - m.constant, target
 
     def objective(self, setting: Setting) -> float:
         """Return minus the logarithm of likelihood and prior at a setting, up to a constant;
@@ -183,7 +191,8 @@ class RowLikelihood:
         time offsets of logs, in the units of ``offsets``, with their standard deviations.
         """
         base = self.base(setting, {}, ())
-        modes, out = base.mode(base.plain, self.power), {}
+        modes = base.mode(base.plain, self.power)
+        out = {}
         for (_, name), offset in self.flights.offsets.items():
             mode, std = modes["", NUISANCE + name]
             out[name] = float(np.clip(offset.size * mode, *offset.range)), offset.size * std
@@ -192,7 +201,7 @@ class RowLikelihood:
     def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
         """Return the effects of a setting, among some, without any effect there."""
         here = self.rows.residual(setting)
-        least = 1e-6 * float(np.abs(here).max())
+        least = 1e-6 * np.abs(here).max()
         return {
             effect
             for effect in among

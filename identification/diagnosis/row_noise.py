@@ -38,8 +38,7 @@ class RowNoise:
     def known(self) -> Mask:
         """The rows (n,) with all earlier rows of the autoregression."""
         since = np.arange(len(self.begins))
-        first = since[self.begins][np.cumsum(self.begins) - 1]
-        return np.asarray(since - first >= len(self.lags))
+        return np.asarray(since - since[self.begins][np.cumsum(self.begins) - 1] >= len(self.lags))
 
     def white(self, x: Array) -> Array:
         """Return rows (n, c, ...) with white noise of variance one; rows outside ``known`` are
@@ -56,8 +55,9 @@ def white_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     """Return noise without memory, of the size of the rows ``fit`` of ``x`` (n, c) and of ``least``
     (c,).
     """
-    size = _size(x[fit], least)
-    return RowNoise(np.zeros((0, x.shape[1], x.shape[1])), np.diag(size**2), begins)
+    return RowNoise(
+        np.zeros((0, x.shape[1], x.shape[1])), np.diag(_size(x[fit], least) ** 2), begins
+    )
 
 
 def _size(x: Array, least: Array) -> Array:
@@ -79,8 +79,7 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     past = np.column_stack([z[at - k] for k in range(1, lags + 1)])
     now = z[at]
     loading = len(at) * (LOADING + np.square(least / size))
-    normal = past.T @ past + np.diag(np.tile(loading, lags))
-    fitted = np.linalg.solve(normal, past.T @ now)
+    fitted = np.linalg.solve(past.T @ past + np.diag(np.tile(loading, lags)), past.T @ now)
     left = now.T @ now + np.diag(loading) - fitted.T @ (past.T @ now)
     covariance = left / max(len(at) - lags * channels, 1)
     parts = [fitted[k * channels : (k + 1) * channels].T for k in range(lags)]

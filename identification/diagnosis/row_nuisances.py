@@ -36,7 +36,8 @@ def row_nuisances(rows: Rows) -> NamedArrays:
     numbers = np.unique(flights.log).tolist()
     for i in numbers:
         here = (flights.log == i)[:, None].astype(float)
-        thrust, turning = here * rotors[:, :1], here * rotors[:, 1:]
+        thrust = here * rotors[:, :1]
+        turning = here * rotors[:, 1:]
         own = _of_accelerometers(rows, here, thrust) if rows.has_accelerometer else {}
         if flights.commanded:
             own |= _of_commands(rows, here, thrust)
@@ -71,9 +72,10 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     turns may show the delay of commands. Even then the delay of thrust may differ: the flight loop
     answers vertical motion.
     """
-    flights, up = rows.flights, thrust * AXES["z"]
+    flights = rows.flights
+    up = thrust * AXES["z"]
     t = flights.t[here[:, 0] > 0.0]
-    w = 2.0 * (flights.t[:, None] - t[0]) / max(float(t[-1] - t[0]), 1e-9) - 1.0
+    w = 2.0 * (flights.t[:, None] - t[0]) / max(t[-1] - t[0], 1e-9) - 1.0
     out = {
         "thrust": rows.from_body(THRUST_STD * up),
         "drift": rows.from_body(DRIFT_STD * w * up),
@@ -102,7 +104,8 @@ def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedA
     out = {f"{MODEL_ERROR} of thrust's changes": rows.from_body(varying * AXES["z"])}
     gains = np.hypot(PRIORS.model_error, noise[1:]).tolist()
     for (name, along), gain in zip(AXES.items(), gains, strict=True):
-        force, torque = PRIORS.model_error * thrust * along, gain * turning * along
+        force = PRIORS.model_error * thrust * along
+        torque = gain * turning * along
         out[f"{MODEL_ERROR} of force {name}"] = rows.from_body(force)
         out[f"{MODEL_ERROR} of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)
     return out
@@ -129,7 +132,7 @@ def followers(rows: Rows) -> Followers:
         return out
     delivered = flights.rotor_wrench({}) / flights.inertias[2:]
     change = np.concatenate([np.gradient(delivered[run, 0]) for run in flights.runs])
-    change *= delivered[:, 0].std() / max(float(change.std()), 1e-12)
+    change *= delivered[:, 0].std() / max(change.std(), 1e-12)
     wrench = rows.at_rows(np.column_stack([delivered, change]))
     turned = [p.smooth(p.signals.angular_velocity) for p in flights.pieces({})]
     rates = rows.at_rows(np.concatenate(turned) / STOPPED_WITHIN)
@@ -153,7 +156,7 @@ def answered(rows: Rows, signals: Followers, disturbance: Array) -> NamedArrays:
     for name, (signal, channels) in signals.items():
         size = signal - signal[rows.fit].mean()
         own = disturbance[rows.fit][:, channels]
-        share = min(float(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12)), 1.0)
+        share = min(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12), 1.0)
         column = out[f"answer by {name}"] = np.zeros((len(size), rows.channels))
         column[:, channels] = share * size[:, None]
     return out

@@ -53,12 +53,14 @@ class Rows:
     """
 
     def __init__(self, flights: RegressedFlights, fixed: Setting) -> None:
-        self.with_torques, cutoff = not flights.commanded, CUTOFFS.residual_hz
+        self.with_torques = not flights.commanded
+        cutoff = CUTOFFS.residual_hz
         self._cutoff = np.inf
         if flights.commanded or flights.filtered:
             self._cutoff = cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else FILTERED_CUTOFF_HZ
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
-        self.flights, self.fixed = flights, fixed
+        self.flights = flights
+        self.fixed = fixed
         self._at: Index = np.concatenate([rows[::step] for rows in flights.runs])
         self.begins: Mask = flights.start[self._at]
         self.t: Array = flights.t[self._at]
@@ -67,19 +69,18 @@ class Rows:
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
         self._inertias = flights.inertias
-        least = LEAST * weight_and_torque(flights.vehicle) / flights.inertias
-        force, torque = np.split(least, 2)
+        force, torque = np.split(LEAST * weight_and_torque(flights.vehicle) / flights.inertias, 2)
         self.least = np.concatenate(
             [force] * (1 + self.has_accelerometer) + [torque] * self.with_torques
         )
         self.rotation = flights.at_rows("rotation")
 
-    def from_world(
-        self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
-    ) -> Array:
-        """Return rows of accelerations in the world frame; arguments as of ``from_body``."""
-        felt = None if accelerometer is None else in_body(accelerometer, self.rotation)
-        return self.from_body(in_body(pose, self.rotation), felt, torque)
+    def from_world(self, x: Array, felt: bool = True) -> Array:
+        """Return rows of accelerations (samples, 6): m/s2 in the world frame, and rad/s2 in body
+        axes; ``felt``: whether an accelerometer reads them as well.
+        """
+        pose = in_body(x[:, :3], self.rotation)
+        return self.from_body(pose, felt * pose, x[:, 3:])
 
     def from_body(
         self, pose: Array, accelerometer: Array | None = None, torque: Array | None = None
@@ -110,7 +111,8 @@ class Rows:
             InputError: no vehicle is possible.
         """
         setting = {**self.fixed, **setting}
-        left, felt = self.flights.residual(setting) / self._inertias, self.flights.felt(setting)
+        left = self.flights.residual(setting) / self._inertias
+        felt = self.flights.felt(setting)
         rotation = self.flights.at_rows("rotation", setting)
         shown = in_body(left[:, :3], rotation)
         read = None if felt is None else shown + in_body(felt / self._inertias[:3], rotation)
@@ -118,9 +120,8 @@ class Rows:
 
     def noise(self) -> Array:
         """Return rows of the sensors' noise, as far as visible in the logs."""
-        noise = self.flights.visible_noise / self._inertias
-        return self.from_world(noise[:, :3], np.zeros_like(noise[:, :3]), noise[:, 3:])
+        return self.from_world(self.flights.visible_noise / self._inertias, felt=False)
 
     def columns(self, setting: Setting, wanted: Iterable[Column]) -> dict[Column, Array]:
         """Return the columns of coefficients (n, channels), by differences."""
-        return self.flights.columns({**self.fixed, **setting}, wanted, residual=self.residual)
+        return self.flights.columns({**self.fixed, **setting}, wanted, self.residual)

@@ -15,11 +15,9 @@ from ..findings import RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
-    Index,
     Marginal,
     SetEvidence,
     evidence_of_one_more,
-    set_evidence,
     tempering,
 )
 from .priors import (
@@ -28,6 +26,7 @@ from .priors import (
     Base,
     Setting,
     Variant,
+    Variants,
     bare,
     declared,
     variants_of,
@@ -60,7 +59,7 @@ ROUNDED = 0.25
 @dataclass(frozen=True, eq=False)
 class _Candidate:
     base: Base
-    variants: tuple[Variant, ...]
+    variants: Variants
     evidence: SetEvidence
 
     @property
@@ -82,7 +81,9 @@ def is_possible(
     needs a quadratic part below zero. A true coefficient of zero is at a bound too, but its best
     fit is not far outside.
     """
-    words, vehicle, own = get(effect), flights.vehicle, setting[effect]
+    words = get(effect)
+    vehicle = flights.vehicle
+    own = setting[effect]
     if words.possible is not None and not words.possible(own, vehicle):
         return False
     if not plausible or words.implausible is None:
@@ -123,7 +124,8 @@ class Posterior:
         idle: Collection[Effects] = (),
     ) -> None:
         self.flights, self.library, self.bases, self.power = flights, library, bases, power
-        self.idle, self.given = idle, given
+        self.idle = idle
+        self.given = given
         self.asked_about = len(library) - len(given or ())
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[Effects, _Candidate] = {}
@@ -145,12 +147,12 @@ class Posterior:
         fitted = np.sort(np.append(base.plain, base.at(best.columns)))
         return tempering(base.blocks, np.searchsorted(base.single, fitted))
 
-    def _negligible(self, base: Base, asked: Index) -> Array:
-        """Return the share (len(asked),) of each column in any flight."""
-        little = PRIORS.negligible * base.typical[asked]
+    def _negligible(self, base: Base) -> Array:
+        """Return the share (len(base.asked),) of each column in any flight."""
+        little = PRIORS.negligible * base.typical[base.at(base.asked)]
         # a start of another base is no small effect
         if self.given is not None:
-            little[[base.names[i][1].startswith(START_PREFIX) for i in asked]] = 0.0
+            little[[name.startswith(START_PREFIX) for _, name in base.asked]] = 0.0
         return little
 
     def _counts(self, number: int, key: Effects) -> bool:
@@ -170,34 +172,35 @@ class Posterior:
                     out.append(columns)
         return out
 
-    def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
+    def _search(self, number: int, asked_sets: Sequence[Variants] | None = None) -> None:
         base = self.bases[number]
-        asked = base.at(base.asked)
-        at = {c: i for i, c in enumerate(base.asked)}
         # integrated out: everything any flight may have, and a little of every effect
-        little = np.concatenate([np.ones(len(base.plain)), self._negligible(base, asked)])
-        m = base.marginal(asked, np.concatenate([base.plain, asked]), little, self.power)
-        low, high = base.low[asked], base.high[asked]
+        little = np.append(np.ones(len(base.plain)), self._negligible(base))
+        m = base.marginal(
+            base.asked, np.append(base.plain, base.at(base.asked)), self.power, little
+        )
         variants = self._variants(base)
         ways = Counter(v[0][0] for v in variants)
-        p, always = self.inclusion, len(self.given or ())
+        always = len(self.given or ())
 
-        def score(some: tuple[Variant, ...]) -> float:
+        def score(some: Variants) -> float:
             key = frozenset(v[0][0] for v in some)
             if not self._counts(number, key):
                 return -math.inf
             if (self.power, some) not in base.tried:
-                index = [at[c] for v in some for c in v]
+                index = [m.place[c] for v in some for c in v]
                 base.tried[self.power, some] = None
                 with suppress(np.linalg.LinAlgError):
-                    first_evidence = set_evidence(m, index, low, high)
-                    if self._possible(_Candidate(base, some, first_evidence)):
-                        base.tried[self.power, some] = first_evidence
+                    new = _Candidate(base, some, m.evidence(index))
+                    if self._possible(new):
+                        base.tried[self.power, some] = new.evidence
             if (evidence := base.tried[self.power, some]) is None:
                 return -math.inf
             total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)
             more = len(some) - always
-            total += more * math.log(p) + (self.asked_about - more) * math.log1p(-p)
+            total += more * math.log(self.inclusion) + (self.asked_about - more) * math.log1p(
+                -self.inclusion
+            )
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
                 self.known[key] = _Candidate(base, some, evidence)
@@ -206,13 +209,14 @@ class Posterior:
         first = tuple(v for v in variants if self.given is not None and v[0][0] in base.effects)
         score(first)
         for some in asked_sets or ():
-            if all(c in at for v in some for c in v):
+            if all(c in m.place for v in some for c in v):
                 score(some)
         level = [(*first, v) for v in variants if v not in first]
-        begun, most = len(first) + 1, MOST_EFFECTS + always
+        begun = len(first) + 1
+        most = MOST_EFFECTS + always
         for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
             level.sort(key=score, reverse=True)
-            grown: dict[frozenset[Variant], tuple[Variant, ...]] = {}
+            grown: dict[frozenset[Variant], Variants] = {}
             for some in level[: KEPT_SETS * (2 if size == begun else 1)]:
                 for v in variants:
                     if v[0][0] not in {x[0][0] for x in some}:
@@ -241,12 +245,13 @@ class Posterior:
             quieter: the last base with the likeliest noise beside the strangest column. The set,
                 and the set with one more column, have the likelier noise of both.
         """
-        none, more = [], []
+        none = []
+        more = []
         for base in (self.bases[-1], *((quieter,) if quieter else ())):
             m = self._dictionary_beside_best(base)
             groups: dict[str, list[int]] = {}
-            for i, at in enumerate(base.dictionary.tolist()):
-                groups.setdefault(base.names[at][1].split(": ")[0], []).append(i)
+            for i, (_, name) in enumerate(base.dictionary):
+                groups.setdefault(name.split(": ")[0], []).append(i)
             factors = [evidence_of_one_more(m, i, UNKNOWN_SIZES) for i in groups.values()]
             none.append(m.constant)
             more.append(m.constant + float(logsumexp(factors)) - math.log(len(factors)))
@@ -261,7 +266,7 @@ class Posterior:
         coefficients = m.right / m.own
         gains = m.right * coefficients
         best = int(np.argmax(gains))
-        return base.names[base.dictionary[best]], float(coefficients[best]), float(gains[best])
+        return base.dictionary[best], float(coefficients[best]), float(gains[best])
 
     def log_bayes_factor(self, effect: str) -> float:
         """Return the log-likelihood ratio of the likeliest set with an effect to the likeliest
@@ -270,28 +275,23 @@ class Posterior:
         each = math.log(self.inclusion / (1.0 - self.inclusion))
         value = {key: x - each * len(key) for key, x in self.scores.items()}
         have = max(x for key, x in value.items() if effect in key)
-        lack = max((x for key, x in value.items() if effect not in key), default=-math.inf)
-        return have - lack
+        return have - max((x for key, x in value.items() if effect not in key), default=-math.inf)
 
     def factor_in_set(self, effect: str) -> float:
         """Return the logarithm of the Bayes factor of the likeliest set over the same without an
         effect, with nothing in its place.
         """
         base, best = self._likeliest()
-        asked = base.at(base.asked)
-        m = base.marginal(asked, base.plain, power=self.power)
-        low, high = base.low[asked], base.high[asked]
-        place = {c: i for i, c in enumerate(base.asked)}
+        m = base.marginal(base.asked, base.plain, self.power)
         whole, rest = (
-            set_evidence(m, [place[c] for c in best.columns if c[0] != out], low, high)
-            for out in ("", effect)
+            m.evidence([m.place[c] for c in best.columns if c[0] != out]) for out in ("", effect)
         )
         return whole.log_evidence - rest.log_evidence
 
     def left(self) -> float:
         """Return the deviance left by the likeliest set, with the nuisances integrated out."""
         base, best = self._likeliest()
-        m = base.marginal(base.at(best.columns), base.plain, power=self.power)
+        m = base.marginal(best.columns, base.plain, self.power).quadratic
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
@@ -303,16 +303,15 @@ class Posterior:
         base = next(x for x in self.bases if x.effects == given)
         asked = [c for c in base.asked if c[0] not in given]
         always = base.at(c for c in base.asked if c[0] in given)
-        at, index = base.at(asked), {c: i for i, c in enumerate(asked)}
-        m = base.marginal(at, np.append(base.plain, always), power=self.power)
-        normal = m.normal + np.eye(len(asked))
-        whole = max(float(m.right @ np.linalg.solve(normal, m.right)), 1e-12)
+        m = base.marginal(asked, np.append(base.plain, always), self.power)
+        right = m.quadratic.right
+        normal = m.quadratic.normal + np.eye(len(asked))
+        whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
         out: NamedNumbers = {}
         for columns in self._variants(base):
             if (effect := columns[0][0]) not in given:
-                own = [index[c] for c in columns]
-                z = set_evidence(m, own, base.low[at], base.high[at]).mode
-                out[effect] = max(out.get(effect, 0.0), m.explained(own, z) / whole)
+                gained = m.explained([m.place[c] for c in columns])
+                out[effect] = max(out.get(effect, 0.0), gained / whole)
         return out
 
     def nuisances(self) -> dict[Column, Pair]:
@@ -329,16 +328,16 @@ class Posterior:
         """
         base, best = self._likeliest()
         others = np.append(np.setdiff1d(base.plain, base.at(known)), base.at(best.columns))
-        m = base.marginal(base.at(base.asked), others, power=self.power)
-        index = {c: i for i, c in enumerate(base.asked)}
+        m = base.marginal(base.asked, others, self.power)
         out: NamedNumbers = {}
         for columns in self._variants(base):
             (effect, name), *_ = columns
-            if name.startswith(START_PREFIX) or effect in {v[0][0] for v in best.variants}:
+            if name.startswith(START_PREFIX) or effect in {e for e, _ in best.columns}:
                 continue
             sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
-            z, i = base.typical[base.at(columns)] * sign, [index[c] for c in columns]
-            out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
+            z = base.typical[base.at(columns)] * sign
+            i = [m.place[c] for c in columns]
+            out[effect] = max(float(z @ m.quadratic.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
 
     def _dictionary_beside_best(self, base: Base) -> Marginal:
@@ -346,15 +345,15 @@ class Posterior:
         set.
         """
         own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
-        asked = base.at(base.asked)
         # an effect of the set is true to some per cent, whatever makes it change
         changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
         wrong = np.full(len(changing), EFFECT_ERROR / SHARE_OF_EFFECT)
-        little, ones = self._negligible(base, asked), np.ones(len(base.plain) + len(own))
-        chosen = np.concatenate([base.plain, own, asked, changing])
+        ones = np.ones(len(base.plain) + len(own))
+        chosen = np.concatenate([base.plain, own, base.at(base.asked), changing])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
         power = self.power * (1.0 if varied else ROUNDED)
-        return base.marginal(base.dictionary, chosen, np.concatenate([ones, little, wrong]), power)
+        size = np.concatenate([ones, self._negligible(base), wrong])
+        return base.marginal(base.dictionary, chosen, power, size).quadratic
 
     def best_setting(self, most: int = MOST_EFFECTS) -> Setting:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
@@ -385,10 +384,10 @@ class Posterior:
 
     def _at_mode(self, candidate: _Candidate) -> tuple[Setting, Setting]:
         """Return the coefficients of a set at the mode, and their standard deviations."""
-        base, evidence = candidate.base, candidate.evidence
+        base = candidate.base
         setting = {}
         std = {}
-        modes = zip(evidence.mode.tolist(), evidence.std.tolist(), strict=True)
+        modes = zip(candidate.evidence.mode.tolist(), candidate.evidence.std.tolist(), strict=True)
         for columns in candidate.variants:
             effect = columns[0][0]
             own = dict(self.flights.coefficients({}, effect))
@@ -399,14 +398,16 @@ class Posterior:
                     if moves_time(effect):
                         own[get(effect).coefficients[0].name] *= mode
                     continue
-                name, size = bare(c)[1], float(base.size[base.columns[c]])
+                name = bare(c)[1]
+                size = float(base.size[base.columns[c]])
                 limits = coefficient((effect, name))
                 value = mode * size + declared(c, self.flights)
                 own[name] = min(max(value, limits.minimum), limits.maximum)
                 off[name] = deviation * size
                 if c[1].startswith(WHOLE_PREFIX):
                     own[CENTRAL] = 1.0
-            setting[effect], std[effect] = own, off
+            setting[effect] = own
+            std[effect] = off
         return setting, std
 
     def ranking(self, quieter: Base | None = None) -> Ranking:

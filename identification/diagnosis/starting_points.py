@@ -40,11 +40,15 @@ def starting_points(
     """
     declared = get(effect).starting_points
     assert declared is not None, f"{effect} declares no starting points"
-    position, seen, vehicle = flights.at_rows("position"), flights.fit_rows, flights.vehicle
+    position = flights.at_rows("position")
+    seen = flights.fit_rows
     starts = declared(
         Unexplained(
-            vehicle,
-            {c.name: typical_size((effect, c.name), vehicle) for c in get(effect).coefficients},
+            flights.vehicle,
+            {
+                c.name: typical_size((effect, c.name), flights.vehicle)
+                for c in get(effect).coefficients
+            },
             stated,
             frozenset(get(e).family for e in beside),
             position.mean(axis=0),
@@ -60,7 +64,9 @@ def starting_points(
     # samples are enough. To find out, one sample is repeated for a minute, in step with no whole Hz
     one = flights.pieces({})[0].signals.at(np.zeros(200, dtype=np.int64))
     acts = flights.acting(replace(one, period=0.317), {effect: starts[0]})
-    steady, sampled, every = bool(np.all(acts == acts[0])), [], []
+    steady = bool(np.all(acts == acts[0]))
+    sampled = []
+    every = []
     for p in flights.pieces({}):
         chosen = np.arange(len(p.rows)) % max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) == 0
         at = p.rows[chosen]
@@ -76,10 +82,11 @@ def starting_points(
 
     # share of the residual along each start's wrench; the later one of equals, and none without a
     # wrench
-    base, likeness = acting({}), []
+    base = acting({})
+    likeness = []
     for i, start in enumerate(starts):
         shape = acting({effect: start}) - base
-        size = float(np.sum(shape * shape))
+        size = np.sum(shape * shape)
         if size > 0.0:
-            likeness.append((float(np.sum(shape * target * scale)) / math.sqrt(size), i))
+            likeness.append((np.sum(shape * target * scale) / math.sqrt(size), i))
     return [starts[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]

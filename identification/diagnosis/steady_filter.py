@@ -16,6 +16,7 @@ from ..logs.table import Array
 PAIRS = np.array([[0, 4], [1, 3], [2, 5]])  # a position, and the turn pulling it
 # (6, 3) whether an axis is of a pair
 OWN = np.equal(np.arange(6)[:, None, None], PAIRS).any(axis=2)
+LAST = [2, 5]  # the disturbances among the states of a pair
 PULL = np.array([1.0, -1.0, 0.0])  # of a turn on its position's acceleration, over gravity
 
 
@@ -49,23 +50,19 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     """Return the steady filter of poses, every ``period`` s, with this noise."""
     keep = np.exp(-period / noise.time)
     # in units of the pose's noise and of a period
-    pose, decay = noise.pose[..., PAIRS], keep[..., PAIRS]
+    pose = noise.pose[..., PAIRS]
+    decay = keep[..., PAIRS]
     unit = period * period / pose
     half = np.array([0.5, 1.0, 0.0])
     white = np.square(noise.white[..., PAIRS] * unit)
-    drift = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
-    shape = (*pose.shape[:-1], 6, 6)
-    F, Q, H = np.zeros(shape), np.zeros(shape), np.zeros((2, 6))
-    for i in range(2):
-        at = slice(3 * i, 3 * i + 3)
-        F[..., at, at] = [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]]
-        F[..., 3 * i + 2, 3 * i + 2] = decay[..., i]
-        Q[..., at, at] = white[..., i, None, None] * np.outer(half, half)
-        Q[..., 3 * i + 2, 3 * i + 2] = drift[..., i]
-        H[i, 3 * i] = 1.0
+    Q = np.repeat(white, 3, axis=-1)[..., None] * np.kron(np.eye(2), np.outer(half, half))
+    Q[..., LAST, LAST] = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
+    F = np.zeros_like(Q)
+    F += np.kron(np.eye(2), [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    F[..., LAST, LAST] = decay
     pull = gravity * PULL * unit[..., 0] * pose[..., 1]
     F[..., :3, 3:6] = pull[..., None, None] * np.outer(half, [1.0, 0.5, 0.0])
-    P = _riccati(F, Q, H)
+    P = _riccati(F, Q)
     S = P[..., ::3, ::3] + np.eye(2)
     K = P[..., :, ::3] @ np.linalg.inv(S)
     gain = np.empty((*keep.shape, 3, 2))
@@ -73,23 +70,25 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     units = np.array([1.0, 1.0 / period, 1.0 / period**2])
     for i in range(2):
         for j in range(2):
-            ratio = pose[..., i] / pose[..., j]
-            at = K[..., 3 * i : 3 * i + 3, j] * ratio[..., None] * units
+            at = K[..., 3 * i : 3 * i + 3, j] * (pose[..., i] / pose[..., j])[..., None] * units
             gain[..., PAIRS[:, i], :, int(i != j)] = np.moveaxis(at, -2, 0)
             covariance[..., PAIRS[:, i], PAIRS[:, j]] = S[..., i, j] * pose[..., i] * pose[..., j]
     return SteadyFilter(gain, keep, covariance)
 
 
-def _riccati(F: Array, Q: Array, H: Array) -> Array:
-    """Return the steady covariance of the prediction, for measurements with unit noise, by doubling
+def _riccati(F: Array, Q: Array) -> Array:
+    """Return the steady covariance of the prediction, for poses with unit noise, by doubling
     (B. D. O. Anderson, International Journal of Control 28 (1978), 295-306).
     """
-    A, X = np.swapaxes(F, -1, -2), Q
-    G = np.broadcast_to(H.T @ H, F.shape)
+    A = np.swapaxes(F, -1, -2)
+    X = Q
+    G = np.broadcast_to(np.diag([1.0, 0.0, 0.0] * 2), F.shape)
     for _ in range(40):
         W = np.linalg.inv(np.eye(F.shape[-1]) + G @ X)
         further = np.swapaxes(A, -1, -2) @ X @ W @ A
-        G, A, X = G + A @ W @ G @ np.swapaxes(A, -1, -2), A @ W @ A, X + further
+        G = G + A @ W @ G @ np.swapaxes(A, -1, -2)
+        A = A @ W @ A
+        X = X + further
         if np.abs(further).max(initial=0.0) <= 1e-10 * np.abs(X).max(initial=0.0):
             break
     return X

@@ -16,11 +16,13 @@ from ..findings import CHANNELS, Signature
 from ..logs.table import Array, Names
 from ..motion.signals import Signals, in_body
 from ..motion.smoothing import mean_square
+from .discrepancy import heading_of
 from .regression import RegressedFlights, Setting, without
 
 # least shares for a channel to carry an effect: of its deviance, in the forces or in the torques,
 # and of its wrench, with a changed input
-LEAST_SHARE, LEAST_CHANGE = 0.05, 0.01
+LEAST_SHARE = 0.05
+LEAST_CHANGE = 0.01
 ORDER = (
     "position",
     "attitude",
@@ -50,20 +52,21 @@ def signature(
     y = share[:, channel]
     name, x = max(
         _explanatory_variables(flights, setting),
-        key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0,
+        key=lambda d: abs(np.corrcoef(d[1], y)[0, 1]) if y.std() > 1e-9 else 0.0,
     )
     return Signature(effect, CHANNELS[channel], name, x, y + after[:, channel], y)
 
 
 def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[tuple[str, Array]]:
     """Return the explanatory variables of a force at the rows, named with their units."""
-    names = ("t", "position", "rotation", "velocity")
-    t, position, rotation, velocity = (flights.at_rows(name, setting) for name in names)
+    position, rotation, velocity = (
+        flights.at_rows(name, setting) for name in ("position", "rotation", "velocity")
+    )
     pieces = flights.pieces(setting)
     rate = np.concatenate([p.smooth(p.signals.angular_velocity) for p in pieces])
     body = in_body(velocity, rotation)
     speed = np.linalg.norm(body, axis=1)
-    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    heading = heading_of(rotation)
     named = [
         *((f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")),
         ("speed (m/s)", speed),
@@ -71,7 +74,7 @@ def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[
         ("height (m)", position[:, 2]),
         ("sine of the heading", np.sin(heading)),
         ("cosine of the heading", np.cos(heading)),
-        ("time (s)", t),
+        ("time (s)", flights.at_rows("t", setting)),
     ]
     if flights.rotor_speeds_vary:
         named.append(("thrust (N)", flights.rotor_wrench(setting)[:, 0]))
@@ -89,7 +92,8 @@ def carrying_channels(flights: RegressedFlights, setting: Setting, effect: str) 
     part = flights.residual(without(setting, effect)) - flights.residual(setting)
     noise = mean_square(flights.sensor_noise) + 1e-30
     force, torque = (mean_square(part) / noise).reshape(2, 3).sum(axis=1)
-    least, carrying = LEAST_SHARE * max(force + torque, 1e-30), {*_read(flights, setting, effect)}
+    least = LEAST_SHARE * max(force + torque, 1e-30)
+    carrying = {*_read(flights, setting, effect)}
     if force > least:
         carrying.add("accelerometer" if flights.inertial else "position")
     if torque > least and not flights.commanded:
@@ -102,8 +106,8 @@ def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[
     if get(effect).kind == "sensing":
         yield from ("position", "attitude")
         return
-    vehicle, less = flights.vehicle, without(setting, effect)
-    unit = vehicle.weight * np.repeat([1.0, vehicle.arm_l], 3)
+    less = without(setting, effect)
+    unit = flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
 
     def added(s: Signals) -> Array:
         """Return the effect's wrench (n, 6) in body axes, over the weight and the weight times the

@@ -38,8 +38,8 @@ def signs(structure: float, push: bool) -> tuple[float, float, float]:
 
 def unknown(structure: float, push: bool) -> float:
     """Return the probability of a cause outside the likeliest set; arguments as of ``signs``."""
-    weights = (UNKNOWN.nothing, 1.0, UNKNOWN.push)
-    odds = sum(a * x for a, x in zip(weights, signs(structure, push), strict=True))
+    always, clipped, pushed = signs(structure, push)
+    odds = UNKNOWN.nothing * always + clipped + UNKNOWN.push * pushed
     return 1.0 / (1.0 + math.exp(-odds))
 
 

@@ -34,7 +34,8 @@ def worth(
     if not setting:
         return {}
     rows = Rows(flights, fixed)
-    fit, left = rows.fit, rows.residual(setting)
+    fit = rows.fit
+    left = rows.residual(setting)
     power, noise = (mean_square(x[fit]) for x in (left, rows.noise()))
     size = np.sqrt(np.maximum(power - noise, NOISE_KNOWN**2 * noise)) + 1e-12
     nuisances = list(row_nuisances(rows).values())
@@ -44,8 +45,7 @@ def worth(
         less = without(setting, effect)
         part = rows.residual(less) - left
         # a drag acts otherwise in still air than in a wind
-        still = get(effect).sets_wind
-        others = rows.columns(less, flights.columns_of(less)) if still else columns
+        others = rows.columns(less, flights.columns_of(less)) if get(effect).sets_wind else columns
         # of every set, or of another family
         own = [
             x * prior_size(c, flights)
