@@ -10,20 +10,20 @@ from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
-from ...dynamics.vehicle import ClosedLoop, Vehicle
+from ...dynamics.vehicle import LoopReaction, Vehicle
 from ...runtime.arrays import Array, Index
 from ..prediction import LoggedStarts, offsets
 
 UNITS = dict(
     zip(
-        (f.name for f in fields(ClosedLoop)),
+        (f.name for f in fields(LoopReaction)),
         ("1", "1", "1", "rad/s2", "1/s", "1/s2", "rad/s2/(m/s)", "rad/s2/(m/s)", "1/s"),
         strict=True,
     )
 )
 _EITHER_SIGN = np.array([name in ("flapping", "never_answered") for name in UNITS])
 # a loop that damps within .2 s; the unmeasured moments' start is the model's own turning
-_BEGIN = ClosedLoop(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
+_BEGIN = LoopReaction(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
 _SIZES = np.array([0.5, 0.5, 0.5, 30.0, 10.0, 20.0, 10.0, 3.0, 5.0])  # of the coefficients
 # share of the loss: the prior's at three sizes from the start. Coefficients without excitation stay
 _PRIOR = 0.003
@@ -40,7 +40,7 @@ class LoopFit:
     """The likeliest coefficients, and the normal equations of g groups of starts, the prior's last.
 
     Attributes:
-        theta: (9,) in the order of ``ClosedLoop``.
+        theta: (9,) in the order of ``LoopReaction``.
         names: (g,) of the groups; -1: the prior.
         grams: (g, 9, 9).
         gradients: (g, 9).
@@ -51,14 +51,14 @@ class LoopFit:
     grams: Array
     gradients: Array
 
-    def by(self, names: Index) -> ClosedLoop:
+    def by(self, names: Index) -> LoopReaction:
         """Return the loop by some groups alone: one step of Gauss-Newton from here."""
         kept = np.isin(self.names, names) | (self.names < 0)
         gram, gradient = self.grams[kept].sum(axis=0), self.gradients[kept].sum(axis=0)
         return _loop(_moved(self.theta, gram, gradient, 0.0))
 
     @property
-    def loop(self) -> ClosedLoop:
+    def loop(self) -> LoopReaction:
         """The loop by all starts."""
         return _loop(self.theta)
 
@@ -69,8 +69,8 @@ class LoopFit:
         return np.sqrt(np.diag(inverse @ self.gradients.T @ self.gradients @ inverse))
 
 
-def _loop(theta: Array) -> ClosedLoop:
-    return ClosedLoop(*theta.tolist())
+def _loop(theta: Array) -> LoopReaction:
+    return LoopReaction(*theta.tolist())
 
 
 def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
@@ -80,10 +80,8 @@ def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
     return np.where(_EITHER_SIGN, moved, np.maximum(moved, 0.0))
 
 
-def fit_loop(
-    starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: Vehicle
-) -> LoopFit | None:
-    """Return the loop of flights with starts, each of a group; None without a start.
+def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: Vehicle) -> LoopFit:
+    """Return the loop of flights with starts, one at least, each of a group.
 
     Args:
         starts: of each flight.
@@ -93,15 +91,12 @@ def fit_loop(
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts]
     group = np.concatenate([numbers[::every] for numbers in groups])
-    if not len(group):
-        return None
     still = _compared(thin, [part.unchanged for part in thin])
-    sizes = np.linalg.norm(still[:, -1], axis=-1).mean(axis=0)[:, None]
+    sizes: Array = np.linalg.norm(still[:, -1], axis=-1).mean(axis=0)[:, None]
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
-        left: Array = _compared(thin, [part.flown(model) for part in thin]) / sizes
-        return left
+        return _compared(thin, [part.flown(model) for part in thin]) / sizes
 
     begin = np.array(astuple(_BEGIN))
     begin[list(UNITS).index("unmeasured")] = _turning(thin, vehicle)
