@@ -358,11 +358,11 @@ class Vehicle:
                 f"vehicle {self.name}: states no motor_curve; expected one, to turn motor "
                 "commands into thrust"
             )
-        thrust: Array = np.polynomial.polynomial.polyval(command, self.motor_curve.thrust)
+        thrust = np.polynomial.polynomial.polyval(command, self.motor_curve.thrust)
         if voltage is not None and self.voltage_ref > 0.0:
             exponent = self.motor_curve.voltage_exponent
             thrust = thrust * np.power(voltage / self.voltage_ref, exponent)[:, None]
-        return np.maximum(thrust, 0.0)
+        return np.maximum(np.asarray(thrust, np.float64), 0.0)
 
     def commanded_speeds(self, command: Array, voltage: Array | None = None) -> Array:
         """Return the rotor speeds (N, 4) in rad/s whose thrust is ``commanded_thrust``."""

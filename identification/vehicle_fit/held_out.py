@@ -203,18 +203,13 @@ def standing(errors: Errors) -> str:
     for name in next(iter(errors.values())):
         bounds, ratios = [], []
         for where, each in errors.items():
-            still, simple = _ends(each[SIMPLEST], still=True), _ends(each[SIMPLEST])
-            ratio = _ends(each[name]) / np.minimum(still, simple)
+            least = [np.minimum(of.still, of.model)[:, -1] for of in each[SIMPLEST]]
+            ratio = np.array([of.model[:, -1] for of in each[name]]) / least
             bounds.append(np.max(ratio if where == OTHER_FLIGHTS else ratio.mean(axis=0)))
             ratios.append(np.log(ratio).mean())
-        worst[name], means[name] = float(max(bounds)), float(np.mean(ratios))
+        worst[name], means[name] = max(bounds), np.mean(ratios)
     fine = [name for name, bound in worst.items() if bound <= _ALIKE]
     return min(fine, key=means.__getitem__) if fine else min(worst, key=worst.__getitem__)
-
-
-def _ends(parts: Sequence[PredictionErrors], still: bool = False) -> Array:
-    """Return the errors (parts, 4) at the horizon's end, of a model or of no change."""
-    return np.array([(of.still if still else of.model)[:, -1] for of in parts])
 
 
 def _reason(errors: Errors) -> str:
@@ -274,14 +269,18 @@ def powers(
     return left, total
 
 
+def refuted(vehicle: Vehicle) -> list[str]:
+    """Return the parts of a vehicle's model that data outside its fit refuted."""
+    return [part for part in ("force", "torque") if getattr(vehicle.status, part) == "refuted"]
+
+
 def warnings_of(vehicle: Vehicle) -> list[str]:
     """Return a warning for a refuted force or torque: what predictions do in its place."""
     kept = {"force": "keep the velocity", "torque": "keep the body rate"}
     if vehicle.closed_loop is not None:
         kept["torque"] = "follow the flight loop's reaction (closed_loop)"
     return [
-        f"warning: {part}: refuted by data outside the fit. Predictions {instead}; the file's "
-        f"numbers of it are assumptions"
-        for part, instead in kept.items()
-        if getattr(vehicle.status, part) == "refuted"
+        f"warning: {part}: refuted by data outside the fit. Predictions {kept[part]}; the file's "
+        "numbers of it are assumptions"
+        for part in refuted(vehicle)
     ]
