@@ -111,13 +111,11 @@ def identify(
     for line in identified.advice:
         console.print(line)
     for of, errors in identified.predicted.items():
-        beside = identified.simplest.get(of)
         after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
         console.print(f"{of.replace('_', ' ')}: {after}, by what was not fitted to them:")
-        simple = () if beside is None else ("thrust and drag",)
         show_table(
-            ("mean error", "of the vehicle", *simple, "if nothing changes", "unit"),
-            table_of(errors, beside),
+            ("mean error", "of the vehicle", "thrust and drag", "if nothing changes", "unit"),
+            table_of(errors, identified.simplest[of]),
         )
     console.print(use_of(identified))
     result = {"headline": headline(identified), **identified_data(identified)}

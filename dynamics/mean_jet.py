@@ -29,6 +29,7 @@ def jet_table(radius: float, hub_radius: float) -> tuple[Array, Array]:
     """Return axial and radial speed for U0 = 1 over the grid of distances and radii, each (137,
     151).
     """
+    from scipy.integrate import cumulative_trapezoid
     from scipy.special import chndtr
 
     x = FIRST_X + STEP_X * np.arange(COUNT_X)
@@ -41,13 +42,7 @@ def jet_table(radius: float, hub_radius: float) -> tuple[Array, Array]:
     )
     axial = np.sqrt(np.maximum(momentum, 0.0))
     slope = (axial[2:] - axial[:-2]) / (2.0 * STEP_X)
-    flux = np.concatenate(
-        [
-            np.zeros((len(x), 1)),
-            np.cumsum(0.5 * (slope[:, 1:] * r[1:] + slope[:, :-1] * r[:-1]) * STEP_R, axis=1),
-        ],
-        axis=1,
-    )
+    flux = cumulative_trapezoid(slope * r, dx=STEP_R, axis=1, initial=0.0)
     radial = np.zeros_like(flux)
     radial[:, 1:] = -flux[:, 1:] / r[1:]
     return np.ascontiguousarray(axial[1:-1]), radial

@@ -167,7 +167,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True)
-class ClosedLoop:
+class LoopReaction:
     """How the flight loop of logged flights answers moments that nothing measures.
 
     Rotor torques of such flights answer unmeasured moments, too, and this part of them turns
@@ -299,7 +299,7 @@ class Vehicle:
     ceiling_z: Number = math.inf
     uncertainty: Uncertainty = Uncertainty()
     status: ModelStatus = ModelStatus()
-    closed_loop: ClosedLoop | None = None
+    closed_loop: LoopReaction | None = None
 
     def __repr__(self) -> str:
         effects = ", ".join(effect.name for effect in self.effects) or "none"
@@ -362,7 +362,7 @@ class Vehicle:
         if voltage is not None and self.voltage_ref > 0.0:
             exponent = self.motor_curve.voltage_exponent
             thrust = thrust * np.power(voltage / self.voltage_ref, exponent)[:, None]
-        return np.maximum(np.asarray(thrust, dtype=np.float64), 0.0)
+        return np.maximum(np.asarray(thrust, np.float64), 0.0)
 
     def commanded_speeds(self, command: Array, voltage: Array | None = None) -> Array:
         """Return the rotor speeds (N, 4) in rad/s whose thrust is ``commanded_thrust``."""

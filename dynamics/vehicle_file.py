@@ -115,10 +115,11 @@ def dump_vehicle(vehicle: Vehicle, std: Deviations | None = None) -> str:
         data["inertia"] = np.diag(vehicle.inertia).tolist()
     if std is not None:
         shares = vehicle.uncertainty
-        accuracies = {name: getattr(shares, name) for name in ("mass", "inertia", "arm_l")}
-        accuracies["k"] = math.hypot(shares.thrust, shares.rotor)
-        accuracies["p"] = math.hypot(shares.thrust, shares.torque)
-        accuracies["uncertainty"] = 0.5
+        accuracies = vars(shares) | {
+            "k": math.hypot(shares.thrust, shares.rotor),
+            "p": math.hypot(shares.thrust, shares.torque),
+            "uncertainty": 0.5,
+        }
         data = {key: _rounded(value, accuracies.get(key, 0.0)) for key, value in data.items()}
         for effect in data["effects"]:
             deviations = std.get(effect["name"], {})

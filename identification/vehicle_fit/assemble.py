@@ -25,9 +25,8 @@ def vehicle_of(
     estimates: Estimated,
     geometry: Geometry,
     logs: Logs,
-    voltage: float,
     step: float,
-    motors: MotorResponse | None = None,
+    motors: MotorResponse | None,
 ) -> Vehicle:
     """Return the vehicle, ready for estimate, diagnose and the environment. Measured rotor speeds
     have the lag behind them already: then no effect of the model has one.
@@ -68,7 +67,7 @@ def vehicle_of(
         rotor_radius=USUAL.radius * arm,
         omega_lsb=step,
         omega_source="commanded" if late else "measured",
-        voltage_ref=voltage,
+        voltage_ref=fit.drive.voltage_ref,
         spin=fit.drive.spin.copy(),
         rotor_positions=geometry.positions if uneven else None,
         com=com,
@@ -93,7 +92,7 @@ def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertaint
         known = [estimates[n] for n in names if n in estimates and estimates[n].low > 0.0]
         return [min(math.log(e.high / e.low) / (2.0 * 1.96), 0.99) for e in known]
 
-    centre = [e for n in ("com x", "com y") if (e := estimates.get(n)) and e.status != NOTHING]
+    centre = [e for n in ("com x", "com y") if (e := estimates[n]).status != NOTHING]
     return Uncertainty(
         thrust=math.hypot(
             min(share("k", "thrust(0.25)", "thrust(0.5)", "thrust(0.75)"), default=0.0),

@@ -6,6 +6,7 @@ Rotors come as measured speeds, or as motor commands.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -43,16 +44,23 @@ class MotionPiece:
     specific_force: Array | None  # (n, 3) m/s2
     angular_acceleration: Array  # (n, 3) rad/s2
     angular_velocity: Array  # (n, 3) rad/s, smoothed
-    velocity: Array | None  # (n, 3) m/s, body axes, smoothed
-    rotor_speeds: Array | None  # (n, 4) rad/s
-    command: Array | None  # (n, 4), 0 to 1
-    voltage: Array | None  # (n,) V
+    velocity: Array | None = None  # (n, 3) m/s, body axes, smoothed
+    rotor_speeds: Array | None = None  # (n, 4) rad/s
+    command: Array | None = None  # (n, 4), 0 to 1
+    voltage: Array | None = None  # (n,) V
 
     def measured(self) -> Array:
         """Return specific force, zero where none is known, and angular acceleration (n, 6)."""
         force = self.specific_force
         none = np.zeros_like(self.angular_acceleration)
         return np.column_stack([none if force is None else force, self.angular_acceleration])
+
+    @property
+    def rotors(self) -> Array:
+        """Rotor speeds in rad/s, or commands where no speeds are compared (n, 4)."""
+        rotors = self.command if self.rotor_speeds is None else self.rotor_speeds
+        assert rotors is not None
+        return rotors
 
     def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
         """Return the piece with each of its series changed."""
@@ -156,9 +164,9 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     sources = sources_of(logs)
     pieces = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
-        posed = "pose" in (sources.rate, sources.force)
-        for motion in _posed(log, sources) if posed else _inertial(log, sources):
-            piece = _piece(log, number, motion, sources)
+        motion = _posed if "pose" in (sources.rate, sources.force) else _inertial
+        for moved in motion(log, number, sources):
+            piece = _piece(log, moved, sources)
             inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
             for part in _cut(piece, inside):
                 pieces += _cut(part, _flying(part))
@@ -172,11 +180,7 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     return pieces, sources
 
 
-# times, period, specific force, angular acceleration, angular velocity and velocity in body axes
-_Motion = tuple[Array, float, Array | None, Array, Array, Array | None]
-
-
-def _posed(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
+def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
     """Yield motion by the pose's derivatives, with accelerometer and gyro in their place if any."""
     for s in log_signals(log, wide_hz=np.inf):
         inverse = Rotation.from_matrix(s.rotation).inv()
@@ -187,10 +191,10 @@ def _posed(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
         if sources.rate == "gyro" and log.gyro is not None:
             rate = _sensor(log, log.gyro, s.t)
             turning = derivative(rate, s.period)
-        yield s.t, s.period, force, turning, rate, inverse.apply(s.velocity)
+        yield MotionPiece(number, s.t, s.period, force, turning, rate, inverse.apply(s.velocity))
 
 
-def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
+def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
     """Yield motion by the IMU: rate, and force if any; velocity is the pose's, if any."""
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
@@ -200,27 +204,24 @@ def _inertial(log: FlightLog, sources: Sources) -> Iterator[_Motion]:
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
-        turning = derivative(rate, period)
-        velocity = _velocity(log, t) if sources.velocity else None
-        if velocity is None:
-            yield t, period, force, turning, rate, None
-            continue
-        for a, b in runs_of(np.isfinite(velocity[:, 0])):
-            if (b - a) * period >= _SHORTEST_PIECE:
-                felt = None if force is None else force[a:b]
-                yield t[a:b], period, felt, turning[a:b], rate[a:b], velocity[a:b]
+        piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
+        moving = []
+        if sources.velocity:
+            velocity = _velocity(log, t)
+            moving = _cut(replace(piece, velocity=velocity), np.isfinite(velocity[:, 0]))
+        yield from moving or [piece]
 
 
-def _piece(log: FlightLog, number: int, motion: _Motion, sources: Sources) -> MotionPiece:
+def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
     """Return a piece with the rotors beside its motion; fast logs are thinned out."""
-    t, period = motion[:2]
-    speeds = log.rotor_speeds if sources.rotors == "rotor speeds" else None
-    piece = MotionPiece(
-        number,
-        *motion,
-        None if speeds is None else resampled(t, log.t, speeds),
-        None if log.command is None else resampled(t, log.t, log.command),
-        None if log.voltage is None else np.interp(t, log.t, log.voltage),
+    t, period = piece.t, piece.period
+    piece = replace(
+        piece,
+        rotor_speeds=(
+            resampled(t, log.t, log.rotor_speeds) if sources.rotors == "rotor speeds" else None
+        ),
+        command=None if log.command is None else resampled(t, log.t, log.command),
+        voltage=None if log.voltage is None else np.interp(t, log.t, log.voltage),
     )
     if period < 0.8 / _FASTEST_HZ:
         period = 1.0 / _FASTEST_HZ
@@ -244,29 +245,20 @@ def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
     return resampled(t, log.t[read], values[read])
 
 
-def _velocity(log: FlightLog, t: Array) -> Array | None:
-    """Return the velocity (n, 3) in body axes at times, NaN in gaps of the pose; None where each
-    unbroken stretch is too short.
-    """
-    try:
-        signals = log_signals(log)
-    except InputError:
-        return None
+def _velocity(log: FlightLog, t: Array) -> Array:
+    """Return the velocity (n, 3) in body axes at times, NaN in gaps of the pose."""
     out = np.full((len(t), 3), np.nan)
-    for s in signals:
-        inside = (t >= s.t[0]) & (t <= s.t[-1])
-        body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
-        out[inside] = resampled(t[inside], s.t, body)
-    known = runs_of(np.isfinite(out[:, 0]))
-    longest = max((b - a for a, b in known), default=0) * float(t[1] - t[0])
-    return out if longest >= _SHORTEST_PIECE else None
+    with suppress(InputError):  # no stretch of pose is long enough
+        for s in log_signals(log):
+            inside = (t >= s.t[0]) & (t <= s.t[-1])
+            body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
+            out[inside] = resampled(t[inside], s.t, body)
+    return out
 
 
 def _flying(piece: MotionPiece) -> Mask:
     """Return where the rotors carry the vehicle, without take-off and landing."""
-    drive = piece.rotor_speeds if piece.rotor_speeds is not None else piece.command
-    assert drive is not None
-    load = low_pass(np.mean(np.square(drive), axis=1), 1.0, piece.period)
+    load = low_pass(np.mean(np.square(piece.rotors), axis=1), 1.0, piece.period)
     usual = float(np.median(load[load > 0.1 * np.quantile(load, 0.95)]))
     return load > _FLYING_SHARE * usual
 

@@ -6,24 +6,28 @@ turn.
 """
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
-from ...dynamics.vehicle import ClosedLoop, Vehicle
+from ...dynamics.vehicle import LoopReaction, Vehicle
 from ...runtime.arrays import Array, Index
 from ..prediction import LoggedStarts, offsets
 
-UNITS = dict(
-    zip(
-        (f.name for f in fields(ClosedLoop)),
-        ("1", "1", "1", "rad/s2", "1/s", "1/s2", "rad/s2/(m/s)", "rad/s2/(m/s)", "1/s"),
-        strict=True,
-    )
-)
+UNITS = {  # in the order of the coefficients
+    "roll_gain": "1",
+    "pitch_gain": "1",
+    "yaw_gain": "1",
+    "unmeasured": "rad/s2",
+    "damping": "1/s",
+    "stiffness": "1/s2",
+    "flapping": "rad/s2/(m/s)",
+    "never_answered": "rad/s2/(m/s)",
+    "yaw_damping": "1/s",
+}
 _EITHER_SIGN = np.array([name in ("flapping", "never_answered") for name in UNITS])
 # a loop that damps within .2 s; the unmeasured moments' start is the model's own turning
-_BEGIN = ClosedLoop(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
+_BEGIN = LoopReaction(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
 _SIZES = np.array([0.5, 0.5, 0.5, 30.0, 10.0, 20.0, 10.0, 3.0, 5.0])  # of the coefficients
 # share of the loss: the prior's at three sizes from the start. Coefficients without excitation stay
 _PRIOR = 0.003
@@ -37,10 +41,10 @@ _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 @dataclass(frozen=True, eq=False)
 class LoopFit:
-    """The likeliest coefficients, and the normal equations of g groups of starts, the prior's last.
+    """The likeliest coefficients, and the normal equations of g groups of starts and the prior.
 
     Attributes:
-        theta: (9,) in the order of ``ClosedLoop``.
+        theta: (9,) in the order of ``LoopReaction``.
         names: (g,) of the groups; -1: the prior.
         grams: (g, 9, 9).
         gradients: (g, 9).
@@ -51,14 +55,14 @@ class LoopFit:
     grams: Array
     gradients: Array
 
-    def by(self, names: Index) -> ClosedLoop:
+    def by(self, names: Index) -> LoopReaction:
         """Return the loop by some groups alone: one step of Gauss-Newton from here."""
         kept = np.isin(self.names, names) | (self.names < 0)
         gram, gradient = self.grams[kept].sum(axis=0), self.gradients[kept].sum(axis=0)
         return _loop(_moved(self.theta, gram, gradient, 0.0))
 
     @property
-    def loop(self) -> ClosedLoop:
+    def loop(self) -> LoopReaction:
         """The loop by all starts."""
         return _loop(self.theta)
 
@@ -69,8 +73,8 @@ class LoopFit:
         return np.sqrt(np.diag(inverse @ self.gradients.T @ self.gradients @ inverse))
 
 
-def _loop(theta: Array) -> ClosedLoop:
-    return ClosedLoop(*theta.tolist())
+def _loop(theta: Array) -> LoopReaction:
+    return LoopReaction(*theta.tolist())
 
 
 def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
@@ -80,10 +84,8 @@ def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
     return np.where(_EITHER_SIGN, moved, np.maximum(moved, 0.0))
 
 
-def fit_loop(
-    starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: Vehicle
-) -> LoopFit | None:
-    """Return the loop of flights with starts, each of a group; None without a start.
+def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: Vehicle) -> LoopFit:
+    """Return the loop of flights with starts, one at least, each of a group.
 
     Args:
         starts: of each flight.
@@ -92,16 +94,13 @@ def fit_loop(
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts]
-    group = np.concatenate([numbers[::every] for numbers in groups])
-    if not len(group):
-        return None
+    group = np.concatenate([*(numbers[::every] for numbers in groups), [-1]])
     still = _compared(thin, [part.unchanged for part in thin])
-    sizes = np.linalg.norm(still[:, -1], axis=-1).mean(axis=0)[:, None]
+    sizes: Array = np.linalg.norm(still[:, -1], axis=-1).mean(axis=0)[:, None]
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
-        left: Array = _compared(thin, [part.flown(model) for part in thin]) / sizes
-        return left
+        return _compared(thin, [part.flown(model) for part in thin]) / sizes
 
     begin = np.array(astuple(_BEGIN))
     begin[list(UNITS).index("unmeasured")] = _turning(thin, vehicle)
@@ -114,13 +113,12 @@ def fit_loop(
         changes = [(root * (off(theta + move) - e)).reshape(len(e), -1) for move in moves]
         slopes = np.stack(changes, axis=1) / (_STEP * _SIZES)[:, None]  # (n, 9, ..)
         residual = (root * e).reshape(len(e), -1, 1)
-        strength = _PRIOR * float(np.sum(np.square(residual))) / np.square(3.0 * _SIZES)
-        grams = [slopes @ np.swapaxes(slopes, 1, 2), np.diag(strength)[None]]
-        gradients = [(slopes @ residual)[..., 0], (strength * (theta - begin))[None]]
-        gram, gradient = (np.concatenate(each).sum(axis=0) for each in (grams, gradients))
+        strength = _PRIOR * np.sum(np.square(residual)) / np.square(3.0 * _SIZES)
+        grams = np.concatenate([slopes @ np.swapaxes(slopes, 1, 2), np.diag(strength)[None]])
+        gradients = np.vstack([(slopes @ residual)[..., 0], strength * (theta - begin)])
         before = loss = _loss(e, theta - begin)
         for _ in range(6):
-            tried = _moved(theta, gram, gradient, damping)
+            tried = _moved(theta, grams.sum(axis=0), gradients.sum(axis=0), damping)
             there = off(tried)
             loss = _loss(there, tried - begin)
             if loss < before:
@@ -130,19 +128,14 @@ def fit_loop(
         if before - loss < _SETTLED * before:
             break
     names = np.unique(group)
-    of = np.array([group == name for name in names], dtype=np.float64)
-    return LoopFit(
-        theta,
-        np.append(names, -1),
-        np.concatenate([np.tensordot(of, grams[0], 1), grams[1]]),
-        np.concatenate([of @ gradients[0], gradients[1]]),
-    )
+    of = (group == names[:, None]).astype(np.float64)
+    return LoopFit(theta, names, np.tensordot(of, grams, 1), of @ gradients)
 
 
 def _loss(e: Array, away: Array) -> float:
     """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (9,)."""
-    prior = 1.0 + _PRIOR * float(np.sum(np.square(away / (3.0 * _SIZES))))
-    return prior * float(np.linalg.norm(e, axis=-1).mean())
+    prior = 1.0 + _PRIOR * np.sum(np.square(away / (3.0 * _SIZES)))
+    return float(prior * np.linalg.norm(e, axis=-1).mean())
 
 
 def _turning(starts: Sequence[LoggedStarts], vehicle: Vehicle) -> float:

@@ -42,6 +42,12 @@ class Drive:
     # rad/s, standard deviation of one measured speed; not known of speeds behind a lag
     speed_noise: float = 0.0
 
+    @property
+    def shares(self) -> NamedArrays:
+        """Each rotor's share (4,) in thrust T and in the torques X, Y and Z, m."""
+        x, y = self.positions[:, 0], self.positions[:, 1]
+        return {"T": np.ones(4), "X": y, "Y": -x, "Z": -self.spin}
+
 
 @dataclass(frozen=True, eq=False)
 class BalanceSpectra:
@@ -70,12 +76,11 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
         base = np.column_stack([piece.measured(), *here.values(), *air.values()])
         parts, count = [base], len(here) + len(air)
         for name in nonlinear:
-            if name == "delay":
-                continue
-            there = replace(drive, **{name: getattr(drive, name) + _STEP[name]})
-            moved = np.column_stack(list(rotor_columns(piece, there).values()))
-            change = (moved - base[:, 6 : 6 + len(here)]) / _STEP[name]
-            parts += [change, np.zeros((len(piece.t), count - len(here)))]
+            if name in _STEP:
+                there = replace(drive, **{name: getattr(drive, name) + _STEP[name]})
+                moved = np.column_stack(list(rotor_columns(piece, there).values()))
+                change = (moved - base[:, 6 : 6 + len(here)]) / _STEP[name]
+                parts += [change, np.zeros((len(piece.t), count - len(here)))]
         stacked = low_pass(np.column_stack(parts), drive.band, piece.period)
         for s in segments_of(stacked, piece.period, piece.log, drive.band):
             segments.append(_with_delay(s, drive, nonlinear, count, len(here), slow))
@@ -90,23 +95,19 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
 
 def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     """Return the columns (n,) of the rotors."""
-    source = piece.command if drive.commands else piece.rotor_speeds
-    assert source is not None
-    speed = lagged(source, drive.lag, piece.period)  # (n, 4), or the command
+    speed = lagged(piece.rotors, drive.lag, piece.period)  # (n, 4), or the command
     phi = np.stack([speed**e for e in drive.exponents], axis=2)  # of each rotor's thrust
-    if drive.commands and drive.voltage_ref > 0.0 and piece.voltage is not None:
+    if drive.voltage_ref > 0.0 and piece.voltage is not None:
         phi *= np.power(piece.voltage / drive.voltage_ref, drive.gamma)[:, None, None]
     x, y = drive.positions[:, 0], drive.positions[:, 1]
     out = {}
     for j in range(phi.shape[2]):
-        out[f"T{j}"] = phi[:, :, j].sum(axis=1)
-        out[f"X{j}"] = phi[:, :, j] @ y
-        out[f"Y{j}"] = -phi[:, :, j] @ x
-        out[f"Z{j}"] = -phi[:, :, j] @ drive.spin
+        for letter, share in drive.shares.items():
+            out[f"{letter}{j}"] = phi[:, :, j] @ share
     momentum = speed @ drive.spin
     w = piece.angular_velocity
     smooth = low_pass(momentum[:, None], 2.0 * BAND, piece.period)
-    out["spin up"] = -derivative(smooth, piece.period)[:, 0]
+    out["spin z"] = -derivative(smooth, piece.period)[:, 0]
     out["spin x"], out["spin y"] = -w[:, 1] * momentum, w[:, 0] * momentum
     if piece.velocity is not None:
         drag = -speed[:, :, None] * _local(piece, piece.velocity, drive)
@@ -184,12 +185,6 @@ def _rotor_noise(piece: MotionPiece, drive: Drive, names: Names) -> Array:
     size = drive.speed_noise * np.sqrt(
         piece.period * np.mean(4.0 * np.square(piece.rotor_speeds), axis=0)
     )
-    parts = {
-        "T0": np.ones(4),
-        "X0": drive.positions[:, 1],
-        "Y0": -drive.positions[:, 0],
-        "Z0": -drive.spin,
-    }
-    for name, share in parts.items():
-        out[:, names.index(name)] = size * share
+    for letter, share in drive.shares.items():
+        out[:, names.index(f"{letter}0")] = size * share
     return out

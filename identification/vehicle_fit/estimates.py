@@ -14,10 +14,10 @@ from ...runtime.errors import InputError
 from ..logs.table import Values
 from .channels import MotionPiece, Sources
 from .effect_settings import effect_of, estimate_name
-from .geometry import USUAL, Geometry
+from .geometry import USUAL, Geometry, Interval
 from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
-from .solve import Function, Interval, VehicleFit
+from .solve import Function, VehicleFit
 
 UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 
@@ -25,6 +25,11 @@ UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
     """Return one rotor's thrust (N) at a speed in rad/s or a command."""
     return sum(values[f"a{j}"] * u**e for j, e in enumerate(exponents))
+
+
+def _times(size: float, known: Interval) -> Interval:
+    value, low, high = (size * x for x in known)
+    return value, low, high
 
 
 @dataclass(eq=False)
@@ -82,7 +87,7 @@ class Estimates:
 
     def _scaled(self, known: Interval) -> Interval:
         """Return a multiple of the arm, with the range of an assumed arm."""
-        value, *ends = (self.arm * x for x in known)
+        value, *ends = _times(self.arm, known)
         corners = [end * share for end in ends for share in self.arm_range]
         return value, min(corners), max(corners)
 
@@ -90,7 +95,7 @@ class Estimates:
         exponents = self.fit.drive.exponents
         for j, e in enumerate(exponents):
             self._say(f"thrust u^{e}", self.fit.interval(f"a{j}", False), "N", how)
-        flown = np.concatenate([p.command.ravel() for p in pieces if p.command is not None])
+        flown = np.concatenate([p.rotors for p in pieces])
         low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
         beyond = f"continues the curve beyond the commands flown, {low:.2f} to {high:.2f}"
         for u in (0.25, 0.5, 0.75, 1.0):
@@ -133,32 +138,34 @@ class Estimates:
     def _say_arm_and_inertia(self) -> None:
         fit, usual, values = self.fit, USUAL, self.fit.values
         known_arm, mass = self.geometry.known, self.fit.model.mass
-        # 0.45 mass arm^2, for Jxx or Jyy missing from the flight
-        guess = usual.gyration * mass * self.geometry.arm**2
-        why = {
-            axis: self.doubt or f"the flight hardly shows {motion}"
-            for axis, motion in (("Jx", "roll"), ("Jy", "pitch"))
-            if self.doubt or not told(fit.interval(axis))
+        flat = values["Jz"] / (values["Jx"] + values["Jy"])
+        missing = {
+            "Jx": "the flight hardly shows roll",
+            "Jy": "the flight hardly shows pitch",
+            "Jz": "the flight does not yaw while it rolls or pitches",
         }
-        if why and not known_arm:
+        why = {
+            axis: self.doubt or text
+            for axis, text in missing.items()
+            if self.doubt or not told(fit.interval(axis)) or (axis == "Jz" and not 0.3 < flat < 1.3)
+        }
+        unknown = dict.fromkeys(why[axis] for axis in ("Jx", "Jy") if axis in why)
+        if unknown and not known_arm:
             raise InputError(
-                f"{'; '.join(dict.fromkeys(why.values()))}, and no arm is given; expected "
+                f"{'; '.join(unknown)}, and no arm is given; expected "
                 "--geometry, or a log with quick roll and pitch"
             )
-        flat = values["Jz"] / (values["Jx"] + values["Jy"])
-        if self.doubt or not told(fit.interval("Jz")) or not 0.3 < flat < 1.3:
-            why["Jz"] = self.doubt or "the flight does not yaw while it rolls or pitches"
         if known_arm:
             self._say("arm_l", 3 * (self.geometry.arm,), "m", "--geometry", GIVEN)
         else:
             # with rotors at unit distance the fit's inertia is inertia over arm: gyration * mass *
             # arm at a usual radius of gyration
-            value = 0.5 * (values["Jx"] + values["Jy"]) / mass / usual.gyration
-            low, high = (value * usual.gyration / g for g in reversed(usual.gyration_range))
+            mean = 0.5 * (values["Jx"] + values["Jy"])
+            value, high, low = (mean / mass / g for g in usual.gyration)
             how = (
-                f"turning shows arm over inertia alone; with {usual.gyration:g} mass arm^2 for the "
-                f"inertia, {usual.gyration_range[0]:g} to {usual.gyration_range[1]:g}"
-            )
+                "turning shows arm over inertia alone; with {:g} mass arm^2 for the inertia, "
+                "{:g} to {:g}"
+            ).format(*usual.gyration)
             self._say("arm_l", (value, low, high), "m", how, ASSUMED)
             self.arm, self.arm_range = value, (low / value, high / value)
         status, given = (IDENTIFIED, "given") if known_arm else (ASSUMED, "assumed")
@@ -173,21 +180,19 @@ class Estimates:
                 continue
             if axis == "Jz":
                 x, y = self.said["Jxx"], self.said["Jyy"]
-                low, high = usual.flat_range
-                guess = usual.flat * (x.value + y.value)
-                known = (guess, low * (x.low + y.low), high * (x.high + y.high))
-                how = f"{usual.flat:g} of Jxx + Jyy, {low:g} to 1"
+                flat, low, high = usual.flat
+                known = flat * (x.value + y.value), low * (x.low + y.low), high * (x.high + y.high)
+                how = f"{flat:g} of Jxx + Jyy, {low:g} to 1"
             else:
-                low, high = (guess * g / usual.gyration for g in usual.gyration_range)
-                known = (guess, low, high)
-                how = f"{usual.gyration:g} mass arm^2"
+                known = _times(mass * self.geometry.arm**2, usual.gyration)
+                how = f"{usual.gyration[0]:g} mass arm^2"
             self._say(name, known, "kg m2", f"{why[axis]}; {how}", ASSUMED)
         for axis, across in (("Jx", 1), ("Jy", 0)):
             if axis not in why:
                 length = float(np.mean(np.abs(fit.drive.positions[:, across])))
-                known = fit.interval(lambda v, n=length, axis=axis: n / v[axis])  # type: ignore[misc]
+                value, low, high = (length / x for x in fit.interval(axis))
                 how = f"{rate} {rotors}: needs no arm"
-                self._say(f"l/{axis}{axis[1]}", known, "1/(kg m)", how)
+                self._say(f"l/{axis}{axis[1]}", (value, high, low), "1/(kg m)", how)
         for name in ("Jxy", "Jxz", "Jyz") if "products of inertia" in self.kept else ():
             doubt = self.doubt or self.kept["products of inertia"]
             known = self._scaled(fit.interval(name, False))
@@ -200,9 +205,8 @@ class Estimates:
         doubt = self.doubt or ("" if told(gain) else "the flight hardly accelerates in yaw")
         self._say("(p/k)/Jzz", gain, "1/(kg m)", how, doubt=doubt)
         if doubt:
-            length = float(np.mean(np.abs(self.fit.drive.positions[:, :2]))) * self.arm
-            low, high = (r * length for r in USUAL.reach_range)
-            ratio, how = (USUAL.reach * length, low, high), f"{doubt}; {USUAL.reach:g} of the arm"
+            length = self.geometry.arm * self.arm
+            ratio, how = _times(length, USUAL.reach), f"{doubt}; {USUAL.reach[0]:g} of the arm"
         elif inertia.status == ASSUMED:
             # the flight tells the ratio alone: p/k carries the assumption of Jzz
             ratio = gain[0] * inertia.value, gain[1] * inertia.low, gain[2] * inertia.high
@@ -211,8 +215,7 @@ class Estimates:
             ratio, status = self._scaled(self.fit.interval("reach")), IDENTIFIED
         self._say("p/k", ratio, "m", how, status)
         if not self.fit.drive.commands:
-            k = self.said["k"].value
-            known = (ratio[0] * k, ratio[1] * k, ratio[2] * k)
+            known = _times(self.said["k"].value, ratio)
             if status == IDENTIFIED:
                 known = self.fit.interval(lambda v: v["reach"] * v["a0"])
             self._say("p", known, "Nm/(rad/s)^2", how, status)
@@ -244,7 +247,7 @@ class Estimates:
         swing = "the pose's point swings about it: or the markers' middle is off"
         widest = 0.5 * self.arm * self.geometry.arm
         for axis in "xy":
-            known = self.fit.interval(lambda v, c=f"c{axis}": self.arm * v[c], False)  # type: ignore[misc]
+            known = _times(self.arm, self.fit.interval(f"c{axis}", False))
             doubt = self.doubt or (steady if known[2] - known[1] > widest else "")
             status = IDENTIFIED if self.geometry.known else ASSUMED
             self._say(f"com {axis}", known, "m", how, status, doubt)
@@ -267,7 +270,7 @@ class Estimates:
             factor = {"lift": 0.25}.get(kind, self.arm if turns else 1.0)
             why = (self.doubt if turns else "") or self.kept[kind]
             for index, parameter in enumerate(effect.parameters, effect.first):
-                known = self.fit.interval(lambda v, p=parameter, f=factor: f * v[p], turns)  # type: ignore[misc]
+                known = _times(factor, self.fit.interval(parameter, turns))
                 unit = get(effect_of(effect.role)).coefficients[index].unit
                 self._say(estimate_name(effect.role, index), known, unit, how, doubt=why)
         if self.hidden:

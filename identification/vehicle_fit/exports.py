@@ -44,37 +44,36 @@ def _autopilot(
     vehicle = identified.vehicle
     linear = [drag / vehicle.mass for drag in linear_drag(vehicle)[:2]]
     quadratic = [coefficient_of(vehicle, Role.BODY_DRAG, 3 + i) for i in range(2)]
-    values: list[float | None] = [None] * 5
+    momentum, *ballistic, hover, bend = parameters
+    values: dict[str, float] = {}
     if max(*linear, *quadratic) > 0.0:
-        values[0] = max(float(np.mean(linear)), 0.0)
-        values[1:3] = (
-            0.5 * AIR_DENSITY * vehicle.mass / c if c > 0.0 else NO_BLUFF_BODY for c in quadratic
-        )
+        values[momentum] = max(float(np.mean(linear)), 0.0)
+        for p, c in zip(ballistic, quadratic, strict=True):
+            values[p] = 0.5 * AIR_DENSITY * vehicle.mass / c if c > 0.0 else NO_BLUFF_BODY
     if vehicle.motor_curve is not None:
         u = np.linspace(0.0, 1.0, 41)
         thrust = np.polynomial.polynomial.polyval(u, vehicle.motor_curve.thrust)
+        values[hover] = float(vehicle.weight / (4.0 * thrust[-1]))
         # least squares of T - u = f (u^2 - u)
-        bend = u**2 - u
-        curve = bend @ (thrust / thrust[-1] - u) / (bend @ bend)
-        values[3:] = float(vehicle.weight / (4.0 * thrust[-1])), float(np.clip(curve, 0.0, 1.0))
-    limits = (1.0, most_ballistic, most_ballistic, math.inf, math.inf)  # stated beside the names
-    missing = [p for p, value in zip(parameters, values, strict=True) if value is None]
+        bent = u**2 - u
+        share = bent @ (thrust / thrust[-1] - u) / (bent @ bent)
+        values[bend] = float(np.clip(share, 0.0, 1.0))
+    missing = [p for p in parameters if p not in values]
     doubts = [f"# not known from these logs: {', '.join(missing)}"] if missing else []
+    limits = {momentum: 1.0, **dict.fromkeys(ballistic, most_ballistic)}  # as both state
     doubts += [
         f"# {p}: its stated range ends at {limit:g}"
-        for p, value, limit in zip(parameters, values, limits, strict=True)
-        if value is not None and value > limit
+        for p, limit in limits.items()
+        if values.get(p, 0.0) > limit
     ]
     full = identified.estimates.get("thrust(1)")
-    if values[3] is not None and full is not None and full.status != IDENTIFIED:
-        doubts.append(
-            f"# {parameters[3]} and {parameters[4]}: the full thrust was not flown; {full.how}"
-        )
+    if hover in values and full is not None and full.status != IDENTIFIED:
+        doubts.append(f"# {hover} and {bend}: the full thrust was not flown; {full.how}")
     text = page_template(__package__, f"templates/{name}.j2", html=False)
     return text.render(
-        known=[(p, x) for p, x in zip(parameters, values, strict=True) if x is not None],
+        known=values.items(),
         doubts="".join(f"{line}\n" for line in doubts),
-        drag_known=values[0] is not None,
+        drag_known=momentum in values,
     ).removesuffix("\n")
 
 

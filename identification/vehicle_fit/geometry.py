@@ -6,8 +6,8 @@ import numpy as np
 
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-from ..logs.table import Pair
 
+Interval = tuple[float, float, float]  # value, low and high
 QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
 SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
 GRAVITY = 9.81  # m/s2
@@ -15,19 +15,16 @@ GRAVITY = 9.81  # m/s2
 
 @dataclass(frozen=True)
 class Usual:
-    """Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Each
-    has a range, claimed in place of an interval.
+    """Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Behind
+    the value stands a range, low and high, claimed in place of an interval.
     """
 
     # Jz over Jx + Jy: 0.88 to 0.96 in these vehicles; 1, the largest ratio, in a flat body
-    flat: float = 0.9
-    flat_range: Pair = (0.75, 1.0)
+    flat: Interval = (0.9, 0.75, 1.0)
     # (Jx + Jy) / 2 over mass times the squared arm: 0.35 to 0.58 in these vehicles
-    gyration: float = 0.45
-    gyration_range: Pair = (0.25, 0.8)
+    gyration: Interval = (0.45, 0.25, 0.8)
     # reaction torque over thrust, as a share of the arm: 0.18 to 0.24 in these vehicles
-    reach: float = 0.2
-    reach_range: Pair = (0.1, 0.4)
+    reach: Interval = (0.2, 0.1, 0.4)
     radius: float = 0.78  # rotor radius, as a share of the arm: 0.71 to 0.83
     # standard deviations, as shares, of thrust from day to day, invisible in the logs of one day:
     # at one rotor speed sessions differ by 0.6 to 2.4 %, at one command by 10 %
@@ -71,11 +68,8 @@ def parse_geometry(text: str | None) -> Geometry:
         rows = [[float(x) for x in row.split(",")] for row in text.split(";")]
     except ValueError as error:
         raise InputError(f"--geometry {text}: is not made of numbers; {expected}") from error
-    if len(rows) == 1 and len(rows[0]) == 1:
-        arm = rows[0][0]
-        if not 0.0 < arm < 10.0:
-            raise InputError(f"--geometry {text}: {expected}")
-        return Geometry(arm * QUADRANT)
+    if len(rows) == len(rows[0]) == 1 and 0.0 < rows[0][0] < 10.0:
+        return Geometry(rows[0][0] * QUADRANT)
     if len(rows) != 4 or any(len(row) not in (2, 3) for row in rows):
         raise InputError(f"--geometry {text}: {expected}")
     positions = np.array([[*row, 0.0][:3] for row in rows])

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...dynamics.effects import Role, get
-from ...dynamics.vehicle import ClosedLoop, ModelStatus, Standing, Vehicle
-from ...runtime.arrays import Array, Index
+from ...dynamics.vehicle import LoopReaction, ModelStatus, Standing, Vehicle
+from ...runtime.arrays import Array, Index, Mask
 from ..logs.flight_log import Logs
 from ..prediction import QUANTITIES, LoggedStarts, PredictionErrors, errors_at, logged_starts
 from .channels import MotionPiece
@@ -60,68 +60,58 @@ class HeldOut:
 
 
 @dataclass(frozen=True, eq=False)
-class _Blocks:
+class _HeldParts:
     """Starts in the segments of a fit, and the parts held out in turn."""
 
     starts: list[LoggedStarts]  # of each log
     segment: list[Index]  # of each log's starts
-    folds: Mapping[str, Index]  # (s,) the part of each segment
-    refits: Mapping[str, list[VehicleFit]]  # without each part
+    refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
     spreads: tuple[float, ...]  # factors of the thrust
 
     def errors(self, models: Callable[[VehicleFit, Index], Mapping[str, Vehicle]]) -> Errors:
         """Return the errors of models made of each refit and the numbers of its segments."""
-        errors: dict[str, dict[str, Sequence[PredictionErrors]]] = {}
-        for where, fold in self.folds.items():
-            names: tuple[str, ...] = ()
-            parts: list[list[PredictionErrors]] = []
-            for held, part in zip(np.unique(fold), self.refits[where], strict=True):
-                starts = [
-                    of.those(fold[numbers] == held)
-                    for of, numbers in zip(self.starts, self.segment, strict=True)
-                ]
-                if any(len(of.rows) for of in starts):
-                    vehicles = models(part, np.flatnonzero(fold != held))
-                    names = tuple(vehicles)
-                    for share in self.spreads:
-                        of_day = [_with_thrust(v, share) for v in vehicles.values()]
-                        parts.append(errors_at(starts, of_day))
-            if parts:
-                errors[where] = dict(zip(names, zip(*parts, strict=True), strict=True))
+        errors: dict[str, dict[str, list[PredictionErrors]]] = {}
+        for where, kept, part in self.refits:
+            each = zip(self.starts, self.segment, strict=True)
+            starts = [of.those(~kept[numbers]) for of, numbers in each]
+            if any(len(of.rows) for of in starts):
+                vehicles = models(part, np.flatnonzero(kept))
+                said = errors.setdefault(where, {name: [] for name in vehicles})
+                for share in self.spreads:
+                    of_day = [_with_thrust(v, share) for v in vehicles.values()]
+                    for name, off in zip(vehicles, errors_at(starts, of_day), strict=True):
+                        said[name].append(off)
         return errors
 
 
-def _blocks(
+def _held_parts(
     pieces: Sequence[MotionPiece], logs: Logs, fit: VehicleFit, vehicle: Vehicle
-) -> _Blocks:
+) -> _HeldParts:
     """Return the starts in the segments of a fit.
 
     Raises:
         InputError: too little would be left of the logs.
     """
-    numbers: list[int] = []  # each segment's log
-    spans = []  # s, from and to
-    for piece in pieces:
-        edges = edges_of(len(piece.t), piece.period)
-        numbers += [piece.log] * (len(edges) - 1)
-        ends = piece.t[edges[:-1]].tolist(), piece.t[edges[1:] - 1].tolist()
-        spans += list(zip(*ends, strict=True))
-    number = np.array(numbers)
+    number = np.array([s.log for s in fit.balance.segments])
+    edges = [edges_of(len(piece.t), piece.period) for piece in pieces]
+    ends = [piece.t[[at[:-1], at[1:] - 1]] for piece, at in zip(pieces, edges, strict=True)]
+    spans = np.concatenate(ends, axis=1).T  # s, from and to
     starts, segment = [], []
     for i, log in enumerate(logs):
         own = np.flatnonzero(number == i)
-        starts.append(logged_starts(log, vehicle, [spans[j] for j in own], _HORIZON))
-        begins = np.array([spans[j][0] for j in own])
-        at = np.searchsorted(begins, log.t[starts[-1].rows] + log.period, side="right")
-        segment.append(own[at - 1] if len(own) else np.empty(0, np.int64))
+        starts.append(logged_starts(log, vehicle, spans[own].tolist(), _HORIZON))
+        begun = log.t[starts[-1].rows] + log.period
+        segment.append(own[np.searchsorted(spans[own, 0], begun, side="right") - 1])
+    refits = []
     folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
-    folds = {where: fold for where, fold in folds.items() if len(np.unique(fold)) > 1}
-    refits = {w: refitted(fit, [fold != n for n in np.unique(fold)]) for w, fold in folds.items()}
+    for where, fold in folds.items():
+        kept = [fold != held for held in np.unique(fold)]
+        if len(kept) > 1:
+            refits += list(zip([where] * len(kept), kept, refitted(fit, kept), strict=True))
     commands = fit.drive.commands
     spread = USUAL.command_spread if commands else USUAL.thrust_spread
-    one_day = commands or OTHER_FLIGHTS not in folds
-    spreads = (1.0 - spread, 1.0 + spread) if one_day else (1.0,)
-    return _Blocks(starts, segment, folds, refits, spreads)
+    one_day = commands or np.ptp(number) == 0
+    return _HeldParts(starts, segment, refits, (1.0 - spread, 1.0 + spread) if one_day else (1.0,))
 
 
 def _with_thrust(vehicle: Vehicle, share: float) -> Vehicle:
@@ -151,26 +141,22 @@ def held_out(
         InputError: too little would be left of the logs.
     """
     if not all(log.has_pose for log in logs):
-        return _by_balance(fit, np.arange(len(fit.balance.segments)) % FOLDS)
-    blocks = _blocks(pieces, logs, fit, vehicle_of(fit, ""))
-    errors = blocks.errors(lambda part, _: models_of(vehicle_of(part, "")))
+        return _by_balance(fit)
+    parts = _held_parts(pieces, logs, fit, vehicle_of(fit, ""))
+    errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
     if not errors:
         return HeldOut({}, {}, "")
     stands, why = standing(errors), ""
     loop: LoopFit | None = None
-    if models_of(vehicle_of(fit, ""))[stands].status.torque == "refuted":
+    if stands not in ("torque", WHOLE):
         why = _reason(errors)
         if OTHER_FLIGHTS in errors:
-            loop = fit_loop(blocks.starts, blocks.segment, vehicle_of(fit, why))
-    if loop is not None:
-        fitted = loop
-
-        def reacting(part: VehicleFit, kept: Index) -> Mapping[str, Vehicle]:
-            return loops_of(vehicle_of(part, why), fitted.by(kept))
-
-        further = blocks.errors(reacting)
-        errors = {where: {**each, **further[where]} for where, each in errors.items()}
-        stands = standing(errors)
+            fitted = loop = fit_loop(parts.starts, parts.segment, vehicle_of(fit, why))
+            further = parts.errors(
+                lambda part, kept: loops_of(vehicle_of(part, why), fitted.by(kept))
+            )
+            errors = {where: {**each, **further[where]} for where, each in errors.items()}
+            stands = standing(errors)
     pooled = {
         name: {where: PredictionErrors.pooled(each[name]) for where, each in errors.items()}
         for name in (stands, SIMPLEST)
@@ -180,18 +166,21 @@ def held_out(
 
 def models_of(vehicle: Vehicle) -> dict[str, Vehicle]:
     """Return models without a loop's reaction by their names, the simplest ones first."""
-    vehicle = replace(vehicle, closed_loop=None)
-    force = replace(vehicle, status=_status(True, False))
+
+    def of(force: Standing, torque: Standing) -> Vehicle:
+        return replace(vehicle, closed_loop=None, status=ModelStatus(force, torque))
+
+    force = of("identified", "refuted")
     return {
-        NO_CHANGE: replace(vehicle, status=_status(False, False)),
+        NO_CHANGE: of("refuted", "refuted"),
         SIMPLEST: without_further(force),
         "force": force,
-        "torque": replace(vehicle, status=_status(False, True)),
-        WHOLE: replace(vehicle, status=_status(True, True)),
+        "torque": of("refuted", "identified"),
+        WHOLE: of("identified", "identified"),
     }
 
 
-def loops_of(vehicle: Vehicle, loop: ClosedLoop) -> dict[str, Vehicle]:
+def loops_of(vehicle: Vehicle, loop: LoopReaction) -> dict[str, Vehicle]:
     """Return the models with a loop's reaction in place of the torque, and the reaction alone."""
     models = models_of(vehicle)
     return {
@@ -214,57 +203,51 @@ def standing(errors: Errors) -> str:
     for name in next(iter(errors.values())):
         bounds, ratios = [], []
         for where, each in errors.items():
-            still, simple = _ends(each[SIMPLEST], still=True), _ends(each[SIMPLEST])
-            ratio = _ends(each[name]) / np.minimum(still, simple)
+            least = [np.minimum(of.still, of.model)[:, -1] for of in each[SIMPLEST]]
+            ratio = np.array([of.model[:, -1] for of in each[name]]) / least
             bounds.append(np.max(ratio if where == OTHER_FLIGHTS else ratio.mean(axis=0)))
             ratios.append(np.log(ratio).mean())
-        worst[name], means[name] = float(max(bounds)), float(np.mean(ratios))
+        worst[name], means[name] = max(bounds), np.mean(ratios)
     fine = [name for name, bound in worst.items() if bound <= _ALIKE]
     return min(fine, key=means.__getitem__) if fine else min(worst, key=worst.__getitem__)
 
 
-def _ends(parts: Sequence[PredictionErrors], still: bool = False) -> Array:
-    """Return the errors (parts, 4) at the horizon's end, of a model or of no change."""
-    return np.array([(of.still if still else of.model)[:, -1] for of in parts])
-
-
-def _status(force: bool, torque: bool) -> ModelStatus:
-    words: tuple[Standing, Standing] = ("refuted", "identified")
-    return ModelStatus(words[force], words[torque])
-
-
 def _reason(errors: Errors) -> str:
     """Return the figures of the torques' worst prediction."""
-    worst = 0.0
+    said = []
     for where, each in errors.items():
         whole, simple = (PredictionErrors.pooled(each[name]) for name in (WHOLE, SIMPLEST))
-        end, still, least = whole.model[:, -1], whole.still[:, -1], simple.model[:, -1]
-        for i, (what, unit) in enumerate(QUANTITIES.items()):
-            best = min(still[i], least[i])
-            if end[i] > worst * best:
-                worst = end[i] / best
-                other = "no change" if still[i] < least[i] else "thrust and drag alone"
-                figures = f"{what} of {where.replace('_', ' ')} worse than {other} "
-                figures += f"({end[i]:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
-    return f"not identifiable: torques predict the {figures}"
+        ends = (of[:, -1] for of in (whole.model, whole.still, simple.model))
+        for (what, unit), end, still, least in zip(QUANTITIES.items(), *ends, strict=True):
+            best, other = min((still, "no change"), (least, "thrust and drag alone"))
+            figures = f"{what} of {where.replace('_', ' ')} worse than {other} "
+            figures += f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
+            said.append((end / best, figures))
+    return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"
 
 
-def _by_balance(fit: VehicleFit, fold: Index) -> HeldOut:
+def _by_balance(fit: VehicleFit) -> HeldOut:
     """Return what the balance of held-out segments says: the fit must leave less power of specific
     force along z, and of turning, than no model.
     """
-    names = np.unique(fold)
-    left, total = np.zeros((2, 6))
-    for held, part in zip(names, refitted(fit, [fold != name for name in names]), strict=True):
-        both = powers(part, [fit.balance.segments[i] for i in np.flatnonzero(fold == held)])
-        left, total = left + both[0], total + both[1]
-    force, torque = bool(left[2] > total[2]), bool(np.sum(left[3:]) > np.sum(total[3:]))
+    segments = fit.balance.segments
+    fold = np.arange(len(segments)) % FOLDS
+    kept = [fold != held for held in np.unique(fold)]
+    left, total = np.sum(
+        [
+            powers(part, [segments[i] for i in np.flatnonzero(~keep)])
+            for keep, part in zip(kept, refitted(fit, kept), strict=True)
+        ],
+        axis=0,
+    )
+    force, turning = left[2] > total[2], np.sum(left[3:]) / np.sum(total[3:])
     why = (
         "not identifiable: torques leave more of the turning of held-out blocks than no model "
-        f"({np.sum(left[3:]) / np.sum(total[3:]):.2g} times its power)"
+        f"({turning:.2f} times its power)"
     )
-    stands = (WHOLE, "torque", "force", NO_CHANGE)[force + 2 * torque]
-    return HeldOut({}, {}, stands, why=why if torque else "")
+    if turning > 1.0:
+        return HeldOut({}, {}, NO_CHANGE if force else "force", why=why)
+    return HeldOut({}, {}, "torque" if force else WHOLE)
 
 
 def powers(
@@ -286,14 +269,18 @@ def powers(
     return left, total
 
 
+def refuted(vehicle: Vehicle) -> list[str]:
+    """Return the parts of a vehicle's model that data outside its fit refuted."""
+    return [part for part in ("force", "torque") if getattr(vehicle.status, part) == "refuted"]
+
+
 def warnings_of(vehicle: Vehicle) -> list[str]:
     """Return a warning for a refuted force or torque: what predictions do in its place."""
     kept = {"force": "keep the velocity", "torque": "keep the body rate"}
     if vehicle.closed_loop is not None:
         kept["torque"] = "follow the flight loop's reaction (closed_loop)"
     return [
-        f"warning: {part}: refuted by data outside the fit. Predictions {instead}; the file's "
-        f"numbers of it are assumptions"
-        for part, instead in kept.items()
-        if getattr(vehicle.status, part) == "refuted"
+        f"warning: {part}: refuted by data outside the fit. Predictions {kept[part]}; the file's "
+        "numbers of it are assumptions"
+        for part in refuted(vehicle)
     ]

@@ -26,13 +26,13 @@ from .closed_loop import UNITS
 from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
 from .estimates import Estimates, thrust_of
-from .geometry import SPIN, Geometry
+from .geometry import SPIN, Geometry, Interval
 from .held_out import HeldOut, held_out, loops_of, models_of, warnings_of
 from .motors import motor_response
 from .parameters import FORCE_BIAS, FURTHER, first_model
 from .plausible import check_thrust
 from .result import ASSUMED, IDENTIFIED, NOTHING, REFUTED, Estimate, Identified, told
-from .solve import Interval, VehicleFit, nearest_body, score_tests, solve
+from .solve import VehicleFit, nearest_body, score_tests, solve
 from .spectra import BAND
 
 Report = Callable[[float, str], None]
@@ -80,12 +80,15 @@ def identify(
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = checked_pieces(logs, windows)
     notes = []
-    voltage = _voltage(pieces)
     commands = sources.rotors == "commands"
     step = 0.0 if commands else rounding_step(logs)
-    reference, noise = voltage if commands else 0.0, 0.0 if commands else speed_noise(pieces)
     drive = Drive(
-        geometry.positions, SPIN, geometry.known, commands, voltage_ref=reference, speed_noise=noise
+        geometry.positions,
+        SPIN,
+        geometry.known,
+        commands,
+        voltage_ref=_voltage(pieces),
+        speed_noise=speed_noise(pieces),
     )
     report(0.05, "fitting forces and torques")
     fit = _first_fit(pieces, sources, drive, mass)
@@ -123,7 +126,7 @@ def identify(
     def described(part: VehicleFit, why: str) -> tuple[dict[str, Estimate], Vehicle]:
         part, _ = nearest_body(part)
         named = Estimates(part, sources, geometry, kept, hidden, doubt or why).say_all(pieces)
-        return named, vehicle_of(name, part, named, geometry, logs, voltage, step, motors)
+        return named, vehicle_of(name, part, named, geometry, logs, step, motors)
 
     report(0.9, "predicting what is held out")
     tested = held_out(pieces, logs, fit, lambda part, why: described(part, why)[1])
@@ -211,9 +214,8 @@ def _voltage(pieces: Sequence[MotionPiece]) -> float:
     if len(voltages) < len(pieces):
         return 0.0
     together = np.concatenate(voltages)
-    middle = float(np.median(together))
-    wide = float(np.ptp(np.quantile(together, [0.05, 0.95])))
-    return middle if middle > 0.0 and wide > _LEAST_VOLTAGE_RANGE * middle else 0.0
+    low, middle, high = np.quantile(together, [0.05, 0.5, 0.95]).tolist()
+    return float(middle) if high - low > _LEAST_VOLTAGE_RANGE * middle > 0.0 else 0.0
 
 
 def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> VehicleFit:
@@ -229,10 +231,9 @@ def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> V
         model, start = model.with_more(plain.theta, "lag")
         start[-1] = _LAGS[0]
         other = solve(pieces, drive, model, start)
-        enough = _PENALTY * math.log(_frequencies(plain))
         lag, low, _ = other.interval("lag", logarithm=False)
         sure = lag > _LEAST_LAG * (lag - low) / other.width
-        return other if sure and plain.loss - other.loss > enough else plain
+        return other if sure and plain.loss - other.loss > _cost(plain, 1) else plain
     nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
     best = None
     # from the richest curve down: a poor first fit takes its own misfit for noise
@@ -244,7 +245,7 @@ def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> V
             start[model.free.index("lag")] = lag
             fits.append(solve(pieces, here, model, start))
         fit = min(fits, key=lambda f: f.loss)
-        cost = fit.loss + _PENALTY * math.log(_frequencies(fit)) * len(exponents)
+        cost = fit.loss + _cost(fit, len(exponents))
         thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
         if rises and (best is None or cost < best[0]):
@@ -284,9 +285,10 @@ def _hover_thrust(fit: VehicleFit) -> Pair:
     return value, (value - low) / (fit.width * max(abs(value), 1e-9))
 
 
-def _frequencies(fit: VehicleFit) -> float:
-    """Return the count of independent numbers behind the fit."""
-    return float(6.0 * sum(len(s.frequency) for s in fit.balance.segments))
+def _cost(fit: VehicleFit, parameters: int) -> float:
+    """Return the least fall of twice the negative log-likelihood for further parameters."""
+    frequencies = 6 * sum(len(s.frequency) for s in fit.balance.segments)
+    return _PENALTY * parameters * math.log(frequencies)
 
 
 def _with_optional(
@@ -311,12 +313,12 @@ def _with_optional(
     hidden = None
     while offered:
         tests = score_tests(fit, offered)
-        falls = {name: tests[name][0] - _least_fall(fit, name) for name in offered}
+        falls = {name: tests[name][0] - _cost(fit, len(offered[name])) for name in offered}
         name = max(falls, key=falls.__getitem__)
         if falls[name] <= 0.0:
             if "flapping" in tests:
                 _, (value,), (size,) = tests["flapping"]
-                hidden = value, size, math.sqrt(_least_fall(fit, "flapping")) * size
+                hidden = value, size, math.sqrt(_cost(fit, 1)) * size
             break
         richer = solve(pieces, fit.drive, *fit.model.with_more(fit.theta, *offered.pop(name)))
         asked = [FURTHER[n] for n in (*kept, name)]
@@ -329,11 +331,6 @@ def _with_optional(
         at = [fit.model.free.index(p) for p in FURTHER[name].parameters]
         theta, covariance = fit.theta[at], fit.covariance[np.ix_(at, at)]
         size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
-        if size < math.sqrt(_least_fall(fit, name)) + fit.width:
+        if size < math.sqrt(_cost(fit, len(at))) + fit.width:
             kept[name] = "it shows, but by so little that what shows is too large on average"
     return fit, kept, hidden
-
-
-def _least_fall(fit: VehicleFit, name: str) -> float:
-    """Return the least fall of twice the negative log-likelihood for a further effect."""
-    return _PENALTY * len(FURTHER[name].parameters) * math.log(_frequencies(fit))

@@ -65,9 +65,20 @@ def inertia_of(p: Values) -> Array:
 
 def coefficients(p: Values, names: Names, mass: float, powers: int) -> Array:
     """Return the coefficients (6, c) of the columns for parameters in SI units."""
-    place, get = {name: i for i, name in enumerate(names)}, p.get
-    inertia, lever = inertia_of(p), np.array([get(f"r{a}", 0.0) for a in _AXES])
+    place = {name: i for i, name in enumerate(names)}
+    inertia, lever = inertia_of(p), np.array([p["rx"], p["ry"], p["rz"]])
     out, moment = np.zeros((6, len(names))), np.zeros((3, len(names)))  # moment: about the centre
+
+    def add(rows: Array, i: int, column: str, parameter: str, size: float = 1.0) -> None:
+        if parameter in p:
+            rows[i, place[column]] += size * p[parameter]
+
+    for j in range(powers):
+        a, thrust = p[f"a{j}"], place[f"T{j}"]
+        out[:3, thrust] += np.array([p["tilt x"], p["tilt y"], 1.0]) * a / mass
+        moment[:2, thrust] += a * np.array([-p["cy"], p["cx"]])
+        for i, lever_arm in enumerate((1.0, 1.0, p["reach"])):
+            moment[i, place[f"{'XYZ'[i]}{j}"]] += a * lever_arm
     for i, axis in enumerate(_AXES):
         out[:3, place[f"dw{axis}"]] = _CROSS[:, i] @ lever
         for j, other in enumerate(_AXES[i:], i):
@@ -76,38 +87,25 @@ def coefficients(p: Values, names: Names, mass: float, powers: int) -> Array:
             column = place[f"w{axis}w{other}"]
             out[:3, column] = products @ lever - np.trace(products) * lever
             moment[:, column] = -np.einsum("ijk,kj", _CROSS, inertia @ products)
-    tilt = np.array([get("tilt x", 0.0), get("tilt y", 0.0), 1.0])
-    for j in range(powers):
-        a, thrust = get(f"a{j}", 0.0), place[f"T{j}"]
-        out[:3, thrust] += tilt * a / mass
-        moment[:2, thrust] += a * np.array([-get("cy", 0.0), get("cx", 0.0)])
-        for i, lever_arm in enumerate((1.0, 1.0, get("reach", 0.0))):
-            moment[i, place[f"{'XYZ'[i]}{j}"]] += a * lever_arm
-    for i, axis in enumerate(_AXES):
-        out[i, place["1"]] += get(f"force bias {axis}", 0.0)
-        moment[i, place[f"w{axis}"]] -= get(f"damping {axis}", 0.0)
+        add(out, i, "1", f"force bias {axis}")
+        add(moment, i, f"w{axis}", f"damping {axis}", -1.0)
+        add(moment, i, f"spin {axis}", "Jr")
         for kind in ("rotor drag", "linear drag", "quadratic drag"):
-            if (value := get(f"{kind} {axis}")) is not None:
-                out[i, place[f"{kind} {axis}"]] += value / mass
-    for axis in "xy" if "rotor drag x" in p else "":
-        moment[2, place[f"moment of rotor drag {axis}"]] += p[f"rotor drag {axis}"]
-    for kind in ("rotor drag z", "lift"):
-        for i, axis in enumerate("xy" if kind in p else ""):
-            moment[i, place[f"moment {axis} of {kind}"]] += p[kind]
-    if "lift" in p:
-        out[2, place["lift"]] += p["lift"] / mass
-    for i, direction in enumerate(("x", "y", "up")):
-        moment[i, place[f"spin {direction}"]] += get("Jr", 0.0)
-    if "flapping" in p:  # the columns of rotor drag are minus the sum of speeds times velocity
-        moment[0, place["rotor drag y"]] += p["flapping"]
-        moment[1, place["rotor drag x"]] -= p["flapping"]
-    for i, axis in enumerate(_AXES):
-        if answered := get(f"answered {axis}", 0.0):
-            for name in (n for n in names if n.startswith(f"slow {axis.upper()}")):
-                moment[i, place[name]] -= answered * moment[i, place[name.removeprefix("slow ")]]
+            add(out, i, f"{kind} {axis}", f"{kind} {axis}", 1.0 / mass)
+    for i, axis in enumerate("xy"):
+        add(moment, 2, f"moment of rotor drag {axis}", f"rotor drag {axis}")
+        for kind in ("rotor drag z", "lift"):
+            add(moment, i, f"moment {axis} of {kind}", kind)
+    add(out, 2, "lift", "lift", 1.0 / mass)
+    # the columns of rotor drag are minus the sum of speeds times velocity
+    add(moment, 0, "rotor drag y", "flapping")
+    add(moment, 1, "rotor drag x", "flapping", -1.0)
+    for name in names:
+        if name.startswith("slow "):
+            i, answering = "XYZ".index(name[5]), place[name.removeprefix("slow ")]
+            add(moment, i, name, f"answered {_AXES[i]}", -moment[i, answering])
     out[3:] = np.linalg.solve(inertia, moment)
-    for i, axis in enumerate(_AXES):
-        out[3 + i, place["1"]] += get(f"turn bias {axis}", 0.0)
+    out[3:, place["1"]] += [p[f"turn bias {axis}"] for axis in _AXES]
     return out
 
 

@@ -11,6 +11,7 @@ from scipy.stats import t as student
 from ...runtime.arrays import Array
 from ..motion.smoothing import lagged
 from .channels import Pieces
+from .geometry import Interval
 
 _LAGS = (1e-3, 0.5)  # s, the shortest and the longest
 _SEGMENT = 5.0  # s: errors further apart are taken as independent
@@ -22,7 +23,7 @@ class MotorResponse:
     """Rotor speed in rad/s against command, and its lag."""
 
     speed: Array  # (3,) coefficients of u^0, u^1, u^2
-    known: tuple[float, float, float]  # s, lag and ends of the 95 % interval
+    known: Interval  # s, lag and ends of the 95 % interval
     left: float  # unexplained share of the speeds' standard deviation
 
 

@@ -14,7 +14,7 @@ from ...runtime.errors import InputError
 from ..logs.table import ArrayPair, NamedArrays, Names, Pair
 from .channels import Pieces, Sources
 from .columns import ANSWERED_HZ, Drive, rotor_columns
-from .geometry import GRAVITY, USUAL
+from .geometry import GRAVITY, USUAL, Geometry
 from .model import Model
 from .spectra import BAND
 
@@ -93,26 +93,27 @@ def first_model(
     gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
     # a loop that answers a swinging load opposes its own slow torque, and no quick one
     _, quick = _first_gains(pieces, columns, shares, (ANSWERED_HZ, BAND))
-    for axis, both in zip(("roll", "pitch"), np.column_stack([alike, quick]), strict=False):
-        if both[0] < -_OPPOSED and both[1] < 0.0:
+    for axis, slow, fast in zip(("roll", "pitch"), alike, quick, strict=False):
+        if slow < -_OPPOSED and fast < 0.0:
             raise InputError(
                 f"{axis} turns against the torque of its rotors; expected rotors in the order "
                 "front-left, rear-left, rear-right, front-right, and body axes forward, left, up"
             )
-    arm = float(np.mean(np.abs(drive.positions[:, :2])))
+    arm = Geometry(drive.positions).arm
     # an axis without a turn starts at the usual inertia of such a vehicle
-    usual = USUAL.gyration * mass * arm**2
+    usual = USUAL.gyration[0] * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
-    flat = USUAL.flat * float(inertia.sum())
-    source = [p.command if drive.commands else p.rotor_speeds for p in pieces]
-    speed = max(float(np.mean(np.concatenate([x for x in source if x is not None]))), 1e-6)
+    flat = USUAL.flat[0] * inertia.sum()
+    speed = max(float(np.mean(np.concatenate([p.rotors for p in pieces]))), 1e-6)
     size = {
         **{f"a{j}": a for j, a in enumerate(each)},
-        **dict(zip(("Jx", "Jy", "Jz"), (*inertia, flat), strict=True)),
+        "Jx": inertia[0],
+        "Jy": inertia[1],
+        "Jz": flat,
         **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 0.1 * inertia[0]),
-        "reach": float(np.clip(abs(float(gains[2])) * flat, 1e-3 * arm, 10.0 * arm)),
+        "reach": float(np.clip(abs(gains[2]) * flat, 1e-3 * arm, 10.0 * arm)),
         **dict.fromkeys(("cx", "cy"), 0.01 * arm),
-        "Jr": 0.01 * inertia[0] / speed * float(np.sqrt(GRAVITY / arm)),
+        "Jr": 0.01 * inertia[0] / speed * np.sqrt(GRAVITY / arm),
         **dict.fromkeys(("tilt x", "tilt y", "rx", "ry", "rz"), 0.01),
         **dict.fromkeys(("turn bias x", "turn bias y", "turn bias z", *BIASES), 0.1),
         **{f"rotor drag {a}": 0.05 * mass / speed for a in "xyz"},
@@ -156,7 +157,7 @@ def _first_gains(
             spin = _passed(np.cumsum(torque - torque.mean()) * piece.period, piece.period, band)
             rate = _passed(piece.angular_velocity[:, i], piece.period, band)
             late = np.rint(_FIRST_DELAYS / piece.period).astype(int)
-            cross += [float(spin[: len(spin) - n] @ rate[n:]) for n in late]
+            cross += [spin[: len(spin) - n] @ rate[n:] for n in late]
             power += float(spin @ spin)
             turned += float(rate @ rate)
         most = cross[np.argmax(np.abs(cross))]

@@ -18,9 +18,9 @@ from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
-from .held_out import LEAST_HZ, powers
+from .held_out import LEAST_HZ, powers, refuted
 from .model import coefficients
-from .result import ASSUMED, NOTHING, REFUTED, Identified
+from .result import ASSUMED, NOTHING, Identified
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,16 +51,18 @@ def identified_data(identified: Identified) -> Data:
         ],
         "notes": identified.notes,
         "advice": identified.advice,
+        "status": identified.vehicle.status,
     }
-    data["status"] = identified.vehicle.status
     for where, errors in identified.predicted.items():
-        of = zip(QUANTITIES.items(), errors.model, errors.still, strict=True)
+        ends = errors.model, errors.still, identified.simplest[where].model
         data[where] = {"starts": errors.starts, "horizon_s": errors.horizon}
-        for i, ((name, unit), model, still) in enumerate(of):
-            said = {"unit": unit, "model": model, "if_nothing_changes": still}
-            if where in identified.simplest:
-                said["thrust_and_drag"] = identified.simplest[where].model[i]
-            data[where][name.replace(" ", "_")] = said
+        for (name, unit), model, still, simple in zip(QUANTITIES.items(), *ends, strict=True):
+            data[where][name.replace(" ", "_")] = {
+                "unit": unit,
+                "model": model,
+                "if_nothing_changes": still,
+                "thrust_and_drag": simple,
+            }
     told: Data = plain(data)
     return told
 
@@ -69,56 +71,53 @@ def headline(identified: Identified) -> str:
     """Return one sentence: parts refuted by held-out flight, identified quantities with half of
     their 95 % interval, and assumed ones.
     """
-    status = identified.vehicle.status
-    parts = [part for part in ("force", "torque") if getattr(status, part) == REFUTED]
-    refuted = f"held-out flight refutes the {' and the '.join(parts)}; " if parts else ""
+    parts = " and the ".join(refuted(identified.vehicle))
+    begin = f"held-out flight refutes the {parts}; " if parts else ""
     thrust = "thrust(0.5)" if identified.fit.drive.commands else "k"
-    told, assumed = [], []
-    for name in (thrust, "Jxx", "Jyy", "Jzz", "p/k"):
-        e = identified.estimates[name]
-        size = f"{name} {e.value:.3g} ± {0.5 * (e.high - e.low):.2g} {e.unit}"
-        if e.status in (ASSUMED, NOTHING):
-            assumed.append(name)
-        else:
-            told.append(size)
-    rest = f"; assumed, since these logs do not tell: {', '.join(assumed)}" if assumed else ""
-    return f"{refuted}identified: {', '.join(told)}{rest}"
+    shown = [identified.estimates[name] for name in (thrust, "Jxx", "Jyy", "Jzz", "p/k")]
+    assumed = ", ".join(e.name for e in shown if e.status in (ASSUMED, NOTHING))
+    told = ", ".join(
+        f"{e.name} {e.value:.3g} ± {0.5 * (e.high - e.low):.2g} {e.unit}"
+        for e in shown
+        if e.status not in (ASSUMED, NOTHING)
+    )
+    rest = f"; assumed, since these logs do not tell: {assumed}" if assumed else ""
+    return f"{begin}identified: {told}{rest}"
 
 
 def use_of(identified: Identified) -> str:
     """Return one sentence: the use of the vehicle's file for predictions."""
-    status, loop = identified.vehicle.status, identified.vehicle.closed_loop
-    refuted = [part for part in ("force", "torque") if getattr(status, part) == "refuted"]
-    if status.force == "assumed":
+    parts = refuted(identified.vehicle)
+    if identified.vehicle.status.force == ASSUMED:
         return "Use: nothing could be held out, so that no number is confirmed. Fly longer."
-    if loop is not None:
-        kept = "an unchanged velocity" if "force" in refuted else "the vehicle for force"
+    if identified.vehicle.closed_loop is not None:
+        kept = "an unchanged velocity" if "force" in parts else "the vehicle for force"
         return (
             f"Use: {kept}, and the flight loop's reaction for the body rate (predict does both). "
             "Plant and tasks fly assumed inertia and reaction torque."
         )
-    if len(refuted) == 2:
+    if len(parts) == 2:
         return (
             "Use: assume an unchanged velocity and body rate; the vehicle predicts no better. Fly "
             "as advised and identify again."
         )
-    if refuted == ["torque"]:
+    if parts == ["torque"]:
         return (
             "Use: the vehicle for force, with an unchanged body rate (predict does both). Inertia "
             "and reaction torque are assumed."
         )
-    if refuted:
+    if parts:
         return "Use: the vehicle for torque, with an unchanged velocity (predict does both)."
     return "Use: this vehicle."
 
 
-def table_of(errors: PredictionErrors, simplest: PredictionErrors | None) -> list[Names]:
+def table_of(errors: PredictionErrors, simplest: PredictionErrors) -> list[Names]:
     """Return rows: quantity, mean error of the vehicle, of thrust and drag, of no change, unit."""
-    columns = [errors.model[:, -1], errors.still[:, -1]]
-    if simplest is not None:
-        columns.insert(1, simplest.model[:, -1])
-    cells = ([f"{x:.3g}" for x in row] for row in np.array(columns).T)
-    return [(name, *row, unit) for (name, unit), row in zip(QUANTITIES.items(), cells, strict=True)]
+    ends = (of[:, -1] for of in (errors.model, simplest.model, errors.still))
+    return [
+        (name, *(f"{x:.3g}" for x in row), unit)
+        for (name, unit), *row in zip(QUANTITIES.items(), *ends, strict=True)
+    ]
 
 
 def write_identified(identified: Identified, path: Path) -> list[Path]:

@@ -8,6 +8,7 @@ from ...dynamics.vehicle import Vehicle
 from ..logs.table import Names
 from ..prediction import PredictionErrors
 from .channels import MotionPiece, Sources
+from .geometry import Interval
 from .solve import VehicleFit
 
 IDENTIFIED, ASSUMED, GIVEN, NOTHING = "identified", "assumed", "given", "not identifiable"
@@ -19,7 +20,7 @@ REFUTED = "refuted"  # by data outside the fit
 WIDEST = 0.5
 
 
-def told(known: tuple[float, float, float]) -> bool:
+def told(known: Interval) -> bool:
     """Return whether value, low and high of a positive quantity are narrow enough to count."""
     _, low, high = known
     return low > 0.0 and 0.5 * math.log(high / low) <= WIDEST

@@ -19,11 +19,11 @@ from ...runtime.errors import InputError
 from ..logs.table import Values
 from .channels import Pieces
 from .columns import BalanceSpectra, Drive, balance
+from .geometry import Interval
 from .model import Model, jacobian
 from .spectra import LOSS, TAPERS, residual_spectra
 
 Function = Callable[[Values], float]
-Interval = tuple[float, float, float]  # value, low and high
 
 _ROUNDS = 12  # each with a new spectrum and a new linearisation
 _STEPS = 2  # Gauss-Newton steps in each round
@@ -58,7 +58,7 @@ class VehicleFit:
         """Covariance (p, p): by the noise's spectrum, or by the segments' own scatter (White's
         sandwich), the larger of the two parameter by parameter.
         """
-        inverse = np.asarray(LOSS * np.linalg.inv(self.information), dtype=np.float64)
+        inverse = np.asarray(LOSS * np.linalg.inv(self.information), np.float64)
         count = len(self.scores)
         if count < 4:
             return inverse
@@ -86,13 +86,13 @@ class VehicleFit:
         """
         of = (lambda v: v[what]) if isinstance(what, str) else what
         theta, values = self.theta, self.model.values
-        here = float(of(values(theta)))
+        here = of(values(theta))
         steps = 1e-5 * np.eye(len(theta))
         slope = np.array([of(values(theta + e)) - of(values(theta - e)) for e in steps]) / 2e-5
         variance = float(slope @ self.covariance @ slope)
         size = self.width * math.sqrt(max(variance, 0.0))
         if logarithm and here > 0.0:
-            factor = float(np.exp(min(size / here, 50.0)))
+            factor = math.exp(min(size / here, 50.0))
             return here, here / factor, here * factor
         return here, here - size, here + size
 
@@ -124,7 +124,7 @@ def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFi
         np.sum(s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p)))
         for s, p in zip(made.segments, spectra, strict=True)
     )
-    loss = float(TAPERS * sum(logs))
+    loss = TAPERS * sum(logs)
     return VehicleFit(model, theta, information, scores, loss, made, spectra)
 
 
@@ -165,7 +165,7 @@ def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
             slope[at] = share  # of logarithms
             move = fit.covariance @ slope
             variance = float(slope @ move)
-            size = max(size, float(share.sum()) / math.sqrt(variance))
+            size = max(size, share.sum() / math.sqrt(variance))
             fit = replace(fit, theta=fit.theta - move * (share.sum() / variance))
     return fit, size
 
@@ -229,7 +229,7 @@ def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
             scaled = (both * np.sqrt(weight)[None, :, None]).reshape(-1, both.shape[2])
             parts = np.concatenate([scaled.real, scaled.imag])
             gram[axis] = parts.T @ parts
-            added = noise * float(np.sum(weight * gain)) * TAPERS
+            added = noise * np.sum(weight * gain) * TAPERS
             gram[axis, 1 : 1 + c, 1 : 1 + c] -= added
         grams.append(gram)
     return grams

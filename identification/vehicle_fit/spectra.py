@@ -49,37 +49,36 @@ def segments_of(columns: Array, period: float, log: int, band: float) -> list[Se
     out = []
     for a, b in itertools.pairwise(edges_of(len(columns), period)):
         size = b - a
-        frequency = np.asarray(np.fft.rfftfreq(size, period), dtype=np.float64)
+        frequency = np.asarray(np.fft.rfftfreq(size, period), np.float64)
         inside = frequency <= min(band, 0.4 / period)
         frequency = frequency[inside]
         weight = np.where(frequency == 0.0, 1.0, 2.0) / TAPERS
         places = np.arange(1, size + 1) * (np.pi / (size + 1))
-        transforms = []
-        for k in range(1, TAPERS + 1):
-            taper = np.sqrt(2.0 * period / (size + 1)) * np.sin(k * places)
-            transforms.append(np.fft.rfft(taper[:, None] * columns[a:b], axis=0)[inside])
-        out.append(Segment(log, frequency, weight, np.array(transforms)))
+        waves = np.sin(np.arange(1, TAPERS + 1)[:, None] * places)
+        tapers = np.sqrt(2.0 * period / (size + 1)) * waves[:, :, None]
+        transforms = np.fft.rfft(tapers * columns[a:b], axis=1)[:, inside]
+        out.append(Segment(log, frequency, weight, transforms))
     return out
 
 
 def residual_spectra(segments: Sequence[Segment], powers: Sequence[Array]) -> list[Array]:
     """Return, for each segment, the spectrum (m, 6) of residuals with given powers (m, 6): smoothed
-    over the segments of a log and over frequency, infinite at no power.
+    over the segments of a log and over frequency, infinite at no power. Segments of a log stand
+    together.
     """
     out = []
-    by_log = {}
-    for log in {s.log for s in segments}:
-        of_log = [(s, p) for s, p in zip(segments, powers, strict=True) if s.log == log]
+    each = zip(segments, powers, strict=True)
+    for _, group in itertools.groupby(each, key=lambda pair: pair[0].log):
+        of_log = list(group)
         frequency = np.concatenate([s.frequency for s, _ in of_log])
-        power = np.concatenate([p for _, p in of_log])
         order = np.argsort(frequency, kind="stable")
-        by_log[log] = frequency[order], power[order]
-    for s in segments:
-        frequency, power = by_log[s.log]
-        total = np.concatenate([np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)])
-        half = 0.5 * np.maximum(_SMOOTHING * s.frequency, _NARROWEST)
-        low = np.searchsorted(frequency, s.frequency - half - 1e-9)
-        high = np.searchsorted(frequency, s.frequency + half + 1e-9, side="right")
-        mean = (total[high] - total[low]) / (high - low)[:, None]
-        out.append(np.where(mean > 0.0, mean, np.inf))
+        frequency = frequency[order]
+        power = np.concatenate([p for _, p in of_log])[order]
+        total = np.pad(np.cumsum(power, axis=0), ((1, 0), (0, 0)))
+        for s, _ in of_log:
+            half = 0.5 * np.maximum(_SMOOTHING * s.frequency, _NARROWEST)
+            low = np.searchsorted(frequency, s.frequency - half - 1e-9)
+            high = np.searchsorted(frequency, s.frequency + half + 1e-9, side="right")
+            mean = (total[high] - total[low]) / (high - low)[:, None]
+            out.append(np.where(mean > 0.0, mean, np.inf))
     return out

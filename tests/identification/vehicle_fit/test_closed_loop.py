@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from tests.support.flown import recorded
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.vehicle import ClosedLoop, ModelStatus
+from windwrench.dynamics.vehicle import LoopReaction, ModelStatus
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
 from windwrench.identification import predict
 from windwrench.identification.prediction import logged_starts
@@ -16,9 +16,9 @@ from windwrench.identification.vehicle_fit.closed_loop import UNITS, fit_loop
 
 CRAZYFLIE = load_vehicle("crazyflie")
 STATUS = ModelStatus("identified", "refuted")
-WHOLE = ClosedLoop(1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+WHOLE = LoopReaction(1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 DAMPED = replace(WHOLE, yaw_gain=0.0, unmeasured=1e6, damping=5.0, yaw_damping=3.0)
-LOOP = ClosedLoop(0.4, 0.6, 0.3, 25.0, 6.0, 15.0, 4.0, 1.5, 5.0)
+LOOP = LoopReaction(0.4, 0.6, 0.3, 25.0, 6.0, 15.0, 4.0, 1.5, 5.0)
 
 
 @pytest.fixture(scope="module")

@@ -217,7 +217,6 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monk
 
     where = "windwrench.identification.vehicle_fit.held_out"
     monkeypatch.setattr(f"{where}.errors_at", errors)
-    monkeypatch.setattr(f"{where}.fit_loop", lambda *_: None)
     logs = commanded[:2]
     found = of_crazyflie(logs)
     check(found, "k", CRAZYFLIE.k[0], 0.05)
