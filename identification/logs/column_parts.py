@@ -38,7 +38,7 @@ _FELT = 0.5  # correlation of rotors with the specific force
 SHOWN = 4  # candidates in a map
 
 
-def correlation(x: Array, y: Array) -> float:
+def _correlation(x: Array, y: Array) -> float:
     """Return the correlation of two series (n,); 0 where one is constant."""
     return float(np.nan_to_num(np.corrcoef(x, y)[0, 1]))
 
@@ -52,7 +52,7 @@ class Numbers:
     """
 
     def __init__(self, t: Array, data: ArrayMap) -> None:
-        order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
+        order = np.argsort(t, kind="stable")[: np.isfinite(t).sum()]
         self.order = order[max(0, (len(order) - _MOST_ROWS) // 2) :][:_MOST_ROWS]
         self.t = t[self.order]
         count = min(_MOST_SAMPLES, len(self.t))
@@ -114,8 +114,8 @@ class Numbers:
         if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
             return 0.0, ""
         middle, total = np.median(x, axis=0), self.between(self.clock, columns).sum(axis=1)
-        together = middle.min() * _ALIKE >= middle.max() > 0.0
-        together &= any(correlation(total, felt) > _FELT for felt in self.felt)
+        together = any(_correlation(total, felt) > _FELT for felt in self.felt)
+        together &= middle.min() * _ALIKE >= middle.max() > 0.0
         return float(together), "they move together with the specific force"
 
     def feel(self, accelerometer: Names, position: Names) -> None:
@@ -137,7 +137,7 @@ class Numbers:
         mean = np.interp(self.clock, self.t[good], total[good])
         there = (mean > 0.5 * np.median(mean)) & (self.felt[0] > 0.3 * np.median(self.felt[0]))
         x, y = np.log(mean[there]), np.log(self.felt[0][there])
-        if len(x) < _FEWEST or correlation(x, y) < 0.85:
+        if len(x) < _FEWEST or _correlation(x, y) < 0.85:
             return np.nan
         return float(np.std(y) / np.std(x))
 
@@ -157,11 +157,10 @@ class ColumnCandidate:
 def _named(group: Group, part: str = "") -> bool:
     """Return whether the names of a group speak for a part, but ``part``."""
     return any(
-        re.fullmatch(word, group.key)
+        re.fullmatch("|".join(way["words"]), group.key)
         for other, ways in WORDS["parts"].items()
         for way in ways
         if other != part and list(group.endings) in way["endings"]
-        for word in way["words"]
     )
 
 
@@ -195,9 +194,9 @@ def candidates(
     ways = []
     for number, way in enumerate(WORDS["parts"][part]):
         for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
-            places = (i for i, word in enumerate(way["words"]) if re.fullmatch(word, group.key))
-            if (i := next(places, None)) is not None:
-                by_name = _NUMBERS - 0.3 * i - 0.5 * number
+            matches = [bool(re.fullmatch(word, group.key)) for word in way["words"]]
+            if any(matches):
+                by_name = _NUMBERS - 0.3 * matches.index(True) - 0.5 * number
                 ways.append((group, by_name, "by the columns' names"))
             elif commanded or _named(group, part):
                 continue
@@ -218,12 +217,13 @@ def candidates(
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
     found = []
     for group, score, why in ways:
-        strength, told = 0.0, ""
-        if len(numbers.rows(group.columns)[0]):
-            strength, told = judge(group.columns)
+        there = len(numbers.rows(group.columns)[0])
+        strength, told = judge(group.columns) if there else (0.0, "")
         words = "; ".join(filter(None, (why, told if strength else "")))
         if words and strength >= 0.0:
             found.append(ColumnCandidate(group, score + _NUMBERS * strength, words))
     found.sort(key=lambda candidate: -candidate.score)
-    likeliest = {candidate.group.columns: candidate for candidate in reversed(found)}
-    return [candidate for candidate in found if likeliest[candidate.group.columns] is candidate]
+    likeliest: dict[Names, ColumnCandidate] = {}
+    for candidate in found:
+        likeliest.setdefault(candidate.group.columns, candidate)
+    return [*likeliest.values()]

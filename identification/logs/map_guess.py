@@ -172,7 +172,7 @@ class _Guessing:
         names = take_apart(table.header, table.units)
         self.data = _numbers_of(table, names)
         self.clock = _time_column(names, self.data)
-        self.t = np.asarray(0.01 * np.arange(table.rows), dtype=np.float64)
+        self.t: Array = 0.01 * np.arange(table.rows)
         if self.clock is not None:
             # a column of nanoseconds may stand beside a clock of whole seconds
             key = re.sub("(^|_)secs?$", "", self.clock.base)
@@ -219,12 +219,7 @@ class _Guessing:
 
     def missing(self) -> list[Reason]:
         """Return the fields missing for a flight log."""
-        out = []
-
-        def lack(part: str, section: str, why: str, field: str = "columns") -> None:
-            ranked = self.ranked.get(part, [])[:SHOWN]
-            out.append(Reason(section, field, False, why, tuple(map(str, ranked))))
-
+        lacks: dict[str, str] = {}
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
             for name in named_alone(self.free, "time"):
@@ -233,7 +228,7 @@ class _Guessing:
                     why = f"column {name.column} is {x[0]:g} in nearly every row: a program that "
                     why += "wrote the table left out its digits; expected a time in each row"
                     break
-            lack("time", "time", why, "column")
+            lacks["time"] = why
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), {*self.sections}
         if "position" not in has and not has.issuperset(imu):
             half = [part for part in pose if part in self.parts]
@@ -242,13 +237,21 @@ class _Guessing:
                 if part in half:
                     self.half_a_pose(part)
                 elif part not in has:
-                    lack(part, part, f"no columns look like one (such as {_EXAMPLES[part]})")
-        for part, why in self.further.items():
-            lack(part, "rotors", why)
-        if not {"rotors", "commands"} & set(self.sections) and not self.further:
+                    lacks[part] = f"no columns look like one (such as {_EXAMPLES[part]})"
+        lacks |= self.further
+        if not self.further and has.isdisjoint(("rotors", "commands")):
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
-            lack("motors", "rotors", why)
-        return out
+            lacks["motors"] = why
+        return [
+            Reason(
+                "rotors" if part in _MOTORS else part,
+                "column" if part == "time" else "columns",
+                False,
+                why,
+                tuple(map(str, self.ranked.get(part, [])[:SHOWN])),
+            )
+            for part, why in lacks.items()
+        ]
 
     def half_a_pose(self, part: str) -> None:
         """Keep a position without an attitude, or the reverse, for a person to complete."""
@@ -256,8 +259,10 @@ class _Guessing:
         most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
         made = Columns(columns, unit or "m")
         if part == "attitude":
-            unit = unit or ("deg" if most > 2.0 * np.pi else "rad")
-            made = Attitude(columns, unit, euler="zyx") if len(columns) == 3 else Attitude(columns)
+            made = Attitude(columns)
+            if len(columns) == 3:
+                unit = unit or ("deg" if most > 2.0 * np.pi else "rad")
+                made = Attitude(columns, unit, euler="zyx")
         self.say(part, "columns", False, self.ranked[part][0].why)
         if made.unit:
             self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
@@ -278,10 +283,11 @@ class _Guessing:
         """Return a section's unit: by its columns' names unless the numbers are certain of another,
         else as guessed.
         """
-        if named in UNITS[section] and (choice[0] == named or not choice[1]):
+        guessed, sure, why = choice
+        if named in UNITS[section]:
             choice = named, True, "by the columns' names"
-        elif named in UNITS[section]:
-            choice = choice[0], False, f"{choice[2]}, though the columns' names say {named}"
+            if sure and guessed != named:
+                choice = guessed, False, f"{why}, though the columns' names say {named}"
         return self.take(section, "unit", choice)
 
     def time(self, clock: Name, nanoseconds: str) -> Array:
@@ -323,7 +329,7 @@ class _Guessing:
         thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
         position = np.column_stack([self.data[name] for name in place.columns])
         evidence = Evidence(self.t, thrusts, position, attitude)
-        return RankedFits.of(evidence, readings, torques=False)
+        return RankedFits(evidence.fit(reading, torques=False) for reading in readings)
 
     def follows_tilt(self, columns: Names) -> Verdict:
         """Return the share of three columns' horizontal acceleration by a quaternion's tilt; 0
@@ -398,8 +404,7 @@ class _Guessing:
             Fit(way, left, (), float(likelihood([left] * 3)) - OTHER * (unit not in ("", way.unit)))
             for way, left in zip(_GYROS, shares, strict=False)
         ]
-        ranked = sorted(fits, key=lambda fit: -fit.score)
-        return RankedFits(ranked, "attitude's rate is left unexplained") if fits else None
+        return RankedFits(fits, "attitude's rate is left unexplained") if fits else None
 
     def turns_alike(self, columns: Names) -> Verdict:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
@@ -476,7 +481,7 @@ class _Guessing:
         if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
-        ranking = RankedFits.of(evidence, ways)
+        ranking = RankedFits(map(evidence.fit, ways))
         left, lead, order = ranking.fit.torque, ranking.other("rotors")[1], ranking.best.motors
         names = order_names(order)
         why = (
@@ -487,7 +492,7 @@ class _Guessing:
         is_sure = left <= GOOD_TORQUE and ranking.certain("rotors") and turns
         if is_sure or (names and left <= 0.9 and lead >= 1.0):
             return order, is_sure, why
-        plus = RankedFits.of(Evidence(self.t, np.square(values), sides=_PLUS, **motion), ways)
+        plus = RankedFits(map(Evidence(self.t, np.square(values), sides=_PLUS, **motion).fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
             why = f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "

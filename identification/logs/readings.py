@@ -23,7 +23,6 @@ from .what_flew import ORDERS, Order, order_names
 
 _I = np.eye(3)
 _STATED: Data = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
-_PLACE, _QUATERNION = ("px", "py", "pz"), ("qw", "qx", "qy", "qz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +165,7 @@ class Convention:
             words.append(
                 f"the rotors look permuted: omega1..omega4 are rotors "
                 f"{','.join(map(str, self.rotors))} of this vehicle"
-                f"{f' (the order {known})' if known else ''}"
+                f"{known and f' (the order {known})'}"
                 "; expected 1 front-left, 2 rear-left, 3 rear-right, 4 front-right: reorder the "
                 "columns"
             )
@@ -187,16 +186,16 @@ class Convention:
         }
         order, is_inverse = self.attitude.order, self.attitude.sense != SENSES[0]
         sense = "world to body" if order in orders else "the quaternion is world to body"
-        facts = [orders.get(order, ""), sense if is_inverse else ""]
-        facts = [fact for fact in (*facts, self.frames.fact) if fact]
-        if not facts:
+        facts = orders.get(order, ""), sense if is_inverse else "", self.frames.fact
+        if not any(facts):
             return []
-        position, quaternion = _combined(self.frames.position, _PLACE), _quaternion(self)
-        take = [f"{position} as the position"] if position != f"({', '.join(_PLACE)})" else []
-        if quaternion != f"({', '.join(_QUATERNION)})":
+        position = _combined(self.frames.position, ("px", "py", "pz"))
+        quaternion = _quaternion(self)
+        take = [f"{position} as the position"] if position != "(px, py, pz)" else []
+        if quaternion != "(qw, qx, qy, qz)":
             take.append(f"{quaternion} as the quaternion (qw, qx, qy, qz)")
         return [
-            " and ".join(facts),
+            " and ".join(filter(None, facts)),
             "expected one world, z up, body axes forward, left, up, and a quaternion scalar first, "
             f"body to world: take {' and '.join(take)}",
         ]
@@ -221,7 +220,7 @@ def _quaternion(reading: Convention) -> str:
     columns = as_written(np.eye(4), reading.attitude)[1]
     made = (world * columns * body).as_quat(scalar_first=True).T
     first = made[0][np.abs(made[0]) > 0.1][0]
-    text = _combined(made * np.sign(first), _QUATERNION)
+    text = _combined(made * np.sign(first), ("qw", "qx", "qy", "qz"))
     return text if abs(first) > 0.9 else f"0.7071 {text}"
 
 
@@ -233,9 +232,8 @@ OTHER, OFFSET = 8.0, 12.0
 
 def _each(**aspects: Sequence[Any]) -> list[Convention]:
     """Return the readings of all combinations of aspects."""
-    return [
-        Convention(**dict(zip(aspects, each, strict=True))) for each in product(*aspects.values())
-    ]
+    ways = product(*aspects.values())
+    return [Convention(**dict(zip(aspects, way, strict=True))) for way in ways]
 
 
 def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convention]:
