@@ -35,6 +35,7 @@ from ..motion.smoothing import (
     turning,
     unbroken,
 )
+from .excerpt import excerpt
 from .flight_log import FlightLog
 from .flight_phases import usual_thrust
 from .log_map import UNITS, Attitude
@@ -389,12 +390,10 @@ class RankedFits:
         """Return whether every other value of properties explains the flight clearly less."""
         return all(self.other(name)[1] >= _CERTAIN_LEAD for name in names)
 
-    def departures(self, by_imu: bool) -> list[Convention]:
-        """Return the readings of a log that explain it better than its declaration; ``by_imu``: the
-        motion is the gyro's.
-        """
+    def departures(self) -> list[Convention]:
+        """Return the readings of a log that explain it better than its declaration."""
         is_good = self.fit.torque <= GOOD_TORQUE
-        if not by_imu and self.best.moves != DECLARED.moves:  # forces tell, not torques
+        if self.best.moves[:3] != DECLARED.moves[:3]:  # another pose: forces tell, not torques
             is_good = self.fit.horizontal <= GOOD
         if self.best is DECLARED or not (is_good or self.best.late):
             return []
@@ -435,9 +434,10 @@ def remedies(
             spins = replace(vehicle, spin=-vehicle.spin)
         return log_ranking(Evidence.of_log(applied(log, reading), spins, by_imu)).best is DECLARED
 
+    log = excerpt([log])[0]
     evidence = Evidence.of_log(log, vehicle, by_imu)
     ranking = log_ranking(evidence)
-    if not ranking.departures(by_imu):
+    if not ranking.departures():
         return [], True
     fits = [*ranking.ranked]
     for one in (fit.reading for fit in ranking.ranked[:_TRIED] if fit.reading is not DECLARED):
@@ -455,6 +455,6 @@ def remedies(
                 )
                 for other in ROTOR_READINGS
             ]
-    alike = RankedFits(fits).departures(by_imu)[:3] or ranking.departures(by_imu)[:1]
+    alike = RankedFits(fits).departures()[:3] or ranking.departures()[:1]
     mending = [reading for reading in alike if mends(reading)]
     return mending or alike[:1], bool(mending)

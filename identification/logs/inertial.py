@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
 from .evidence import GOOD, likelihood, remedies
-from .excerpt import excerpt
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import (
@@ -58,7 +57,7 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
     checked, notes = _agreeing(log, gravity)
     if not (notes and log.has_pose and log.has_rotor_speeds):
         return checked, notes
-    advice, is_whole = remedies(excerpt([log])[0], vehicle)
+    advice, is_whole = remedies(log, vehicle)
     for reading in advice if is_whole else ():
         if not (reading.moves == DECLARED.moves or _agreeing(applied(log, reading), gravity)[1]):
             wrong = "the pose contradicts the inertial sensors and the rotors"

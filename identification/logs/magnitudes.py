@@ -77,8 +77,8 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     unit is certain. The size is a battery's median voltage, the time's median step, or an
     accelerometer's median length.
     """
-    units = {unit: one for unit, one in UNITS[section].items() if unit not in ("min", "raw")}
-    sizes = {unit: size * one for unit, one in units.items()}
+    units = UNITS[section]
+    sizes = {unit: size * one for unit, one in units.items() if unit not in ("min", "raw")}
     if section == "time":
         sizes = {unit: 1.0 / max(step, 1e-300) for unit, step in sizes.items()}
     elif section == "accelerometer":
@@ -91,12 +91,11 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
 def time_doubt(step: float) -> str:
     """Return a doubt on the time's unit by a median step (s), or nothing."""
     unit, is_sure = likely_unit("time", step)
-    if unit == "s" or not is_sure:
-        return ""
-    return (
+    words = (
         f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: divide t "
         f"by {1.0 / UNITS['time'][unit]:g}"
     )
+    return words if is_sure and unit != "s" else ""
 
 
 def _thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
@@ -176,18 +175,17 @@ def motor_unit(
     turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
     if not turning.size:
         return "commands", "normalised", False, "all are zero"
-    low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
+    low, middle, high = np.quantile(turning, [0.01, 0.5, 1.0]).tolist()
     named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = any(re.search(word, names) for word in WORDS["command_words"])
-    speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
+    commanded = bool(re.search("|".join(WORDS["command_words"]), names))
+    speeds = bool(re.search("omega|speed|rotor|rpm", names))
     speeds |= within(power, MAGNITUDES.squares) and not commanded
     pulses = low >= 850.0 and high <= 2250.0
-    carrying = []
+    carrier = ""  # the one unit in which the rotors carry the vehicle
     if vehicle is not None and not commanded:
-        there = values[finite_rows(values)]
-        carrying = [
-            u for u in _carrying_units(_thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
-        ]
+        thrust = _thrust_by_weight(values[finite_rows(values)], vehicle)
+        carrying = [unit for unit in _carrying_units(thrust) if unit in UNITS["rotors"]]
+        carrier = carrying[0] if len(carrying) == 1 else ""
     # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
     doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
     doubt = "" if speeds else doubt
@@ -198,9 +196,9 @@ def motor_unit(
     carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
     carries += f", though they may be {doubt}" if doubt else ""
     # the vehicle's weight may contradict a name, but poles of eRPM are unknown
-    lifts = len(carrying) == 1 and named in UNITS["rotors"] and named not in ("eRPM", *carrying)
+    lifts = carrier and named in UNITS["rotors"] and named not in ("eRPM", carrier)
     rules = (
-        (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
+        (lifts, "rotors", carrier, False, f"{carries}, not in {named} as names say"),
         (named in UNITS["rotors"], "rotors", named, True, by_names),
         (high <= 1.0, "commands", "normalised", "omega" not in names, up_to),
         (named in ("us", "percent"), "commands", named, True, by_names),
@@ -208,9 +206,9 @@ def motor_unit(
         (commanded and high <= 100.0, "commands", "percent", False, up_to),
         (commanded and high <= 65535.0, "commands", "counts", False, up_to),
         (pulses and power >= MAGNITUDES.offset, "commands", "us", True, between),
-        (len(carrying) == 1, "rotors", "".join(carrying), not doubt, carries),
+        (carrier, "rotors", carrier, not doubt, carries),
         (
-            not commanded and middle > MAGNITUDES.counts and high <= 65535.5,
+            middle > MAGNITUDES.counts and high <= 65535.0,
             "commands",
             "counts",
             False,
@@ -255,20 +253,18 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             f"at most {MAGNITUDES.longest_step:g} s"
         )
     for names, values in parts_of(log)[1:]:
-        values = values.reshape(len(log.t), -1)
-        for row, column in np.argwhere(np.abs(values) > MAGNITUDES.largest)[:1]:  # False where NaN
+        columns = values.reshape(len(log.t), -1)
+        for row, i in np.argwhere(np.abs(columns) > MAGNITUDES.largest)[:1]:  # False where NaN
             raise InputError(
-                f"{where} {names[column]}, row {row + 1}: {values[row, column]:.3g}; expected a "
-                f"number within {MAGNITUDES.largest:g}"
+                f"{where} {names[i]}, row {row + 1}: {columns[row, i]:.3g}; expected a number "
+                f"within {MAGNITUDES.largest:g}"
             )
     doubts = [time_doubt(log.period), *motor_doubts(log)]
-    if log.valid.any():
-        spread = np.max(np.ptp(log.position[log.valid], axis=0))
-        if spread > MAGNITUDES.widest:
-            doubts.append(
-                f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
-                f"metres"
-            )
+    spread = np.max(np.ptp(log.position[log.valid], axis=0)) if log.has_pose else 0.0
+    if spread > MAGNITUDES.widest:
+        doubts.append(
+            f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres"
+        )
     if vehicle is not None and log.has_rotor_speeds:
         doubts.append(rotor_doubt(_thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
     return [doubt for doubt in doubts if doubt]

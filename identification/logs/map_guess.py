@@ -73,7 +73,7 @@ _EXAMPLES = {
 
 
 @dataclass(frozen=True)
-class Reason:
+class _Reason:
     """The reason for a field's value."""
 
     section: str
@@ -88,9 +88,9 @@ class Guess:
     """A guessed map."""
 
     log_map: LogMap
-    reasons: tuple[Reason, ...]
+    reasons: tuple[_Reason, ...]
     unused: Names = ()  # columns
-    missing: tuple[Reason, ...] = ()  # fields ``?``; the log is not read without them
+    missing: tuple[_Reason, ...] = ()  # fields ``?``; the log is not read without them
 
     @property
     def lacks(self) -> str:
@@ -98,7 +98,7 @@ class Guess:
         return "; ".join(f"{m.section}.{m.field}: {m.why}" for m in self.missing)
 
     @property
-    def doubts(self) -> tuple[Reason, ...]:
+    def doubts(self) -> tuple[_Reason, ...]:
         """The uncertain fields."""
         return tuple(reason for reason in self.reasons if not reason.certain)
 
@@ -163,7 +163,7 @@ class _Guessing:
         self.table, self.vehicle = table, vehicle
         self.sections: Data = {}
         self.time_columns: Names = ()
-        self.reasons: list[Reason] = []
+        self.reasons: list[_Reason] = []
         self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
         self.unnamed: set[str] = set()  # sections without telling names
@@ -217,7 +217,7 @@ class _Guessing:
         """Return the columns (N, k) of a part."""
         return np.column_stack([self.data[name] for name in self.parts[part].columns])
 
-    def missing(self) -> list[Reason]:
+    def missing(self) -> list[_Reason]:
         """Return the fields missing for a flight log."""
         lacks: dict[str, str] = {}
         if self.clock is None:
@@ -243,7 +243,7 @@ class _Guessing:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lacks["motors"] = why
         return [
-            Reason(
+            _Reason(
                 "rotors" if part in _MOTORS else part,
                 "column" if part == "time" else "columns",
                 False,
@@ -271,7 +271,7 @@ class _Guessing:
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep the reason for a field's value."""
         certain = certain and section not in self.unnamed
-        self.reasons.append(Reason(section, name, certain, why))
+        self.reasons.append(_Reason(section, name, certain, why))
 
     def take(self, section: str, name: str, choice: _Choice) -> str:
         """Return the choice for a field, and keep the reason."""
@@ -295,20 +295,19 @@ class _Guessing:
         elsewhere.
         """
         raw = TimeColumn(clock.column, nanoseconds=nanoseconds).raw(self.data)
-        steps = np.diff(raw[np.isfinite(raw)])
-        step = float(np.median(steps[steps > 0.0]))
+        known, units = raw[np.isfinite(raw)], UNITS["time"]
+        steps = np.diff(known)
+        step = max(float(np.median(steps[steps > 0.0])), 1e-300)
         guessed, sure = likely_unit("time", step)
-        rates = {unit: 1.0 / max(step * one, 1e-300) for unit, one in UNITS["time"].items()}
-        if clock.unit in rates:  # an unusual rate is no reason to doubt a name
-            sure &= not within(rates[clock.unit], MAGNITUDES.named_rates)
-        choice = guessed, sure, f"{rates[guessed]:.4g} rows a second"
+        if clock.unit in units:  # an unusual rate is no reason to doubt a name
+            sure &= not within(1.0 / (step * units[clock.unit]), MAGNITUDES.named_rates)
+        choice = guessed, sure, f"{1.0 / (step * units[guessed]):.4g} rows a second"
         unit = self.unit("time", "s" if nanoseconds else clock.unit, choice)
-        t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
+        t = (raw - known[0]) * units[unit]
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
-        t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
         self.sections["time"] = column = TimeColumn(clock.column, unit, nanoseconds)
         self.time_columns = column.named
-        return t
+        return np.where(np.abs(t - middle) <= 0.5 * LONGEST, t, np.nan)
 
     def pose_fits(self, place: Group, group: Group) -> RankedFits:
         """Return the fits of a pose in each of a map's frames, units, orders and senses."""
@@ -367,11 +366,11 @@ class _Guessing:
     def accelerometer(self, group: Group) -> None:
         """Find unit and axes of the accelerometer by gravity."""
         values = self.values("accelerometer")
-        size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
-        z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
+        size = max(float(np.nanmedian(np.linalg.norm(values, axis=1))), 1e-12)
+        z = np.nanmean(values[:, 2]) / size
         # without a pose, a negative z may also be gravity in place of the specific force
-        sure = abs(z) > 0.8 and (z > 0.0 or self.ranking is not None)
-        why = f"along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size"
+        sure = bool(z > 0.8 or (z < -0.8 and self.ranking))
+        why = f"along z it reads {z:+.2f} of its size"
         axes = self.take("accelerometer", "body", ("flu" if z > 0.0 else "frd", sure, why))
         guessed, is_gravity = likely_unit("accelerometer", size)
         units, why, scale = UNITS["accelerometer"], f"its median size is {size:.4g}", 1.0
@@ -381,7 +380,7 @@ class _Guessing:
             if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
                 self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:
-            scale = float(f"{_G / max(size, 1e-12):.6g}")
+            scale = float(f"{_G / size:.6g}")
             why += ", which is taken for the 9.81 m/s2 of a hover"
             unit = self.take("accelerometer", "scale", ("raw", False, why))
         self.sections["accelerometer"] = Sensor(group.columns, unit, scale=scale, body=axes)
@@ -451,14 +450,14 @@ class _Guessing:
         order, sure, why = self.order(group, values)
         self.say(kind, "order", sure, why)
         if kind == "rotors":
-            if unit == "eRPM":
-                self.say(kind, "pole_pairs", False, "7, of most motors of small racers")
             pairs = 7 if unit == "eRPM" else 1
+            if pairs > 1:
+                self.say(kind, "pole_pairs", False, "7, of most motors of small racers")
             self.sections[kind] = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
             return
         high = np.nanmax(values, initial=0.0)
-        counts = next((float(2**bits - 1) for bits in (8, 10, 11, 12) if high < 2**bits), 65535.0)
-        limits = COMMAND_UNITS[unit] or (0.0, counts)
+        bits = next((bits for bits in (8, 10, 11, 12) if high < 2**bits), 16)
+        limits = COMMAND_UNITS[unit] or (0.0, 2.0**bits - 1.0)
         if unit in ("us", "counts", "dshot"):
             self.say(kind, "range", False, f"{limits[0]:g} to {limits[1]:g}, the usual one")
         self.sections[kind] = Commands(group.columns, unit, order=order, range=limits)
@@ -484,15 +483,16 @@ class _Guessing:
         ranking = RankedFits(map(evidence.fit, ways))
         left, lead, order = ranking.fit.torque, ranking.other("rotors")[1], ranking.best.motors
         names = order_names(order)
-        why = (
-            f"{names[0] if names else order_words(order)}: {left:.0%} of the angular acceleration "
-            f"is left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
-        )
         turns = evidence.turns(best) >= TURNING_RATE
         is_sure = left <= GOOD_TORQUE and ranking.certain("rotors") and turns
         if is_sure or (names and left <= 0.9 and lead >= 1.0):
+            why = (
+                f"{(*names, order_words(order))[0]}: {left:.0%} of the angular acceleration is "
+                f"left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
+            )
             return order, is_sure, why
-        plus = RankedFits(map(Evidence(self.t, np.square(values), sides=_PLUS, **motion).fit, ways))
+        evidence = Evidence(self.t, np.square(values), sides=_PLUS, **motion)
+        plus = RankedFits(map(evidence.fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
             why = f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
@@ -505,9 +505,8 @@ class _Guessing:
         if not named or (column := named[0].column) not in self.data:
             return
         values = self.data[column]
-        values = values[np.isfinite(values) & (values > 0.0)]
-        if values.size:
-            middle = float(np.median(values))
+        middle = float(np.nanmedian(values[values > 0.0]))
+        if np.isfinite(middle):
             guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
             unit = self.unit("battery", named[0].unit, guessed)
             self.sections["battery"] = Battery((column,), unit)

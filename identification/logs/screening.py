@@ -21,9 +21,8 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.inertial_signals import inertial_pieces, reads_imu
 from ..motion.signals import SHORTEST_PIECE, pose_pieces
-from ..motion.smoothing import CUTOFFS, low_pass, runs_of
+from ..motion.smoothing import CUTOFFS, low_pass, runs_of, turn_between
 from .evidence import remedies
-from .excerpt import excerpt
 from .flight_log import MOTOR_RATES, FlightLog
 from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
@@ -147,7 +146,7 @@ def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
     by_imu = reads_imu(log)
     if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
         return ""
-    advice, mends = remedies(excerpt([log])[0], vehicle, by_imu)
+    advice, mends = remedies(log, vehicle, by_imu)
     says = "; or ".join(dict.fromkeys(reading.says for reading in advice))
     if all(reading.is_delay for reading in advice):
         return _Fault(says)
@@ -305,7 +304,7 @@ def _steps(log: FlightLog) -> _Findings:
     t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
     step = np.diff(t)
     way = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    angle = 2.0 * np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=1)), 0.0, 1.0))
+    angle = np.linalg.norm(turn_between(q[:-1], q[1:]), axis=1)
     far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
     leaps = far | turned
     if leaps.any():
@@ -320,15 +319,14 @@ def _steps(log: FlightLog) -> _Findings:
         )
     # two poses as if no time had passed, by velocities over 10 poses on each side
     span = 10
-    for i in np.flatnonzero(step > _JUMP):
-        a, b = i - span, i + 1 + span
-        if a < 0 or b >= len(t) or t[i] - t[a] > _JUMP or t[b] - t[i + 1] > _JUMP:
-            continue
-        before = (position[i] - position[a]) / (t[i] - t[a])
-        after = (position[b] - position[i + 1]) / (t[b] - t[i + 1])
+    for i in span + np.flatnonzero(step[span:-span] > _JUMP):
+        begins, ends = [i - span, i + 1], [i, i + 1 + span]
+        seconds = t[ends] - t[begins]
+        before, after = (position[ends] - position[begins]) / seconds[:, None]
         speed = min(np.linalg.norm(before), np.linalg.norm(after))
         is_alike = np.linalg.norm(after - before) < 0.15 * speed + 0.05 and angle[i] < 0.05
-        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * step[i]:
+        is_close = speed > _MOVING and way[i] < _SAME * speed * 0.5 * step[i]
+        if seconds.max() <= _JUMP and is_alike and is_close:
             yield _Fault(
                 f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
                 f"where it was ({1e3 * way[i]:.0f} mm on at {speed:.2g} m/s); expected one clock "

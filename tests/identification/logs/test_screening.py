@@ -59,7 +59,7 @@ def test_every_order_of_rotors_is_told_apart(trajectory, step):
         for mirrored in (False, True):
             vehicle = replace(VEHICLE, spin=-VEHICLE.spin) if mirrored else VEHICLE
             evidence = Evidence.of_log(permuted(log, order), vehicle)
-            found = log_ranking(evidence).departures(by_imu=False)
+            found = log_ranking(evidence).departures()
             rotors = tuple(i + 1 for i in order)
             expected = [] if rotors == (1, 2, 3, 4) and not mirrored else [(rotors, mirrored)]
             assert [(reading.rotors, reading.mirrored) for reading in found] == expected
