@@ -55,9 +55,9 @@ class Numbers:
         order = np.argsort(t, kind="stable")[: np.isfinite(t).sum()]
         self.order = order[max(0, (len(order) - _MOST_ROWS) // 2) :][:_MOST_ROWS]
         self.t = t[self.order]
-        count = min(_MOST_SAMPLES, len(self.t))
+        rows = len(self.t)
         # times (n,) in s of comparisons of motors
-        self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
+        self.clock = self.t[np.linspace(0, rows - 1, min(_MOST_SAMPLES, rows)).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
         self._rows: dict[Names, ArrayPair] = {}
         self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
@@ -91,9 +91,8 @@ class Numbers:
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
         off = np.abs(length[length > 0.5] - 1.0)  # zeros stand for a missing quaternion
-        if len(off) < max(2, 0.5 * len(x)) or np.any(
-            np.quantile(off, [0.5, 0.98]) >= _LENGTH_ERROR
-        ):
+        few = len(off) < max(2, 0.5 * len(x))
+        if few or np.any(np.quantile(off, [0.5, 0.98]) >= _LENGTH_ERROR):
             return -np.inf, ""
         return 1.0, "their length is 1"
 
@@ -132,11 +131,11 @@ class Numbers:
         """
         if len(self.felt) != 1:
             return np.nan
-        total = np.nanmean(values[self.order], axis=1)
+        total, felt = np.nanmean(values[self.order], axis=1), self.felt[0]
         good = np.isfinite(total)
         mean = np.interp(self.clock, self.t[good], total[good])
-        there = (mean > 0.5 * np.median(mean)) & (self.felt[0] > 0.3 * np.median(self.felt[0]))
-        x, y = np.log(mean[there]), np.log(self.felt[0][there])
+        there = (mean > 0.5 * np.median(mean)) & (felt > 0.3 * np.median(felt))
+        x, y = np.log(mean[there]), np.log(felt[there])
         if len(x) < _FEWEST or _correlation(x, y) < 0.85:
             return np.nan
         return float(np.std(y) / np.std(x))
@@ -173,10 +172,7 @@ def named_columns(names: Sequence[Name]) -> set[str]:
 
 
 def candidates(
-    part: str,
-    names: Sequence[Name],
-    numbers: Numbers,
-    judge: Judge,
+    part: str, names: Sequence[Name], numbers: Numbers, judge: Judge
 ) -> list[ColumnCandidate]:
     """Return the candidates of a part by their names and numbers, the likeliest first.
 
@@ -204,14 +200,14 @@ def candidates(
                 ways.append((group, -1.0, "their names go together"))
             named |= set(group.columns)
     if part != "commands" and not commanded:
-        wanted, width = WORDS["not_measured"], 4 if part in ("attitude", "motors") else 3
+        width = 4 if part in ("attitude", "motors") else 3
         # with more than a few values: no counter's and no switch's
         measured = tuple(
             n.column
             for n in names
             if n.column not in named
             and len(np.unique(numbers.some((n.column,)))) > _LEVELS
-            and not re.search(wanted, n.base)
+            and not re.search(WORDS["not_measured"], n.base)
         )
         for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))

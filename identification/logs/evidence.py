@@ -113,14 +113,9 @@ class Fit:
 
     reading: Any  # a Convention, or a SensorReading
     horizontal: float  # share of the horizontal specific force, or of the sensor's vector
-    torques: tuple[float, ...]  # shares about x, y and, with a vehicle, z
+    torque: float  # mean share of the torques about x, y and, with a vehicle, z
     score: float  # log-likelihood less the penalty on an unusual reading
     delay: float = 0.0  # s, the likeliest of the motion behind the rotors' columns
-
-    @property
-    def torque(self) -> float:
-        """Mean share of the torques."""
-        return float(np.mean(self.torques)) if self.torques else 1.0
 
 
 class Evidence:
@@ -149,7 +144,7 @@ class Evidence:
         sides: Array = SIDES,
     ) -> None:
         self._t, self._position, self._attitude = t, position, attitude
-        self._gyro, self._along = gyro, along
+        self._gyro, self._along = gyro, np.zeros(len(t)) if along is None else along
         self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), sides
         self._gains = [_TORQUE_GAIN, (0.0, np.inf), (0.0, np.inf)]  # of thrust, and of torques
         if vehicle is not None:
@@ -183,15 +178,13 @@ class Evidence:
         """Lay the runs of known motion out on one even clock, ``_PAUSE`` apart. Return the samples
         in flight, far enough from the runs' ends for the filters.
         """
-        if len(rows) < 2:
-            return np.empty(0, np.intp)
-        step = median_step(self._t[rows])
+        step = median_step(self._t[rows]) if len(rows) > 1 else 0.0
         self._period = period = max(step, _PERIOD)
         runs = unbroken(self._t, rows, max(LONGEST_GAP, 3.5 * step), 8, SHORTEST_PIECE)
-        known = np.flatnonzero(finite_rows(self._thrusts))
-        runs = [run for run in runs if np.any((known >= run[0]) & (known <= run[-1]))]
+        known = finite_rows(self._thrusts)
+        runs = [run for run in runs if known[run[0] : run[-1] + 1].any()]
         if not runs:
-            return np.empty(0, np.intp)
+            return rows[:0]
         ends = np.array([self._t[run[[0, -1]]] for run in runs])
         before = np.append(0.0, np.cumsum(np.diff(ends)[:-1, 0] + _PAUSE))
         laid = before[:, None] + ends - ends[:, :1]
@@ -247,8 +240,7 @@ class Evidence:
         at = self._clock[self._compared] - np.array(delays)[:, None]
         begin, end = (x[self._compared] for x in self._ends)
         within = ((at >= begin) & (at <= end)).astype(float)
-        driving = self._driving[:, :9]
-        thrusts = np.stack([resampled(times, self._clock, driving) for times in at])
+        thrusts = resampled(at.ravel(), self._clock, self._driving[:, :9]).reshape(*at.shape, 9)
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
@@ -293,8 +285,7 @@ class Evidence:
         """
         reading = Convention(*moves)
         if self._attitude is None:
-            force = np.zeros(len(self._t)) if self._along is None else self._along
-            felt = self._slow(self._even(force[:, None]))[self._compared]
+            felt = self._slow(self._even(self._along[:, None]))[self._compared]
             return 0.0, 0.0, self._needed(felt[:, 0], reading)
         frames, axes = reading.frames, self._motion(reading.attitude)[0]
         push = axes @ frames.body[:, 2] @ frames.world.T
@@ -302,8 +293,8 @@ class Evidence:
         force = acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
-        mean, size = push.mean(axis=0), np.linalg.norm(push, axis=1)
-        along = np.sum(force * push, axis=1) / np.maximum(size, 1e-9)
+        mean = push.mean(axis=0)
+        along = np.sum(force * push, axis=1) / np.maximum(np.linalg.norm(push, axis=1), 1e-9)
         cost = _FALLEN * (mean[2] <= GOOD * np.linalg.norm(mean))
         cost += _BELOW * ((frames.position @ middle)[2] < 0.0)
         left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
@@ -314,7 +305,7 @@ class Evidence:
         too short for a decision leaves all of its motion.
         """
         if not self.enough:
-            return Fit(reading, 1.0, (), -reading.unlikely)
+            return Fit(reading, 1.0, 1.0, -reading.unlikely)
         if torques:
             return self._fit(reading, self._mixing, *(delay - reading.late for delay in _DELAYS))
         return self._fit(reading, self._mixing[:0], 0.0)
@@ -334,11 +325,11 @@ class Evidence:
         """Return the fit of a reading at the likeliest delay in s."""
         rows = np.zeros((1 + len(mixing), 9))  # what drives: all together along, and each torque
         rows[0, 8] = 1.0
-        torques = mixing[:, [rotor - 1 for rotor in reading.rotors]]
+        torques = mixing[:, np.subtract(reading.rotors, 1)]
         rows[1:3, :4] = torques[:2]
         rows[3:, 4:8] = -torques[2:] if reading.mirrored else torques[2:]
-        horizontal, cost, motion = self._moved(*reading.moves)
-        needed = motion[: len(rows)]
+        horizontal, cost, needed = self._moved(*reading.moves)
+        needed = needed[: len(rows)]
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
         left = shares(  # (d, 1 + torques)
@@ -350,7 +341,7 @@ class Evidence:
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
         best = np.argmax(likelihood(left))
         score = likelihood([horizontal, horizontal, *left[best]]) - cost - reading.unlikely
-        torque = tuple(left[best, 1:].tolist())
+        torque = float(np.mean(left[best, 1:])) if len(mixing) else 1.0
         return Fit(reading, horizontal, torque, float(score), delays[best])
 
     def turns(self, reading: Convention) -> float:

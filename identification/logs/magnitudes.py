@@ -22,11 +22,11 @@ from .table import Array, Mask, Pair, finite_rows
 class _Magnitudes:
     """How large and how small the numbers of a log may be."""
 
-    # sizes of a likely unit, and of a certain one: Hz of rows, V of a battery, 1 g
+    # sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
     units: ClassVar[dict[str, tuple[Pair, Pair]]] = {
-        "time": ((5.0, 5000.0), (15.0, 2500.0)),
+        "time": ((2e-4, 0.2), (4e-4, 1.0 / 15.0)),
         "battery": ((2.7, 100.0), (2.7, 60.0)),
-        "accelerometer": ((0.85, 1.15), (0.85, 1.15)),
+        "accelerometer": ((8.335, 11.278), (8.335, 11.278)),
     }
 
     shortest_period = 1e-5  # s, of the median step: 100 kHz, far above any pose's rate
@@ -77,12 +77,8 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     unit is certain. The size is a battery's median voltage, the time's median step, or an
     accelerometer's median length.
     """
-    units = UNITS[section]
-    sizes = {unit: size * one for unit, one in units.items() if unit not in ("min", "raw")}
-    if section == "time":
-        sizes = {unit: 1.0 / max(step, 1e-300) for unit, step in sizes.items()}
-    elif section == "accelerometer":
-        sizes = {unit: force / units["g"] for unit, force in sizes.items()}
+    units = UNITS[section].items()
+    sizes = {unit: size * one for unit, one in units if unit not in ("min", "raw")}
     likely, sure = MAGNITUDES.units[section]
     unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
     return unit, within(sizes[unit], sure)

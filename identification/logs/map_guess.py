@@ -56,7 +56,8 @@ from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
 # fields of a body's turns
-_TURNS = ("world", "body", "attitude.sense", "attitude.order", "attitude.unit", "pitch_sign")
+_FRAMES = "frames.map_world", "frames.map_body"
+_TURNS = *_FRAMES, "attitude.sense", "attitude.order", "attitude.unit", "pitch_sign"
 _MOTORS = ("motors", "commands")
 _GYROS = [
     SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
@@ -73,7 +74,7 @@ _EXAMPLES = {
 
 
 @dataclass(frozen=True)
-class _Reason:
+class Reason:
     """The reason for a field's value."""
 
     section: str
@@ -88,9 +89,9 @@ class Guess:
     """A guessed map."""
 
     log_map: LogMap
-    reasons: tuple[_Reason, ...]
+    reasons: tuple[Reason, ...]
     unused: Names = ()  # columns
-    missing: tuple[_Reason, ...] = ()  # fields ``?``; the log is not read without them
+    missing: tuple[Reason, ...] = ()  # fields ``?``; the log is not read without them
 
     @property
     def lacks(self) -> str:
@@ -98,7 +99,7 @@ class Guess:
         return "; ".join(f"{m.section}.{m.field}: {m.why}" for m in self.missing)
 
     @property
-    def doubts(self) -> tuple[_Reason, ...]:
+    def doubts(self) -> tuple[Reason, ...]:
         """The uncertain fields."""
         return tuple(reason for reason in self.reasons if not reason.certain)
 
@@ -118,7 +119,7 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
         guessing = _Guessing(table, vehicle)
         missing = tuple(guessing.missing())
     parts = [part for part in guessing.sections.values() if isinstance(part, Columns)]
-    used = {*guessing.time_columns, *(c for part in parts for c in part.columns)}
+    used = {*guessing.clocks, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
     guessing.sections.setdefault("time", TimeColumn(UNKNOWN))
     return Guess(
@@ -162,8 +163,7 @@ class _Guessing:
     def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
         self.sections: Data = {}
-        self.time_columns: Names = ()
-        self.reasons: list[_Reason] = []
+        self.reasons: list[Reason] = []
         self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
         self.unnamed: set[str] = set()  # sections without telling names
@@ -172,14 +172,15 @@ class _Guessing:
         names = take_apart(table.header, table.units)
         self.data = _numbers_of(table, names)
         self.clock = _time_column(names, self.data)
-        self.t: Array = 0.01 * np.arange(table.rows)
+        self.t: Array = 0.01 * np.arange(table.rows, dtype=np.float64)
         if self.clock is not None:
             # a column of nanoseconds may stand beside a clock of whole seconds
             key = re.sub("(^|_)secs?$", "", self.clock.base)
             fine = {f"{key}_{word}".strip("_") for word in WORDS["nanoseconds"]}
             beside = next((name.column for name in names if name.base in fine), "")
             self.t = self.time(self.clock, beside)
-        self.free = [name for name in names if name.column not in self.time_columns]
+        self.clocks = self.sections.get("time", TimeColumn()).named
+        self.free = [name for name in names if name.column not in self.clocks]
         self.numbers = numbers = Numbers(self.t, self.data)
         self.battery()
         attitude = self.choose("attitude", numbers.quaternion)
@@ -213,11 +214,11 @@ class _Guessing:
             self.say(part, field, False, "; or ".join(map(str, likely[:SHOWN])))
         return group
 
-    def values(self, part: str) -> Array:
-        """Return the columns (N, k) of a part."""
-        return np.column_stack([self.data[name] for name in self.parts[part].columns])
+    def values(self, columns: Names) -> Array:
+        """Return the values (N, k) of columns."""
+        return np.column_stack([self.data[name] for name in columns])
 
-    def missing(self) -> list[_Reason]:
+    def missing(self) -> list[Reason]:
         """Return the fields missing for a flight log."""
         lacks: dict[str, str] = {}
         if self.clock is None:
@@ -243,7 +244,7 @@ class _Guessing:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lacks["motors"] = why
         return [
-            _Reason(
+            Reason(
                 "rotors" if part in _MOTORS else part,
                 "column" if part == "time" else "columns",
                 False,
@@ -271,7 +272,7 @@ class _Guessing:
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep the reason for a field's value."""
         certain = certain and section not in self.unnamed
-        self.reasons.append(_Reason(section, name, certain, why))
+        self.reasons.append(Reason(section, name, certain, why))
 
     def take(self, section: str, name: str, choice: _Choice) -> str:
         """Return the choice for a field, and keep the reason."""
@@ -305,13 +306,12 @@ class _Guessing:
         unit = self.unit("time", "s" if nanoseconds else clock.unit, choice)
         t = (raw - known[0]) * units[unit]
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
-        self.sections["time"] = column = TimeColumn(clock.column, unit, nanoseconds)
-        self.time_columns = column.named
+        self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
         return np.where(np.abs(t - middle) <= 0.5 * LONGEST, t, np.nan)
 
     def pose_fits(self, place: Group, group: Group) -> RankedFits:
         """Return the fits of a pose in each of a map's frames, units, orders and senses."""
-        attitude = self.values("attitude")
+        attitude = self.values(group.columns)
         units: Names = ("deg", "rad")
         if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
@@ -324,10 +324,9 @@ class _Guessing:
             place.unit,
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
-        motors = [self.values(part) for part in _MOTORS if part in self.parts]
+        motors = [self.values(self.parts[part].columns) for part in _MOTORS if part in self.parts]
         thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
-        position = np.column_stack([self.data[name] for name in place.columns])
-        evidence = Evidence(self.t, thrusts, position, attitude)
+        evidence = Evidence(self.t, thrusts, self.values(place.columns), attitude)
         return RankedFits(evidence.fit(reading, torques=False) for reading in readings)
 
     def follows_tilt(self, columns: Names) -> Verdict:
@@ -345,8 +344,11 @@ class _Guessing:
         self.ranking = ranking = self.pose_fits(place, group)
         best = ranking.best
         length = self.unit("position", place.unit, ranking.says("length"))
-        turned = ("attitude", "sense", "attitude.sense")
-        fields = [("world", "", "world"), ("body", "", "body"), turned]
+        fields = [
+            ("world", "", "frames.map_world"),
+            ("body", "", "frames.map_body"),
+            ("attitude", "sense", "attitude.sense"),
+        ]
         if best.attitude.euler:
             guessed = ranking.says("attitude.unit")
             if len({fit.reading.attitude.unit for fit in ranking.ranked}) == 1:
@@ -359,13 +361,13 @@ class _Guessing:
             self.say("attitude", "order", True, "by the columns' names")
         for section, name, prop in fields:
             self.take(section, name, ranking.says(prop))
-        self.sections |= {"world": best.world, "body": best.body}
+        self.sections |= {"world": best.frames.map_world, "body": best.frames.map_body}
         self.sections["position"] = Columns(place.columns, length)
         self.sections["attitude"] = replace(best.attitude, columns=group.columns)
 
     def accelerometer(self, group: Group) -> None:
         """Find unit and axes of the accelerometer by gravity."""
-        values = self.values("accelerometer")
+        values = self.values(group.columns)
         size = max(float(np.nanmedian(np.linalg.norm(values, axis=1))), 1e-12)
         z = np.nanmean(values[:, 2]) / size
         # without a pose, a negative z may also be gravity in place of the specific force
@@ -397,10 +399,11 @@ class _Guessing:
         times, first = np.unique(times, return_index=True)
         good, rotation = rotations(attitude[first], self.ranking.best)
         t, values = self.numbers.rows(columns)
-        turns = [way.turn for way in _GYROS]
-        shares = gyro_shares(t, values, times[good], rotation, turns) or []
+        shares = gyro_shares(t, values, times[good], rotation, _GYROS) or []
         fits = [
-            Fit(way, left, (), float(likelihood([left] * 3)) - OTHER * (unit not in ("", way.unit)))
+            Fit(
+                way, left, 1.0, float(likelihood([left] * 3)) - OTHER * (unit not in ("", way.unit))
+            )
             for way, left in zip(_GYROS, shares, strict=False)
         ]
         return RankedFits(fits, "attitude's rate is left unexplained") if fits else None
@@ -428,7 +431,7 @@ class _Guessing:
             told = {(r.section, r.field) for r in self.reasons if r.certain}
             sure = self.ranking is None and ("accelerometer", "body") in told
             self.say("gyro", "body", sure, "as the accelerometer's")
-            high = float(np.nanquantile(np.abs(self.values("gyro")), 0.995))
+            high = float(np.nanquantile(np.abs(self.values(group.columns)), 0.995))
             unit = "deg/s" if high > MAGNITUDES.slow_gyro else "rad/s"
             guessed = unit, high > MAGNITUDES.fast_gyro, f"its fast values are {high:.3g}"
         unit = self.unit("gyro", group.unit, guessed)
@@ -436,7 +439,7 @@ class _Guessing:
 
     def motors(self, part: str, group: Group) -> None:
         """Find unit and order of rotor speeds or commands, unless the map has such a section."""
-        values = self.values(part)
+        values = self.values(group.columns)
         power = self.numbers.elasticity(values)
         kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
         if more := more_rotors(group.columns, self.table):
@@ -471,11 +474,13 @@ class _Guessing:
         best, motion = DECLARED, Data()
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
-            rates = self.values("gyro") * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body].T
-            motion = {"gyro": rates}
+            rates = self.values(sensor.columns) * UNITS["gyro"][sensor.unit]
+            motion = {"gyro": rates @ BODY_TURNS[sensor.body].T}
         elif self.ranking is not None and self.ranking.certain(*_TURNS):
             best = self.ranking.best
-            motion = {"position": self.values("position"), "attitude": self.values("attitude")}
+            motion = {
+                part: self.values(self.parts[part].columns) for part in ("position", "attitude")
+            }
         evidence = Evidence(self.t, np.square(values), **motion)
         if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
@@ -491,13 +496,14 @@ class _Guessing:
                 f"left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
             )
             return order, is_sure, why
+        why = f"{hint}: no order is much likelier than all others"
         evidence = Evidence(self.t, np.square(values), sides=_PLUS, **motion)
         plus = RankedFits(map(evidence.fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
             why = f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
-            return ORDERS[hint], False, f"{why}expected a vehicle file with these rotor_positions"
-        return ORDERS[hint], False, f"{hint}: no order is much likelier than all others"
+            why += "expected a vehicle file with these rotor_positions"
+        return ORDERS[hint], False, why
 
     def battery(self) -> None:
         """Find the battery's voltage and its unit."""

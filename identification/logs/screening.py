@@ -111,9 +111,7 @@ def screen_log(
                 notes.append(str(text) if kind is _Note else f"warning: {text}")
 
     hear(_rotors(log, vehicle, by_imu))
-    above = log.rotor_speeds > _most_rad_s(log, vehicle)
-    if above.any():
-        log = interpolated(log, above)
+    log = interpolated(log, log.rotor_speeds > _most_rad_s(log, vehicle))
     if by_imu:
         hear(_imu(log, vehicle, least_seconds or 0.0))
     else:
@@ -121,7 +119,7 @@ def screen_log(
             hear(_uneven_steps(log))
         seen, same = np.flatnonzero(log.valid), np.zeros(len(log.t), np.bool_)
         pose = np.column_stack([log.position, log.quaternion])[seen]
-        same[seen[1:]] = np.all(pose[1:] == pose[:-1], axis=1)
+        same[seen[1:]] = ~np.diff(pose, axis=0).any(axis=1)
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
@@ -151,7 +149,8 @@ def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
     if all(reading.is_delay for reading in advice):
         return _Fault(says)
     whose = "motion contradicts the rotor speeds and gravity"
-    whose = "gyro contradicts the rotors' torques" if by_imu else whose
+    if by_imu:
+        whose = "gyro contradicts the rotors' torques"
     unmended = "" if mends else ". No usual convention mends this log; the likeliest is named"
     return _Refused(f"{says}. As logged, the {whose}{unmended}")
 
@@ -160,7 +159,7 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     """Check for a motion, the declared vehicle, and four turning rotors at speeds (rad/s) for its
     weight.
     """
-    if not by_imu and not log.valid.any():
+    if not by_imu and not log.has_pose:
         yield _Refused(
             "no row has a pose; expected at least one to start from, or gyro and accelerometer "
             "(gx, gy, gz and ax, ay, az)"
@@ -185,8 +184,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
         yield _Refused(f"{still}; expected {hover}")
     if not np.isfinite(most):
         yield _Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
-    for i in np.flatnonzero(speeds[thrust > 0.3 * most].max(axis=0) <= 0.0):
-        yield _Refused(f"omega{i + 1} {zero.format('')}")
+    for rotor in np.flatnonzero(speeds[thrust > 0.3 * most].max(axis=0) <= 0.0):
+        yield _Refused(f"omega{rotor + 1} {zero.format('')}")
     ratio = usual_thrust(thrust)
     if doubt := rotor_doubt(ratio, vehicle):
         yield _Refused(doubt)
@@ -209,14 +208,14 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     for i in range(4):
         if stopped := _stretches((speeds[:, i] == 0.0) & carried, log.t, _STOPPED):
             yield _Fault(f"omega{i + 1} {zero.format(f', for {stopped}')}")
-    most = _most_rad_s(log, vehicle)
-    if (above := np.argwhere(speeds > most)).size:
+    fastest = _most_rad_s(log, vehicle)
+    if (above := np.argwhere(speeds > fastest)).size:
         row, rotor = above[0]
-        kind = _Refused if (speeds > most).all(axis=0).any() else _Fault
+        kind = _Refused if (speeds > fastest).all(axis=0).any() else _Fault
         yield kind(
             f"omega{rotor + 1} reads {speeds[row, rotor]:.4g} rad/s at t = {log.t[row]:.6g} s "
             f"({len(above)} such value(s)), faster than {vehicle.name} turns its rotors; expected "
-            f"at most {most:.4g} rad/s: an estimate interpolates them"
+            f"at most {fastest:.4g} rad/s: an estimate interpolates them"
         )
 
 
@@ -250,7 +249,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
             f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "
             f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
         )
-    there = sum(log.t[piece[-1]] - log.t[piece[0]] for piece in inertial_pieces(log))
+    there = sum(np.ptp(log.t[piece]) for piece in inertial_pieces(log))
     if there < least - 1e-9:
         yield _Needed(
             f"{there:.3g} s of unbroken gyro and accelerometer; expected at least {least:g} s of "
@@ -264,7 +263,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
 def _new_poses(log: FlightLog, same: Mask) -> _Findings:
     """Check the rate of new poses; ``same`` (N,): the pose is the one before, to the last digit."""
     seen = np.flatnonzero(log.valid)
-    if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(same[seen[1:]]):
+    if np.ptp(log.t[seen]) > _NEVER and same[seen[1:]].all():
         yield _Refused("the pose never changes, to the last digit; expected the poses of a flight")
     fastest = np.square(log.rotor_speeds).max(axis=1)
     if held := _stretches((same & carrying(fastest))[seen], log.t[seen], _HELD):
@@ -380,7 +379,7 @@ def _still(
     """Note the stretches of rows (N,) with a still channel (N, k) and moving sisters (N, m), called
     ``names``.
     """
-    still = np.append(False, np.all(np.diff(channel, axis=0) == 0.0, axis=1)) & rows
+    still = rows & ~np.diff(channel, axis=0, prepend=np.nan).any(axis=1)
     changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
     for first, end in runs_of(still):
         lasts = t[end - 1] - t[first] >= _STILL
