@@ -38,7 +38,7 @@ _FELT = 0.5  # correlation of rotors with the specific force
 SHOWN = 4  # candidates in a map
 
 
-def correlation(x: Array, y: Array) -> float:
+def _correlation(x: Array, y: Array) -> float:
     """Return the correlation of two series (n,); 0 where one is constant."""
     return float(np.nan_to_num(np.corrcoef(x, y)[0, 1]))
 
@@ -52,12 +52,12 @@ class Numbers:
     """
 
     def __init__(self, t: Array, data: ArrayMap) -> None:
-        order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
+        order = np.argsort(t, kind="stable")[: np.isfinite(t).sum()]
         self.order = order[max(0, (len(order) - _MOST_ROWS) // 2) :][:_MOST_ROWS]
         self.t = t[self.order]
-        count = min(_MOST_SAMPLES, len(self.t))
+        rows = len(self.t)
         # times (n,) in s of comparisons of motors
-        self.clock = self.t[np.linspace(0, len(self.t) - 1, count).astype(int)]
+        self.clock = self.t[np.linspace(0, rows - 1, min(_MOST_SAMPLES, rows)).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
         self._rows: dict[Names, ArrayPair] = {}
         self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
@@ -91,9 +91,8 @@ class Numbers:
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
         off = np.abs(length[length > 0.5] - 1.0)  # zeros stand for a missing quaternion
-        if len(off) < max(2, 0.5 * len(x)) or np.any(
-            np.quantile(off, [0.5, 0.98]) >= _LENGTH_ERROR
-        ):
+        few = len(off) < max(2, 0.5 * len(x))
+        if few or np.any(np.quantile(off, [0.5, 0.98]) >= _LENGTH_ERROR):
             return -np.inf, ""
         return 1.0, "their length is 1"
 
@@ -114,8 +113,8 @@ class Numbers:
         if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
             return 0.0, ""
         middle, total = np.median(x, axis=0), self.between(self.clock, columns).sum(axis=1)
-        together = middle.min() * _ALIKE >= middle.max() > 0.0
-        together &= any(correlation(total, felt) > _FELT for felt in self.felt)
+        together = any(_correlation(total, felt) > _FELT for felt in self.felt)
+        together &= middle.min() * _ALIKE >= middle.max() > 0.0
         return float(together), "they move together with the specific force"
 
     def feel(self, accelerometer: Names, position: Names) -> None:
@@ -132,12 +131,12 @@ class Numbers:
         """
         if len(self.felt) != 1:
             return np.nan
-        total = np.nanmean(values[self.order], axis=1)
+        total, felt = np.nanmean(values[self.order], axis=1), self.felt[0]
         good = np.isfinite(total)
         mean = np.interp(self.clock, self.t[good], total[good])
-        there = (mean > 0.5 * np.median(mean)) & (self.felt[0] > 0.3 * np.median(self.felt[0]))
-        x, y = np.log(mean[there]), np.log(self.felt[0][there])
-        if len(x) < _FEWEST or correlation(x, y) < 0.85:
+        there = (mean > 0.5 * np.median(mean)) & (felt > 0.3 * np.median(felt))
+        x, y = np.log(mean[there]), np.log(felt[there])
+        if len(x) < _FEWEST or _correlation(x, y) < 0.85:
             return np.nan
         return float(np.std(y) / np.std(x))
 
@@ -157,11 +156,10 @@ class ColumnCandidate:
 def _named(group: Group, part: str = "") -> bool:
     """Return whether the names of a group speak for a part, but ``part``."""
     return any(
-        re.fullmatch(word, group.key)
+        re.fullmatch("|".join(way["words"]), group.key)
         for other, ways in WORDS["parts"].items()
         for way in ways
         if other != part and list(group.endings) in way["endings"]
-        for word in way["words"]
     )
 
 
@@ -174,10 +172,7 @@ def named_columns(names: Sequence[Name]) -> set[str]:
 
 
 def candidates(
-    part: str,
-    names: Sequence[Name],
-    numbers: Numbers,
-    judge: Judge,
+    part: str, names: Sequence[Name], numbers: Numbers, judge: Judge
 ) -> list[ColumnCandidate]:
     """Return the candidates of a part by their names and numbers, the likeliest first.
 
@@ -195,9 +190,9 @@ def candidates(
     ways = []
     for number, way in enumerate(WORDS["parts"][part]):
         for group in (group for endings in way["endings"] for group in groups_of(names, endings)):
-            places = (i for i, word in enumerate(way["words"]) if re.fullmatch(word, group.key))
-            if (i := next(places, None)) is not None:
-                by_name = _NUMBERS - 0.3 * i - 0.5 * number
+            matches = [bool(re.fullmatch(word, group.key)) for word in way["words"]]
+            if any(matches):
+                by_name = _NUMBERS - 0.3 * matches.index(True) - 0.5 * number
                 ways.append((group, by_name, "by the columns' names"))
             elif commanded or _named(group, part):
                 continue
@@ -205,25 +200,26 @@ def candidates(
                 ways.append((group, -1.0, "their names go together"))
             named |= set(group.columns)
     if part != "commands" and not commanded:
-        wanted, width = WORDS["not_measured"], 4 if part in ("attitude", "motors") else 3
+        width = 4 if part in ("attitude", "motors") else 3
         # with more than a few values: no counter's and no switch's
         measured = tuple(
             n.column
             for n in names
             if n.column not in named
             and len(np.unique(numbers.some((n.column,)))) > _LEVELS
-            and not re.search(wanted, n.base)
+            and not re.search(WORDS["not_measured"], n.base)
         )
         for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
     found = []
     for group, score, why in ways:
-        strength, told = 0.0, ""
-        if len(numbers.rows(group.columns)[0]):
-            strength, told = judge(group.columns)
+        there = len(numbers.rows(group.columns)[0])
+        strength, told = judge(group.columns) if there else (0.0, "")
         words = "; ".join(filter(None, (why, told if strength else "")))
         if words and strength >= 0.0:
             found.append(ColumnCandidate(group, score + _NUMBERS * strength, words))
     found.sort(key=lambda candidate: -candidate.score)
-    likeliest = {candidate.group.columns: candidate for candidate in reversed(found)}
-    return [candidate for candidate in found if likeliest[candidate.group.columns] is candidate]
+    likeliest: dict[Names, ColumnCandidate] = {}
+    for candidate in found:
+        likeliest.setdefault(candidate.group.columns, candidate)
+    return [*likeliest.values()]

@@ -15,7 +15,7 @@ flight counts for few independent samples ``n``. A hover tells nothing: all shar
 likeliest reading is taken, after a penalty on unusual ones.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from operator import attrgetter
@@ -35,6 +35,7 @@ from ..motion.smoothing import (
     turning,
     unbroken,
 )
+from .excerpt import excerpt
 from .flight_log import FlightLog
 from .flight_phases import usual_thrust
 from .log_map import UNITS, Attitude
@@ -112,13 +113,9 @@ class Fit:
 
     reading: Any  # a Convention, or a SensorReading
     horizontal: float  # share of the horizontal specific force, or of the sensor's vector
-    torques: tuple[float, ...]  # shares about x, y and, with a vehicle, z
+    torque: float  # mean share of the torques about x, y and, with a vehicle, z
     score: float  # log-likelihood less the penalty on an unusual reading
-
-    @property
-    def torque(self) -> float:
-        """Mean share of the torques."""
-        return float(np.mean(self.torques)) if self.torques else 1.0
+    delay: float = 0.0  # s, the likeliest of the motion behind the rotors' columns
 
 
 class Evidence:
@@ -147,18 +144,17 @@ class Evidence:
         sides: Array = SIDES,
     ) -> None:
         self._t, self._position, self._attitude = t, position, attitude
-        self._gyro, self._along = gyro, along
+        self._gyro, self._along = gyro, np.zeros(len(t)) if along is None else along
         self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), sides
-        self._gains = _TORQUE_GAIN, (0.0, np.inf)  # gains of thrust and of torques
+        self._gains = [_TORQUE_GAIN, (0.0, np.inf), (0.0, np.inf)]  # of thrust, and of torques
         if vehicle is not None:
             self._k, self._inertia, self._mixing = vehicle.k, vehicle.inertia, vehicle.mixing[1:]
-            self._gains = _FORCE_GAIN, _TORQUE_GAIN
+            self._gains = [_FORCE_GAIN, _TORQUE_GAIN, _TORQUE_GAIN, _TORQUE_GAIN]
         self._thrusts = thrusts
         if np.isfinite(thrusts).any():
-            most = _MOST_THRUST * np.nanquantile(thrusts, 0.99)
-            self._thrusts = np.minimum(thrusts, most)
-        moving = [x for x in (position, attitude, gyro) if x is not None]
-        there = np.isfinite(t) & np.all([finite_rows(x) for x in moving], axis=0)
+            self._thrusts = np.minimum(thrusts, _MOST_THRUST * np.nanquantile(thrusts, 0.99))
+        moving = (x for x in (t[:, None], position, attitude, gyro) if x is not None)
+        there = np.all([finite_rows(x) for x in moving], axis=0)
         self._compared = self._laid_out(np.flatnonzero(there))
         self.has_pose = attitude is not None
         self.enough = len(self._compared) >= _FEWEST  # whether the flight is long enough
@@ -182,15 +178,13 @@ class Evidence:
         """Lay the runs of known motion out on one even clock, ``_PAUSE`` apart. Return the samples
         in flight, far enough from the runs' ends for the filters.
         """
-        if len(rows) < 2:
-            return np.empty(0, np.intp)
-        step = median_step(self._t[rows])
+        step = median_step(self._t[rows]) if len(rows) > 1 else 0.0
         self._period = period = max(step, _PERIOD)
         runs = unbroken(self._t, rows, max(LONGEST_GAP, 3.5 * step), 8, SHORTEST_PIECE)
-        known = np.flatnonzero(finite_rows(self._thrusts))
-        runs = [run for run in runs if np.any((known >= run[0]) & (known <= run[-1]))]
+        known = finite_rows(self._thrusts)
+        runs = [run for run in runs if known[run[0] : run[-1] + 1].any()]
         if not runs:
-            return np.empty(0, np.intp)
+            return rows[:0]
         ends = np.array([self._t[run[[0, -1]]] for run in runs])
         before = np.append(0.0, np.cumsum(np.diff(ends)[:-1, 0] + _PAUSE))
         laid = before[:, None] + ends - ends[:, :1]
@@ -246,8 +240,7 @@ class Evidence:
         at = self._clock[self._compared] - np.array(delays)[:, None]
         begin, end = (x[self._compared] for x in self._ends)
         within = ((at >= begin) & (at <= end)).astype(float)
-        driving = self._driving[:, :9]
-        thrusts = np.stack([resampled(times, self._clock, driving) for times in at])
+        thrusts = resampled(at.ravel(), self._clock, self._driving[:, :9]).reshape(*at.shape, 9)
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
         return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
@@ -292,8 +285,7 @@ class Evidence:
         """
         reading = Convention(*moves)
         if self._attitude is None:
-            force = np.zeros(len(self._t)) if self._along is None else self._along
-            felt = self._slow(self._even(force[:, None]))[self._compared]
+            felt = self._slow(self._even(self._along[:, None]))[self._compared]
             return 0.0, 0.0, self._needed(felt[:, 0], reading)
         frames, axes = reading.frames, self._motion(reading.attitude)[0]
         push = axes @ frames.body[:, 2] @ frames.world.T
@@ -301,8 +293,8 @@ class Evidence:
         force = acceleration @ frames.position.T * UNITS["position"][reading.length]
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
-        mean, size = push.mean(axis=0), np.linalg.norm(push, axis=1)
-        along = np.sum(force * push, axis=1) / np.maximum(size, 1e-9)
+        mean = push.mean(axis=0)
+        along = np.sum(force * push, axis=1) / np.maximum(np.linalg.norm(push, axis=1), 1e-9)
         cost = _FALLEN * (mean[2] <= GOOD * np.linalg.norm(mean))
         cost += _BELOW * ((frames.position @ middle)[2] < 0.0)
         left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
@@ -313,11 +305,10 @@ class Evidence:
         too short for a decision leaves all of its motion.
         """
         if not self.enough:
-            return Fit(reading, 1.0, (), -reading.unlikely)
+            return Fit(reading, 1.0, 1.0, -reading.unlikely)
         if torques:
-            delays = tuple(delay - reading.late for delay in _DELAYS)
-            return self._fit(reading, self._mixing, delays)[0]
-        return self._fit(reading, self._mixing[:0], (0.0,))[0]
+            return self._fit(reading, self._mixing, *(delay - reading.late for delay in _DELAYS))
+        return self._fit(reading, self._mixing[:0], 0.0)
 
     def late(self, reading: Convention = DECLARED) -> Fit:
         """Return the fit of a reading at the likeliest delay of the rotors beyond a flight loop's
@@ -326,34 +317,32 @@ class Evidence:
         far = np.arange(-_FAR, _FAR, _STEP)
         parts = np.array_split(far[(far < _DELAYS[0]) | (far > _DELAYS[-1] + _STEP)], 20)
         reading = replace(reading, unlikely=reading.unlikely + OFFSET)
-        fits = (self._fit(reading, self._mixing, tuple(part.tolist())) for part in parts)
-        fit, delay = max(fits, key=lambda each: each[0].score)
-        return replace(fit, reading=replace(reading, late=-delay))
+        fits = (self._fit(reading, self._mixing, *part.tolist()) for part in parts)
+        fit = max(fits, key=attrgetter("score"))
+        return replace(fit, reading=replace(reading, late=-fit.delay))
 
-    def _fit(
-        self, reading: Convention, mixing: Array, delays: tuple[float, ...]
-    ) -> tuple[Fit, float]:
-        """Return the fit of a reading at the likeliest delay in s, and the delay."""
+    def _fit(self, reading: Convention, mixing: Array, *delays: float) -> Fit:
+        """Return the fit of a reading at the likeliest delay in s."""
         rows = np.zeros((1 + len(mixing), 9))  # what drives: all together along, and each torque
         rows[0, 8] = 1.0
-        torques = mixing[:, [rotor - 1 for rotor in reading.rotors]]
+        torques = mixing[:, np.subtract(reading.rotors, 1)]
         rows[1:3, :4] = torques[:2]
         rows[3:, 4:8] = -torques[2:] if reading.mirrored else torques[2:]
-        gains = [self._gains[0], *[self._gains[1]] * len(mixing)]
-        horizontal, cost, motion = self._moved(*reading.moves)
-        needed = motion[: len(rows)]
+        horizontal, cost, needed = self._moved(*reading.moves)
+        needed = needed[: len(rows)]
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
         left = shares(  # (d, 1 + torques)
             there @ np.square(needed).T,
             np.sum(given * given, axis=2),
             np.sum(given * needed, axis=2),
-            np.transpose(gains),
+            np.transpose(self._gains[: len(rows)]),
         )
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
         best = np.argmax(likelihood(left))
         score = likelihood([horizontal, horizontal, *left[best]]) - cost - reading.unlikely
-        return Fit(reading, horizontal, tuple(left[best, 1:].tolist()), float(score)), delays[best]
+        torque = float(np.mean(left[best, 1:])) if len(mixing) else 1.0
+        return Fit(reading, horizontal, torque, float(score), delays[best])
 
     def turns(self, reading: Convention) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
@@ -361,34 +350,21 @@ class Evidence:
         return float(np.sqrt(np.mean(np.square(rates))))
 
 
-@dataclass(frozen=True, eq=False)
 class RankedFits:
-    """Fits of readings, the likeliest first."""
+    """Fits of readings, the likeliest first.
 
-    ranked: Sequence[Fit]
-    left: str = "horizontal acceleration is left by the tilt"  # words for the unexplained share
+    Args:
+        fits: at least one. Equally likely ones keep their order.
+        left: words for the unexplained share.
+    """
 
-    @classmethod
-    def of(
-        cls, evidence: Evidence, readings: Sequence[Convention], torques: bool = True
-    ) -> "RankedFits":
-        """Return the ranking of readings; where a flight does not tell, the usual come first."""
-        return cls.sorted(evidence.fit(reading, torques) for reading in readings)
-
-    @classmethod
-    def sorted(cls, fits: Iterable[Fit]) -> "RankedFits":
-        """Return the ranking of some fits."""
-        return cls(sorted(fits, key=lambda fit: fit.score, reverse=True))
-
-    @property
-    def best(self) -> Any:
-        """The likeliest reading."""
-        return self.ranked[0].reading
-
-    @property
-    def fit(self) -> Fit:
-        """How well the best reading explains the flight."""
-        return self.ranked[0]
+    def __init__(
+        self, fits: Iterable[Fit], left: str = "horizontal acceleration is left by the tilt"
+    ) -> None:
+        self.ranked = sorted(fits, key=lambda fit: -fit.score)
+        self.left = left
+        self.fit = self.ranked[0]
+        self.best = self.fit.reading
 
     def other(self, name: str) -> tuple[object, float]:
         """Return the next best value of a property, and the log-likelihood ratio of the best over
@@ -405,16 +381,15 @@ class RankedFits:
         """Return whether every other value of properties explains the flight clearly less."""
         return all(self.other(name)[1] >= _CERTAIN_LEAD for name in names)
 
-    def departures(self, by_imu: bool) -> list[Convention]:
-        """Return the readings of a log that explain it better than its declaration; ``by_imu``: the
-        motion is the gyro's.
-        """
-        best, left, most = self.best, self.fit.torque, GOOD_TORQUE
-        if not by_imu and best.moves != DECLARED.moves:  # forces tell, not torques
-            left, most = self.fit.horizontal, GOOD
-        if best is DECLARED or (left > most and not best.late):
+    def departures(self) -> list[Convention]:
+        """Return the readings of a log that explain it better than its declaration."""
+        is_good = self.fit.torque <= GOOD_TORQUE
+        if self.best.moves[:3] != DECLARED.moves[:3]:  # another pose: forces tell, not torques
+            is_good = self.fit.horizontal <= GOOD
+        if self.best is DECLARED or not (is_good or self.best.late):
             return []
-        alike = (fit.reading for fit in self.ranked if fit.score >= self.fit.score - _CERTAIN_LEAD)
+        least = self.fit.score - _CERTAIN_LEAD
+        alike = (fit.reading for fit in self.ranked if fit.score >= least)
         return [reading for reading in alike if reading is not DECLARED]
 
     def says(self, name: str) -> tuple[Any, bool, str]:
@@ -428,8 +403,8 @@ class RankedFits:
 
 def log_ranking(evidence: Evidence) -> RankedFits:
     """Return the ranking of the readings of the kit's own columns, and of a delay of the rotors."""
-    ranking = RankedFits.of(evidence, log_readings(evidence.has_pose))
-    return RankedFits.sorted([*ranking.ranked, evidence.late()]) if evidence.enough else ranking
+    fits = [evidence.fit(reading) for reading in log_readings(evidence.has_pose)]
+    return RankedFits([*fits, evidence.late()] if evidence.enough else fits)
 
 
 def remedies(
@@ -448,12 +423,12 @@ def remedies(
         spins = vehicle
         if vehicle is not None and reading.mirrored:
             spins = replace(vehicle, spin=-vehicle.spin)
-        mended = Evidence.of_log(applied(log, reading), spins, by_imu)
-        return log_ranking(mended).best is DECLARED
+        return log_ranking(Evidence.of_log(applied(log, reading), spins, by_imu)).best is DECLARED
 
+    log = excerpt([log])[0]
     evidence = Evidence.of_log(log, vehicle, by_imu)
     ranking = log_ranking(evidence)
-    if not ranking.departures(by_imu):
+    if not ranking.departures():
         return [], True
     fits = [*ranking.ranked]
     for one in (fit.reading for fit in ranking.ranked[:_TRIED] if fit.reading is not DECLARED):
@@ -471,6 +446,6 @@ def remedies(
                 )
                 for other in ROTOR_READINGS
             ]
-    alike = RankedFits.sorted(fits).departures(by_imu)[:3] or ranking.departures(by_imu)[:1]
+    alike = RankedFits(fits).departures()[:3] or ranking.departures()[:1]
     mending = [reading for reading in alike if mends(reading)]
     return mending or alike[:1], bool(mending)

@@ -19,7 +19,7 @@ def excerpt(logs: Sequence[FlightLog]) -> list[FlightLog]:
 
     The rest becomes a gap in the log, with a note.
     """
-    seconds = [float(log.t[-1] - log.t[0]) for log in logs]
+    seconds = [log.t[-1] - log.t[0] for log in logs]
     share = LONGEST / max(sum(seconds), LONGEST)
     out = []
     for log, length in zip(logs, seconds, strict=True):
@@ -27,9 +27,8 @@ def excerpt(logs: Sequence[FlightLog]) -> list[FlightLog]:
             out.append(log)
             continue
         count, spare = max(1, round(share * length / _WINDOW)), length - _WINDOW
-        begins = log.t[0] + (
-            np.linspace(0.0, spare, count) if count > 1 else np.array([0.5 * spare])
-        )
+        first = 0.0 if count > 1 else 0.5 * spare
+        begins = log.t[0] + np.linspace(first, spare, count)
         keep = np.any([(log.t >= at) & (log.t <= at + _WINDOW) for at in begins], axis=0)
         note = (
             f"of {length:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "

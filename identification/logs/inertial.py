@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
 from .evidence import GOOD, likelihood, remedies
-from .excerpt import excerpt
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import (
@@ -58,10 +57,10 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
     checked, notes = _agreeing(log, gravity)
     if not (notes and log.has_pose and log.has_rotor_speeds):
         return checked, notes
-    advice, is_whole = remedies(excerpt([log])[0], vehicle)
+    advice, is_whole = remedies(log, vehicle)
+    wrong = "the pose contradicts the inertial sensors and the rotors"
     for reading in advice if is_whole else ():
-        if not (reading.moves == DECLARED.moves or _agreeing(applied(log, reading), gravity)[1]):
-            wrong = "the pose contradicts the inertial sensors and the rotors"
+        if reading.moves != DECLARED.moves and not _agreeing(applied(log, reading), gravity)[1]:
             return log, (f"{wrong}: {reading.says}",)
     return checked, notes
 
@@ -77,8 +76,7 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
             continue
         t, measured = log.t[read], values[read]
         if field == "gyro":
-            turns = [reading.turn for reading in (AS_DECLARED, *GYRO_READINGS)]
-            shares = gyro_shares(t, measured, *pose, turns)
+            shares = gyro_shares(t, measured, *pose, (AS_DECLARED, *GYRO_READINGS))
             doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
             fast = np.quantile(np.abs(measured), 0.99) > MAGNITUDES.fastest_gyro
             alone = GYRO_READINGS[0].says if fast else ""
@@ -93,15 +91,14 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
                     "were turned into body axes by the attitude"
                 )
             otherwise = "contradict the position's acceleration and gravity"
-            doubt = _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
-            doubt = _blown_up(measured) or doubt
+            doubt = _blown_up(measured)
+            doubt = doubt or _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
             alone = gravity_doubt(measured, gravity, is_flight=False)
         if is_stuck(measured):
             doubt = f"never change: the {field} was not read"
         if doubt:
             notes.append(f"{columns} {doubt}. They were left out")
-            left_out: Data = {field: None}
-            log = replace(log, **left_out)
+            log = replace(log, **Data({field: None}))
         elif shares is None and alone:  # no pose shows the error
             notes.append(f"{columns} {alone}")
     return log, tuple(notes)
@@ -125,14 +122,19 @@ def _sensor_doubt(
     if shares is None or shares[0] <= GOOD:
         return ""
     declared, *others = likelihood(np.array([shares] * 3).T)
-    if min(shares[1:]) > GOOD or max(others) - declared < OTHER:
+    best = max(others)
+    if min(shares[1:]) > GOOD or best - declared < OTHER:
         return otherwise
-    alike = [r.says for r, score in zip(readings, others, strict=True) if score > max(others) - 1.0]
+    alike = [r.says for r, score in zip(readings, others, strict=True) if score > best - 1.0]
     return "; or ".join(alike[:3])
 
 
 def gyro_shares(
-    t: Array, gyro: Array, pose_times: Array, attitude: Rotation, turns: Sequence[Array]
+    t: Array,
+    gyro: Array,
+    pose_times: Array,
+    attitude: Rotation,
+    readings: Sequence[SensorReading],
 ) -> list[float] | None:
     """Return the share of the attitude's rate left by a gyro, by each of several readings; None:
     too little is measured.
@@ -142,7 +144,7 @@ def gyro_shares(
         gyro: (N, 3) as in the columns.
         pose_times: (M,) s.
         attitude: (M) body to world.
-        turns: (3, 3) each, a reading's factor on the gyro.
+        readings: of the gyro's columns.
     """
     read = np.isfinite(t) & finite_rows(gyro)
     t, gyro = t[read], gyro[read]
@@ -153,7 +155,7 @@ def gyro_shares(
     sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
     seen = unbiased(mean_rate(begins, t, sum_of))
     size = median_square(motion) + STILL**2
-    return [median_square(motion - seen @ turn.T) / size for turn in turns]
+    return [median_square(motion - seen @ reading.turn.T) / size for reading in readings]
 
 
 def turn_rates(begins: Array, pose_times: Array, attitude: Rotation) -> Array:
@@ -275,8 +277,7 @@ def windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     last = min(pose_times[-1], sensor_times[-1]) - WINDOW
     if last <= first:
         return np.empty(0)
-    count = min(int((last - first) / _STEP), 100_000)
-    times = np.linspace(first, last, count + 1)
+    times = np.linspace(first, last, min(int((last - first) / _STEP), 100_000) + 1)
     for clock in (pose_times, sensor_times):
         gaps = np.flatnonzero(np.diff(clock) > _GAP)
         begun = np.searchsorted(clock[gaps], times + WINDOW)

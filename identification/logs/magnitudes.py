@@ -4,7 +4,7 @@ The guess of a map, the reading of a log and its screening decide here, with the
 """
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import ClassVar
 
@@ -16,53 +16,51 @@ from .column_names import WORDS, Group
 from .flight_log import FlightLog, parts_of
 from .flight_phases import carrying, usual_thrust
 from .log_map import UNITS
-from .table import Array, Pair, finite_rows
+from .table import Array, Mask, Pair, finite_rows
 
 
-@dataclass(frozen=True)
-class Magnitudes:
+class _Magnitudes:
     """How large and how small the numbers of a log may be."""
 
-    # sizes of a likely unit, and of a certain one: Hz of rows, V of a battery, 1 g
+    # sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
     units: ClassVar[dict[str, tuple[Pair, Pair]]] = {
-        "time": ((5.0, 5000.0), (15.0, 2500.0)),
+        "time": ((2e-4, 0.2), (4e-4, 1.0 / 15.0)),
         "battery": ((2.7, 100.0), (2.7, 60.0)),
-        "accelerometer": ((0.85, 1.15), (0.85, 1.15)),
+        "accelerometer": ((8.335, 11.278), (8.335, 11.278)),
     }
 
-    shortest_period: float = 1e-5  # s, of the median step: 100 kHz, far above any pose's rate
+    shortest_period = 1e-5  # s, of the median step: 100 kHz, far above any pose's rate
     # s, of any step. A log in nanoseconds has steps of 1e7; a step of a year is no flight
-    longest_step: float = 1e12
-    largest: float = 1e9  # SI units, all other numbers; millimetres or rpm stay far below
-    widest: float = 300.0  # m, spread of one flight's positions
-    # thrust by weight of rotors in their right unit; mass and thrust curve may be off
-    carries: Pair = (0.55, 1.8)
-    flies: Pair = (0.2, 5.0)  # its median; beyond, another vehicle flew
-    doubtful: Pair = (0.5, 2.0)  # the same; beyond, another may have flown
-    strongest: float = 300.0  # m/s2 of specific force, above all racers and most sensors' range
-    fastest_gyro: float = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
-    fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
-    slow_gyro: float = 6.0  # rad/s: 99.5 % of a flight's angular velocities are less
-    named_rates: Pair = (0.5, 20_000.0)  # Hz of rows; beyond, no name counts
+    longest_step = 1e12
+    largest = 1e9  # SI units, all other numbers; millimetres or rpm stay far below
+    widest = 300.0  # m, spread of one flight's positions
+    flies = 0.2, 5.0  # median thrust by weight; beyond, another vehicle flew
+    doubtful = 0.5, 2.0  # the same; beyond, another may have flown
+    strongest = 300.0  # m/s2 of specific force, above all racers and most sensors' range
+    fastest_gyro = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
+    fast_gyro = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
+    slow_gyro = 6.0  # rad/s: 99.5 % of a flight's angular velocities are less
+    named_rates = 0.5, 20_000.0  # Hz of rows; beyond, no name counts
     # limits of four motors' median. Above the first, only rpm is left: no propeller turns as fast
     # in rad/s. Above the second, rpm is likelier: in rad/s only palm-sized vehicles hover as fast.
     # Above the third, rpm may also be a command of 16 bits
-    rpm: float = 4500.0
+    rpm, fast, counts = 4500.0, 2600.0, 20_000.0
     # rad/s: the largest drones' rotors (1.4 m across) hover at 150; slower, the unit is wrong
-    slow: float = 100.0
-    uneven: float = 2.0  # ratio of two rotors' medians in flight, at most
-    fast: float = 2600.0
-    counts: float = 20_000.0
+    slow = 100.0
+    uneven = 2.0  # ratio of two rotors' medians in flight, at most
     # power of the specific force's growth: with rotor speeds, and with pulses at least
-    squares: Pair = (1.5, 2.5)
-    offset: float = 2.8
+    squares = 1.5, 2.5
+    offset = 2.8
 
 
-MAGNITUDES = Magnitudes()
+MAGNITUDES = _Magnitudes()
+# thrust by weight of rotors in their right unit; mass and thrust curve may be off
+_CARRIES = 0.55, 1.8
 # changes of a column: fewer are no measurement, and equal by chance
 _CHANGES = 20
 _TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 _SPEEDS = {
+    "rad/s": ("", 1.0),
     "rpm": ("revolutions per minute", UNITS["rotors"]["rpm"]),
     "Hz": ("revolutions per second", UNITS["rotors"]["Hz"]),
     "deg/s": ("degrees per second", np.pi / 180.0),
@@ -79,12 +77,8 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     unit is certain. The size is a battery's median voltage, the time's median step, or an
     accelerometer's median length.
     """
-    units = {unit: one for unit, one in UNITS[section].items() if unit not in ("min", "raw")}
-    sizes = {unit: size * one for unit, one in units.items()}
-    if section == "time":
-        sizes = {unit: 1.0 / max(step, 1e-300) for unit, step in sizes.items()}
-    elif section == "accelerometer":
-        sizes = {unit: force / units["g"] for unit, force in sizes.items()}
+    units = UNITS[section].items()
+    sizes = {unit: size * one for unit, one in units if unit not in ("min", "raw")}
     likely, sure = MAGNITUDES.units[section]
     unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
     return unit, within(sizes[unit], sure)
@@ -93,15 +87,14 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
 def time_doubt(step: float) -> str:
     """Return a doubt on the time's unit by a median step (s), or nothing."""
     unit, is_sure = likely_unit("time", step)
-    if unit == "s" or not is_sure:
-        return ""
-    return (
+    words = (
         f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: divide t "
         f"by {1.0 / UNITS['time'][unit]:g}"
     )
+    return words if is_sure and unit != "s" else ""
 
 
-def thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
+def _thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
     """Return the median thrust of turning rotors (N, 4) in rad/s, by the vehicle's weight; 1 where
     none turns.
     """
@@ -116,8 +109,7 @@ def _carrying_units(thrust: float) -> list[str]:
     """Return the units of rotor speeds able to carry the vehicle, by the median thrust by weight of
     the numbers as rad/s.
     """
-    factors = {"rad/s": 1.0} | {unit: factor for unit, (_, factor) in _SPEEDS.items()}
-    return [u for u, factor in factors.items() if within(thrust * factor**2, MAGNITUDES.carries)]
+    return [u for u, (_, factor) in _SPEEDS.items() if within(thrust * factor**2, _CARRIES)]
 
 
 def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
@@ -137,19 +129,6 @@ def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     )
 
 
-def equal_motors(motors: Array) -> tuple[int, int] | None:
-    """Return the first two motors, from 1, with the same numbers in every row of (N, 4); None:
-    there are none, or two such pairs, as of a flight in one plane without noise.
-    """
-    alike = [
-        (i + 1, j + 1)
-        for i, j in combinations(range(4), 2)
-        if np.array_equal(motors[:, i], motors[:, j])
-        and np.count_nonzero(np.diff(motors[:, i])) >= _CHANGES
-    ]
-    return None if len(alike) in (0, 2) else alike[0]
-
-
 def motor_doubts(log: FlightLog) -> list[str]:
     """Return doubts on four motors, whatever the vehicle: equal columns, uneven medians in flight,
     and rotors slower than any propeller in hover.
@@ -159,25 +138,23 @@ def motor_doubts(log: FlightLog) -> list[str]:
     if motors is None or not np.isfinite(motors).all() or not np.any(motors > 0.0):
         return []
     what = "rotor speeds" if measured else "motor commands"
-    doubts = []
-    if alike := equal_motors(motors):
-        doubts.append(
-            f"{what} of motors {alike[0]} and {alike[1]} are equal in every row; expected "
-            "four motors"
-        )
+    alike = [
+        f"{what} of motors {i + 1} and {j + 1} are equal in every row; expected four motors"
+        for i, j in combinations(range(4), 2)
+        if np.array_equal(motors[:, i], motors[:, j])
+        and np.count_nonzero(np.diff(motors[:, i])) >= _CHANGES
+    ]
+    doubts = [] if len(alike) == 2 else alike[:1]  # two pairs: a flight in one plane without noise
     medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
-    listed = ", ".join(f"{x:.3g}" for x in medians)
-    if not measured:
-        return doubts
+    expected = ""
     if medians.max() > MAGNITUDES.uneven * medians.min():
-        doubts.append(
-            f"medians of the four rotor speeds in flight are {listed} rad/s; expected a ratio of "
-            f"at most {MAGNITUDES.uneven:g}"
-        )
+        expected = f"a ratio of at most {MAGNITUDES.uneven:g}"
     elif medians.max() < MAGNITUDES.slow:
+        expected = f"at least {MAGNITUDES.slow:g}: no rotor carries a drone at less. Check the unit"
+    if measured and expected:
+        listed = ", ".join(f"{x:.3g}" for x in medians)
         doubts.append(
-            f"medians of the four rotor speeds in flight are {listed} rad/s; expected at least "
-            f"{MAGNITUDES.slow:g}: no rotor carries a drone at less. Check the unit"
+            f"medians of the four rotor speeds in flight are {listed} rad/s; expected {expected}"
         )
     return doubts
 
@@ -194,18 +171,17 @@ def motor_unit(
     turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
     if not turning.size:
         return "commands", "normalised", False, "all are zero"
-    low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
+    low, middle, high = np.quantile(turning, [0.01, 0.5, 1.0]).tolist()
     named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = any(re.search(word, names) for word in WORDS["command_words"])
-    speeds = any(word in names for word in ("omega", "speed", "rotor", "rpm"))
+    commanded = bool(re.search("|".join(WORDS["command_words"]), names))
+    speeds = bool(re.search("omega|speed|rotor|rpm", names))
     speeds |= within(power, MAGNITUDES.squares) and not commanded
     pulses = low >= 850.0 and high <= 2250.0
-    carrying = []
+    carrier = ""  # the one unit in which the rotors carry the vehicle
     if vehicle is not None and not commanded:
-        there = values[finite_rows(values)]
-        carrying = [
-            u for u in _carrying_units(thrust_by_weight(there, vehicle)) if u in UNITS["rotors"]
-        ]
+        thrust = _thrust_by_weight(values[finite_rows(values)], vehicle)
+        carrying = [unit for unit in _carrying_units(thrust) if unit in UNITS["rotors"]]
+        carrier = carrying[0] if len(carrying) == 1 else ""
     # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
     doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
     doubt = "" if speeds else doubt
@@ -216,9 +192,9 @@ def motor_unit(
     carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
     carries += f", though they may be {doubt}" if doubt else ""
     # the vehicle's weight may contradict a name, but poles of eRPM are unknown
-    lifts = len(carrying) == 1 and named in UNITS["rotors"] and named not in ("eRPM", *carrying)
+    lifts = carrier and named in UNITS["rotors"] and named not in ("eRPM", carrier)
     rules = (
-        (lifts, "rotors", "".join(carrying), False, f"{carries}, not in {named} as names say"),
+        (lifts, "rotors", carrier, False, f"{carries}, not in {named} as names say"),
         (named in UNITS["rotors"], "rotors", named, True, by_names),
         (high <= 1.0, "commands", "normalised", "omega" not in names, up_to),
         (named in ("us", "percent"), "commands", named, True, by_names),
@@ -226,9 +202,9 @@ def motor_unit(
         (commanded and high <= 100.0, "commands", "percent", False, up_to),
         (commanded and high <= 65535.0, "commands", "counts", False, up_to),
         (pulses and power >= MAGNITUDES.offset, "commands", "us", True, between),
-        (len(carrying) == 1, "rotors", "".join(carrying), not doubt, carries),
+        (carrier, "rotors", carrier, not doubt, carries),
         (
-            not commanded and middle > MAGNITUDES.counts and high <= 65535.5,
+            middle > MAGNITUDES.counts and high <= 65535.0,
             "commands",
             "counts",
             False,
@@ -273,23 +249,29 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             f"at most {MAGNITUDES.longest_step:g} s"
         )
     for names, values in parts_of(log)[1:]:
-        values = values.reshape(len(log.t), -1)
-        for row, column in np.argwhere(np.abs(values) > MAGNITUDES.largest)[:1]:  # False where NaN
+        columns = values.reshape(len(log.t), -1)
+        for row, i in np.argwhere(np.abs(columns) > MAGNITUDES.largest)[:1]:  # False where NaN
             raise InputError(
-                f"{where} {names[column]}, row {row + 1}: {values[row, column]:.3g}; expected a "
-                f"number within {MAGNITUDES.largest:g}"
+                f"{where} {names[i]}, row {row + 1}: {columns[row, i]:.3g}; expected a number "
+                f"within {MAGNITUDES.largest:g}"
             )
     doubts = [time_doubt(log.period), *motor_doubts(log)]
-    if log.valid.any():
-        spread = np.max(np.ptp(log.position[log.valid], axis=0))
-        if spread > MAGNITUDES.widest:
-            doubts.append(
-                f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
-                f"metres"
-            )
+    spread = np.max(np.ptp(log.position[log.valid], axis=0)) if log.has_pose else 0.0
+    if spread > MAGNITUDES.widest:
+        doubts.append(
+            f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres"
+        )
     if vehicle is not None and log.has_rotor_speeds:
-        doubts.append(rotor_doubt(thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
+        doubts.append(rotor_doubt(_thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
     return [doubt for doubt in doubts if doubt]
+
+
+def interpolated(log: FlightLog, broken: Mask) -> FlightLog:
+    """Return a log with lines between the other rotor speeds where they are ``broken`` (N, 4)."""
+    speeds = log.rotor_speeds.copy()
+    for column, wrong in zip(speeds.T, broken.T, strict=True):
+        column[wrong] = np.interp(log.t[wrong], log.t[~wrong], column[~wrong])
+    return replace(log, rotor_speeds=speeds)
 
 
 _BROKEN = 3.0  # times the speed that 99 % of a rotor's samples stay below: 9 times their thrust
@@ -308,11 +290,8 @@ def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     broken = fast & ~far[:-6] & ~far[6:]
     if not broken.any():
         return log, []
-    speeds, rows = log.rotor_speeds.copy(), np.arange(len(log.t))
-    for column, wrong in zip(speeds.T, broken.T, strict=True):
-        column[wrong] = np.interp(rows[wrong], rows[~wrong], column[~wrong])
     highest = np.max(log.rotor_speeds[broken])
-    return replace(log, rotor_speeds=speeds), [
+    return interpolated(log, broken), [
         f"{np.count_nonzero(broken)} rotor speeds are broken, up to {highest:.0f} rad/s where "
         f"99 % are below {high.max():.0f}: they were interpolated"
     ]

@@ -56,7 +56,8 @@ from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
 # fields of a body's turns
-_TURNS = ("world", "body", "attitude.sense", "attitude.order", "attitude.unit", "pitch_sign")
+_FRAMES = "frames.map_world", "frames.map_body"
+_TURNS = *_FRAMES, "attitude.sense", "attitude.order", "attitude.unit", "pitch_sign"
 _MOTORS = ("motors", "commands")
 _GYROS = [
     SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
@@ -118,7 +119,7 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
         guessing = _Guessing(table, vehicle)
         missing = tuple(guessing.missing())
     parts = [part for part in guessing.sections.values() if isinstance(part, Columns)]
-    used = {*guessing.time_columns, *(c for part in parts for c in part.columns)}
+    used = {*guessing.clocks, *(c for part in parts for c in part.columns)}
     unused = tuple(column for column in table.header if column not in used)
     guessing.sections.setdefault("time", TimeColumn(UNKNOWN))
     return Guess(
@@ -162,7 +163,6 @@ class _Guessing:
     def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
         self.sections: Data = {}
-        self.time_columns: Names = ()
         self.reasons: list[Reason] = []
         self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
@@ -172,14 +172,15 @@ class _Guessing:
         names = take_apart(table.header, table.units)
         self.data = _numbers_of(table, names)
         self.clock = _time_column(names, self.data)
-        self.t = np.asarray(0.01 * np.arange(table.rows), dtype=np.float64)
+        self.t: Array = 0.01 * np.arange(table.rows, dtype=np.float64)
         if self.clock is not None:
             # a column of nanoseconds may stand beside a clock of whole seconds
             key = re.sub("(^|_)secs?$", "", self.clock.base)
             fine = {f"{key}_{word}".strip("_") for word in WORDS["nanoseconds"]}
             beside = next((name.column for name in names if name.base in fine), "")
             self.t = self.time(self.clock, beside)
-        self.free = [name for name in names if name.column not in self.time_columns]
+        self.clocks = self.sections.get("time", TimeColumn()).named
+        self.free = [name for name in names if name.column not in self.clocks]
         self.numbers = numbers = Numbers(self.t, self.data)
         self.battery()
         attitude = self.choose("attitude", numbers.quaternion)
@@ -213,18 +214,13 @@ class _Guessing:
             self.say(part, field, False, "; or ".join(map(str, likely[:SHOWN])))
         return group
 
-    def values(self, part: str) -> Array:
-        """Return the columns (N, k) of a part."""
-        return np.column_stack([self.data[name] for name in self.parts[part].columns])
+    def values(self, columns: Names) -> Array:
+        """Return the values (N, k) of columns."""
+        return np.column_stack([self.data[name] for name in columns])
 
     def missing(self) -> list[Reason]:
         """Return the fields missing for a flight log."""
-        out = []
-
-        def lack(part: str, section: str, why: str, field: str = "columns") -> None:
-            ranked = self.ranked.get(part, [])[:SHOWN]
-            out.append(Reason(section, field, False, why, tuple(map(str, ranked))))
-
+        lacks: dict[str, str] = {}
         if self.clock is None:
             why = "no column looks like a time; expected one such as t, time or timestamp"
             for name in named_alone(self.free, "time"):
@@ -233,7 +229,7 @@ class _Guessing:
                     why = f"column {name.column} is {x[0]:g} in nearly every row: a program that "
                     why += "wrote the table left out its digits; expected a time in each row"
                     break
-            lack("time", "time", why, "column")
+            lacks["time"] = why
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), {*self.sections}
         if "position" not in has and not has.issuperset(imu):
             half = [part for part in pose if part in self.parts]
@@ -242,13 +238,21 @@ class _Guessing:
                 if part in half:
                     self.half_a_pose(part)
                 elif part not in has:
-                    lack(part, part, f"no columns look like one (such as {_EXAMPLES[part]})")
-        for part, why in self.further.items():
-            lack(part, "rotors", why)
-        if not {"rotors", "commands"} & set(self.sections) and not self.further:
+                    lacks[part] = f"no columns look like one (such as {_EXAMPLES[part]})"
+        lacks |= self.further
+        if not self.further and has.isdisjoint(("rotors", "commands")):
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
-            lack("motors", "rotors", why)
-        return out
+            lacks["motors"] = why
+        return [
+            Reason(
+                "rotors" if part in _MOTORS else part,
+                "column" if part == "time" else "columns",
+                False,
+                why,
+                tuple(map(str, self.ranked.get(part, [])[:SHOWN])),
+            )
+            for part, why in lacks.items()
+        ]
 
     def half_a_pose(self, part: str) -> None:
         """Keep a position without an attitude, or the reverse, for a person to complete."""
@@ -256,8 +260,10 @@ class _Guessing:
         most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
         made = Columns(columns, unit or "m")
         if part == "attitude":
-            unit = unit or ("deg" if most > 2.0 * np.pi else "rad")
-            made = Attitude(columns, unit, euler="zyx") if len(columns) == 3 else Attitude(columns)
+            made = Attitude(columns)
+            if len(columns) == 3:
+                unit = unit or ("deg" if most > 2.0 * np.pi else "rad")
+                made = Attitude(columns, unit, euler="zyx")
         self.say(part, "columns", False, self.ranked[part][0].why)
         if made.unit:
             self.say(part, "unit", False, f"{made.unit}: values up to {most:.3g}")
@@ -278,10 +284,11 @@ class _Guessing:
         """Return a section's unit: by its columns' names unless the numbers are certain of another,
         else as guessed.
         """
-        if named in UNITS[section] and (choice[0] == named or not choice[1]):
+        guessed, sure, why = choice
+        if named in UNITS[section]:
             choice = named, True, "by the columns' names"
-        elif named in UNITS[section]:
-            choice = choice[0], False, f"{choice[2]}, though the columns' names say {named}"
+            if sure and guessed != named:
+                choice = guessed, False, f"{why}, though the columns' names say {named}"
         return self.take(section, "unit", choice)
 
     def time(self, clock: Name, nanoseconds: str) -> Array:
@@ -289,24 +296,22 @@ class _Guessing:
         elsewhere.
         """
         raw = TimeColumn(clock.column, nanoseconds=nanoseconds).raw(self.data)
-        steps = np.diff(raw[np.isfinite(raw)])
-        step = float(np.median(steps[steps > 0.0]))
+        known, units = raw[np.isfinite(raw)], UNITS["time"]
+        steps = np.diff(known)
+        step = max(float(np.median(steps[steps > 0.0])), 1e-300)
         guessed, sure = likely_unit("time", step)
-        rates = {unit: 1.0 / max(step * one, 1e-300) for unit, one in UNITS["time"].items()}
-        if clock.unit in rates:  # an unusual rate is no reason to doubt a name
-            sure &= not within(rates[clock.unit], MAGNITUDES.named_rates)
-        choice = guessed, sure, f"{rates[guessed]:.4g} rows a second"
+        if clock.unit in units:  # an unusual rate is no reason to doubt a name
+            sure &= not within(1.0 / (step * units[clock.unit]), MAGNITUDES.named_rates)
+        choice = guessed, sure, f"{1.0 / (step * units[guessed]):.4g} rows a second"
         unit = self.unit("time", "s" if nanoseconds else clock.unit, choice)
-        t = np.asarray((raw - raw[np.isfinite(raw)][0]) * UNITS["time"][unit])
+        t = (raw - known[0]) * units[unit]
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
-        t[~(np.abs(t - middle) <= 0.5 * LONGEST)] = np.nan
-        self.sections["time"] = column = TimeColumn(clock.column, unit, nanoseconds)
-        self.time_columns = column.named
-        return t
+        self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
+        return np.where(np.abs(t - middle) <= 0.5 * LONGEST, t, np.nan)
 
     def pose_fits(self, place: Group, group: Group) -> RankedFits:
         """Return the fits of a pose in each of a map's frames, units, orders and senses."""
-        attitude = self.values("attitude")
+        attitude = self.values(group.columns)
         units: Names = ("deg", "rad")
         if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
@@ -319,11 +324,10 @@ class _Guessing:
             place.unit,
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
-        motors = [self.values(part) for part in _MOTORS if part in self.parts]
+        motors = [self.values(self.parts[part].columns) for part in _MOTORS if part in self.parts]
         thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
-        position = np.column_stack([self.data[name] for name in place.columns])
-        evidence = Evidence(self.t, thrusts, position, attitude)
-        return RankedFits.of(evidence, readings, torques=False)
+        evidence = Evidence(self.t, thrusts, self.values(place.columns), attitude)
+        return RankedFits(evidence.fit(reading, torques=False) for reading in readings)
 
     def follows_tilt(self, columns: Names) -> Verdict:
         """Return the share of three columns' horizontal acceleration by a quaternion's tilt; 0
@@ -340,8 +344,11 @@ class _Guessing:
         self.ranking = ranking = self.pose_fits(place, group)
         best = ranking.best
         length = self.unit("position", place.unit, ranking.says("length"))
-        turned = ("attitude", "sense", "attitude.sense")
-        fields = [("world", "", "world"), ("body", "", "body"), turned]
+        fields = [
+            ("world", "", "frames.map_world"),
+            ("body", "", "frames.map_body"),
+            ("attitude", "sense", "attitude.sense"),
+        ]
         if best.attitude.euler:
             guessed = ranking.says("attitude.unit")
             if len({fit.reading.attitude.unit for fit in ranking.ranked}) == 1:
@@ -354,18 +361,18 @@ class _Guessing:
             self.say("attitude", "order", True, "by the columns' names")
         for section, name, prop in fields:
             self.take(section, name, ranking.says(prop))
-        self.sections |= {"world": best.world, "body": best.body}
+        self.sections |= {"world": best.frames.map_world, "body": best.frames.map_body}
         self.sections["position"] = Columns(place.columns, length)
         self.sections["attitude"] = replace(best.attitude, columns=group.columns)
 
     def accelerometer(self, group: Group) -> None:
         """Find unit and axes of the accelerometer by gravity."""
-        values = self.values("accelerometer")
-        size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
-        z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
+        values = self.values(group.columns)
+        size = max(float(np.nanmedian(np.linalg.norm(values, axis=1))), 1e-12)
+        z = np.nanmean(values[:, 2]) / size
         # without a pose, a negative z may also be gravity in place of the specific force
-        sure = abs(z) > 0.8 and (z > 0.0 or self.ranking is not None)
-        why = f"along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size"
+        sure = bool(z > 0.8 or (z < -0.8 and self.ranking))
+        why = f"along z it reads {z:+.2f} of its size"
         axes = self.take("accelerometer", "body", ("flu" if z > 0.0 else "frd", sure, why))
         guessed, is_gravity = likely_unit("accelerometer", size)
         units, why, scale = UNITS["accelerometer"], f"its median size is {size:.4g}", 1.0
@@ -375,7 +382,7 @@ class _Guessing:
             if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
                 self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:
-            scale = float(f"{_G / max(size, 1e-12):.6g}")
+            scale = float(f"{_G / size:.6g}")
             why += ", which is taken for the 9.81 m/s2 of a hover"
             unit = self.take("accelerometer", "scale", ("raw", False, why))
         self.sections["accelerometer"] = Sensor(group.columns, unit, scale=scale, body=axes)
@@ -392,14 +399,14 @@ class _Guessing:
         times, first = np.unique(times, return_index=True)
         good, rotation = rotations(attitude[first], self.ranking.best)
         t, values = self.numbers.rows(columns)
-        turns = [way.turn for way in _GYROS]
-        shares = gyro_shares(t, values, times[good], rotation, turns) or []
+        shares = gyro_shares(t, values, times[good], rotation, _GYROS) or []
         fits = [
-            Fit(way, left, (), float(likelihood([left] * 3)) - OTHER * (unit not in ("", way.unit)))
+            Fit(
+                way, left, 1.0, float(likelihood([left] * 3)) - OTHER * (unit not in ("", way.unit))
+            )
             for way, left in zip(_GYROS, shares, strict=False)
         ]
-        ranked = sorted(fits, key=lambda fit: -fit.score)
-        return RankedFits(ranked, "attitude's rate is left unexplained") if fits else None
+        return RankedFits(fits, "attitude's rate is left unexplained") if fits else None
 
     def turns_alike(self, columns: Names) -> Verdict:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
@@ -424,7 +431,7 @@ class _Guessing:
             told = {(r.section, r.field) for r in self.reasons if r.certain}
             sure = self.ranking is None and ("accelerometer", "body") in told
             self.say("gyro", "body", sure, "as the accelerometer's")
-            high = float(np.nanquantile(np.abs(self.values("gyro")), 0.995))
+            high = float(np.nanquantile(np.abs(self.values(group.columns)), 0.995))
             unit = "deg/s" if high > MAGNITUDES.slow_gyro else "rad/s"
             guessed = unit, high > MAGNITUDES.fast_gyro, f"its fast values are {high:.3g}"
         unit = self.unit("gyro", group.unit, guessed)
@@ -432,7 +439,7 @@ class _Guessing:
 
     def motors(self, part: str, group: Group) -> None:
         """Find unit and order of rotor speeds or commands, unless the map has such a section."""
-        values = self.values(part)
+        values = self.values(group.columns)
         power = self.numbers.elasticity(values)
         kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
         if more := more_rotors(group.columns, self.table):
@@ -446,14 +453,14 @@ class _Guessing:
         order, sure, why = self.order(group, values)
         self.say(kind, "order", sure, why)
         if kind == "rotors":
-            if unit == "eRPM":
-                self.say(kind, "pole_pairs", False, "7, of most motors of small racers")
             pairs = 7 if unit == "eRPM" else 1
+            if pairs > 1:
+                self.say(kind, "pole_pairs", False, "7, of most motors of small racers")
             self.sections[kind] = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
             return
         high = np.nanmax(values, initial=0.0)
-        counts = next((float(2**bits - 1) for bits in (8, 10, 11, 12) if high < 2**bits), 65535.0)
-        limits = COMMAND_UNITS[unit] or (0.0, counts)
+        bits = next((bits for bits in (8, 10, 11, 12) if high < 2**bits), 16)
+        limits = COMMAND_UNITS[unit] or (0.0, 2.0**bits - 1.0)
         if unit in ("us", "counts", "dshot"):
             self.say(kind, "range", False, f"{limits[0]:g} to {limits[1]:g}, the usual one")
         self.sections[kind] = Commands(group.columns, unit, order=order, range=limits)
@@ -467,32 +474,36 @@ class _Guessing:
         best, motion = DECLARED, Data()
         if "gyro" in self.sections:
             sensor = self.sections["gyro"]
-            rates = self.values("gyro") * UNITS["gyro"][sensor.unit] @ BODY_TURNS[sensor.body].T
-            motion = {"gyro": rates}
+            rates = self.values(sensor.columns) * UNITS["gyro"][sensor.unit]
+            motion = {"gyro": rates @ BODY_TURNS[sensor.body].T}
         elif self.ranking is not None and self.ranking.certain(*_TURNS):
             best = self.ranking.best
-            motion = {"position": self.values("position"), "attitude": self.values("attitude")}
+            motion = {
+                part: self.values(self.parts[part].columns) for part in ("position", "attitude")
+            }
         evidence = Evidence(self.t, np.square(values), **motion)
         if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
-        ranking = RankedFits.of(evidence, ways)
+        ranking = RankedFits(map(evidence.fit, ways))
         left, lead, order = ranking.fit.torque, ranking.other("rotors")[1], ranking.best.motors
         names = order_names(order)
-        why = (
-            f"{names[0] if names else order_words(order)}: {left:.0%} of the angular acceleration "
-            f"is left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
-        )
         turns = evidence.turns(best) >= TURNING_RATE
         is_sure = left <= GOOD_TORQUE and ranking.certain("rotors") and turns
         if is_sure or (names and left <= 0.9 and lead >= 1.0):
+            why = (
+                f"{(*names, order_words(order))[0]}: {left:.0%} of the angular acceleration is "
+                f"left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
+            )
             return order, is_sure, why
-        plus = RankedFits.of(Evidence(self.t, np.square(values), sides=_PLUS, **motion), ways)
+        why = f"{hint}: no order is much likelier than all others"
+        evidence = Evidence(self.t, np.square(values), sides=_PLUS, **motion)
+        plus = RankedFits(map(evidence.fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
             why = f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
-            return ORDERS[hint], False, f"{why}expected a vehicle file with these rotor_positions"
-        return ORDERS[hint], False, f"{hint}: no order is much likelier than all others"
+            why += "expected a vehicle file with these rotor_positions"
+        return ORDERS[hint], False, why
 
     def battery(self) -> None:
         """Find the battery's voltage and its unit."""
@@ -500,9 +511,8 @@ class _Guessing:
         if not named or (column := named[0].column) not in self.data:
             return
         values = self.data[column]
-        values = values[np.isfinite(values) & (values > 0.0)]
-        if values.size:
-            middle = float(np.median(values))
+        middle = float(np.nanmedian(values[values > 0.0]))
+        if np.isfinite(middle):
             guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
             unit = self.unit("battery", named[0].unit, guessed)
             self.sections["battery"] = Battery((column,), unit)

@@ -23,7 +23,6 @@ from .what_flew import ORDERS, Order, order_names
 
 _I = np.eye(3)
 _STATED: Data = read_yaml(Path(__file__).with_name("conventions.yaml"), "conventions")
-_PLACE, _QUATERNION = ("px", "py", "pz"), ("qw", "qx", "qy", "qz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +35,8 @@ class Frames:
     position: Array = field(default_factory=lambda: _I)
     world: Array = field(default_factory=lambda: _I)
     body: Array = field(default_factory=lambda: _I)
-    names: tuple[str, str] = ("", "")  # names of world and body in a map; empty: a map has none
+    map_world: str = ""  # names in a map; empty: a map has none
+    map_body: str = ""
     unusual: bool = False  # axes of no usual convention
 
 
@@ -50,11 +50,11 @@ def _frames(
     says: str = "", map: Sequence[str] = ("", ""), unusual: bool = False, **axes: str
 ) -> Frames:
     turns = {name: _axes(text) for name, text in axes.items()}
-    return Frames(says, **turns, names=(map[0], map[1]), unusual=unusual)
+    return Frames(says, **turns, map_world=map[0], map_body=map[1], unusual=unusual)
 
 
 _USUAL_FRAMES = tuple(_frames(**stated) for stated in _STATED["frames"])
-MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.names[0])  # with names in a map
+MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.map_world)  # with names in a map
 PLAIN = MAP_FRAMES[0]
 
 
@@ -128,16 +128,6 @@ class Convention:
         return -1 if self.attitude.signs else 1
 
     @property
-    def world(self) -> str:
-        """Name of the world in a map."""
-        return self.frames.names[0]
-
-    @property
-    def body(self) -> str:
-        """Name of the body axes in a map."""
-        return self.frames.names[1]
-
-    @property
     def motors(self) -> Order:
         """Motor, from 1, of each of the kit's rotors."""
         a, b, c, d = (self.rotors.index(rotor) + 1 for rotor in ROTORS)
@@ -149,10 +139,11 @@ class Convention:
         words = [f"gx, gy, gz {self.gyro.says}"] if self.gyro.says else []
         if self.late:
             late, sooner = ("late", "earlier") if self.late > 0.0 else ("early", "later")
+            seconds = f"{abs(self.late):.2f} s"
             words.append(
-                f"the rotor speeds come {abs(self.late):.2f} s too {late} against the motion; "
-                "expected both on one clock: put omega1..omega4 (or the commands behind them) "
-                f"{abs(self.late):.2f} s {sooner}"
+                f"the rotor speeds come {seconds} too {late} against the motion; expected both on "
+                "one clock: put omega1..omega4 (or the commands behind them) "
+                f"{seconds} {sooner}"
             )
         if self.length != "m":
             name = {"mm": "milli", "cm": "centi"}[self.length]
@@ -166,7 +157,7 @@ class Convention:
             words.append(
                 f"the rotors look permuted: omega1..omega4 are rotors "
                 f"{','.join(map(str, self.rotors))} of this vehicle"
-                f"{f' (the order {known})' if known else ''}"
+                f"{known and f' (the order {known})'}"
                 "; expected 1 front-left, 2 rear-left, 3 rear-right, 4 front-right: reorder the "
                 "columns"
             )
@@ -187,16 +178,16 @@ class Convention:
         }
         order, is_inverse = self.attitude.order, self.attitude.sense != SENSES[0]
         sense = "world to body" if order in orders else "the quaternion is world to body"
-        facts = [orders.get(order, ""), sense if is_inverse else ""]
-        facts = [fact for fact in (*facts, self.frames.fact) if fact]
-        if not facts:
+        facts = orders.get(order, ""), sense if is_inverse else "", self.frames.fact
+        if not any(facts):
             return []
-        position, quaternion = _combined(self.frames.position, _PLACE), _quaternion(self)
-        take = [f"{position} as the position"] if position != f"({', '.join(_PLACE)})" else []
-        if quaternion != f"({', '.join(_QUATERNION)})":
+        position = _combined(self.frames.position, ("px", "py", "pz"))
+        quaternion = _quaternion(self)
+        take = [f"{position} as the position"] if position != "(px, py, pz)" else []
+        if quaternion != "(qw, qx, qy, qz)":
             take.append(f"{quaternion} as the quaternion (qw, qx, qy, qz)")
         return [
-            " and ".join(facts),
+            " and ".join(filter(None, facts)),
             "expected one world, z up, body axes forward, left, up, and a quaternion scalar first, "
             f"body to world: take {' and '.join(take)}",
         ]
@@ -221,7 +212,7 @@ def _quaternion(reading: Convention) -> str:
     columns = as_written(np.eye(4), reading.attitude)[1]
     made = (world * columns * body).as_quat(scalar_first=True).T
     first = made[0][np.abs(made[0]) > 0.1][0]
-    text = _combined(made * np.sign(first), _QUATERNION)
+    text = _combined(made * np.sign(first), ("qw", "qx", "qy", "qz"))
     return text if abs(first) > 0.9 else f"0.7071 {text}"
 
 
@@ -233,32 +224,35 @@ OTHER, OFFSET = 8.0, 12.0
 
 def _each(**aspects: Sequence[Any]) -> list[Convention]:
     """Return the readings of all combinations of aspects."""
-    return [
-        Convention(**dict(zip(aspects, each, strict=True))) for each in product(*aspects.values())
-    ]
+    ways = product(*aspects.values())
+    return [Convention(**dict(zip(aspects, way, strict=True))) for way in ways]
 
 
 def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convention]:
     """Return readings with a penalty of 1 for each less usual convention; ``world``: the usual."""
-    return [
-        replace(
-            r,
-            unlikely=r.unlikely
-            + (r.attitude.order != "wxyz")
-            + (r.attitude.euler == "xyz")
-            + (r.pitch_sign < 0)
-            + (r.attitude.sense != SENSES[0])
-            + (r.world != world)
-            + r.frames.unusual,
+    weighed = []
+    for reading in readings:
+        attitude, frames = reading.attitude, reading.frames
+        less_usual = (
+            attitude.order != "wxyz",
+            attitude.euler == "xyz",
+            bool(attitude.signs),
+            attitude.sense != SENSES[0],
+            frames.map_world != world,
+            frames.unusual,
         )
-        for r in readings
-    ]
+        weighed.append(replace(reading, unlikely=reading.unlikely + sum(less_usual)))
+    return weighed
 
 
 ROTOR_READINGS = [  # two departures at once are as unlikely as both
     replace(r, unlikely=OTHER * (r.mirrored + (r.rotors != ROTORS)))
     for r in _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
 ]
+
+
+def _quaternions(orders: Names) -> list[Attitude]:
+    return [Attitude((), order=order, sense=sense) for order, sense in product(orders, SENSES)]
 
 
 def log_readings(has_pose: bool) -> list[Convention]:
@@ -269,8 +263,7 @@ def log_readings(has_pose: bool) -> list[Convention]:
     """
     others = _each(gyro=GYRO_READINGS)
     if has_pose:
-        orders = product(("wxyz", "xyzw", "zwxy"), SENSES)
-        attitudes = [Attitude((), order=order, sense=sense) for order, sense in orders]
+        attitudes = _quaternions(("wxyz", "xyzw", "zwxy"))
         others = _each(attitude=attitudes, frames=_USUAL_FRAMES)[1:]
         others.append(Convention(attitudes[1], _frames(**_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
@@ -287,13 +280,11 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
         length: unit of the position by the columns' names; others have a penalty.
         hint: the world by the columns' names; empty: none.
     """
-    attitudes = [Attitude((), order=order, sense=sense) for order, sense in product(orders, SENSES)]
-    if not orders:
-        angles = product(("zyx", "xyz"), units, ((), (1, -1, 1)), SENSES)
-        attitudes = [
-            Attitude((), unit, signs=signs, euler=euler, sense=sense)
-            for euler, unit, signs, sense in angles
-        ]
+    ways = product(("zyx", "xyz"), units, ((), (1, -1, 1)), SENSES)
+    angles = [
+        Attitude((), unit, euler=e, signs=signs, sense=sense) for e, unit, signs, sense in ways
+    ]
+    attitudes = _quaternions(orders) or angles
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
     readings = _each(attitude=attitudes, frames=MAP_FRAMES, length=lengths)
     named = [
@@ -304,14 +295,13 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
 
 def applied(log: FlightLog, reading: Convention) -> FlightLog:
     """Return a log with the advice of a reading taken; the vehicle's spin is no part of a log."""
-    speeds, parts = np.empty_like(log.rotor_speeds), Data()
-    speeds[:, np.subtract(reading.rotors, 1)] = log.rotor_speeds
+    speeds, parts = log.rotor_speeds[:, np.argsort(reading.rotors)], Data()
     if reading.late:
         speeds = resampled(log.t + reading.late, log.t, speeds)
     if reading.gyro.says:
         assert log.gyro is not None
         parts["gyro"] = log.gyro @ reading.gyro.turn.T
-    if log.valid.any():
+    if log.has_pose:
         quaternion = np.full_like(log.quaternion, np.nan)
         good, turned = rotations(log.quaternion, reading)
         quaternion[good] = turned.as_quat(scalar_first=True)

@@ -21,13 +21,12 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.inertial_signals import inertial_pieces, reads_imu
 from ..motion.signals import SHORTEST_PIECE, pose_pieces
-from ..motion.smoothing import CUTOFFS, low_pass, runs_of
+from ..motion.smoothing import CUTOFFS, low_pass, runs_of, turn_between
 from .evidence import remedies
-from .excerpt import excerpt
 from .flight_log import MOTOR_RATES, FlightLog
-from .flight_phases import carrying, flying
+from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
-from .magnitudes import MAGNITUDES, equal_motors, rotor_doubt, thrust_by_weight, time_doubt, within
+from .magnitudes import MAGNITUDES, interpolated, motor_doubts, rotor_doubt, time_doubt, within
 from .table import Array, Mask, Names, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
@@ -56,23 +55,23 @@ _AT_LIMIT = 0.99  # share of the fastest rotor speed: a rotor at its limit stand
 _BEYOND = 20.0  # of the median rotor speed: the same where the vehicle states no fastest
 
 
-class Refused(str):
+class _Refused(str):
     """A reason against any use of the log."""
 
 
-class Needed(str):
+class _Needed(str):
     """A reason against a diagnosis, without meaning for an estimate."""
 
 
-class Fault(str):
+class _Fault(str):
     """A reason against a diagnosis, and a warning for an estimate."""
 
 
-class Note(str):
+class _Note(str):
     """A note."""
 
 
-Findings = Iterable[str]
+_Findings = Iterable[str]
 
 
 def screen_log(
@@ -103,21 +102,16 @@ def screen_log(
     source, by_imu = log.source or log.name or "log", reads_imu(log)
     notes = []
 
-    def hear(findings: Findings) -> None:
+    def hear(findings: _Findings) -> None:
         for text in findings:
             kind = type(text)
-            if kind is Refused or (kind is not Note and least_seconds is not None):
+            if kind is _Refused or (kind is not _Note and least_seconds is not None):
                 raise InputError(f"{source}: {text}")
-            if kind is not Needed:
-                notes.append(str(text) if kind is Note else f"warning: {text}")
+            if kind is not _Needed:
+                notes.append(str(text) if kind is _Note else f"warning: {text}")
 
     hear(_rotors(log, vehicle, by_imu))
-    above = log.rotor_speeds > _most_rad_s(log, vehicle)
-    if above.any():
-        speeds = log.rotor_speeds.copy()
-        for column, bad in zip(speeds.T, above.T, strict=True):
-            column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
-        log = replace(log, rotor_speeds=speeds)
+    log = interpolated(log, log.rotor_speeds > _most_rad_s(log, vehicle))
     if by_imu:
         hear(_imu(log, vehicle, least_seconds or 0.0))
     else:
@@ -125,12 +119,12 @@ def screen_log(
             hear(_uneven_steps(log))
         seen, same = np.flatnonzero(log.valid), np.zeros(len(log.t), np.bool_)
         pose = np.column_stack([log.position, log.quaternion])[seen]
-        same[seen[1:]] = np.all(pose[1:] == pose[:-1], axis=1)
+        same[seen[1:]] = ~np.diff(pose, axis=0).any(axis=1)
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
     doubt = convention_doubt(log, vehicle)
-    hear([doubt] if isinstance(doubt, Refused) else [])
+    hear([doubt] if isinstance(doubt, _Refused) else [])
     if not by_imu:
         hear(_steps(log))
         hear([] if least_seconds is None else _length(log, vehicle, least_seconds))
@@ -140,8 +134,8 @@ def screen_log(
 
 def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
     """Return the contradiction between a log's motion and its rotors, with the advice that leaves a
-    consistent log; empty: none, or nothing to tell from. A delay alone is a ``Fault``, all others
-    are ``Refused``.
+    consistent log; empty: none, or nothing to tell from. An estimate is refused for all but a
+    delay.
 
     Args:
         log: the flight.
@@ -150,82 +144,79 @@ def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
     by_imu = reads_imu(log)
     if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
         return ""
-    advice, mends = remedies(excerpt([log])[0], vehicle, by_imu)
+    advice, mends = remedies(log, vehicle, by_imu)
     says = "; or ".join(dict.fromkeys(reading.says for reading in advice))
     if all(reading.is_delay for reading in advice):
-        return Fault(says)
-    whose = "gyro contradicts the rotors' torques"
-    whose = whose if by_imu else "motion contradicts the rotor speeds and gravity"
+        return _Fault(says)
+    whose = "motion contradicts the rotor speeds and gravity"
+    if by_imu:
+        whose = "gyro contradicts the rotors' torques"
     unmended = "" if mends else ". No usual convention mends this log; the likeliest is named"
-    return Refused(f"{says}. As logged, the {whose}{unmended}")
+    return _Refused(f"{says}. As logged, the {whose}{unmended}")
 
 
-def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> Findings:
+def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     """Check for a motion, the declared vehicle, and four turning rotors at speeds (rad/s) for its
     weight.
     """
-    if not by_imu and not log.valid.any():
-        yield Refused(
+    if not by_imu and not log.has_pose:
+        yield _Refused(
             "no row has a pose; expected at least one to start from, or gyro and accelerometer "
             "(gx, gy, gz and ax, ay, az)"
         )
     if not log.has_rotor_speeds:
-        yield Refused(
+        yield _Refused(
             f"has motor commands and no rotor speeds, and the vehicle {vehicle.name} states no "
             "motor_curve; expected one, to turn commands into thrust"
         )
     if log.vehicle and log.vehicle != vehicle.name:
-        yield Note(
+        yield _Note(
             f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
         )
     speeds = log.rotor_speeds
     with np.errstate(over="ignore"):
         thrust = np.square(speeds) @ vehicle.k / vehicle.weight
-    most = float(np.quantile(thrust, 0.95))
+    most = np.quantile(thrust, 0.95)
     hover = f"rotor speeds in rad/s (about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
-    zero, all_four = "is 0 while the other rotors turn", "expected the rotor speeds of all four"
+    zero = "is 0 while the other rotors turn{}; expected the rotor speeds of all four"
     if most < _AT_REST:
         still = "omega1..omega4 are at rest all the time, so nothing flew"
-        yield Refused(f"{still}; expected {hover}")
+        yield _Refused(f"{still}; expected {hover}")
     if not np.isfinite(most):
-        yield Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
-    for i, column in enumerate(speeds[thrust > 0.3 * most].T):
-        if np.max(column) <= 0.0:
-            yield Refused(f"omega{i + 1} {zero}; {all_four}")
-    ratio = thrust_by_weight(speeds, vehicle)
+        yield _Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
+    for rotor in np.flatnonzero(speeds[thrust > 0.3 * most].max(axis=0) <= 0.0):
+        yield _Refused(f"omega{rotor + 1} {zero.format('')}")
+    ratio = usual_thrust(thrust)
     if doubt := rotor_doubt(ratio, vehicle):
-        yield Refused(doubt)
+        yield _Refused(doubt)
     if not within(ratio, MAGNITUDES.doubtful):
-        yield Note(
+        yield _Note(
             f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
             f"{vehicle.name}: is it this vehicle, and did it fly?"
         )
     least = MOTOR_RATES.force_hz if log.commanded else MOTOR_RATES.torque_hz
     if not MOTOR_RATES.serves(log.motor_rate, least):
         what = "motor commands" if log.commanded else "rotor speeds"
-        yield Needed(
+        yield _Needed(
             f"{what} come {log.motor_rate:.3g} times a second; expected at least {least:g}: what "
             "the rotors do between them is not known"
         )
     times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
     if doubt := time_doubt(median_step(times)):
-        yield Refused(doubt)
+        yield _Refused(doubt)
     carried = carrying(np.square(speeds).max(axis=1))
-    for i, column in enumerate(speeds.T):
-        if stopped := _stretches((column == 0.0) & carried, log.t, _STOPPED):
-            yield Fault(f"omega{i + 1} {zero}, for {stopped}; {all_four}")
-    most = _most_rad_s(log, vehicle)
-    if (above := np.argwhere(speeds > most)).size:
+    for i in range(4):
+        if stopped := _stretches((speeds[:, i] == 0.0) & carried, log.t, _STOPPED):
+            yield _Fault(f"omega{i + 1} {zero.format(f', for {stopped}')}")
+    fastest = _most_rad_s(log, vehicle)
+    if (above := np.argwhere(speeds > fastest)).size:
         row, rotor = above[0]
-        racing = (
+        kind = _Refused if (speeds > fastest).all(axis=0).any() else _Fault
+        yield kind(
             f"omega{rotor + 1} reads {speeds[row, rotor]:.4g} rad/s at t = {log.t[row]:.6g} s "
             f"({len(above)} such value(s)), faster than {vehicle.name} turns its rotors; expected "
-            f"at most {most:.4g} rad/s"
+            f"at most {fastest:.4g} rad/s: an estimate interpolates them"
         )
-        if (speeds > most).all(axis=0).any():
-            yield Refused(racing)
-        yield Needed(racing)
-        yield Fault(f"{racing}. They were interpolated")
 
 
 def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
@@ -234,7 +225,7 @@ def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
     return min(_ABOVE_MOST * vehicle.omega_max, _BEYOND * max(middle, vehicle.hover_rate))
 
 
-def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
+def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
     """Check rate, length, unit and axes of an IMU.
 
     Gravity shows the accelerometer's unit and axes, and the rotors the gyro's. An accelerometer
@@ -244,82 +235,82 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
     assert log.accelerometer is not None
     rows = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
     if len(rows) < LEAST_SAMPLES:
-        yield Refused(
+        yield _Refused(
             f"ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected them in "
             "the same rows, and a whole flight"
         )
     for names, x in (("ax, ay, az", log.accelerometer), ("gx, gy, gz", log.gyro)):
         if is_stuck(x[rows]):
-            yield Refused(f"{names} never change: the sensor was not read")
-    rate = 1.0 / median_step(log.t[rows])
-    rate = min(rate, *(log.rates.get(name, np.inf) for name in ("gyro", "accelerometer")))
+            yield _Refused(f"{names} never change: the sensor was not read")
+    known = (log.rates.get(name, np.inf) for name in ("gyro", "accelerometer"))
+    rate = min(1.0 / median_step(log.t[rows]), *known)
     if rate < _LEAST_IMU_HZ:
-        yield Refused(
+        yield _Refused(
             f"{rate:.3g} IMU readings a second and no pose as fast; expected at least "
             f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
         )
-    there = sum(log.t[piece[-1]] - log.t[piece[0]] for piece in inertial_pieces(log))
+    there = sum(np.ptp(log.t[piece]) for piece in inertial_pieces(log))
     if there < least - 1e-9:
-        yield Needed(
+        yield _Needed(
             f"{there:.3g} s of unbroken gyro and accelerometer; expected at least {least:g} s of "
             "flight, in runs of more than 3 s"
         )
     thrust = np.square(log.rotor_speeds[rows]) @ vehicle.k
     if doubt := gravity_doubt(log.accelerometer[rows[flying(thrust)]], vehicle.gravity):
-        yield Refused(f"ax, ay, az {doubt}")
+        yield _Refused(f"ax, ay, az {doubt}")
 
 
-def _new_poses(log: FlightLog, same: Mask) -> Findings:
+def _new_poses(log: FlightLog, same: Mask) -> _Findings:
     """Check the rate of new poses; ``same`` (N,): the pose is the one before, to the last digit."""
     seen = np.flatnonzero(log.valid)
-    if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(same[seen[1:]]):
-        yield Refused("the pose never changes, to the last digit; expected the poses of a flight")
+    if np.ptp(log.t[seen]) > _NEVER and same[seen[1:]].all():
+        yield _Refused("the pose never changes, to the last digit; expected the poses of a flight")
     fastest = np.square(log.rotor_speeds).max(axis=1)
     if held := _stretches((same & carrying(fastest))[seen], log.t[seen], _HELD):
-        yield Note(
+        yield _Note(
             f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
             "rotors turn. These rows count as without a pose"
         )
     times = log.t[log.valid & ~same]
     period = median_step(times) if len(times) > 1 else np.inf
     if period * _LEAST_RATE_HZ > _SLACK:
-        yield Needed(
+        yield _Needed(
             f"{1 / period:.3g} new poses a second; expected at least {_LEAST_RATE_HZ:g}: "
             "accelerations come from differences of poses that are low-passed at 15 Hz, and a "
             "quadrotor turns within a tenth of a second"
         )
 
 
-def _uneven_steps(log: FlightLog) -> Findings:
+def _uneven_steps(log: FlightLog) -> _Findings:
     """Check for even steps of the clock."""
     step = np.diff(log.t)
     median = np.median(step)
     uneven = np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median))
     words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
     if uneven > _UNEVEN_SHARE:
-        yield Refused(
+        yield _Refused(
             f"column t: time steps vary wildly, from {step.min():.3g} to {step.max():.3g} s, "
             f"{words}; expected the times at which the poses were taken, not those at which they "
             "arrived"
         )
     if uneven > _UNEVEN_NOTE:
-        yield Note(f"time steps are uneven: {words}")
+        yield _Note(f"time steps are uneven: {words}")
 
 
-def _steps(log: FlightLog) -> Findings:
+def _steps(log: FlightLog) -> _Findings:
     """Check for leaps of the pose beyond a quadrotor's speed, and for jumps of the clock."""
     seen = np.flatnonzero(log.valid)
     t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
     step = np.diff(t)
     way = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    angle = 2.0 * np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=1)), 0.0, 1.0))
+    angle = np.linalg.norm(turn_between(q[:-1], q[1:]), axis=1)
     far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
     leaps = far | turned
     if leaps.any():
         first = np.argmax(leaps)
         what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
         units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
-        kind = Refused if leaps.mean() > _MOST_LEAPS else Fault
+        kind = _Refused if leaps.mean() > _MOST_LEAPS else _Fault
         yield kind(
             f"the pose leaps by {what} within {step[first]:.3g} s at t = {t[first + 1]:.6g} s, "
             f"which no quadrotor flies ({leaps.sum()} such step(s)){units}; expected poses of "
@@ -327,16 +318,15 @@ def _steps(log: FlightLog) -> Findings:
         )
     # two poses as if no time had passed, by velocities over 10 poses on each side
     span = 10
-    for i in np.flatnonzero(step > _JUMP):
-        a, b = i - span, i + 1 + span
-        if a < 0 or b >= len(t) or t[i] - t[a] > _JUMP or t[b] - t[i + 1] > _JUMP:
-            continue
-        before = (position[i] - position[a]) / (t[i] - t[a])
-        after = (position[b] - position[i + 1]) / (t[b] - t[i + 1])
+    for i in span + np.flatnonzero(step[span:-span] > _JUMP):
+        begins, ends = [i - span, i + 1], [i, i + 1 + span]
+        seconds = t[ends] - t[begins]
+        before, after = (position[ends] - position[begins]) / seconds[:, None]
         speed = min(np.linalg.norm(before), np.linalg.norm(after))
         is_alike = np.linalg.norm(after - before) < 0.15 * speed + 0.05 and angle[i] < 0.05
-        if speed > _MOVING and is_alike and way[i] < _SAME * speed * 0.5 * step[i]:
-            yield Fault(
+        is_close = speed > _MOVING and way[i] < _SAME * speed * 0.5 * step[i]
+        if seconds.max() <= _JUMP and is_alike and is_close:
+            yield _Fault(
                 f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
                 f"where it was ({1e3 * way[i]:.0f} mm on at {speed:.2g} m/s); expected one clock "
                 "for the whole log: set the clock's jump back, or cut the log there"
@@ -344,27 +334,26 @@ def _steps(log: FlightLog) -> Findings:
             return
 
 
-def _length(log: FlightLog, vehicle: Vehicle, least: float) -> Findings:
+def _length(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
     """Check for enough flight in unbroken runs, and note large losses."""
     thrust = np.square(log.rotor_speeds) @ vehicle.k
     thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
     step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
-    step = np.where(carrying(thrust), step, 0.0)
+    step *= carrying(thrust)
     pieces = pose_pieces(log)
-    left = sum(float(step[piece[0] : piece[-1] + 1].sum()) for piece in pieces)
-    whole, runs = step.sum(), len(runs_of(~log.valid))
-    lost = (
-        f"the pose is lost in {runs} run(s), {np.count_nonzero(~log.valid)} of {len(log.t)} rows; "
-    )
-    words = f"{lost if runs else ''}{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of "
-    words += f"poses of more than {SHORTEST_PIECE:g} s"
+    left, whole = sum(step[piece[0] : piece[-1] + 1].sum() for piece in pieces), step.sum()
+    words = f"{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of poses of more than "
+    words += f"{SHORTEST_PIECE:g} s"
+    if lost := np.count_nonzero(~log.valid):
+        runs = len(runs_of(~log.valid))
+        words = f"the pose is lost in {runs} run(s), {lost} of {len(log.t)} rows; {words}"
     if not pieces or left < least - 1e-9:
-        yield Refused(f"{words}; expected at least {least:g} s")
+        yield _Refused(f"{words}; expected at least {least:g} s")
     if left < (1.0 - _LOST_SHARE) * whole:
-        yield Note(words)
+        yield _Note(words)
 
 
-def stuck_channels(log: FlightLog, vehicle: Vehicle) -> Findings:
+def stuck_channels(log: FlightLog, vehicle: Vehicle) -> _Findings:
     """Note hung sensors and repeated columns of rotor speeds. A hung sensor's channel stands still
     to the last digit for half a second or more in flight, while the other channels of its kind
     change.
@@ -374,24 +363,23 @@ def stuck_channels(log: FlightLog, vehicle: Vehicle) -> Findings:
     turning = (rotors > 0.0) & (rotors < (_AT_LIMIT * vehicle.omega_max or np.inf))
     place, turn, flown = log.position[seen], log.quaternion[seen], aloft[seen]
     for i in range(4):
-        others = np.delete(rotors, i, axis=1), "the other rotor speeds"
-        yield from _still(f"omega{i + 1}", log.t, aloft & turning[:, i], rotors[:, [i]], *others)
+        others = rotors[:, [i]], np.delete(rotors, i, axis=1), "the other rotor speeds"
+        yield from _still(f"omega{i + 1}", log.t, aloft & turning[:, i], *others)
     for i, axis in enumerate("xyz"):
-        others = np.delete(place, i, axis=1), "the other coordinates"
-        yield from _still(f"p{axis}", log.t[seen], flown, place[:, [i]], *others)
+        others = place[:, [i]], np.delete(place, i, axis=1), "the other coordinates"
+        yield from _still(f"p{axis}", log.t[seen], flown, *others)
     yield from _still("the attitude", log.t[seen], flown, turn, place, "the coordinates")
-    if alike := equal_motors(rotors):
-        yield Note(
-            "warning: the columns omega{} and omega{} are the same in every row: if one is written "
-            "under both names, force and torque are wrong".format(*alike)
-        )
+    said = (f"warning: {doubt}" for doubt in motor_doubts(log))
+    yield from (_Note(text) for text in said if text not in log.notes)
 
 
-def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, names: str) -> Findings:
+def _still(
+    name: str, t: Array, rows: Mask, channel: Array, sisters: Array, names: str
+) -> _Findings:
     """Note the stretches of rows (N,) with a still channel (N, k) and moving sisters (N, m), called
     ``names``.
     """
-    still = np.append(False, np.all(np.diff(channel, axis=0) == 0.0, axis=1)) & rows
+    still = rows & ~np.diff(channel, axis=0, prepend=np.nan).any(axis=1)
     changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
     for first, end in runs_of(still):
         lasts = t[end - 1] - t[first] >= _STILL
@@ -399,16 +387,14 @@ def _still(name: str, t: Array, rows: Mask, channel: Array, sisters: Array, name
             still[first:end] = False
     if stretches := _stretches(still, t, _STILL):
         wrong = "what depends on it there is wrong if its sensor hung"
-        yield Note(f"warning: {name} stands still for {stretches} while {names} change: {wrong}")
+        yield _Note(f"warning: {name} stands still for {stretches} while {names} change: {wrong}")
 
 
 def _stretches(rows: Mask, t: Array, least: float) -> str:
     """Return the longest run of rows (N,) of at least ``least`` s, and the number of such runs, in
     words, or nothing.
     """
-    runs = [(float(t[end - 1] - t[first]), float(t[first])) for first, end in runs_of(rows)]
-    long_runs = [run for run in runs if run[0] >= least]
-    if not long_runs:
-        return ""
-    seconds, begin = max(long_runs, key=lambda run: run[0])
-    return f"{seconds:.3g} s from t = {begin:.6g} s ({len(long_runs)} such stretch(es))"
+    runs = [(t[end - 1] - t[first], -t[first]) for first, end in runs_of(rows)]
+    count = sum(seconds >= least for seconds, _ in runs)
+    seconds, begin = max(runs, default=(0.0, 0.0))
+    return f"{seconds:.3g} s from t = {-begin:.6g} s ({count} such stretch(es))" if count else ""
