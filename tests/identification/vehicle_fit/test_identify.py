@@ -33,6 +33,7 @@ from windwrench.dynamics.vehicle import EffectSetting, ModelStatus, MotorCurve
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
 from windwrench.identification.causal_states import causal_states
 from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
+from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
