@@ -105,14 +105,14 @@ class Stream:
         """Return the values (M, K) at times (M,) in s: a sample's own at its time, else linear
         between its neighbours; NaN beyond the first and the last, and where samples are missing.
         """
-        if np.array_equal(t, self.t):
+        times = self.t
+        if np.array_equal(t, times):
             return self.values
-        out = resampled(t, self.t, self.values)
-        step = np.diff(self.t)
-        after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
-        there = step[after - 1] <= _SENSOR_GAP * np.median(step)
-        there |= (self.t[after] == t) | (self.t[after - 1] == t)
-        out[~there | (t < self.t[0]) | (t > self.t[-1])] = np.nan
+        out = resampled(t, times, self.values)
+        step = np.diff(times)
+        after = np.clip(np.searchsorted(times, t), 1, len(step))
+        there = (step[after - 1] <= _SENSOR_GAP * np.median(step)) | np.isin(t, times)
+        out[~there | (t < times[0]) | (t > times[-1])] = np.nan
         return out
 
 
@@ -225,19 +225,19 @@ def on_one_clock(
             notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
     groups, said = _of_piece(path, groups, piece)
     notes += said
-    out = []
-    for samples in groups:
+    for i, samples in enumerate(groups):
         rows, late = in_order(samples.t)
-        name = samples.topic or next(iter(samples.columns), "rows")
+        name, count = samples.topic or next(iter(samples.columns), "rows"), len(samples.t)
         if late:
-            notes.append(f"{name}: {late} of {len(samples.t)} rows were written late and sorted in")
-        if left := len(samples.t) - len(rows):
+            notes.append(f"{name}: {late} of {count} rows were written late and sorted in")
+        if left := count - len(rows):
             notes.append(
-                f"{name}: {left} of {len(samples.t)} samples repeat a time or have one that the "
-                "samples around them contradict, and were left out"
+                f"{name}: {left} of {count} samples repeat a time or have one that the samples "
+                "around them contradict, and were left out"
             )
-        out.append(samples if left == 0 and late == 0 else samples.cut(rows))
-    return out, list(dict.fromkeys(notes))
+        if late or left:
+            groups[i] = samples.cut(rows)
+    return groups, list(dict.fromkeys(notes))
 
 
 def _of_piece(
@@ -297,12 +297,12 @@ def in_order(t: Array) -> tuple[Rows, int]:
     Most rows are right: the longest increasing sequence is kept. A row outside the sequence is put
     at its time, if a row is missing there. The others have a wrong or a repeated time.
     """
-    increases = len(t) < 2 or bool(np.all(np.diff(t) > 0.0))
+    increases = np.all(np.diff(t) > 0.0)
     rows = np.arange(len(t)) if increases else _longest_increase(t)
     if len(rows) > 3:  # a first or a last one far off all others is left out
         steps = np.diff(t[rows])
-        far = max(_ALONE * np.median(steps), _JITTER)
-        rows = rows[int(steps[0] > far) : len(rows) - int(steps[-1] > far)]
+        first, last = steps[[0, -1]] > max(_ALONE * np.median(steps), _JITTER)
+        rows = rows[int(first) : len(rows) - int(last)]
     if increases or len(rows) < 2:
         return rows, 0
     steps = np.diff(t[rows])
@@ -473,8 +473,8 @@ def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
     are in all rows alike.
     """
     there = {n: samples.there(part) for n, part in log_map.sections.items() if samples.has(part)}
-    base = next((name for name in ("position", "gyro") if name in there), "")
-    if not base:
+    base = "position" if "position" in there else "gyro"
+    if base not in there:
         return False
     placed = there.pop(base)
     turned = there.get("attitude", placed)

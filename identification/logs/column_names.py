@@ -17,9 +17,7 @@ WORDS: Data = read_yaml(Path(__file__).with_name("column_words.yaml"), "words")
 _UNITS: dict[str, str] = {
     word: unit for unit, spellings in WORDS["units"].items() for word in spellings
 }
-_PLAIN = "|".join(
-    word for word, unit in _UNITS.items() if unit and re.fullmatch(r"\w+", word, re.A)
-)
+_PLAIN = "|".join(word for word in _UNITS if _UNITS[word] and re.fullmatch(r"\w+", word, re.A))
 _ENDING = re.compile(rf"[_ ]({_PLAIN})$", re.IGNORECASE)
 _BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()\d][^\[\]()]*?)\s*[\])]\s*$")
 
@@ -86,34 +84,33 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
     families: dict[tuple[str, bool], dict[str, Name]] = {}
     names = list(names)
     bases = {name.base for name in names}
-    before = "(?<!\\d)" if endings[0].isdigit() else "_"
+    numbered = endings[0].isdigit()
+    before = "(?<!\\d)" if numbered else "_"
     for name in names:
+        base = name.base
         for ending in endings:
             for key, behind in (
-                (name.base.removesuffix(ending), True),
-                (name.base.removeprefix(ending), False),
-                (re.sub(rf"{before}{ending}_(?=.)", "_", name.base, count=1), True),
+                (base.removesuffix(ending), True),
+                (base.removeprefix(ending), False),
+                (re.sub(rf"{before}{ending}_(?=.)", "_", base, count=1), True),
             ):
-                if key == name.base or key == "_" or (not behind and key[:1] not in ("_", "")):
+                if key in (base, "_") or (not behind and key[:1] not in ("_", "")):
                     continue
-                if key[-1:].isdigit() and behind and endings[0].isdigit():
+                if key[-1:].isdigit() and behind and numbered:
                     continue
                 families.setdefault((key.strip("_"), behind), {}).setdefault(ending, name)
+    unwanted = WORDS["not_measured"] + ("" if numbered else f"|{WORDS['sticks']}")
+    more = "3" if endings[-1] == "2" else "0" if endings[0] == "1" else ""
     out = []
     for (key, _), members in families.items():
-        more = "3" if endings[-1] == "2" else "0" if endings[0] == "1" else ""
         if more and {key + more, f"{key}_{more}"} & bases:
             continue  # three of four, or four of five
-        if len(members) == len(endings):
+        if len(members) == len(endings) and not re.search(unwanted, key):
             named = [members[ending] for ending in endings]
             units = {name.unit for name in named}
-            unit = units.pop() if len(units) == 1 else ""
-            group = Group(tuple(name.column for name in named), key, unit, tuple(endings))
-            if group not in out:
-                out.append(group)
-    wanted = WORDS["not_measured"]
-    wanted += "" if endings[0].isdigit() else f"|{WORDS['sticks']}"
-    return [group for group in out if not re.search(wanted, group.key)]
+            unit = "" if units - {named[0].unit} else named[0].unit
+            out.append(Group(tuple(name.column for name in named), key, unit, tuple(endings)))
+    return list(dict.fromkeys(out))
 
 
 def named_alone(names: Sequence[Name], part: str) -> list[Name]:

@@ -122,19 +122,19 @@ def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]
     notes.
     """
     square = np.linalg.solve(vehicle.mixing, wrench.T).T
-    limit = vehicle.omega_max**2
+
     notes = [
         "no rotor speeds in the log: commanded thrust and torques were converted into rotor speeds "
         f"by the inverse of the rotor mixing of {vehicle.name}, clipped at zero and at omega_max. "
         "What the firmware's thrust curve, the battery and the motors made of the command is not "
         "in the log; a constant factor on thrust remains unknown"
     ]
-    clipped = np.count_nonzero(np.any((square < 0.0) | (square > limit), axis=1))
-    if clipped:
+    within_reach = np.clip(square, 0.0, vehicle.omega_max**2)
+    if clipped := np.count_nonzero(np.any(square != within_reach, axis=1)):
         notes.append(
             f"the commands of {clipped} sample(s) were out of the rotors' reach and were clipped"
         )
-    return np.sqrt(np.clip(square, 0.0, limit)), notes
+    return np.sqrt(within_reach), notes
 
 
 def _polynomial(coefficients: Sequence[float]) -> str:

@@ -126,10 +126,10 @@ class FlightLog:
                 object.__setattr__(self, name, np.where(read[:, None], x, np.nan))
 
     def __repr__(self) -> str:
-        times = f", {self.t[0]:.3g} to {self.t[-1]:.3g} s" if len(self.t) else ""
+        t = self.t
+        times = f", {t[0]:.3g} to {t[-1]:.3g} s" if len(t) else ""
         whose = f", of {self.vehicle}" if self.vehicle else ""
-        name = self.name or "without a name"
-        return f"<{type(self).__name__} {name}: {len(self.t)} samples{times}{whose}>"
+        return f"<FlightLog {self.name or 'without a name'}: {len(t)} samples{times}{whose}>"
 
     @property
     def has_pose(self) -> bool:
@@ -144,7 +144,7 @@ class FlightLog:
     @property
     def motor_rate(self) -> float:
         """Rate of measured rotor speeds, else of commands, Hz."""
-        names = ("commands", "wrench") if self.commanded else ("rotors", "commands", "wrench")
+        names = ("rotors", "commands", "wrench")[self.commanded :]
         return next((self.rates[name] for name in names if name in self.rates), np.inf)
 
     @property
@@ -281,18 +281,22 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
 
 def parts_of(log: FlightLog) -> list[tuple[Names, Array]]:
     """Return a log's channels (N, k), with their columns' names in a file."""
-    pose = np.where(log.valid[:, None], np.column_stack([log.position, log.quaternion]), np.nan)
-    parts: list[tuple[Names, Array | None]] = [(("t",), log.t)]
-    if log.has_pose or log.accelerometer is None or log.gyro is None:
-        parts.append((POSE, pose))
-    elif np.isfinite(log.position).any():
-        parts.append((POSE[:3], log.position))
-    if log.has_rotor_speeds or log.command is None:
-        parts.append((ROTORS, log.rotor_speeds))
-    parts += [(COMMANDS, log.command), (("vbat",), log.voltage)]
-    if log.force is not None and log.torque is not None:
-        parts.append((TRUTH, np.column_stack([log.force, log.torque])))
-    parts += [(ACCELEROMETER, log.accelerometer), (GYRO, log.gyro)]
+    speeds, command, force, torque = log.rotor_speeds, log.command, log.force, log.torque
+    accelerometer, gyro, pose = log.accelerometer, log.gyro, log.position
+    is_whole = log.has_pose or accelerometer is None or gyro is None
+    if is_whole:
+        pose = np.column_stack([pose, log.quaternion])
+        pose[~log.valid] = np.nan
+    parts: list[tuple[Names, Array | None]] = [
+        (("t",), log.t),
+        (POSE[: pose.shape[1]], pose if is_whole or np.isfinite(pose).any() else None),
+        (ROTORS, speeds if log.has_rotor_speeds or command is None else None),
+        (COMMANDS, command),
+        (("vbat",), log.voltage),
+        (TRUTH, None if force is None or torque is None else np.column_stack([force, torque])),
+        (ACCELEROMETER, accelerometer),
+        (GYRO, gyro),
+    ]
     return [(names, values) for names, values in parts if values is not None]
 
 

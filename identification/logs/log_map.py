@@ -84,12 +84,11 @@ EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 def _known(value: Any, known: Collection[str], what: str) -> str:
     """Return a value as one of the known words, in any case or spelling."""
-    lower = {name.lower(): name for name in known}
     text = str(value).lower()
-    word = lower.get(text) or lower.get(unit_spelled(text).lower())
-    if word is None:
-        raise unknown_name(what, str(value), known)
-    return word
+    for name in known:
+        if name.lower() in (text, unit_spelled(text).lower()):
+            return name
+    raise unknown_name(what, str(value), known)
 
 
 def one_of(known: Collection[str]) -> BeforeValidator:
@@ -98,8 +97,7 @@ def one_of(known: Collection[str]) -> BeforeValidator:
 
 
 def _two_levels(given: Pair) -> Pair:
-    if given[0] == given[1]:
-        raise ValueError("the same")
+    _not_zero(given[1] - given[0])
     return given
 
 
@@ -143,8 +141,7 @@ class Columns:
     @property
     def label(self) -> str:
         """The columns' common name: their topic, else the first of them."""
-        several = " ..." if len(self.columns) > 1 else ""
-        return self.topic or f"{self.columns[0]}{several}"
+        return self.topic or self.columns[0] + " ..." * (len(self.columns) > 1)
 
     @property
     def named(self) -> list[str]:
@@ -173,10 +170,9 @@ class TimeColumn:
 
     def raw(self, columns: ArrayMap) -> Array:
         """Return times (N,) in its unit."""
-        raw = columns[self.column]
         if not self.nanoseconds:
-            return raw
-        return raw + 1e-9 / UNITS["time"][self.unit] * columns[self.nanoseconds]
+            return columns[self.column]
+        return columns[self.column] + 1e-9 / UNITS["time"][self.unit] * columns[self.nanoseconds]
 
 
 @dataclass(frozen=True)
@@ -249,15 +245,16 @@ def _section(count: int, units: Collection[str] = ()) -> WrapValidator:
                 given["columns"] = [given.pop("column")]
             given.setdefault("columns", [])
         part = inner(given)
-        quaternion = isinstance(part, Attitude) and not part.euler
-        needed = 3 if isinstance(part, Attitude) and part.euler else count
-        if len(part.columns) != (needed or max(1, len(part.columns))):
+        is_euler = isinstance(part, Attitude) and part.euler
+        needed, found = 3 if is_euler else count, len(part.columns)
+        if found != (needed or max(1, found)):
             words = {0: "some columns", 1: "one column"}.get(needed, f"a list of {needed} columns")
             raise ValueError(f"must have {words} of the table, got {list(part.columns)!r:.100}")
-        if part.signs and len(part.signs) != len(part.columns):
-            count_words = f"{len(part.columns)} times 1 or -1"
-            raise ValueError(f"must have signs of {count_words}, got {list(part.signs)!r:.100}")
-        if units and not (quaternion and not part.unit):
+        if len(part.signs) not in (0, found):
+            raise ValueError(
+                f"must have signs of {found} times 1 or -1, got {list(part.signs)!r:.100}"
+            )
+        if units and (part.unit or is_euler or not isinstance(part, Attitude)):
             part = replace(part, unit=_known(part.unit or next(iter(units)), units, "unit"))
         if part.unit == "raw" and "scale" not in stated:
             raise ValueError("has unit raw without a scale; expected the scale to SI units")
@@ -312,8 +309,7 @@ class LogMap:
     @property
     def sections(self) -> dict[str, Columns]:
         """The sections of the map, without the time."""
-        parts = {name: getattr(self, name) for name in SECTIONS}
-        return {name: part for name, part in parts.items() if part is not None}
+        return {name: part for name in SECTIONS if (part := getattr(self, name)) is not None}
 
     @property
     def is_own(self) -> bool:
@@ -340,8 +336,8 @@ class LogMap:
     def wanted(self) -> list[str]:
         """The map's columns, each once."""
         parts = [way for section in self.sections for way in self.ways(section)]
-        names = [name for part in (*parts, *self.extra.values()) for name in part.named]
-        return [name for name in dict.fromkeys([*names, *self.time.named]) if name]
+        parts += [*self.extra.values(), self.time]
+        return list(dict.fromkeys(name for part in parts for name in part.named if name))
 
     @property
     def topics(self) -> set[str]:
@@ -386,23 +382,23 @@ def load_map(name: str | Path) -> LogMap:
         InputError: the name is unknown, the file is no map, or leaves a field open; the message
             says where, and the expected value.
     """
-    path = Path(name)
-    if str(name) in map_names():
-        return shipped_map(str(name))
+    path, known = Path(name), map_names()
+    if (text := str(name)) in known:
+        return shipped_map(text)
     if path.suffix.lower() not in (".yaml", ".yml") and not path.exists():
-        raise unknown_name("map", str(name), [*map_names(), "the path of a YAML file"])
+        raise unknown_name("map", text, [*known, "the path of a YAML file"])
     content = read_yaml(path, "a map file")
     for section, part in content.items() if isinstance(content, Mapping) else ():
         for field_name, value in part.items() if isinstance(part, Mapping) else ():
-            if UNKNOWN in (value if isinstance(value, list) else [value]):
+            if value == UNKNOWN or (isinstance(value, list) and UNKNOWN in value):
                 # a comment beside the field holds the candidates
                 text = path.read_text(encoding="utf-8-sig")
-                noted = re.search(rf"^# choose {section}\.{field_name}: (.*)$", text, re.MULTILINE)
+                noted = re.search(rf"(?m)^# choose {section}\.{field_name}: (.*)$", text)
                 raise InputError(
                     f"{path}: {section}.{field_name} is still {UNKNOWN}; expected "
                     f"{noted[1] if noted else 'columns of the table'}"
                 )
-    return parse_map(content, str(path), str(path))
+    return parse_map(content, str(path))
 
 
 @cache
@@ -450,21 +446,21 @@ def parse_map(value: object, where: str, name: str = "") -> LogMap:
 
 def check_whole(log_map: LogMap, where: str) -> None:
     """Raise InputError where a map's sections are not enough for a flight log."""
-    has_imu = log_map.accelerometer is not None and log_map.gyro is not None
-    if (log_map.position is None) != (log_map.attitude is None) and not (
-        log_map.is_own and has_imu
-    ):
-        missing = "attitude" if log_map.attitude is None else "position"
+    there = set(log_map.sections)
+    has_imu = {"accelerometer", "gyro"} <= there
+    pose = {"position", "attitude"} & there
+    if len(pose) == 1 and not (log_map.is_own and has_imu):
+        (missing,) = {"position", "attitude"} - pose
         raise InputError(
             f"{where}: no section {missing}; expected position and attitude, or neither where "
             "accelerometer and gyro are there"
         )
-    if log_map.position is None and not has_imu and not log_map.extra:
+    if "position" not in there and not has_imu and not log_map.extra:
         raise InputError(
             f"{where}: no pose and no IMU; expected the sections position and attitude, or "
             "accelerometer and gyro"
         )
-    if log_map.rotors is None and log_map.commands is None and log_map.wrench is None:
+    if there.isdisjoint(("rotors", "commands", "wrench")):
         raise InputError(f"{where}: no motors; expected a section rotors or commands")
-    if (log_map.force is None) != (log_map.torque is None):
+    if len({"force", "torque"} & there) == 1:
         raise InputError(f"{where}: force and torque come together; expected both or neither")

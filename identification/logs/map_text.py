@@ -13,13 +13,15 @@ def map_yaml(guess: Guess) -> str:
     columns to choose from for each ``?``.
     """
     m = guess.log_map
-    sections: Data = {"vehicle": m.vehicle} if m.vehicle else {}
-    if m.time.column:
-        sections["time"] = {"column": m.time.column, "unit": m.time.unit}
-        if m.time.nanoseconds:
-            sections["time"]["nanoseconds"] = m.time.nanoseconds
-    sections |= {"world": m.world, "body": m.body}
-    sections |= {name: _fields(part) for name, part in m.sections.items()}
+    time = {name: getattr(m.time, name) for name in ("column", "unit", "nanoseconds")}
+    sections: Data = {
+        "vehicle": m.vehicle,
+        "time": {name: value for name, value in time.items() if value and m.time.column},
+        "world": m.world,
+        "body": m.body,
+        **{name: _fields(part) for name, part in m.sections.items()},
+    }
+    sections = {name: value for name, value in sections.items() if value}
     lines = ["# A map of this table's columns. What is marked GUESS: check it."]
     if guess.missing:
         lines.append(f"# {UNKNOWN}: choose, and write it here. Still missing: {guess.lacks}")
@@ -27,12 +29,16 @@ def map_yaml(guess: Guess) -> str:
         several = [UNKNOWN] * (4 if lack.section in ("attitude", "rotors") else 3)
         sections[lack.section] = {lack.field: several if lack.field == "columns" else UNKNOWN}
     for name, value in sections.items():
-        for r in (r for r in guess.reasons if r.section == name):
-            mark = "certain" if r.certain else "GUESS"
-            lines.append(f"# {mark}: {f'{r.field}: ' if r.field else ''}{r.why}")
-        for lack in (lack for lack in guess.missing if lack.section == name):
-            listed = "; ".join(lack.candidates) or "columns of the table"
-            lines.append(f"# choose {name}.{lack.field}: {listed}")
+        lines += [
+            f"# {'certain' if r.certain else 'GUESS'}: {f'{r.field}: ' if r.field else ''}{r.why}"
+            for r in guess.reasons
+            if r.section == name
+        ]
+        lines += [
+            f"# choose {name}.{lack.field}: {'; '.join(lack.candidates) or 'columns of the table'}"
+            for lack in guess.missing
+            if lack.section == name
+        ]
         flow = False if isinstance(value, str) else None
         text = yaml.safe_dump(
             {name: value}, default_flow_style=flow, sort_keys=False, width=1000, allow_unicode=True
@@ -53,7 +59,7 @@ def _fields(part: Columns) -> Data:
     if isinstance(part, Battery):
         fields = {"column": fields.pop("columns")[0], **fields}
     if isinstance(part, Rotors | Commands):
-        fields["order"] = [*order_names(part.order), list(part.order)][0]
+        fields["order"] = [*order_names(part.order), fields["order"]][0]
     if fields.get("euler"):
         del fields["order"]  # a quaternion's
     return fields

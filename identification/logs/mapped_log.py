@@ -55,7 +55,7 @@ from .log_map import (
     Rotors,
     check_whole,
 )
-from .table import Array, Mask, Names, Table, finite_rows, median_step
+from .table import Array, Mask, Table, finite_rows, median_step
 from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
 
 _SHOWN = 30  # columns in an error
@@ -240,7 +240,8 @@ def motors_left_out(names: Sequence[str], used: Collection[str]) -> list[str]:
         if re.search(words, group.key) and not re.search(WORDS["sticks"], group.key)
         if not {*group.columns} & {*used}
     }
-    return [f"columns named as motors' were left out: {', '.join([*left][:_SHOWN])}"] * bool(left)
+    listed = ", ".join([*left][:_SHOWN])
+    return [f"columns named as motors' were left out: {listed}"] if left else []
 
 
 def _pose(
@@ -347,7 +348,7 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
     """
     low, high = part.range or (0.0, 1.0)
     u = commands.values[np.isfinite(commands.values)]
-    if np.mean((u < -0.01) | (u > 1.01)) > _OUTSIDE if u.size else False:
+    if np.count_nonzero((u < -0.01) | (u > 1.01)) > _OUTSIDE * len(u):
         raw = low + (high - low) * u
         what, hint = ("", ": state the range in the map")
         if u.max() < 0.0 and part.topic:  # an autopilot knows its range
@@ -358,7 +359,7 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
         )
     notes = []
     if not log_map.is_own:
-        is_said = bool(part.note) or (low, high) == (0.0, 1.0)
+        is_said = part.note or (low, high) == (0.0, 1.0)
         taken = "" if is_said else f"{low:g} to {high:g} taken as 0 to 1, "
         notes.append(f"commands: {commands.name}, {part.unit}, {taken}{_order_note(part.order)}")
     if outside := np.count_nonzero((u < -1e-9) | (u > 1.0 + 1e-9)):
@@ -462,15 +463,16 @@ def _is_measured(section: str, way: Columns, samples: ChannelGroup, rows: str) -
     """
     values = samples.values(way)
     values = values[finite_rows(values)]
+    told = values != 0.0
     if isinstance(way, Attitude) and not way.euler:
-        return bool(np.any(np.linalg.norm(values, axis=1) > NO_QUATERNION))
-    if section == "battery":
-        return bool(np.any(values > 0.0))
-    if section == "rotors":
-        return bool(np.any(values))
-    if section == "position" and rows != "messages" and len(values):
-        return bool(np.any(np.ptp(values, axis=0) > 0.0))
-    return len(values) > 1
+        told = np.linalg.norm(values, axis=1) > NO_QUATERNION
+    elif section == "battery":
+        told = values > 0.0
+    elif section == "position" and rows != "messages" and len(values):
+        told = np.ptp(values, axis=0) > 0.0
+    elif section != "rotors":
+        return len(values) > 1
+    return bool(told.any())
 
 
 def flight_log(
@@ -502,125 +504,122 @@ def flight_log(
     log_map, streams, extra, said = sections
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
     made, words = _cleaned(path, streams)
-    notes = (*said, *words)
-    sensors = {name: made[name] for name in ("gyro", "accelerometer") if name in made}
+    notes = [*said, *words]
     kind = next(name for name in _MOTORS if name in made)
-    motors = made[kind].whole()
-    t, pose, words = _rows(path, made.get("position"), motors, [*sensors.values()])
+    motors, sensor = made[kind].whole(), made.get("gyro", made.get("accelerometer"))
+    t, pose, words = _rows(path, made.get("position"), motors, sensor)
     notes += words
     after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
     steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
     if (longest := steps.max(initial=0.0)) > _ROTOR_GAP:
-        notes += (
+        notes.append(
             f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
-            "are interpolated",
+            "are interpolated"
         )
     valid = finite_rows(pose)
     if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
         pose[~valid] = np.nan
     pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
-    speeds = np.full((len(t), 4), np.nan)
-    if "rotors" in made:
-        speeds = made["rotors"].at(t)
-    elif kind == "wrench" and vehicle is not None:
-        speeds, wrench_notes = speeds_of_wrench(made["wrench"].at(t), vehicle)
-        notes += tuple(wrench_notes)
-    measured = {name: x for name, s in sensors.items() if np.isfinite(x := s.between(t)).any()}
-    truth = {name: made[name].at(t) for name in ("force", "torque") if name in made}
+    there = {
+        name: stream.between(t) if name in _IMU else stream.at(t)
+        for name, stream in made.items()
+        if name != "position"
+    }
+    measured = {name: x for name, x in there.items() if name in _IMU and np.isfinite(x).any()}
+    speeds = there.get("rotors", np.full((len(t), 4), np.nan))
+    if kind == "wrench" and vehicle is not None:
+        speeds, words = speeds_of_wrench(there["wrench"], vehicle)
+        notes += words
     times = t - t[0] if log_map.time.offset is None else t
     notes += time_notes(times)
     without = np.count_nonzero(~valid) if valid.any() else 0
     if without and measured:  # the sensor may be faster than the pose
-        notes += tuple(f"of the pose: {text}" for text in time_notes(times[valid]))
+        notes += [f"of the pose: {text}" for text in time_notes(times[valid])]
     elif without:
         first = times[np.argmin(valid)]
-        notes += (f"{without} of {len(t)} rows without a pose, the first at t = {first:.6g} s",)
+        notes.append(f"{without} of {len(t)} rows without a pose, the first at t = {first:.6g} s")
     log = FlightLog(
         times,
         pose[:, :3],
         pose[:, 3:],
         speeds,
-        voltage=made["battery"].at(t)[:, 0] if "battery" in made else None,
+        voltage=there["battery"][:, 0] if "battery" in there else None,
+        force=there.get("force"),
+        torque=there.get("torque"),
         name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
         source=f"{path} (reader {reader})" if reader else str(path),
-        notes=notes,
+        notes=tuple(notes),
         valid=valid,
         extra={n: x if (x := s.between(t)).shape[1] > 1 else x[:, 0] for n, s in extra.items()},
         commanded=kind == "wrench",
-        command=made["commands"].at(t) if "commands" in made else None,
+        command=there.get("commands"),
         vehicle=log_map.vehicle,
         flown=flown,
         rates={name: source_rate(s.t, s.values) for name, s in made.items()},
         **measured,
-        **truth,
     )
     return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
-def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Stream], Names]:
+def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Stream], list[str]]:
     """Return the streams with values, within a flight's limits, and notes.
 
     Raises:
         InputError: too few samples, or an infinite rotor speed.
     """
-    made: dict[str, Stream] = {}
-    notes: Names = ()
-    for name, stream in streams.items():
-        if name in ("position", *_MOTORS) and len(stream.t) < 2:
-            raise InputError(
-                f"{path}: {stream.name}: {len(stream.t)} message(s); expected at least two"
-            )
-        values = stream.values
-        if name == "rotors" and np.isinf(values).any():
+    made, notes = {}, []
+    for section, stream in streams.items():
+        name, values, count = stream.name, stream.values, len(stream.t)
+        if section in ("position", *_MOTORS) and count < 2:
+            raise InputError(f"{path}: {name}: {count} message(s); expected at least two")
+        if section == "rotors" and np.isinf(values).any():
             row, rotor = np.argwhere(np.isinf(values))[0]
             raise InputError(
-                f"{path}: {stream.name}, message {row + 1}: the rotor speed of rotor "
+                f"{path}: {name}, message {row + 1}: the rotor speed of rotor "
                 f"{rotor + 1} is {values[row, rotor]}; expected a finite number"
             )
-        if name in _MOTORS and readable(stream) is None:
+        if section in _MOTORS and readable(stream) is None:
             raise InputError(
-                f"{path}: {stream.name}: no two samples have four finite {_MOTORS[name]}; "
-                "expected some"
+                f"{path}: {name}: no two samples have four finite {_MOTORS[section]}; expected some"
             )
-        if name == "rotors":
+        if section == "rotors":
             if np.any(values < 0.0):
-                notes += (f"{stream.name}: negative rotor speeds were taken as positive",)
+                notes.append(f"{name}: negative rotor speeds were taken as positive")
             values = np.abs(values)
-        elif name == "commands":
+        elif section == "commands":
             values = np.clip(values, 0.0, 1.0)
-        elif name == "battery":
+        elif section == "battery":
             plausible = (values >= LEAST_VOLTS) & (values <= MOST_VOLTS)
             wrong = values[~plausible & (values > 0.0)]
             if len(wrong):
-                notes += (
-                    f"{stream.name}: {len(wrong)} of {len(values)} voltages, {wrong.min():.3g} to "
-                    f"{wrong.max():.3g} V, are none of a vehicle's battery; left out",
+                notes.append(
+                    f"{name}: {len(wrong)} of {count} voltages, {wrong.min():.3g} to "
+                    f"{wrong.max():.3g} V, are none of a vehicle's battery; left out"
                 )
             values = np.where(plausible, values, np.nan)
-        elif name in _IMU:
+        elif section in _IMU:
             values = np.where(finite_rows(values)[:, None], values, np.nan)
-        if name == "position" or (np.isfinite(values).any() and len(values) > 1):
-            made[name] = Stream(stream.name, stream.t, values)
-        elif name == "battery" and not np.any(values > 0.0):
-            notes += (f"{stream.name}: no positive voltage; left out",)
+        if section == "position" or (np.isfinite(values).any() and count > 1):
+            made[section] = Stream(name, stream.t, values)
+        elif section == "battery" and not np.any(values > 0.0):
+            notes.append(f"{name}: no positive voltage; left out")
     return made, notes
 
 
 def _rows(
-    path: Path, pose: Stream | None, motors: Stream, sensors: Sequence[Stream]
-) -> tuple[Array, Array, Names]:
+    path: Path, pose: Stream | None, motors: Stream, sensor: Stream | None
+) -> tuple[Array, Array, list[str]]:
     """Return the rows' times (M,) in s, the poses (M, 7) in them, NaN where there is none, and
     notes.
 
     Raises:
         InputError: fewer than two rows lie within the span of the motors' stream.
     """
-    sensor = sensors[0] if sensors else None
-    own = sensor is not None and (
+    of_sensor = sensor is not None and (
         pose is None or median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0
     )
     begin, end = motors.t[0], motors.t[-1]
-    for stream in (pose, sensor if own else None):  # both must meet the motors
+    for stream in (pose, sensor if of_sensor else None):  # both must meet the motors
         if stream is None:
             continue
         inside = (stream.t >= begin) & (stream.t <= end)
@@ -631,22 +630,22 @@ def _rows(
                 "over the same flight"
             )
         t = stream.t[inside]
-    if sensor is None or not own:
+    if sensor is None or not of_sensor:
         assert pose is not None
-        return t, pose.values[inside], ()
+        return t, pose.values[inside], []
     rows = f"rows are those of {sensor.name}, {1.0 / median_step(sensor.t):.4g} Hz"
     placed = np.full((len(t), 7), np.nan)
     if pose is None:
-        return t, placed, (rows,)
-    seen = pose.whole()
-    if len(seen.t) >= 2:
-        near = np.clip(np.searchsorted(t, seen.t), 1, len(t) - 1)
-        near -= seen.t - t[near - 1] < t[near] - seen.t
-        reach = max(0.6 * median_step(t), 0.5 * median_step(seen.t) / _OWN_ROWS)
-        near = np.unique(near[np.abs(t[near] - seen.t) <= reach])
-        near = near[(t[near] >= seen.t[0]) & (t[near] <= seen.t[-1])]
-        placed[near, :3] = resampled(t[near], seen.t, seen.values[:, :3])
-        placed[near, 3:] = slerp(t[near], replace(seen, values=seen.values[:, 3:]))
+        return t, placed, [rows]
+    if (seen := readable(pose)) is not None:
+        own, values = seen.t, seen.values
+        near = np.clip(np.searchsorted(t, own), 1, len(t) - 1)
+        near -= own - t[near - 1] < t[near] - own
+        reach = max(0.6 * median_step(t), 0.5 * median_step(own) / _OWN_ROWS)
+        near = np.unique(near[np.abs(t[near] - own) <= reach])
+        near = near[(t[near] >= own[0]) & (t[near] <= own[-1])]
+        placed[near, :3] = resampled(t[near], own, values[:, :3])
+        placed[near, 3:] = slerp(t[near], replace(seen, values=values[:, 3:]))
     rate = 1.0 / median_step(pose.t)
     rows += f"; the pose of {pose.name}, {rate:.4g} Hz, stands in the nearest of them"
-    return t, placed, (rows,)
+    return t, placed, [rows]

@@ -8,18 +8,19 @@ Files of more than ``MOST_BYTES`` unpacked are refused before an array is made. 
 process's memory refuses other demands of a spoiled file.
 """
 
+import struct
 import sys
 import warnings
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib import import_module
 from typing import Any, BinaryIO
 
 import numpy as np
 from scipy.io import loadmat
 
-_HEADER = 128  # bytes of a file of version 5 to 7
-_BIG, _LITTLE = b"MI", b"IM"  # its last two
+_HEADER = 128  # bytes of a file of version 5 to 7; the last two state the order of bytes
 _PACKED = 15  # type of a packed element
 _PIECE = 2**16  # bytes packed or unpacked at a time
 
@@ -30,11 +31,10 @@ def check_unpacked(data: BinaryIO, most: int) -> None:
     Raises:
         ValueError: they do not, or are spoiled.
     """
-    begin = data.read(_HEADER)
-    order = {_BIG: "big", _LITTLE: "little"}.get(begin[-2:])
+    order = {b"MI": ">", b"IM": "<"}.get(data.read(_HEADER)[-2:])
     left = most
     while order and len(tag := data.read(8)) == 8:
-        kind, size = (int.from_bytes(tag[i : i + 4], order) for i in (0, 4))  # type: ignore[arg-type]
+        kind, size = struct.unpack(f"{order}II", tag)
         if kind != _PACKED:
             left -= size
             data.seek(size, 1)
@@ -63,11 +63,9 @@ def main() -> None:
     """Read and write."""
     warnings.simplefilter("ignore")
     most, memory = map(int, sys.argv[1:])
-    try:
+    with suppress(ImportError):  # Windows
         import resource
-    except ImportError:  # Windows
-        pass
-    else:
+
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     data = sys.stdin.buffer
     data.seek(0)  # the caller has read the file's start

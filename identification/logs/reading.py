@@ -6,6 +6,7 @@ import os
 import re
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
@@ -122,7 +123,7 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     of_units = unit_doubts(log, vehicle)
     log, moved = on_one_clock(log, vehicle)
     log, wrong = check_inertial(log, vehicle)
-    doubts = [*broken, *moved, *wrong, *of_units]
+    doubts = (*broken, *moved, *wrong, *of_units)
     for doubt in doubts:
         warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
@@ -132,9 +133,9 @@ def is_own(header: Sequence[str]) -> bool:
     """Return whether a table has this kit's own columns: a time; a pose, or an inertial sensor; and
     rotor speeds or motor commands. Further rules are in the map.
     """
-    there = set(header)
-    moves = set(POSE) <= there or {*ACCELEROMETER, *GYRO} <= there
-    return "t" in there and moves and (set(ROTORS) <= there or set(COMMANDS) <= there)
+    has = set(header).issuperset
+    moves = has(POSE) or has((*ACCELEROMETER, *GYRO))
+    return has(("t",)) and moves and (has(ROTORS) or has(COMMANDS))
 
 
 def unknown_table(path: Path) -> Table | None:
@@ -171,11 +172,12 @@ def _read(
     if chosen is None and not is_table(path):
         raise unknown_content(path)
     table = open_table(path)
+    header = set(table.header)
     if chosen is None and is_own(table.header):
         return map_table(table, load_map(OWN_MAP), vehicle, piece=piece)
     chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
-        if missing := [name for name in chosen.signature if name not in table.header]:
+        if missing := [name for name in chosen.signature if name not in header]:
             raise InputError(
                 f"{path}: missing column(s) {', '.join(missing)}; expected those of {chosen.what}"
             )
@@ -183,14 +185,13 @@ def _read(
     from .map_guess import guess_map  # the guess is slow to import, and few logs need a guess
 
     guess = guess_map(table, vehicle)
-    if not guess.missing and not guess.doubts:
+    if not (guess.missing or guess.doubts):
         log = map_table(table, guess.log_map, vehicle, piece=piece)
         said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
         return replace(log, notes=(said, *log.notes))
     known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in table_readers())
-    has_imu = {*ACCELEROMETER, *GYRO} <= set(table.header)
-    needed = ("t", *ROTORS) if has_imu else REQUIRED
-    missing = [name for name in needed if name not in table.header]
+    has_imu = header.issuperset((*ACCELEROMETER, *GYRO))
+    missing = [name for name in (("t", *ROTORS) if has_imu else REQUIRED) if name not in header]
     raise InputError(
         f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
         f"columns of {known}, found {', '.join(table.header[:_SHOWN])}. A table of "
@@ -206,13 +207,12 @@ def find_reader(name: str) -> Reader:
         InputError: the name is unknown, or the reader takes no option.
     """
     name, colon, option = name.partition(":")
+    reader = READERS.get(name)
     if name in TABLES:
         log_map = load_map(TABLES[name])
         read = partial(map_table, log_map=log_map, reader=name)
         reader = Reader(name, log_map.about, read, log_map.recognise)
-    elif name in READERS:
-        reader = READERS[name]
-    else:
+    if reader is None:
         raise unknown_name("reader", name, [*TABLES, *READERS])
     if not colon:
         return reader
@@ -230,13 +230,14 @@ def reader_by_content(path: Path) -> Reader | None:
         InputError: the path is a folder, but no ROS 2 bag's.
     """
     if not os.path.isdir(path):  # False for an overlong name
-        try:
+        with suppress(InputError):  # reading the file states the error
             head = _head(path)
-        except InputError:
-            return None  # reading the file states the error
-        return next((r for r in READERS.values() if r.begins and re.match(r.begins, head)), None)
+            for reader in READERS.values():
+                if reader.begins and re.match(reader.begins, head):
+                    return reader
+        return None
     try:
-        names = sorted(entry.name for entry in path.iterdir())
+        names = sorted(os.listdir(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read as a folder: {error.strerror}") from error
     if any(name.lower().endswith(_BAG_FOLDER) for name in names):
@@ -271,7 +272,7 @@ def unknown_content(path: Path) -> InputError:
         )
     start = head[:16]
     is_text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start)
-    shown = repr(start.decode("ascii")) if is_text else " ".join(f"{x:02x}" for x in start[:8])
+    shown = repr(start.decode()) if is_text else start[:8].hex(" ")
     shown = shown if head else "nothing (it is empty)"
     known = ", ".join(reader.what for reader in READERS.values() if reader.begins)
     return InputError(

@@ -64,18 +64,19 @@ class Table:
             InputError: a field is no number; a name stands in the header more than once; the
                 numbers are more than ``FileLimits.table_numbers``.
         """
+        columns = self._columns
         for name in names:
             if self.header.count(name) > 1:
                 raise InputError(
                     f"{self.path}: column {name} stands there more than once; expected it once"
                 )
-        new = [name for name in dict.fromkeys(names) if name not in self._columns]
-        numbers = self.rows * (len(self._columns) + len(new))
+        new = [name for name in dict.fromkeys(names) if name not in columns]
+        numbers = self.rows * (len(columns) + len(new))
         check_count(self.path, numbers, LIMITS.table_numbers, "numbers")
         for name, column in zip(new, self.load(self, new) if new else (), strict=True):
-            self._columns[name] = np.asarray(column, dtype=np.float64).view()
-            self._columns[name].flags.writeable = False
-        return {name: self._columns[name] for name in names}
+            columns[name] = np.asarray(column, dtype=np.float64).view()
+            columns[name].flags.writeable = False
+        return {name: columns[name] for name in names}
 
     def forget(self) -> None:
         """Forget the columns read so far; they are read anew on demand."""

@@ -28,15 +28,7 @@ from ...runtime.page_files import write_text
 from ...runtime.regular_files import check_archive, check_regular, open_regular
 from ...runtime.threads import SINGLE_THREADED
 from ...runtime.whole_files import replaced
-from .table import (
-    WHAT,
-    Array,
-    ArrayMap,
-    Data,
-    Table,
-    file_kind,
-    one_line,
-)
+from .table import WHAT, Array, ArrayMap, Data, Table, file_kind, one_line
 
 _MEMORY = 7 * 2**27  # bytes of the process for MATLAB's files
 _SHOWN = 10  # arrays in a note
@@ -109,18 +101,18 @@ def open_arrays(path: Path) -> Table:
     other = []
     for name, array in arrays.items():
         array = array if array.shape[:1] == (rows,) else array.T
-        if array.shape[:1] != (rows,):
-            other += [name] if array.size > 1 else []
-            continue
-        flat = array.reshape(rows, -1)
-        names = [name] if array.ndim == 1 else [f"{name}[{i}]" for i in range(flat.shape[1])]
-        columns |= dict(zip(names, flat.T, strict=True))
-    notes = [f"arrays of other lengths than {rows} were left out: {', '.join(other[:_SHOWN])}"]
+        if array.shape[:1] == (rows,):
+            flat = array.reshape(rows, -1).T
+            names = [name] if array.ndim == 1 else [f"{name}[{i}]" for i in range(len(flat))]
+            columns |= zip(names, flat, strict=True)
+        elif array.size > 1:
+            other.append(name)
+    note = f"arrays of other lengths than {rows} were left out: {', '.join(other[:_SHOWN])}"
 
     def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
-        return (columns[name] for name in names)
+        return map(columns.__getitem__, names)
 
-    return Table(path, tuple(columns), rows, load, notes=tuple(notes if other else ()))
+    return Table(path, tuple(columns), rows, load, notes=(note,) if other else ())
 
 
 def _write_matlab(path: Path, data: BinaryIO, made: BinaryIO) -> None:
@@ -169,13 +161,12 @@ def open_parquet(path: Path) -> Table:
         columns = []  # names, and arrays of their own or the file's fields
         held = 0
         for field in file.schema_arrow:
+            parts = [(field.name, field)]
             if field.name in nested:
                 parts = list(_within(path, field.name, _column(path, file, field.name)))
                 held += rows * len(parts)
                 check_count(path, held, LIMITS.list_numbers, "numbers of lists")
-                columns += parts
-            else:
-                columns.append((field.name, field))
+            columns += parts
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read as Parquet: {error}") from error
 
@@ -207,11 +198,15 @@ def _check_claims(
 ) -> None:
     """Raise InputError where columns unpack to more bytes or numbers, by the file's metadata."""
     groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
-    chunks = [chunk for group in groups for chunk in map(group.column, range(group.num_columns))]
-    chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] in names]
-    unpacked = sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks)
+    claims = [
+        (max(chunk.total_uncompressed_size, 0), max(chunk.num_values, 0))
+        for group in groups
+        for chunk in map(group.column, range(group.num_columns))
+        if chunk.path_in_schema.split(".")[0] in names
+    ]
+    unpacked, numbers = map(sum, zip((0, 0), *claims, strict=True))
     check_count(path, unpacked, size, f"bytes {what}")
-    check_count(path, sum(max(chunk.num_values, 0) for chunk in chunks), count, f"numbers {what}")
+    check_count(path, numbers, count, f"numbers {what}")
 
 
 def _column(path: Path, file: Any, name: str) -> Any:

@@ -69,6 +69,10 @@ _DECIMAL_COMMA = (
 )
 
 
+def _is_missing(field: str) -> bool:
+    return not field or field.lower() in MISSING_WORDS
+
+
 def _items(field: str) -> list[str]:
     """Return the items of a list, between commas, semicolons or spaces."""
     return re.sub(r"[\[\](),;]", " ", field).split()
@@ -127,8 +131,7 @@ class TextLayout:
         """Return the columns' names of a header; a separator behind the last name, and the mark of
         a comment before the first, belong to none.
         """
-        bare = _COMMENT.sub("", line)
-        names = [name.strip('" ') for name in self.fields(bare)]
+        names = [name.strip('" ') for name in self.fields(_COMMENT.sub("", line))]
         while len(names) > 1 and not names[-1]:
             names.pop()
         return names
@@ -137,7 +140,7 @@ class TextLayout:
         """Return the number in a field, or the seconds of a date or a time of day; NaN: empty,
         None: something else.
         """
-        if not field or field.lower() in MISSING_WORDS:
+        if _is_missing(field):
             return math.nan
         if self.decimal == ",":
             field = field.translate(_POINTS)
@@ -266,9 +269,9 @@ def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], .
     lengths: dict[int, int] = {}
     for line in lines if layout.separator != " " else ():
         for i, field in enumerate(layout.fields(_LIST.sub(r'"\1"', line))):
-            if field[:1] in ("[", "("):
-                lengths[i] = lengths.get(i) or len(_items(field))
-    return tuple(sorted((i, count) for i, count in lengths.items() if count))
+            if field.startswith(("[", "(")) and (count := len(_items(field))):
+                lengths.setdefault(i, count)
+    return tuple(sorted(lengths.items()))
 
 
 def _latin(error: UnicodeError) -> tuple[str, int]:
@@ -319,8 +322,7 @@ def _blocks(path: Path) -> Iterator[bytes]:
             source = gzip.GzipFile(fileobj=packed) if path.name.lower().endswith(".gz") else file
             while piece := source.read(_BUFFER):
                 piece += source.read(1) if piece.endswith(b"\r") else b""
-                if b"\r" in piece:
-                    piece = piece.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+                piece = piece.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
                 if b"\0" in piece:
                     raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
                 block = rest + (piece if size else piece.removeprefix(codecs.BOM_UTF8))
@@ -427,7 +429,7 @@ def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
 
 def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:
     """Return how many fields are empty, and how many hold a number (``nan`` among them)."""
-    empty = sum(not field or field.lower() in MISSING_WORDS for field in fields)
+    empty = sum(map(_is_missing, fields))
     others = sum(number is None for number in map(layout.number, fields))
     return empty, len(fields) - others - empty
 
@@ -483,11 +485,11 @@ def _fill(
     for i, fields in enumerate(rows):
         if len(fields) == width + 1 and not fields[-1].strip():  # a separator behind the last
             fields.pop()
-        if len(fields) != width:
-            hint = f". {_DECIMAL_COMMA.capitalize()}" if len(fields) == 2 * width else ""
+        if (count := len(fields)) != width:
+            hint = f". {_DECIMAL_COMMA.capitalize()}" if count == 2 * width else ""
             raise InputError(
-                f"{table.path}: {table.row(first + i)} has {len(fields)} field(s); expected "
-                f"{width}, as many as the header{hint}"
+                f"{table.path}: {table.row(first + i)} has {count} field(s); expected {width}, as "
+                f"many as the header{hint}"
             )
     is_plain = "_" not in "".join(lines)  # Python's numbers may hold underscores
     columns = dict(zip(table.header, zip(*rows, strict=True), strict=True))

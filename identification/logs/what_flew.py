@@ -87,7 +87,7 @@ class WhatFlew:
         Raises:
             InputError: the log states another vehicle.
         """
-        count = self.rotors if self.rotors is not None else _ROTORS.get(self.airframe)
+        count = _ROTORS.get(self.airframe) if self.rotors is None else self.rotors
         with_rotors = "" if count in (None, 4) else f" with {count} rotors"
         if self.airframe not in ("", QUADROTOR) or with_rotors:
             what = f"{self.airframe or 'a vehicle'}{with_rotors}"
@@ -97,7 +97,7 @@ class WhatFlew:
         """Return the statements as rows of a table: name, value, and source."""
         told = [
             ("airframe", self.airframe.partition(" ")[2], self.by),
-            ("rotors", "" if self.rotors is None else str(self.rotors), self.by),
+            ("rotors", str(self.rotors or ""), self.by),
             ("outputs", self.outputs, ""),
         ]
         return [row for row in told if row[1]]
@@ -125,12 +125,13 @@ def more_rotors(columns: Names, source: Table | ArrayMap, are_speeds: bool = Fal
         data = source.read([*columns, name]) if isinstance(source, Table) else source
         rows = np.column_stack([data[column] for column in (*columns, name)])
         rows = rows[finite_rows(rows)]
-        if len(rows) < _FEWEST or np.ptp(rows[:, 4]) == 0.0:
+        four, fifth = rows[:, :4], rows[:, 4]
+        if len(rows) < _FEWEST or np.ptp(fifth) == 0.0:
             continue
-        size = abs(np.median(rows[:, 4]) / max(np.median(np.abs(rows[:, :4])), 1e-12))
-        moves = rows - rows.mean(axis=0)
-        left = np.linalg.lstsq(moves[:, :4], moves[:, 4])[1]
-        share = float(left[0] / np.sum(moves[:, 4] ** 2)) if len(left) else 0.0
+        size = abs(np.median(fifth) / max(np.median(np.abs(four)), 1e-12))
+        moves = fifth - fifth.mean()
+        left = np.linalg.lstsq(four - four.mean(axis=0), moves)[1]
+        share = left.sum() / np.sum(moves**2)  # no residual: of columns that depend on each other
         is_motor = are_speeds or re.search(WORDS["motor_words"], name.lower())
         if (is_motor or share < _LEFT) and _SIZES[0] <= size <= _SIZES[1]:
             turning.append(name)
@@ -141,9 +142,10 @@ def more_rotors(columns: Names, source: Table | ArrayMap, are_speeds: bool = Fal
 
 def _numbered_on(columns: Names, others: Sequence[str]) -> list[str]:
     """Return the other columns with the next numbers up in the four columns' names."""
-    for numbers in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
-        if len({match[0] for match in numbers}) == len(columns):
-            first, last = numbers[0], max(int(match[0]) for match in numbers)
+    for found in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
+        numbers = {match[0] for match in found}
+        if len(numbers) == len(columns):
+            first, last = found[0], max(map(int, numbers))
             before, behind = first.string[: first.start()], first.string[first.end() :]
             following = (f"{before}{n:0{len(first[0])}d}{behind}" for n in range(last + 1, 16))
             return list(takewhile(others.__contains__, following))
@@ -170,8 +172,8 @@ def order_by_places(places: Sequence[Pair], vehicle: Vehicle | None = None) -> O
     motors = np.arctan2(*np.transpose(places)[::-1])
     wanted = np.arctan2(*np.transpose(rotors)[::-1])
     off = np.abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
-    nearest = [int(i) for i in np.argmin(off, axis=1)]
-    if sorted(nearest) != [0, 1, 2, 3] or off.min(axis=1).max() > _APART:
+    nearest = 1 + np.argmin(off, axis=1)
+    if off.min(axis=1).max() > _APART or len({*nearest}) < len(nearest):
         return None
-    first, second, third, fourth = (i + 1 for i in nearest)
+    first, second, third, fourth = nearest.tolist()
     return first, second, third, fourth
