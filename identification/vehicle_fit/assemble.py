@@ -155,8 +155,11 @@ def advice_of(estimates: Estimated) -> list[str]:
         lag: "Log the motor commands beside the rotor speeds: together they show the lag.",
         "drag": "Log the position: drag needs a velocity.",
     }
+    for name in unmeasured.keys() & estimates.keys():
+        if math.isnan(estimates[name].value):
+            advice[name] = unmeasured[name]
     if estimates["arm_l"].status == ASSUMED:  # and inertia with it
-        advice = {n: text for n, text in advice.items() if n not in ("Jxx", "Jyy", "Jzz")}
+        for name in ("Jxx", "Jyy", "Jzz"):
+            del advice[name]
     open_ones = [n for n in advice if n in estimates and estimates[n].status in (ASSUMED, NOTHING)]
-    nothing = [n for n in open_ones if n in unmeasured and math.isnan(estimates[n].value)]
-    return list(dict.fromkeys((unmeasured if n in nothing else advice)[n] for n in open_ones))
+    return list(dict.fromkeys(advice[n] for n in open_ones))

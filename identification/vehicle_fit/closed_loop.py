@@ -5,7 +5,7 @@ where nothing changes. Gauss-Newton minimises the mean norm, with norms weighted
 turn.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
@@ -95,12 +95,12 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts]
     group = np.concatenate([*(numbers[::every] for numbers in groups), [-1]])
-    still = _compared(thin, [part.unchanged for part in thin])
+    still = _compared(thin, lambda part: part.unchanged)
     sizes: Array = np.linalg.norm(still[:, -1], axis=-1).mean(axis=0)[:, None]
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
-        return _compared(thin, [part.flown(model) for part in thin]) / sizes
+        return _compared(thin, lambda part: part.flown(model)) / sizes
 
     begin = np.array(astuple(_BEGIN))
     begin[list(UNITS).index("unmeasured")] = _turning(thin, vehicle)
@@ -145,10 +145,11 @@ def _turning(starts: Sequence[LoggedStarts], vehicle: Vehicle) -> float:
     return float(np.sqrt(np.mean(np.square(torque / np.diag(vehicle.inertia)[:2]))))
 
 
-def _compared(starts: Sequence[LoggedStarts], paths: Sequence[Array]) -> Array:
+def _compared(starts: Sequence[LoggedStarts], path_of: Callable[[LoggedStarts], Array]) -> Array:
     """Return the differences (n, _TIMES, 4, 3) of paths (.., m, STATE) from the flight."""
     parts = []
-    for part, path in zip(starts, paths, strict=True):
+    for part in starts:
+        path = path_of(part)
         at = np.rint(np.arange(1, _TIMES + 1) / _TIMES * path.shape[1]).astype(int) - 1
         parts.append(offsets(path[:, at], part.seen[:, at]))
     return np.concatenate(parts)

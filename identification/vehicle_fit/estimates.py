@@ -106,8 +106,6 @@ class Estimates:
                 *((how, IDENTIFIED) if low <= u <= high else (beyond, ASSUMED)),
             )
 
-        reference = self.fit.drive.voltage_ref
-
         def hover(values: Values, share: float = 1.0) -> float:
             weight = self.fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
 
@@ -131,7 +129,7 @@ class Estimates:
         self._say("voltage_exponent", known, "1", how, doubt=why if wide else "")
         flown = np.concatenate([p.voltage for p in pieces if p.voltage is not None])
         for volts in () if wide else np.quantile(flown, [0.05, 0.95]).tolist():
-            share = volts / reference
+            share = volts / self.fit.drive.voltage_ref
             name = f"hover command at {volts:.2f} V"
             self._say_positive(name, lambda v, s=share: hover(v, s), "1", how)  # type: ignore[misc]
 

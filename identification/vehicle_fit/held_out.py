@@ -257,7 +257,7 @@ def powers(
     ``LEAST_HZ`` on; ``spectra`` divide it, frequency by frequency.
     """
     count = len(fit.balance.names)
-    model = coefficients(fit.values, fit.balance.names, fit.model.mass, fit.model.powers)
+    model = coefficients(fit.model, fit.values, fit.balance.names)
     left, total = np.zeros((2, 6))
     for i, s in enumerate(segments):
         inside = s.frequency >= LEAST_HZ

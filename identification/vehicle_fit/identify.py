@@ -213,8 +213,7 @@ def _voltage(pieces: Sequence[MotionPiece]) -> float:
     voltages = [p.voltage for p in pieces if p.voltage is not None]
     if len(voltages) < len(pieces):
         return 0.0
-    together = np.concatenate(voltages)
-    low, middle, high = np.quantile(together, [0.05, 0.5, 0.95]).tolist()
+    low, middle, high = np.quantile(np.concatenate(voltages), [0.05, 0.5, 0.95]).tolist()
     return float(middle) if high - low > _LEAST_VOLTAGE_RANGE * middle > 0.0 else 0.0
 
 

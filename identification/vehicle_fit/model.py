@@ -63,8 +63,9 @@ def inertia_of(p: Values) -> Array:
     return np.array([[p["Jx"], xy, xz], [xy, p["Jy"], yz], [xz, yz, p["Jz"]]])
 
 
-def coefficients(p: Values, names: Names, mass: float, powers: int) -> Array:
+def coefficients(model: Model, p: Values, names: Names) -> Array:
     """Return the coefficients (6, c) of the columns for parameters in SI units."""
+    mass = model.mass
     place = {name: i for i, name in enumerate(names)}
     inertia, lever = inertia_of(p), np.array([p["rx"], p["ry"], p["rz"]])
     out, moment = np.zeros((6, len(names))), np.zeros((3, len(names)))  # moment: about the centre
@@ -73,7 +74,7 @@ def coefficients(p: Values, names: Names, mass: float, powers: int) -> Array:
         if parameter in p:
             rows[i, place[column]] += size * p[parameter]
 
-    for j in range(powers):
+    for j in range(model.powers):
         a, thrust = p[f"a{j}"], place[f"T{j}"]
         out[:3, thrust] += np.array([p["tilt x"], p["tilt y"], 1.0]) * a / mass
         moment[:2, thrust] += a * np.array([-p["cy"], p["cx"]])
@@ -113,7 +114,7 @@ def jacobian(model: Model, theta: Array, names: Names) -> ArrayPair:
     """Return the coefficients (6, c) and their derivatives (p, 6, c) by the free parameters."""
 
     def at(x: Array) -> Array:
-        return coefficients(model.values(x), names, model.mass, model.powers)
+        return coefficients(model, model.values(x), names)
 
     here = at(theta)
     return here, np.array([(at(theta + e) - here) / 1e-6 for e in 1e-6 * np.eye(len(theta))])

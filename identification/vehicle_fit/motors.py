@@ -31,7 +31,7 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
     if any(p.command is None or p.rotor_speeds is None for p in pieces):
         return None
-    speeds = np.concatenate([p.rotor_speeds for p in pieces if p.rotor_speeds is not None])
+    speeds = np.concatenate([p.rotors for p in pieces])
     commands = np.concatenate([p.command for p in pieces if p.command is not None])
     if np.std(commands) < 1e-3 or np.std(speeds) == 0.0:
         return None

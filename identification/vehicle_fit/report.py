@@ -156,7 +156,7 @@ def fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     then = piece.t - fit.drive.delay
     columns = {n: np.interp(then, piece.t, x) for n, x in rotor_columns(piece, fit.drive).items()}
     columns |= air_columns(piece, fit.drive)
-    gains = coefficients(fit.values, tuple(columns), fit.model.mass, fit.model.powers)
+    gains = coefficients(fit.model, fit.values, tuple(columns))
     model = np.column_stack(list(columns.values())) @ gains.T
     measured = piece.measured()
     if piece.specific_force is None:

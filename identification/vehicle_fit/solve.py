@@ -111,7 +111,7 @@ def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFi
     for number in range(_ROUNDS):
         total = np.sum(_grams(made, spectra), axis=0)
         theta, information, moved = _moved(made, total, model, theta, _STEPS)
-        made = linear() if model.nonlinear else made
+        made = linear()
         if number >= 2 and moved < _CLOSE:
             break
         powers = _powers(made, spectra, model, theta, information)
@@ -155,7 +155,7 @@ def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
     """
     names, size = ("Jx", "Jy", "Jz"), 0.0
     at = [fit.model.free.index(name) for name in names]
-    for i in range(len(names)):
+    for i in range(3):
         for _ in range(_ROUNDS):
             moments = np.array([fit.values[name] for name in names])
             share = np.where(np.arange(3) == i, 1.0, -_FLATTEST) * moments
