@@ -107,7 +107,7 @@ class Base:
         others: Index,
         power: float = 1.0,
         size: Array | None = None,
-    ) -> "Asked":
+    ) -> "_Asked":
         """Return the likelihood, to a power, of the columns asked about, with others integrated
         out; ``size``: standard deviations of their prior, if not their own.
         """
@@ -115,7 +115,7 @@ class Base:
         products[-1, -1] += power * self.penalty
         at = self.at(asked)
         size = np.ones(len(others)) if size is None else size
-        return Asked(self, asked, at, marginal(products, at, others, size))
+        return _Asked(self, asked, at, marginal(products, at, others, size))
 
     def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, Pair]:
         """Return the coefficients of some columns at the mode without all others, and their
@@ -130,7 +130,7 @@ class Base:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class _Asked:
     """The likelihood of some columns of a base, with all others integrated out."""
 
     base: Base

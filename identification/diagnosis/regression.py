@@ -78,7 +78,7 @@ STEP = 0.1
 LARGE_STEP = 0.5
 # coefficients by effect, beside the declared vehicle
 Setting = Mapping[str, Values]
-Residual = Callable[[Setting], Array]  # of flights with a setting (rows, channels)
+_Residual = Callable[[Setting], Array]  # of flights with a setting (rows, channels)
 Effects = frozenset[str]
 # an effect's coefficient
 Column = tuple[str, str]
@@ -546,7 +546,7 @@ class RegressedFlights:
         self,
         setting: Setting,
         wanted: Iterable[Column],
-        residual: Residual,
+        residual: _Residual,
         step: float = STEP,
     ) -> dict[Column, Array]:
         """Return the columns of coefficients, for a residual (rows, 6) of these flights.
@@ -556,7 +556,7 @@ class RegressedFlights:
         """
         return {column: self._slope(setting, column, residual, step) for column in wanted}
 
-    def _slope(self, setting: Setting, column: Column, residual: Residual, step: float) -> Array:
+    def _slope(self, setting: Setting, column: Column, residual: _Residual, step: float) -> Array:
         effect, name = column
         own = self.coefficients(setting, effect)
         value, delta = self.step(setting, column, step)

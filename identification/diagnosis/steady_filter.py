@@ -16,7 +16,7 @@ from ..logs.table import Array
 PAIRS = np.array([[0, 4], [1, 3], [2, 5]])  # a position, and the turn pulling it
 # (6, 3) whether an axis is of a pair
 OWN = np.equal(np.arange(6)[:, None, None], PAIRS).any(axis=2)
-LAST = [2, 5]  # the disturbances among the states of a pair
+_LAST = [2, 5]  # the disturbances among the states of a pair
 PULL = np.array([1.0, -1.0, 0.0])  # of a turn on its position's acceleration, over gravity
 
 
@@ -56,10 +56,10 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     half = np.array([0.5, 1.0, 0.0])
     white = np.square(noise.white[..., PAIRS] * unit)
     Q = np.repeat(white, 3, axis=-1)[..., None] * np.kron(np.eye(2), np.outer(half, half))
-    Q[..., LAST, LAST] = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
+    Q[..., _LAST, _LAST] = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
     F = np.zeros_like(Q)
     F += np.kron(np.eye(2), [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
-    F[..., LAST, LAST] = decay
+    F[..., _LAST, _LAST] = decay
     pull = gravity * PULL * unit[..., 0] * pose[..., 1]
     F[..., :3, 3:6] = pull[..., None, None] * np.outer(half, [1.0, 0.5, 0.0])
     P = _riccati(F, Q)
