@@ -67,7 +67,6 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about a drive in its ``nonlinear`` parameters."""
     segments = []
     names: Names = ()
-    noise = []
     for piece in pieces:
         here = rotor_columns(piece, drive)
         air = air_columns(piece, drive)
@@ -84,13 +83,9 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
         stacked = low_pass(np.column_stack(parts), drive.band, piece.period)
         for s in segments_of(stacked, piece.period, piece.log, drive.band):
             segments.append(_with_delay(s, drive, nonlinear, count, len(here), slow))
-        noise.append(_rotor_noise(piece, drive, names))
-    weights = np.array([len(p.t) * p.period for p in pieces])
-    mean = np.sqrt(np.average(np.square(noise), axis=0, weights=weights))
-    signs = np.sign(np.sum(noise, axis=0))
-    return BalanceSpectra(
-        drive, names, nonlinear, tuple(segments), float(weights.sum()), mean * signs
-    )
+    seconds = np.array([len(p.t) * p.period for p in pieces])
+    noise = _rotor_noise(pieces, drive, names, seconds)
+    return BalanceSpectra(drive, names, nonlinear, tuple(segments), float(seconds.sum()), noise)
 
 
 def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
@@ -175,16 +170,14 @@ def _with_delay(
     return replace(s, columns=np.concatenate([measured, *every], axis=2))
 
 
-def _rotor_noise(piece: MotionPiece, drive: Drive, names: Names) -> Array:
+def _rotor_noise(pieces: Pieces, drive: Drive, names: Names, seconds: Array) -> Array:
     """Return the white noise of each rotor's speed in each column (4, c), as the root of a
     spectrum: standard deviation of the column times the root of the period.
     """
     out = np.zeros((4, len(names)))
-    if drive.speed_noise <= 0.0 or drive.lag > 0.0 or piece.rotor_speeds is None:
-        return out
-    size = drive.speed_noise * np.sqrt(
-        piece.period * np.mean(4.0 * np.square(piece.rotor_speeds), axis=0)
-    )
-    for letter, share in drive.shares.items():
-        out[:, names.index(f"{letter}0")] = size * share
+    if drive.speed_noise > 0.0 and drive.lag <= 0.0:
+        squares = [p.period * np.mean(4.0 * np.square(p.rotors), axis=0) for p in pieces]
+        size = drive.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
+        for letter, share in drive.shares.items():
+            out[:, names.index(f"{letter}0")] = size * share
     return out

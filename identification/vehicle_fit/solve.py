@@ -256,13 +256,11 @@ def _newton(
     weighted = np.einsum("iac,acd->iad", rows, grams)
     information = np.einsum("iad,jad->ij", weighted, rows)
     gradient = np.einsum("iad,ad->i", weighted, v)
-    for i, name in enumerate(model.free):
-        if name in model.prior:
-            strength = (model.scale.get(name, 1.0) / model.prior[name]) ** 2
-            information[i, i] += strength
-            gradient[i] += theta[i] * strength
+    known = {name: (model.scale.get(name, 1.0) / x) ** 2 for name, x in model.prior.items()}
+    strength = np.array([known.get(name, 0.0) for name in model.free])
+    gradient += theta * strength
     # parameters without excitation stay
-    information += 1e-8 * np.eye(len(information))
+    information += np.diag(strength + 1e-8)
     return np.linalg.solve(information, -gradient), information, rows, v
 
 
