@@ -117,12 +117,12 @@ class Numbers:
         together &= middle.min() * _ALIKE >= middle.max() > 0.0
         return float(together), "they move together with the specific force"
 
-    def feel(self, accelerometer: Names, position: Names) -> None:
+    def feel(self, accelerometer: Group | None, position: Group | None) -> None:
         """Keep likely specific forces: an accelerometer's size, else accelerations."""
         if accelerometer:
-            self.felt = [np.linalg.norm(self.between(self.clock, accelerometer), axis=1)]
+            self.felt = [np.linalg.norm(self.between(self.clock, accelerometer.columns), axis=1)]
         elif position:
-            force = second_difference(self.clock, _WINDOW, *self.rows(position)).T
+            force = second_difference(self.clock, _WINDOW, *self.rows(position.columns)).T
             self.felt = [*force, *-force]
 
     def elasticity(self, values: Array) -> float:

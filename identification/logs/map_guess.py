@@ -186,7 +186,7 @@ class _Guessing:
         attitude = self.choose("attitude", numbers.quaternion)
         force = self.choose("accelerometer", numbers.gravity)
         place = self.choose("position", self.follows_tilt)
-        numbers.feel(force.columns if force else (), place.columns if place else ())
+        numbers.feel(force, place)
         motors = [part for part in _MOTORS if self.choose(part, numbers.moves_together)]
         if attitude and place:
             self.pose(place, attitude)
