@@ -134,7 +134,7 @@ class _Belief(ABC):
         return min(max(command, -MAX_COMMAND), MAX_COMMAND)
 
 
-def velocity_after(
+def _velocity_after(
     before: Array,
     rng: np.random.Generator,
     acceleration: float = 0.025,
@@ -156,7 +156,7 @@ def velocity_after(
 
 @dataclass(eq=False, kw_only=True)
 class Tracker(_Belief):
-    """A tracker without knowledge of the fan's motion: ``velocity_after``."""
+    """A tracker without knowledge of the fan's motion: ``_velocity_after``."""
 
     gain: float = 2.5
     damping: float = 0.4
@@ -172,7 +172,7 @@ class Tracker(_Belief):
 
     def _move(self) -> None:
         before = self._velocity
-        self._velocity = velocity_after(
+        self._velocity = _velocity_after(
             before, self._rng, self.acceleration, self.jumps, self.speed
         )
         self._place += 0.5 * DECISION_PERIOD * (before + self._velocity)
@@ -216,7 +216,7 @@ class InformedTracker(_Belief):
         self._free |= self._rng.random(len(place)) < self.leave * DECISION_PERIOD
         some = np.flatnonzero(self._free)
         before = velocity[some]
-        after = velocity_after(before, self._rng)
+        after = _velocity_after(before, self._rng)
         self._velocity[some] = after
         self._place[some] = place[some] + 0.5 * DECISION_PERIOD * (before + after)
 

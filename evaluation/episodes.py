@@ -115,7 +115,7 @@ def error_of(info: Mapping[str, Any]) -> Any:
     return np.abs(info["offset"]) if "offset" in info else None
 
 
-def length_of(env: Any) -> int:
+def _length_of(env: Any) -> int:
     """Return the number of decisions of an environment's whole episode.
 
     Raises:
@@ -159,7 +159,7 @@ def fly_episode(
         controller.brief(world.briefing())
     if hasattr(controller, "reset"):
         controller.reset()
-    whole, low, high = decisions or length_of(env), env.action_space.low, env.action_space.high
+    whole, low, high = decisions or _length_of(env), env.action_space.low, env.action_space.high
     rows, total, uses_truth = [], 0.0, bool(foresight)
     rate = getattr(world, "decision_hz", world.metadata.get("render_fps", 1))
     for k in range(whole):

@@ -24,7 +24,7 @@ _AT_ONCE = 1_000_000  # numbers per draw
 _LAST_TWO = (-2, -1)
 
 
-def score_matrix(scores: ArrayLike) -> Array:
+def _score_matrix(scores: ArrayLike) -> Array:
     """Return scores as a matrix (..., runs, tasks); a single run may come as (tasks,).
 
     Raises:
@@ -40,12 +40,12 @@ def score_matrix(scores: ArrayLike) -> Array:
 
 def mean(scores: ArrayLike) -> Any:
     """Return the mean over runs and tasks."""
-    return score_matrix(scores).mean(axis=_LAST_TWO)
+    return _score_matrix(scores).mean(axis=_LAST_TWO)
 
 
 def interquartile_mean(scores: ArrayLike) -> Any:
     """Return the mean over the middle half of all runs and tasks together."""
-    matrix = score_matrix(scores)
+    matrix = _score_matrix(scores)
     return trim_mean(matrix.reshape(*matrix.shape[:-2], -1), 0.25, axis=-1)
 
 
@@ -93,7 +93,7 @@ def episode_bootstrap(
         scores: (tasks,), or (1, tasks).
         resamples: number of draws.
     """
-    (run,) = score_matrix(scores)
+    (run,) = _score_matrix(scores)
     if len(run) == 1:  # scipy refuses a single number
         return float(run[0]), float(run[0])
     drawn = bootstrap(
@@ -198,7 +198,7 @@ def holm(p_values: ArrayLike) -> Array:
 
 
 def _same_tasks(*matrices: ArrayLike) -> list[Array]:
-    scores = [score_matrix(m) for m in matrices]
+    scores = [_score_matrix(m) for m in matrices]
     if len({m.shape[-1] for m in scores}) > 1:
         raise InputError(
             f"scores: expected the same tasks, got {' and '.join(str(m.shape[-1]) for m in scores)}"

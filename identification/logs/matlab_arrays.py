@@ -25,7 +25,7 @@ _PACKED = 15  # type of a packed element
 _PIECE = 2**16  # bytes packed or unpacked at a time
 
 
-def check_unpacked(data: BinaryIO, most: int) -> None:
+def _check_unpacked(data: BinaryIO, most: int) -> None:
     """Check that the elements of a file of version 5 to 7 unpack to at most ``most`` bytes.
 
     Raises:
@@ -78,7 +78,7 @@ def main() -> None:
                 raise ValueError(f"it unpacks to more than {most} bytes; expected one flight")
             arrays = {name: value[()].T for name, value in sets.items()}
     else:
-        check_unpacked(data, most)
+        _check_unpacked(data, most)
         arrays = dict(named("", loadmat(data, simplify_cells=True)))
     np.savez(sys.stdout.buffer, **{f"_{name}": value for name, value in arrays.items()})
 

@@ -170,7 +170,7 @@ def _read(
     if chosen is not None and not chosen.signature:
         return chosen.read(path, vehicle, piece=piece)
     if chosen is None and not is_table(path):
-        raise unknown_content(path)
+        raise _unknown_content(path)
     table = open_table(path)
     header = set(table.header)
     if chosen is None and is_own(table.header):
@@ -189,7 +189,7 @@ def _read(
         log = map_table(table, guess.log_map, vehicle, piece=piece)
         said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
         return replace(log, notes=(said, *log.notes))
-    known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in table_readers())
+    known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in _table_readers())
     has_imu = header.issuperset((*ACCELEROMETER, *GYRO))
     missing = [name for name in (("t", *ROTORS) if has_imu else REQUIRED) if name not in header]
     raise InputError(
@@ -254,7 +254,7 @@ def _head(path: Path) -> bytes:
         return file.read(_HEAD)
 
 
-def unknown_content(path: Path) -> InputError:
+def _unknown_content(path: Path) -> InputError:
     """Return the error for an unknown file without a table's name.
 
     Raises:
@@ -287,7 +287,7 @@ def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
     Raises:
         InputError: the columns fit several readers.
     """
-    readers = [reader for reader in table_readers() if set(header).issuperset(reader.signature)]
+    readers = [reader for reader in _table_readers() if set(header).issuperset(reader.signature)]
     if len(readers) > 1:
         raise InputError(
             f"{path}: its columns are those of {' and of '.join(r.what for r in readers)}; "
@@ -296,6 +296,6 @@ def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
     return readers[0] if readers else None
 
 
-def table_readers() -> list[Reader]:
+def _table_readers() -> list[Reader]:
     """Return the readers of tables known by their columns."""
     return [*map(find_reader, TABLES), READERS["betaflight_csv"]]

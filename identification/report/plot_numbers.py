@@ -170,9 +170,9 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
             "counts": [len(k) for k in kept],
             "tick": tick,
             "steps": _base64(steps, "<u2"),
-            "before": packed_series(before[rows]),
-            "after": packed_series(after[rows]),
-            "parts": [packed_series(part[rows]) for part in parts],
+            "before": _packed_series(before[rows]),
+            "after": _packed_series(after[rows]),
+            "parts": [_packed_series(part[rows]) for part in parts],
             "products": [[np.mean(x * y) for y in (after, *parts)] for x in (after, *parts)],
             "rms": _rms(before),
         },
@@ -237,7 +237,7 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
     symbol = _SYMBOLS[CHANNELS.index(signature.channel)]
     factor, unit = scale_of(columns[:, 1:].ravel(), "N" if symbol.startswith("F") else "Nm")
     x, residual, fitted = (columns * [1.0, factor, factor]).T
-    middle, mean = binned(x, residual)
+    middle, mean = _binned(x, residual)
     kept = np.linspace(0, len(x) - 1, min(len(x), _POINTS)).astype(int)
     kept = kept[np.argsort(x[kept], kind="stable")]
     correlation = ""
@@ -251,8 +251,8 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
             "effect": signature.effect,
             "regressor": signature.regressor,
             "x": x[kept],
-            "residual": packed_series(residual[kept]),
-            "fitted": packed_series(fitted[kept]),
+            "residual": _packed_series(residual[kept]),
+            "fitted": _packed_series(fitted[kept]),
             "middle": middle,
             "mean": mean,
         },
@@ -267,7 +267,7 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
             (signature.regressor, "Residual without it", "Effect"),
             [
                 (rounded(at), rounded(r, 2), rounded(f, 2))
-                for at, r, f in zip(middle, mean, binned(x, fitted)[1], strict=True)
+                for at, r, f in zip(middle, mean, _binned(x, fitted)[1], strict=True)
             ],
         ),
         f"{symbol} ({unit})",
@@ -278,7 +278,7 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
     )
 
 
-def binned(x: Array, y: Array, count: int = 14) -> ArrayPair:
+def _binned(x: Array, y: Array, count: int = 14) -> ArrayPair:
     """Return the mean of ``y`` over ``x`` (n,) in bins with as many points each."""
     if len(x) < 4 * count:
         return np.empty(0), np.empty(0)
@@ -350,7 +350,7 @@ def candidate_bars(diagnosis: Diagnosis) -> list[Bar]:
     ]
 
 
-def packed_series(x: Array) -> Data | None:
+def _packed_series(x: Array) -> Data | None:
     """Return a series (n,) as 16-bit integers in base64 and their scale; None for zeros, or nearly
     zeros, throughout.
     """

@@ -82,7 +82,7 @@ class Sources:
     velocity: bool
 
 
-def sources_of(logs: Logs) -> Sources:
+def _sources_of(logs: Logs) -> Sources:
     """Return the sensors common to all logs.
 
     Raises:
@@ -161,7 +161,7 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     Raises:
         InputError: a log lacks a channel, or no piece in flight is long enough.
     """
-    sources = sources_of(logs)
+    sources = _sources_of(logs)
     pieces = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
         motion = _posed if "pose" in (sources.rate, sources.force) else _inertial

@@ -173,7 +173,7 @@ def models_of(vehicle: Vehicle) -> dict[str, Vehicle]:
     force = of("identified", "refuted")
     return {
         NO_CHANGE: of("refuted", "refuted"),
-        SIMPLEST: without_further(force),
+        SIMPLEST: _without_further(force),
         "force": force,
         "torque": of("refuted", "identified"),
         WHOLE: of("identified", "identified"),
@@ -189,7 +189,7 @@ def loops_of(vehicle: Vehicle, loop: LoopReaction) -> dict[str, Vehicle]:
     }
 
 
-def without_further(vehicle: Vehicle) -> Vehicle:
+def _without_further(vehicle: Vehicle) -> Vehicle:
     """Return the vehicle without effects beside drag and lag."""
     return vehicle.with_effects(*(e for e in vehicle.effects if get(e.name).role in _DRAGS))
 

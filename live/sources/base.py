@@ -48,7 +48,7 @@ class Source(ABC):
         self, text: str, vehicle: Vehicle, tallies: Tallies, log_map: LogMap | None = None
     ) -> None:
         self.name = text  # for people
-        self.address = read_address(text, self.kind, self.options)
+        self.address = _read_address(text, self.kind, self.options)
         self.vehicle = vehicle
         self.tallies = tallies
         self.log_map = log_map
@@ -200,7 +200,7 @@ class Address:
         return value
 
 
-def read_address(text: str, kind: str, options: tuple[str, ...]) -> Address:
+def _read_address(text: str, kind: str, options: tuple[str, ...]) -> Address:
     """Return the parts of a source's address.
 
     Raises:

@@ -104,15 +104,15 @@ def channels(
     Raises:
         InputError: pyulog is missing, the file is no ULog or no quadrotor's, or lacks four motors.
     """
-    topics, stated, is_damaged = read_ulog(path)
+    topics, stated, is_damaged = _read_ulog(path)
     flown = what_flew(stated, topics.pop(_STATUS, []))
     flown.check(path)
     parameters = {
         n: x for n, x in stated.items() if has_ranges or not re.search(r"_(MIN|MAX)\d*$", n)
     }
-    outputs = outputs_of(path, topics.get("actuator_outputs", []), parameters)
+    outputs = _outputs_of(path, topics.get("actuator_outputs", []), parameters)
     flown = replace(flown, outputs=outputs.words)
-    order, order_note = motor_order(path, stated, vehicle)
+    order, order_note = _motor_order(path, stated, vehicle)
     log_map = shipped_map("recordings/px4").with_order(order)
     if stated.get("SIM_GZ_EN") and (rotors := log_map.rotors):
         note = f"{rotors.note}, in rad/s, as PX4 in Gazebo (SIM_GZ_EN = 1) writes them"
@@ -149,7 +149,7 @@ def channels(
     return sections, flown
 
 
-def read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, bool]:
+def _read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, bool]:
     """Return the topics of the map, the parameters at the log's start, and whether the file is
     damaged. A topic's instances are mappings from field to column.
 
@@ -199,7 +199,7 @@ def _samples(topic: str, fields: ArrayMap, outputs: Outputs) -> Iterator[Channel
         return
     columns = {name: x for name, x in fields.items() if "timestamp" not in name}
     if topic == "actuator_outputs":
-        columns = shares_of_outputs(columns, outputs)
+        columns = _shares_of_outputs(columns, outputs)
     yield ChannelGroup(t, unified(topic, columns), topic)
 
 
@@ -330,7 +330,7 @@ def what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
     return WhatFlew(airframe, "parameter CA_ROTOR_COUNT" if count else by, count or None)
 
 
-def motor_order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Order, str]:
+def _motor_order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Order, str]:
     """Return PX4's motor of each of the vehicle's rotors, and a note on the source: the positions
     CA_ROTORn_PX and PY, the airframe's, else PX4's quad x.
 
@@ -360,7 +360,7 @@ def motor_order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tupl
     return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
 
 
-def outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outputs:
+def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outputs:
     """Return the motors' outputs, and their values for commands 0 and 1. Shares count as they are.
     DShot and UAVCAN, by parameters or by numbers beyond pulses, have the protocol's range. Pulses
     have each output's own parameter, the bank's, or PX4's default.
@@ -420,7 +420,7 @@ def outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outp
     return Outputs(slots, np.zeros(4), np.full(4, high), f"{protocol}, 0 to {high:g}, {why}")
 
 
-def shares_of_outputs(columns: ArrayMap, outputs: Outputs) -> NamedArrays:
+def _shares_of_outputs(columns: ArrayMap, outputs: Outputs) -> NamedArrays:
     """Return each output's values (N,) as 0 to 1, other outputs' in the motors' range; nothing if a
     motor's output never changes.
     """

@@ -183,7 +183,7 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
         for name, text in variant.items():
             stores[-1].register(get_types_from_msg(text, name))
     if not is_ros1:
-        check_bag_files(path)
+        _check_bag_files(path)
 
     def messages(topic: str) -> Iterator[tuple[int, Any]]:
         kind = types[topic]
@@ -312,7 +312,7 @@ def limited_unpacking() -> Iterator[None]:
         yield
 
 
-def check_bag_files(path: Path) -> None:
+def _check_bag_files(path: Path) -> None:
     """Check the files of a ROS 2 bag, a file or a folder, before a library opens them by name.
 
     Raises:

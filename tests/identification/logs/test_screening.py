@@ -338,7 +338,7 @@ def test_a_clean_flight_and_a_rotor_at_its_limit_are_not_noted():
 
 def test_commands_that_run_seconds_late_are_named_by_the_thrust_alone():
     """No torque is known of a collective command; the force along the thrust axis is enough."""
-    log = flight("gentle", seconds=25.0)
+    log = flight("excite", seconds=25.0)
     collective = rms(log.rotor_speeds, axis=1)
     on_time = replace(log, rotor_speeds=np.tile(collective[:, None], 4), commanded=True)
     screen_log(on_time, VEHICLE)
