@@ -1,5 +1,5 @@
 /* The plots of a report: zoom, values under a cursor that all plots over time share, effects
-   switched off one by one. Without this script the page shows a still picture and tables of the same numbers. */
+   switched off one by one. Without this script the page shows tables of the same numbers. */
 (() => {
   "use strict";
   const data = JSON.parse(document.getElementById("plots").textContent);

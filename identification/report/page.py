@@ -1,8 +1,8 @@
 """The page of a diagnosis's report: one self-contained HTML file.
 
 A script and a small library (``uplot/``) draw its plots, with zoom and cursor. In a browser without
-scripts, one still picture and a table of each plot show the same numbers. The page's policy allows
-no other script, and nothing from elsewhere.
+scripts, a table of each plot shows the same numbers. The page's policy allows no other script, and
+nothing from elsewhere.
 """
 
 import base64
@@ -19,7 +19,6 @@ from ..findings import Diagnosis
 from . import amounts, words
 from .headline import headline
 from .plot_numbers import candidate_bars, page_plots
-from .still_picture import still_picture
 
 _TONES = {
     "explained": "good",
@@ -34,7 +33,7 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     files come from users.
     """
     plots, bars = page_plots(diagnosis), candidate_bars(diagnosis)
-    data, drawn = plots.data, [*plots.time, *plots.frequency, *plots.signatures]
+    data = plots.data
     library, script = _library(), _page_file("page.js")
     shown = {bar.name for bar in bars}
     return page_template(__package__, "page.html.j2").render(
@@ -45,7 +44,6 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         tone=_TONES[diagnosis.verdict],
         table=error_table(diagnosis),
         plots=plots,
-        still=still_picture(drawn) if drawn else "",
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
         policy=_policy((library, script) if data else ()),

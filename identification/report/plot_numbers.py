@@ -1,9 +1,8 @@
-"""The plots of a diagnosis's page: one object with three forms each.
+"""The plots of a diagnosis's page: one object with two forms each.
 
-``packed`` is for uPlot in ``page.js``, ``lines`` for the still picture on pages without scripts,
-and ``table`` for readers without sight of a plot. A plot over time keeps, in each column of the
-window, the samples with the lowest and the highest residual before and after: peaks stay, and every
-value is one of the log.
+``packed`` is for uPlot in ``page.js``, and ``table`` for pages without scripts and readers without
+sight of a plot. A plot over time keeps, in each column of the window, the samples with the lowest
+and the highest residual before and after: peaks stay, and every value is one of the log.
 """
 
 import base64
@@ -47,7 +46,6 @@ class Plot(NamedTuple):
     """One plot of the page."""
 
     packed: Data  # ``key`` is the plot's name in the page
-    lines: dict[str, ArrayPair]  # x and y (n,) of ``before``, ``after`` and ``mean``
     table: PlotTable
     title: str  # quantity and unit
     axis: str  # quantity of the x axis
@@ -176,7 +174,6 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
             "products": [[np.mean(x * y) for y in (after, *parts)] for x in (after, *parts)],
             "rms": _rms(before),
         },
-        {name: (joined.x[rows], x[rows]) for name, x in (("before", before), ("after", after))},
         _table_over_time(joined.traces, i, factor, unit),
         f"{_SYMBOLS[i]} ({unit})",
         "time (s)" if len(kept) == 1 else "pieces of flight, side by side (s)",
@@ -204,7 +201,6 @@ def _plot_of_spectrum(
             "before": before,
             "after": after,
         },
-        {"before": (x, before), "after": (x, after)},
         PlotTable(
             f"Amplitude of the residual {name}",
             ("Frequency (Hz)", "Before", "After"),
@@ -255,11 +251,6 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
             "fitted": _packed_series(fitted[kept]),
             "middle": middle,
             "mean": mean,
-        },
-        {
-            "before": (x[kept], residual[kept]),
-            "after": (x[kept], fitted[kept]),
-            "mean": (middle, mean),
         },
         PlotTable(
             f"{signature.effect}: {symbol} ({unit}) over {signature.regressor}, means of "

@@ -266,7 +266,7 @@ class TestInABrowser:
         assert found["complaints"] == []
         assert found["missing"] == []
         plots = 6 + 2 + len(made.signatures)
-        assert len(found["pictures"]) == (plots if scripts else 1)  # one still picture of all
+        assert len(found["pictures"]) == (plots if scripts else 0)
         assert all(p["alt"] and p["width"] > 250 and p["height"] > 100 for p in found["pictures"])
         heads = ("Held out\tBefore\tAfter", "Frequency (Hz)\tBefore", "without it\tEffect")
         assert all((head in found["text"]) != scripts for head in heads)  # tables stand open
