@@ -107,13 +107,14 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     if not (len(after) and len(before)):
         raise InputError("compare: expected at least one flight in each of the two sets")
     ways = difference(after, before)
-    moved, unchanged = ways.mean[:, None], ways.variance
+    moved = ways.mean[:, None]
+    unchanged = ways.variance
     unchanged[:, 3] += (_VOLTAGE_POWER * _voltage_ratio(after, before)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
 
     def logs_of(means: Array, spread: Array) -> Array:
         """Return the log-likelihoods (n,) of the difference for changes of given ``means`` (n, 4)
-        and standard deviations beside the scatter, ``spread`` (n, 4).
+        and standard deviations beside the scatter, ``spread`` (n, 4); or one for all of the four.
         """
         variance = unchanged[:, None] + spread**2
         off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
@@ -121,21 +122,22 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
 
     amounts = np.linspace(0.02, 4.0, _AMOUNTS) * _USUAL_AMOUNT
     prior = log_softmax(-0.5 * np.square(amounts / _USUAL_AMOUNT))
-    nothing = float(logs_of(np.zeros((1, 4)), np.zeros((1, 4)))[0])
+    zero = np.zeros(1)
     # log posterior, and mean and deviation of the amount; keys: place and kind
-    found = {(NOWHERE, ""): (nothing + math.log(_UNCHANGED), 0.0, 0.0)}
+    found = {(NOWHERE, ""): (logs_of(zero, zero)[0] + math.log(_UNCHANGED), 0.0, 0.0)}
     for (place, kind), share in _CHANGES.items():
         if place == SOMETHING_ELSE:
-            means, spread = np.zeros((_AMOUNTS, 4)), np.repeat(amounts[:, None], 4, axis=1)
+            means = zero
+            spread = amounts[:, None]
         else:
             means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
             spread = np.linalg.norm(means, axis=1)[:, None] * np.array(_BEND)
         every = logs_of(means, spread) + prior
         weights = softmax(every)
         middle = float(amounts @ weights)
-        std = math.sqrt(float(np.square(amounts - middle) @ weights))
+        std = math.sqrt(np.square(amounts - middle) @ weights)
         each = (1.0 - _UNCHANGED) * share / sum(_CHANGES.values())
-        found[place, kind] = float(logsumexp(every)) + math.log(each), middle, std
+        found[place, kind] = logsumexp(every) + math.log(each), middle, std
     chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
     likeliest = max(places, key=places.__getitem__)

@@ -37,25 +37,29 @@ class FaultBalance:
     """
 
     def __init__(self, samples: Samples, lag: float, bend: float, dead: float) -> None:
-        w, turning = samples.angular_velocity, samples.angular_acceleration
+        w = samples.angular_velocity
+        turning = samples.angular_acceleration
         self.follows = samples.follows
         self.thrust = thrust = samples.thrust(lag, bend, dead)  # (N, 4)
         self.ramps = [_ramp(part, late) for late in (0.0, lag) for part in PARTS]
         gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, -2, axis=1)
         one = np.ones(len(w))
-        free = [np.column_stack([one, w[:, i], gyroscopic[:, i]]) for i in range(3)]
+        free = [[one, *own] for own in zip(w.T, gyroscopic.T, strict=True)]
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
-        free[2] = np.column_stack([free[2], turning[:, :2]])
-        y, moment = np.column_stack([turning, samples.specific_force]), thrust @ _SIGNS.T
+        free[2].extend(turning.T[:2])
+        free.append([])
+        measured = [*turning.T, samples.specific_force]
+        moments = (thrust @ _SIGNS.T).T
         # each channel's measurement, moment and free columns
         self.columns = [
-            np.column_stack([y[:, c], moment[:, c], *free[c : c + 1]]) for c in range(4)
+            np.column_stack([y, moment, *own])
+            for y, moment, own in zip(measured, moments, free, strict=True)
         ]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
         away += _TURNING * np.square(w).sum(axis=1) + samples.between
         # at the start of a fault the error of its shape grows with the acceleration
         strong = maximum_filter1d(np.linalg.norm(turning[:, :2], axis=1), _AROUND)
-        away += strong / max(float(strong.max()), 1e-300)
+        away += strong / max(strong.max(), 1e-300)
         # a rotor late by an interval is wrong there too
         self.activity = np.maximum(away, np.append(away[:1], away[:-1]))
         self.fit()
@@ -97,7 +101,8 @@ class BalanceChannel:
     """Innovations of a channel's measurement and moment, the free columns projected out."""
 
     def __init__(self, columns: Array, activity: Array, follows: Mask, *step: Array) -> None:
-        y, x = columns[:, 0], np.column_stack([columns[:, 1:], *step])
+        y = columns[:, 0]
+        x = np.column_stack([columns[:, 1:], *step])
         beta = np.linalg.lstsq(x, y, rcond=None)[0]
         if beta[0] <= 0.0:  # a moment with a negative factor is left out
             x = x[:, 1:]
@@ -117,15 +122,16 @@ class BalanceChannel:
         """Return the ratio, negative, of the factors of a column (N,) and of the moment, and its
         standard deviation: infinite where the channel does not follow the commands.
         """
-        y, x = self.white[:, 0], np.insert(self.white[:, 1:], 1, self.noise.whiten(column), axis=1)
+        y = self.white[:, 0]
+        x = np.insert(self.white[:, 1:], 1, self.noise.whiten(column), axis=1)
         beta = np.linalg.lstsq(x, y, rcond=None)[0]
         left = y - x @ beta
-        covariance = np.linalg.pinv(x.T @ x) * float(left @ left) / max(1, len(y) - len(beta))
+        covariance = np.linalg.pinv(x.T @ x) * (left @ left) / max(1, len(y) - len(beta))
         a, b = beta[:2].tolist()
         if a <= 2.0 * math.sqrt(covariance[0, 0]):
             return 0.0, math.inf
         slope = np.array([b / a**2, -1.0 / a])
-        return -b / a, math.sqrt(max(float(slope @ covariance[:2, :2] @ slope), 1e-12))
+        return -b / a, math.sqrt(max(slope @ covariance[:2, :2] @ slope, 1e-12))
 
     def steps(self, rows: Index, ramp: Array) -> Array:
         """Return the log-likelihoods (K,) of a step beginning at each of ``rows`` by a ramp.
@@ -133,9 +139,11 @@ class BalanceChannel:
         The size is the best one, at the price of a normal prior: as wide as this size, or as wide
         as a single sample's if wider.
         """
-        noise, count = self.noise, len(self.noise.whole)
+        noise = self.noise
+        count = len(noise.whole)
         # behind the last row nothing happens
-        whole, scale = np.append(noise.whole, False), np.append(noise.scale, np.inf)
+        whole = np.append(noise.whole, False)
+        scale = np.append(noise.scale, np.inf)
         against = np.zeros((count + 1, 2 + self.basis.shape[1]))
         against[whole] = np.column_stack([self.both, self.basis])
         # a share of 1 from each row on: its products with y, the moment, the basis, and itself

@@ -11,7 +11,7 @@ scatter, at either level, is summed over likewise.
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -58,7 +58,8 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     every = [*before, *after]
     names = [trim.session for trim in every]
     order = sorted(range(len(every)), key=lambda i: names.index(names[i]) if names[i] else -1)
-    trims, later = [every[i] for i in order], np.array(order) >= len(before)
+    trims = [every[i] for i in order]
+    later = np.array(order) >= len(before)
     x = np.array([trim.features for trim in trims])
     noise = np.array([trim.noise for trim in trims])
     parts = (_of_cut(x, later, noise, cut, log) for cut, log in _cuts(trims, later, x))
@@ -68,8 +69,8 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     return Difference(mean[keep], variance[keep], log[keep])
 
 
-def _cuts(trims: Sequence[Trim], later: Mask, x: Array) -> list[tuple[Index, float]]:
-    """Return each way to cut the flights into sessions: the number of each flight's session, and
+def _cuts(trims: Sequence[Trim], later: Mask, x: Array) -> Iterator[tuple[Index, float]]:
+    """Yield each way to cut the flights into sessions: the number of each flight's session, and
     the logarithm of its prior.
     """
     apart = np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
@@ -81,14 +82,12 @@ def _cuts(trims: Sequence[Trim], later: Mask, x: Array) -> list[tuple[Index, flo
     told = named[1:] | named[:-1] | np.diff(later)
     known = ~named[1:] | (names[1:] != names[:-1])
     places = np.argsort(np.where(told, np.inf, -apart), kind="stable")
-    places = places[: min(int((~told).sum()), _MOST_ENDS)]
-    out = []
+    places = places[: min((~told).sum(), _MOST_ENDS)]
     for chosen in itertools.product((False, True), repeat=len(places)):
         ends = told & known
         ends[places] = chosen
-        log = float(np.log(np.where(ends, chance, 1.0 - chance)[places]).sum())
-        out.append((np.append(0, np.cumsum(ends)), log))
-    return out
+        chances = np.where(ends, chance, 1.0 - chance)[places]
+        yield np.append(0, np.cumsum(ends)), np.log(chances).sum()
 
 
 def _of_cut(

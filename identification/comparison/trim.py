@@ -121,7 +121,8 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     Raises:
         InputError: too little calm flight, or neither rotor speeds nor commands.
     """
-    name, t = log.source or log.name, log.t
+    name = log.source or log.name
+    t = log.t
     if log.has_rotor_speeds:
         thrust = np.square(log.rotor_speeds) * vehicle.k
     elif log.command is None:
@@ -133,13 +134,14 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     total = thrust.sum(axis=1)
     if not log.has_pose:
         return trim_of(name, t, thrust, carrying(t, total), log.voltage)
-    at, place = t[log.valid], log.position[log.valid]
+    at = t[log.valid]
+    place = log.position[log.valid]
     if len(at) < 3:
         raise InputError(f"{name}: fewer than three poses; expected a flight")
     speeds = log.rotor_speeds
     if not log.has_rotor_speeds:  # then scaled: while the rotors are high, they carry the weight
         carried = total[flying(total)]
-        scale = vehicle.weight / float(np.median(carried)) if len(carried) else 0.0
+        scale = vehicle.weight / np.median(carried) if len(carried) else 0.0
         speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
     phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
     flown = [(t >= phase.start) & (t <= phase.end) for phase in phases if phase.name == FLIGHT]
@@ -155,7 +157,8 @@ def carrying(t: Array, total: Array) -> Mask:
         t: (N,) s.
         total: (N,) thrust of all rotors, in any unit.
     """
-    steady, smooth = np.zeros(len(t), dtype=bool), _smooth(total, t)
+    steady = np.zeros(len(t), dtype=bool)
+    smooth = _smooth(total, t)
     for first, end in runs_of(flying(smooth)):  # a single low sample is no landing
         # a log may begin and end in flight
         start = t[first] + (EDGE if first > 0 else 0.0)

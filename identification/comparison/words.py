@@ -1,6 +1,6 @@
 """Changes between two sets of flights, and rotor faults within one: sentences, data, pictures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -30,32 +30,32 @@ _NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
 
-def _cannot_tell(chances: Values, likeliest: str, name: Callable[[str], str]) -> str:
+def _cannot_tell(chances: Values) -> str:
     """Return a sentence on an unsure finding and its rivals."""
-    rivals = [
-        f"{name(rival)} ({p:.2f})"
-        for rival, p in sorted(chances.items(), key=itemgetter(1), reverse=True)
-        if rival != likeliest and p >= _NAMED
-    ]
-    told = f"Cannot tell {name(likeliest)} ({chances[likeliest]:.2f})"
-    return f"{told} from {' or '.join(rivals) or 'the other possibilities'}."
+    likeliest, *rivals = (
+        f"{name} ({p:.2f})"
+        for name, p in sorted(chances.items(), key=itemgetter(1), reverse=True)
+        if p >= _NAMED
+    )
+    return f"Cannot tell {likeliest} from {' or '.join(rivals) or 'the other possibilities'}."
 
 
 def change_headline(change: Change) -> str:
     """Return a sentence on the change, with its probability."""
-    place, chance = change.place, change.places[change.place]
+    place = change.place
+    chance = change.places[place]
     if place == NOWHERE:
         if change.sure:
             return f"Nothing changed (probability {chance:.2f})."
-        other = max(change.places, key=lambda name: (name != NOWHERE, change.places[name]))
+        other = sorted(change.places, key=change.places.__getitem__, reverse=True)[1]
         return (
             f"Cannot tell whether anything changed: nothing with probability {chance:.2f}; if "
             f"something did, it is likeliest at {other} ({change.places[other]:.2f})."
         )
-    if change.sure:
-        return f"Changed: {place}, probability {chance:.2f}; {_kind(change)}"
     kind = _kind(change)
-    return f"{_cannot_tell(change.places, place, str)} {kind[:1].upper()}{kind[1:]}"
+    if change.sure:
+        return f"Changed: {place}, probability {chance:.2f}; {kind}"
+    return f"{_cannot_tell(change.places)} {kind[:1].upper()}{kind[1:]}"
 
 
 def _kind(change: Change) -> str:
@@ -63,8 +63,9 @@ def _kind(change: Change) -> str:
     if change.place == SOMETHING_ELSE:
         return "the rotors share the work otherwise than one weaker rotor or one weight would ask."
     if change.place == "all rotors":
-        why = "a heavier vehicle, a weaker battery, thin air"
-        return f"all rotors are asked for {size} more: {why}."
+        return (
+            f"all rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
+        )
     if not change.place.startswith("rotor"):
         return f"the vehicle carries {size} of its weight more at that side."
     if change.weaker >= 0.95:
@@ -154,10 +155,10 @@ def _draw_change(change: Change) -> Any:
 
 
 def _place_of(fault: RotorFault, rotor: int) -> str:
-    """Return the name of a rotor (1 to 4), with the log's own name if any."""
+    """Return the number of a rotor (1 to 4), its place, and the log's own name if any."""
     names = fault.samples.channels.motor_names
     own = "" if names is None else f"; {names[rotor - 1]} in the log"
-    return f"rotor {rotor} ({PLACES[rotor - 1]}{own})"
+    return f"{rotor} ({PLACES[rotor - 1]}{own})"
 
 
 def fault_headline(fault: RotorFault) -> str:
@@ -166,7 +167,7 @@ def fault_headline(fault: RotorFault) -> str:
     chance = fault.probabilities[likeliest]
     sure = f"(probability {chance:.2f})" if chance < 0.9995 else "(probability above 0.999)"
     if not fault.sure:
-        return _cannot_tell(fault.probabilities, likeliest, lambda name: _finding(fault, name))
+        return _cannot_tell({_finding(fault, k): p for k, p in fault.probabilities.items()})
     if likeliest == NOTHING:
         return f"No rotor lost thrust {sure}."
     if likeliest == OTHER:
@@ -177,16 +178,16 @@ def fault_headline(fault: RotorFault) -> str:
     if likeliest == ALL:
         return f"All rotors lost thrust at once {sure}: the battery, the air, or the vehicle."
     when, low, high = fault.onset
-    left, least, most = (100 * share for share in fault.remaining)
+    lost, most, least = (100 - 100 * share for share in fault.remaining)
     return (
-        f"R{_place_of(fault, fault.rotor)[1:]} lost {100 - left:.0f} % of its thrust "
-        f"({100 - most:.0f} to {100 - least:.0f}) at t = {when:.3f} s ({low:.3f} to {high:.3f}, "
+        f"Rotor {_place_of(fault, fault.rotor)} lost {lost:.0f} % of its thrust "
+        f"({least:.0f} to {most:.0f}) at t = {when:.3f} s ({low:.3f} to {high:.3f}, "
         f"the log's clock) {sure}."
     )
 
 
 def _finding(fault: RotorFault, name: str) -> str:
-    return f"a fault of {_place_of(fault, int(name))}" if name in _FOUND else name
+    return f"a fault of rotor {_place_of(fault, int(name))}" if name in _FOUND else name
 
 
 def fault_data(fault: RotorFault) -> Data:
@@ -196,9 +197,9 @@ def fault_data(fault: RotorFault) -> Data:
         "rotor": fault.rotor,
         "motor": channels.motor_names and channels.motor_names[fault.rotor - 1],
         "onset_s": fault.onset[0],
-        "onset_ci95_s": list(fault.onset[1:]),
+        "onset_ci95_s": fault.onset[1:],
         "remaining": fault.remaining[0],
-        "remaining_ci95": list(fault.remaining[1:]),
+        "remaining_ci95": fault.remaining[1:],
     }
     return {
         "log": channels.name,
@@ -227,11 +228,11 @@ def _draw_faults(faults: Sequence[RotorFault]) -> Any:
     figure = new_figure(3.4 * len(faults))
     axes = figure.subplots(len(faults), 2, squeeze=False)
     for fault, (left, right) in zip(faults, axes, strict=True):
-        samples, channels = fault.samples, fault.samples.channels
-        commands, turning = channels.command.at(samples.t), samples.angular_acceleration
+        samples = fault.samples
+        channels = samples.channels
         for panel, what, lines, kind, names in (
-            (left, "angular acceleration, rad/s2", turning, "about", "xyz"),
-            (right, "command", commands, "rotor", "1234"),
+            (left, "angular acceleration, rad/s2", samples.angular_acceleration, "about", "xyz"),
+            (right, "command", channels.command.at(samples.t), "rotor", "1234"),
         ):
             panel.plot(samples.t, lines, lw=1, label=[f"{kind} {name}" for name in names])
             room_above(panel)
