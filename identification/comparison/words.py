@@ -197,9 +197,9 @@ def fault_data(fault: RotorFault) -> Data:
         "rotor": fault.rotor,
         "motor": channels.motor_names and channels.motor_names[fault.rotor - 1],
         "onset_s": fault.onset[0],
-        "onset_ci95_s": fault.onset[1:],
+        "onset_ci95_s": list(fault.onset[1:]),
         "remaining": fault.remaining[0],
-        "remaining_ci95": fault.remaining[1:],
+        "remaining_ci95": list(fault.remaining[1:]),
     }
     return {
         "log": channels.name,
