@@ -64,9 +64,9 @@ def rotor_order(value: object) -> Order:
     )
 
 
-def order_words(order: Order) -> str:
+def order_words(order: Order, named: Names = PLACES) -> str:
     """Return an order in words, by the places of the kit's rotors."""
-    places = sorted(zip(order, PLACES, strict=True))
+    places = sorted(zip(order, named, strict=True))
     return f"motors {', '.join(f'{motor} {place}' for motor, place in places)}"
 
 
