@@ -150,10 +150,10 @@ def _imu_delay(log: FlightLog) -> Pair:
     """
     seen = np.flatnonzero(log.valid)
     sensors = (
-        (log.gyro, 0.0, STILL, _turns_and_felt),
-        (log.accelerometer, WINDOW, _MOVING, _forces_and_felt),
+        (log.gyro, 0.0, STILL),
+        (log.accelerometer, WINDOW, _MOVING),
     )
-    for measured, before, least, compared in sensors:
+    for measured, before, least in sensors:
         if measured is None or not seen.size:
             continue
         read = np.isfinite(measured[:, 0])
@@ -164,7 +164,12 @@ def _imu_delay(log: FlightLog) -> Pair:
         if len(begins) < _FEWEST_WINDOWS:
             continue
         attitude = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
-        needed, felt = compared(begins, t, measured[read], pose_times, attitude, log.position[seen])
+        if measured is log.gyro:
+            needed = turn_rates(begins, pose_times, attitude)
+            felt = _mean_rates(t, measured[read])
+        else:
+            needed = second_difference(begins, WINDOW, pose_times, log.position[seen]) / WINDOW**2
+            felt = _mean_forces(t, measured[read], pose_times, attitude)
         late, left = _likeliest(felt, begins, needed)
         if left <= GOOD * (median_square(unbiased(needed)) + least**2):
             parts = zip(*(np.array_split(x, _PARTS) for x in (begins, needed)), strict=True)
@@ -184,26 +189,17 @@ def _likeliest(felt: _Felt, begins: Array, needed: Array) -> Pair:
     return found, left
 
 
-def _turns_and_felt(
-    begins: Array, t: Array, gyro: Array, pose_times: Array, attitude: Rotation, position: Array
-) -> tuple[Array, _Felt]:
-    """Return the attitude's angular velocity (n, 3) in windows, and a gyro's (N, 3)."""
+def _mean_rates(t: Array, gyro: Array) -> _Felt:
+    """Return a gyro's angular velocity in windows, by its samples (N, 3)."""
     sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
-    return turn_rates(begins, pose_times, attitude), lambda late, at: mean_rate(
-        at + late, t, sum_of
-    )
+    return lambda late, at: mean_rate(at + late, t, sum_of)
 
 
-def _forces_and_felt(
-    begins: Array, t: Array, force: Array, pose_times: Array, attitude: Rotation, position: Array
-) -> tuple[Array, _Felt]:
-    """Return the position's acceleration (n, 3) around times, and an accelerometer's (N, 3)."""
-    needed = second_difference(begins, WINDOW, pose_times, position) / WINDOW**2
+def _mean_forces(t: Array, force: Array, pose_times: Array, attitude: Rotation) -> _Felt:
+    """Return an accelerometer's acceleration around times, by its samples (N, 3)."""
     times = np.linspace(pose_times[0], pose_times[-1], len(t))
     turn = Slerp(pose_times, attitude)(times)
-    return needed, lambda late, at: mean_force(
-        at, times, turn.apply(resampled(times + late, t, force))
-    )
+    return lambda late, at: mean_force(at, times, turn.apply(resampled(times + late, t, force)))
 
 
 def _rotors_later(log: FlightLog, late: float, std: float) -> FlightLog:

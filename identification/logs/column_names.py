@@ -5,7 +5,7 @@ Names are read as people write them: ``pos_x``, ``Position.X [mm]``, ``qw``, ``q
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,12 +77,11 @@ def _bare(text: str) -> str:
     return text.strip(" []()").lower()
 
 
-def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
+def groups_of(names: Sequence[Name], endings: Sequence[str]) -> list[Group]:
     """Return the groups of columns whose names differ in one of ``endings`` alone, in the order of
     the endings. An ending stands at the end, at the beginning, or between other words.
     """
     families: dict[tuple[str, bool], dict[str, Name]] = {}
-    names = list(names)
     bases = {name.base for name in names}
     numbered = endings[0].isdigit()
     before = "(?<!\\d)" if numbered else "_"
@@ -108,7 +107,7 @@ def groups_of(names: Iterable[Name], endings: Sequence[str]) -> list[Group]:
         if len(members) == len(endings) and not re.search(unwanted, key):
             named = [members[ending] for ending in endings]
             units = {name.unit for name in named}
-            unit = "" if units - {named[0].unit} else named[0].unit
+            unit = units.pop() if len(units) == 1 else ""
             out.append(Group(tuple(name.column for name in named), key, unit, tuple(endings)))
     return list(dict.fromkeys(out))
 

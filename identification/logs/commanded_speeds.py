@@ -160,5 +160,5 @@ def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -
         return vehicle.mass * float(np.median(share)) if len(share) else None
     _, x, y, _ = log.quaternion[rows].T
     vertical = (total * (1.0 - 2.0 * (x * x + y * y)))[aloft]
-    mean = float(np.sum(vertical)) / max(1, len(vertical))
+    mean = float(np.mean(vertical)) if len(vertical) else 0.0
     return vehicle.weight / mean if mean > 0.0 else None

@@ -120,8 +120,8 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
 
     # well above the ground: a bounce on landing is no flight
     typical = float(np.median(height[clear]))
-    window = _CLIMB_WINDOW
-    climb = (np.interp(t + window, t, height) - np.interp(t - window, t, height)) / (2 * window)
+    rise = np.interp(t + _CLIMB_WINDOW, t, height) - np.interp(t - _CLIMB_WINDOW, t, height)
+    climb = rise / (2 * _CLIMB_WINDOW)
     lift_off, cruise, descent, touch_down = 0, 0, last, last
     if starts:
         lift_off, cruise = _first_climb(clear, height, before, typical, climb)

@@ -48,7 +48,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -57,6 +57,7 @@ from pydantic import (
     Field,
     Strict,
     StringConstraints,
+    ValidationInfo,
     WrapValidator,
 )
 
@@ -67,6 +68,8 @@ from .column_names import WORDS, unit_spelled
 from .table import Array, ArrayMap, Data, NamedNumbers, Names, Pair
 from .what_flew import ORDERS, Order, rotor_order
 
+_T = TypeVar("_T")
+
 MAPS = Path(__file__).parent / "maps"  # the kit's own maps
 OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # a field that a person must choose
@@ -76,6 +79,18 @@ BODIES = ("flu", "frd", "y_up")
 UNITS: dict[str, NamedNumbers] = WORDS["factors"]
 COMMAND_UNITS: dict[str, Pair | None] = {
     unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()
+}
+SECTIONS = {  # columns of each
+    "position": 3,
+    "attitude": 4,
+    "rotors": 4,
+    "commands": 4,
+    "wrench": 4,
+    "battery": 1,
+    "accelerometer": 3,
+    "gyro": 3,
+    "force": 3,
+    "torque": 3,
 }
 SENSES = ("body_to_world", "world_to_body")
 QUATERNIONS = ("wxyz", "xyzw")
@@ -124,11 +139,13 @@ _Range = Annotated[
 _Order = Annotated[Order, BeforeValidator(rotor_order)]
 
 
-@dataclass(frozen=True)
-class Columns:
-    """Columns of one kind, with unit, scale and signs."""
-
+class _Form:
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
+
+@dataclass(frozen=True)
+class Columns(_Form):
+    """Columns of one kind, with unit, scale and signs."""
 
     columns: tuple[_Name, ...]
     unit: str = ""
@@ -150,10 +167,8 @@ class Columns:
 
 
 @dataclass(frozen=True)
-class TimeColumn:
+class TimeColumn(_Form):
     """The clock."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     column: _Name = ""
     unit: Annotated[str, one_of(UNITS["time"])] = "s"
@@ -229,45 +244,41 @@ class Sensor(Columns):
     body: Annotated[str, one_of(BODIES)] = ""  # empty: the map's
 
 
-def _section(count: int, units: Collection[str] = ()) -> WrapValidator:
-    """Return a validator of a section: the number of columns, their unit and signs.
+def _section(given: Any, inner: Callable[[Any], Any], info: ValidationInfo) -> Any:
+    """Check a section: the number of columns, their unit and signs."""
+    name = info.field_name or ""
+    count = SECTIONS.get(name, 0)
+    units: Collection[str] = COMMAND_UNITS if name == "commands" else UNITS.get(name, ())
+    stated = given if isinstance(given, Mapping) else {}
+    if stated:
+        given = {str(key): value for key, value in stated.items() if value is not None}
+        if count == 1 and "column" in given:
+            given["columns"] = [given.pop("column")]
+        given.setdefault("columns", [])
+    part = inner(given)
+    is_euler = isinstance(part, Attitude) and part.euler
+    needed, found = 3 if is_euler else count, len(part.columns)
+    if found != (needed or max(1, found)):
+        words = {0: "some columns", 1: "one column"}.get(needed, f"a list of {needed} columns")
+        raise ValueError(f"must have {words} of the table, got {list(part.columns)!r:.100}")
+    if len(part.signs) not in (0, found):
+        raise ValueError(f"must have signs of {found} times 1 or -1, got {list(part.signs)!r:.100}")
+    if units and (part.unit or is_euler or not isinstance(part, Attitude)):
+        part = replace(part, unit=_known(part.unit or next(iter(units)), units, "unit"))
+    if part.unit == "raw" and "scale" not in stated:
+        raise ValueError("has unit raw without a scale; expected the scale to SI units")
+    if part.unit == "eRPM" and "pole_pairs" not in stated:
+        raise ValueError(
+            "has unit eRPM without pole_pairs; expected the motors' pairs of poles (7 on most "
+            "motors of 5-inch racers, 6 on smaller ones)"
+        )
+    if isinstance(part, Commands) and part.range is None:
+        part = replace(part, range=COMMAND_UNITS[part.unit])
+    return part
 
-    Args:
-        count: columns; 0: any but none.
-        units: units of the columns; nothing: they have none.
-    """
 
-    def check(given: Any, inner: Callable[[Any], Any]) -> Any:
-        stated = given if isinstance(given, Mapping) else {}
-        if stated:
-            given = {str(key): value for key, value in stated.items() if value is not None}
-            if count == 1 and "column" in given:
-                given["columns"] = [given.pop("column")]
-            given.setdefault("columns", [])
-        part = inner(given)
-        is_euler = isinstance(part, Attitude) and part.euler
-        needed, found = 3 if is_euler else count, len(part.columns)
-        if found != (needed or max(1, found)):
-            words = {0: "some columns", 1: "one column"}.get(needed, f"a list of {needed} columns")
-            raise ValueError(f"must have {words} of the table, got {list(part.columns)!r:.100}")
-        if len(part.signs) not in (0, found):
-            raise ValueError(
-                f"must have signs of {found} times 1 or -1, got {list(part.signs)!r:.100}"
-            )
-        if units and (part.unit or is_euler or not isinstance(part, Attitude)):
-            part = replace(part, unit=_known(part.unit or next(iter(units)), units, "unit"))
-        if part.unit == "raw" and "scale" not in stated:
-            raise ValueError("has unit raw without a scale; expected the scale to SI units")
-        if part.unit == "eRPM" and "pole_pairs" not in stated:
-            raise ValueError(
-                "has unit eRPM without pole_pairs; expected the motors' pairs of poles (7 on most "
-                "motors of 5-inch racers, 6 on smaller ones)"
-            )
-        if isinstance(part, Commands) and part.range is None:
-            part = replace(part, range=COMMAND_UNITS[part.unit])
-        return part
-
-    return WrapValidator(check)
+_Section = Annotated[_T, WrapValidator(_section)]
+_Part = _Section[_T] | None
 
 
 def _clock(time: TimeColumn) -> TimeColumn:
@@ -277,24 +288,22 @@ def _clock(time: TimeColumn) -> TimeColumn:
 
 
 @dataclass(frozen=True)
-class LogMap:
+class LogMap(_Form):
     """The meaning of a table's columns."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     time: Annotated[TimeColumn, AfterValidator(_clock)]
     world: Annotated[str, one_of(WORLDS), AfterValidator(WORLDS.__getitem__)] = "enu"
     body: Annotated[str, one_of(BODIES)] = "flu"
-    position: Annotated[Position, _section(3, UNITS["position"])] | None = None
-    attitude: Annotated[Attitude, _section(4, UNITS["attitude"])] | None = None
-    rotors: Annotated[Rotors, _section(4, UNITS["rotors"])] | None = None
-    commands: Annotated[Commands, _section(4, COMMAND_UNITS)] | None = None
-    wrench: Annotated[Columns, _section(4, ("N",))] | None = None
-    battery: Annotated[Battery, _section(1, UNITS["battery"])] | None = None
-    accelerometer: Annotated[Sensor, _section(3, UNITS["accelerometer"])] | None = None
-    gyro: Annotated[Sensor, _section(3, UNITS["gyro"])] | None = None
-    force: Annotated[Columns, _section(3, UNITS["force"])] | None = None
-    torque: Annotated[Columns, _section(3, UNITS["torque"])] | None = None
+    position: _Part[Position] = None
+    attitude: _Part[Attitude] = None
+    rotors: _Part[Rotors] = None
+    commands: _Part[Commands] = None
+    wrench: _Part[Columns] = None
+    battery: _Part[Battery] = None
+    accelerometer: _Part[Sensor] = None
+    gyro: _Part[Sensor] = None
+    force: _Part[Columns] = None
+    torque: _Part[Columns] = None
     about: str = ""
     vehicle: str = ""
     recognise: Names = ()
@@ -302,7 +311,7 @@ class LogMap:
     notes: Names = ()
     rows: Literal["mixed", "whole", "messages"] = "mixed"
     stray_rows: Annotated[int, Field(ge=0)] = 0
-    extra: Mapping[str, Annotated[Columns, _section(0)]] = field(default_factory=dict)
+    extra: Mapping[str, _Section[Columns]] = field(default_factory=dict)
     # further ways to fill a section (``time`` among them), in their order
     alternatives: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
@@ -345,18 +354,6 @@ class LogMap:
         return {way.topic for section in self.sections for way in self.ways(section)}
 
 
-SECTIONS = (
-    "position",
-    "attitude",
-    "rotors",
-    "commands",
-    "wrench",
-    "battery",
-    "accelerometer",
-    "gyro",
-    "force",
-    "torque",
-)
 _FIELDS = [field.name for field in fields(LogMap) if field.name not in ("name", "alternatives")]
 
 

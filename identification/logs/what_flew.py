@@ -23,16 +23,20 @@ Order = tuple[int, int, int, int]
 
 PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of rotors 1 to 4
 
-ORDERS: dict[str, Order] = {
-    name: (a, b, c, d) for name, (a, b, c, d) in WORDS["rotor_orders"].items()
-}
+ORDERS: dict[str, Order] = {name: tuple(order) for name, order in WORDS["rotor_orders"].items()}
 
 QUADROTOR = "a quadrotor"
-_ROTORS = {QUADROTOR: 4, "a tricopter": 3, "a hexarotor": 6, "an octorotor": 8}
-_ROTORS |= {"a decarotor": 10, "a dodecarotor": 12}
+_ROTORS = {
+    QUADROTOR: 4,
+    "a tricopter": 3,
+    "a hexarotor": 6,
+    "an octorotor": 8,
+    "a decarotor": 10,
+    "a dodecarotor": 12,
+}
 # motors 1 to 4 of PX4's and ArduPilot's plus: right, left, front, rear; x forward, y left
 PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
-_QUADRANTS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))  # x forward, y left
+_QUADRANTS = np.radians([45.0, 135.0, 225.0, 315.0])  # of rotors 1 to 4, from forward to the left
 _APART = np.radians(30.0)  # between a motor and its rotor, at most
 # of a further rotor's column: share of variance unexplained by the four, and its median by theirs
 _LEFT, _SIZES = 0.5, (0.5, 2.0)
@@ -53,8 +57,7 @@ def rotor_order(value: object) -> Order:
             raise unknown_name("rotor order", value, ORDERS)
         return ORDERS[value]
     if isinstance(value, list | tuple) and sorted(map(str, value)) == ["1", "2", "3", "4"]:
-        a, b, c, d = (int(str(x)) for x in value)
-        return a, b, c, d
+        return tuple(np.array(value, dtype=int).tolist())
     raise InputError(
         f"{value!r}; expected one of {', '.join(ORDERS)}, or the numbers of the motors "
         f"at the {', '.join(PLACES)}, such as [3, 2, 4, 1]"
@@ -168,12 +171,10 @@ def order_by_places(places: Sequence[Pair], vehicle: Vehicle | None = None) -> O
         places: (x forward, y left) of motors 1 to 4, in any unit.
         vehicle: with rotors wherever its file has them; None: one in each quadrant.
     """
-    rotors = _QUADRANTS if vehicle is None else vehicle.positions[:, :2].tolist()
     motors = np.arctan2(*np.transpose(places)[::-1])
-    wanted = np.arctan2(*np.transpose(rotors)[::-1])
+    wanted = _QUADRANTS if vehicle is None else np.arctan2(*vehicle.positions.T[1::-1])
     off = np.abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
     nearest = 1 + np.argmin(off, axis=1)
     if off.min(axis=1).max() > _APART or len({*nearest}) < len(nearest):
         return None
-    first, second, third, fourth = nearest.tolist()
-    return first, second, third, fourth
+    return tuple(nearest.tolist())
