@@ -128,29 +128,26 @@ def estimate_log(
             (``screen_log``), or its rotor speeds make the filter's numbers overflow.
     """
     log, doubts = screen_log(log, vehicle, None)
-    return _estimate(log, vehicle, tuning, report, smooth, gate, doubts)
-
-
-def _estimate(
-    log: FlightLog,
-    vehicle: Vehicle,
-    tuning: UKFTuning | None = None,
-    report: Callable[[float], None] | None = None,
-    smooth: bool = False,
-    gate: float | None = GATE,
-    doubts: Names = (),
-) -> WrenchSeries:
-    """Return the estimate of a screened log (``screen_log``), with its doubts."""
     if log.commanded:
         vehicle = replace(vehicle, omega_source="commanded")
-    both = log.gyro is not None and log.accelerometer is not None
-    if reads_imu(log) or (smooth and both):
-        tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
+    tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
+    if reads_imu(log) or (smooth and log.gyro is not None and log.accelerometer is not None):
         estimate, loads, notes = inertial_wrench(log, vehicle, tuning)
-        notes = (*log.notes, *doubts, *notes, *_slow_motors(log, vehicle, estimate))
-        return WrenchSeries(estimate, log.t, vehicle, tuning, notes, loads)
-    first, count = int(np.flatnonzero(log.valid)[0]), len(log.t)
-    ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, log.period, gate)
+    else:
+        ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, log.period, gate)
+        estimate, loads = _filtered(log, ukf, report)
+        notes = tuple(_notes(log, estimate, smooth))
+    notes = (*log.notes, *doubts, *notes, *_slow_motors(log, vehicle, estimate))
+    return WrenchSeries(estimate, log.t, vehicle, tuning, notes, loads)
+
+
+def _filtered(
+    log: FlightLog, ukf: WrenchUKF, report: Callable[[float], None] | None = None
+) -> tuple[WrenchEstimate, Array]:
+    """Return a filter's estimate of a screened log (``screen_log``), smoothed by a recording
+    filter, and the loads (N, 7, 3).
+    """
+    first, count = int(np.argmax(log.valid)), len(log.t)
     numbers, std = np.empty((count, WITHOUT_COVARIANCE)), np.empty((count, 18))
     loads = np.zeros((count, *LOAD))
     events = np.zeros(count, dtype=np.int64)  # last event of each row, of a recording filter
@@ -161,7 +158,7 @@ def _estimate(
         if report is not None:
             report(begin / count)
         rows = np.arange(begin, min(begin + _REPORTED, count))
-        calls, to = calls_of(log, rows, ukf, not smooth)
+        calls, to = calls_of(log, rows, ukf, not isinstance(ukf, RecordingUKF))
         made = make_calls(ukf.record, calls, to, numbers, std, loads)
         if made < len(calls):
             raise Sample(calls["z"][made]).bad_quaternion()
@@ -171,14 +168,12 @@ def _estimate(
     if broken.any():
         raise InputError(
             f"{log.source or log.name}: the estimate overflows at t = {log.t[broken][0]:.6g} s; "
-            f"expected rotor speeds and poses that {vehicle.name} can fly"
+            f"expected rotor speeds and poses that {ukf.vehicle.name} can fly"
         )
     estimate = ukf.smooth(events) if isinstance(ukf, RecordingUKF) else WrenchEstimate(numbers, std)
     estimate.numbers[~log.valid, NIS] = np.nan
     estimate.numbers[:first, STATUS] = COASTING
-    notes = (*log.notes, *doubts, *_notes(log, estimate, smooth))
-    notes += _slow_motors(log, vehicle, estimate)
-    return WrenchSeries(estimate, log.t, vehicle, ukf.tuning, notes, loads)
+    return estimate, loads
 
 
 def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> Names:
@@ -213,7 +208,10 @@ def pose_notes(log: FlightLog, vehicle: Vehicle) -> Names:
     """
     if reads_imu(log):
         return ()
-    return tuple(_notes(log, _estimate(log, vehicle), False))
+    if log.commanded:
+        vehicle = replace(vehicle, omega_source="commanded")
+    estimate, _ = _filtered(log, WrenchUKF(vehicle, None, log.period, GATE))
+    return tuple(_notes(log, estimate, False))
 
 
 def counts(series: WrenchSeries) -> dict[str, int]:
@@ -242,7 +240,7 @@ def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> st
     parts["noise"] = np.mean(np.square(series.std[:, 12 + first : 15 + first]))
     total = np.mean(np.square(std))
     parts["what the rotors do between samples"] = total - sum(parts.values())
-    name = max(parts, key=lambda part: parts[part])
+    name = max(parts, key=parts.__getitem__)
     return (
         f"{np.sqrt(total):.2g} {unit} an axis, and {name} makes up "
         f"{100.0 * parts[name] / total:.0f} % of its square"
@@ -279,8 +277,9 @@ def tune_to_log(
         InputError: the log does not suit a wrench estimate (``screen_log``), has too few poses for
             a tuning, or has a filtered pose that hides both its noise and a walk.
     """
-    judge = partial(fit_noise, settings=NoiseFitSettings(gusts=gusts))
-    fit = _of_poses(judge, log, vehicle, tuning)
+    fit = _of_poses(
+        partial(fit_noise, settings=NoiseFitSettings(gusts=gusts)), log, vehicle, tuning
+    )
     on_bound = np.isnan(fit.deviation)
     if on_bound[:4].any() and on_bound[6:8].any():
         raise InputError(
@@ -310,9 +309,16 @@ def _of_poses(
             "expected 50 poses a second"
         )
     position = np.where(log.valid[:, None], log.position, np.nan)
-    columns = log.t, log.rotor_speeds, position, log.quaternion, log.voltage
     try:
-        return judge(vehicle, *columns, tuning=tuning)
+        return judge(
+            vehicle,
+            log.t,
+            log.rotor_speeds,
+            position,
+            log.quaternion,
+            log.voltage,
+            tuning=tuning,
+        )
     except InputError as error:
         raise InputError(f"{log.source or log.name}: {error}") from error
 
@@ -348,8 +354,17 @@ def write_wrench(series: WrenchSeries, path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    wrench = series.force, series.torque, series.std_force, series.std_torque
-    values = np.column_stack([series.t, *wrench, series.nis, series.numbers[:, STATUS]])
+    values = np.column_stack(
+        [
+            series.t,
+            series.force,
+            series.torque,
+            series.std_force,
+            series.std_torque,
+            series.nis,
+            series.numbers[:, STATUS],
+        ]
+    )
     write_csv(dict(zip(COLUMNS, values.T, strict=True)), path)
 
 
@@ -359,5 +374,7 @@ def truth_rmse(series: WrenchSeries, log: FlightLog) -> ArrayPair | None:
     """
     if log.force is None or log.torque is None:
         return None
-    force, torque = series.force - log.force, series.torque - log.torque
-    return np.sqrt(mean_square(force)), np.sqrt(mean_square(torque))
+    return (
+        np.sqrt(mean_square(series.force - log.force)),
+        np.sqrt(mean_square(series.torque - log.torque)),
+    )

@@ -17,7 +17,7 @@ from ..findings import CHANNELS, Diagnosis, NamedEffect
 from ..logs.table import Array, Pair
 from .words import SPACE, coefficient_meaning, effect_summary, in_words, scale_of, with_std
 
-_ROTORS = 4
+_ROTORS = 4.0
 _SMALL = 0.5
 # units below this size, in place of metres, seconds, kilograms and radians
 _SMALL_UNITS = {
@@ -77,7 +77,7 @@ def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
     value, std = effect.coefficients[coefficient], effect.std.get(coefficient, 0.0)
     unit = effect.units.get(coefficient, "1")
     meaning = coefficient_meaning(effect.name, coefficient)
-    factor, when = float(_ROTORS) if "per rotor" in meaning else 1.0, ""
+    factor, when = _ROTORS if "per rotor" in meaning else 1.0, ""
     if unit.endswith("/(rad/s m/s)"):
         factor, unit, when = factor * vehicle.hover_rate, unit.split("/")[0], "at 1 m/s"
     elif unit in _AT:
@@ -128,13 +128,13 @@ def _wind(effect: NamedEffect) -> Amount:
     names = [name for name in effect.coefficients if effect.units.get(name) == "m/s"]
     wind = np.nan_to_num([effect.coefficients[name] for name in names])
     std = np.array([effect.std.get(name, 0.0) for name in names])
-    speed = float(np.linalg.norm(wind))
+    speed = math.hypot(*wind)
     sides = (
         f"{'−' if x > 0.0 else '+'}{coefficient_meaning(effect.name, name)[-1]}"
         for name, x in zip(names, wind, strict=True)
         if abs(x) > _BESIDE * speed
     )
-    spread = float(np.linalg.norm(wind * std)) / (speed or 1.0)
+    spread = math.hypot(*(wind * std)) / (speed or 1.0)
     return Amount(speed, spread, "m/s", f"from {' '.join(sides)}", "")
 
 
@@ -170,5 +170,8 @@ def steady_wrench(pieces: Sequence[Array], periods: Sequence[float], floors: Pai
 def steady_residual(diagnosis: Diagnosis) -> str:
     """Return the mean force and torque that the named effects leave, in words, or nothing."""
     traces = diagnosis.traces
-    floors = diagnosis.floor_force_rms, diagnosis.floor_torque_rms
-    return steady_wrench([x.after for x in traces], [x.period for x in traces], floors)
+    return steady_wrench(
+        [x.after for x in traces],
+        [x.period for x in traces],
+        (diagnosis.floor_force_rms, diagnosis.floor_torque_rms),
+    )

@@ -38,20 +38,22 @@ def headline(diagnosis: Diagnosis) -> str:
     lacking = _lacking(diagnosis)
     if is_outside(diagnosis):
         hidden = ", or hidden in these logs," if diagnosis.needs_pose else ""
-        probable = f"probability {chance(diagnosis.probabilities.unknown)}"
         rest = f"H{error[1:]}"
         if lacking:
             rest = f"Effects of the library that imitate the cause, no findings: {lacking}"
-        sign = _sign(diagnosis)
-        return f"A cause outside the library{hidden} acts ({probable}){sign}. {rest}."
+        return (
+            f"A cause outside the library{hidden} acts "
+            f"(probability {chance(diagnosis.probabilities.unknown)}){_sign(diagnosis)}. {rest}."
+        )
     if lacking:
         perhaps = "perhaps " if all(e.tentative for e in diagnosis.effects) else ""
         return f"The model {perhaps}lacks {lacking}."
     looks = "looks random" if diagnosis.remainder == "random" else "has structure"
     if steady := steady_residual(diagnosis):
         steady = f"On average {steady} acts that the model lacks. "
-    told = f"the residual {looks}, and no effect {tried(diagnosis)} explains it"
-    return f"{steady}H{error[1:]}; {told}."
+    return (
+        f"{steady}H{error[1:]}; the residual {looks}, and no effect {tried(diagnosis)} explains it."
+    )
 
 
 def _sign(diagnosis: Diagnosis) -> str:
@@ -88,8 +90,9 @@ def _lacking(diagnosis: Diagnosis) -> str:
 def _told(effect: NamedEffect, diagnosis: Diagnosis, all_perhaps: bool) -> str:
     """Return one effect with its amount and its rivals; declared ones as wrong coefficients."""
     declared = {e.name: e.coefficients.keys() for e in diagnosis.declared.effects}
-    is_new = not effect.coefficients.keys() <= declared.get(effect.name, set())
-    told = ("" if is_new else "the right ") + with_amounts(effect, diagnosis.declared)
+    told = with_amounts(effect, diagnosis.declared)
+    if effect.coefficients.keys() <= declared.get(effect.name, set()):
+        told = f"the right {told}"
     if rivals := [title(name) for name in effect.indistinguishable_from]:
         told = f"one of {in_words([told, *rivals], 'or')}"
     return f"perhaps {told}" if effect.tentative and not all_perhaps else told
@@ -101,11 +104,13 @@ def wrench_headline(series: WrenchSeries) -> str:
     """
     rows = finite_rows(series.force)
     wrench = np.nan_to_num(np.hstack([series.force, series.torque])[rows])
-    stated = np.nan_to_num(np.hstack([series.std_force, series.std_torque])[rows])
-    std = np.median(stated, axis=0)
+    stated = np.hstack([series.std_force, series.std_torque])[rows]
+    std = np.median(np.nan_to_num(stated), axis=0)
     floors = std[:3].max(), std[3:].max()
-    steady = steady_wrench([wrench], [median_step(series.t)], floors)
-    told = steady or f"no steady force above {in_unit(floors[0], 'N')}"
+    told = (
+        steady_wrench([wrench], [median_step(series.t)], floors)
+        or f"no steady force above {in_unit(floors[0], 'N')}"
+    )
     spread = in_unit(math.sqrt(wrench[:, :3].var(axis=0).sum()), "N")
     return (
         f"Beside the model of {series.vehicle.name}, on average {told} acts; the force is {spread} "

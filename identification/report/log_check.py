@@ -35,9 +35,9 @@ class LogCheck:
     read_by: str
     channels: list[Channel]
     doubts: Names  # of the reading; the gravest first
-    limits: Names = ()  # not shown by the log
-    guess: Guess | None = None
-    map_text: str = ""  # the log's map as a YAML file; empty without one
+    limits: Names  # not shown by the log
+    guess: Guess | None
+    map_text: str  # the log's map as a YAML file; empty without one
 
     def headline(self) -> str:
         """Return the gravest doubt, and what flew how long and how far."""
@@ -113,8 +113,10 @@ def check_log(
             log = read_log(path, reader, vehicle, piece=piece)
             named = re.search(r"\(reader ([^()]+)\)$", log.source)
             read_by = f"the reader {named[1]}" if named else "this kit's own format"
-    guesses = guess.doubts if guess else ()
-    guessed = [f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}" for r in guesses]
+    guessed = [
+        f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}"
+        for r in (guess.doubts if guess else ())
+    ]
     vehicle = flown_vehicle(vehicle, log.vehicle)
     doubts = _doubts(log, guessed, vehicle)
     limits = [

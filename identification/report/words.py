@@ -36,16 +36,13 @@ def with_std(value: float, std: float) -> str:
     power = math.floor(math.log10(size)) if size else 0
     power = 0 if -3 <= power < 4 else power
     scaled = value / 10.0**power
+    text = rounded(scaled)
     if std > 0.0:
         spread = float(f"{std:.1e}") / 10.0**power
         decimals = min(max(1 - math.floor(math.log10(spread)), 0), 9)
-        text = f"{scaled:.{decimals}f} ± {spread:.{decimals}f}"
-    else:
-        text = rounded(scaled)
-    text = text.replace("-", "−")
-    if power:
-        text = f"{f'({text})' if std > 0.0 else text} × 10{str(power).translate(_SUPERSCRIPT)}"
-    return text
+        text = f"{scaled:.{decimals}f} ± {spread:.{decimals}f}".replace("-", "−")
+        text = f"({text})" if power else text
+    return f"{text} × 10{str(power).translate(_SUPERSCRIPT)}" if power else text
 
 
 def scale_of(values: Iterable[float], unit: str, least: float = 0.1) -> tuple[float, str]:
@@ -72,9 +69,8 @@ def percent(share: float) -> str:
     """Return a share in per cent, with a digit behind the point below 10 %."""
     if not math.isfinite(share):
         return MISSING
-    share = 0.0 if abs(share) < 0.0005 else share
-    number = f"{100.0 * share:.{0 if abs(share) >= 0.0995 or not share else 1}f}"
-    return f"{number.replace('-', '−')}{SPACE}%"
+    decimals = 1 if 0.0005 <= abs(share) < 0.0995 else 0
+    return f"{100.0 * share:z.{decimals}f}{SPACE}%".replace("-", "−")
 
 
 def chance(probability: float) -> str:
@@ -127,8 +123,11 @@ def by_energy(diagnosis: Diagnosis) -> list[NamedEffect]:
 
 def doubts(diagnosis: Diagnosis) -> list[str]:
     """Return the reasons to doubt the logs, and then the names."""
-    names = {text for some in diagnosis.doubts.values() for text in some}
-    doubted = (text for text in diagnosis.notes if _WARNING in text or text in names)
+    doubted = (
+        text
+        for text in diagnosis.notes
+        if _WARNING in text or any(text in some for some in diagnosis.doubts.values())
+    )
     return sorted(doubted, key=lambda text: _WARNING not in text)
 
 
@@ -153,7 +152,7 @@ def error_amounts(diagnosis: Diagnosis) -> Iterator[str]:
 
 def error_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return the error on held-out data, before and after, as sentences."""
-    return [f"{text[:1].upper()}{text[1:]}." for text in error_amounts(diagnosis)]
+    return [f"H{text[1:]}." for text in error_amounts(diagnosis)]
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
@@ -184,8 +183,10 @@ def _disturbances(diagnosis: Diagnosis) -> str:
         own = [gusts for gusts in diagnosis.gusts if gusts.channel in channels]
         if own:
             largest = max(own, key=lambda gusts: gusts.rms)
-            time = f"correlation time {rounded(largest.time, 2)}{SPACE}s"
-            stated.append(f"{in_unit(largest.rms, unit)} rms ({time})")
+            stated.append(
+                f"{in_unit(largest.rms, unit)} rms "
+                f"(correlation time {rounded(largest.time, 2)}{SPACE}s)"
+            )
     return f", with disturbances of up to {in_words(stated)}" if stated else ""
 
 

@@ -2,7 +2,7 @@
 shaded.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,20 +13,20 @@ from ...runtime.arrays import Array
 from ...runtime.drawing import BLACK, GREY, PALE, SERIES, new_figure, room_above, styled
 from ...runtime.page_files import write_png
 from ..logs.flight_log import FlightLog
-from ..logs.flight_phases import FLIGHT, GROUND, LANDING, TAKE_OFF, Phase, flight_phases
+from ..logs.flight_phases import GROUND, LANDING, TAKE_OFF, Phase, flight_phases
 from ..wrench_series import WrenchSeries
 from .words import scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SHADES = {GROUND: PALE, TAKE_OFF: "#cfe8cf", FLIGHT: "#ffffff", LANDING: "#fbe3c4"}
+_SHADES = {GROUND: PALE, TAKE_OFF: "#cfe8cf", LANDING: "#fbe3c4"}
 _THRUST = SERIES[3]
 _LASTING = 0.1  # s without a pose, at least, for hatching
 
 
 @styled()
-def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
+def plot_wrench(series: WrenchSeries, log: FlightLog, path: Path) -> Path:
     """Draw height, force and torque with their 2-sigma bands, and the log's truth if any, into a
     PNG.
 
@@ -38,7 +38,7 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     Raises:
         InputError: the file cannot be written.
     """
-    path, vehicle = Path(path), series.vehicle
+    vehicle = series.vehicle
     known = bool(np.isfinite(series.position).all())
     phases = (
         flight_phases(series.t, series.position[:, 2], log.rotor_speeds, vehicle) if known else []
@@ -60,8 +60,9 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     force.set_ylabel("external force (N)")
     torque.set(ylabel=f"external torque ({unit})", xlabel="time (s)")
     if GROUND in {phase.name for phase in phases}:
-        weight = f"weight {vehicle.weight:.3g} N"
-        force.axhline(vehicle.weight, color=BLACK, lw=0.8, ls=":", label=weight)
+        force.axhline(
+            vehicle.weight, color=BLACK, lw=0.8, ls=":", label=f"weight {vehicle.weight:.3g} N"
+        )
     columns, room = (4, 0.14) if log.force is None else (3, 0.26)
     for panel, behind in ((height, backdrop), (force, force), (torque, torque)):
         panel.grid()
@@ -71,9 +72,13 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
             panel.legend(loc="upper center", ncols=columns)
             room_above(panel, room)
     for phase in phases:
-        middle = 0.5 * (phase.start + phase.end)
-        place = height.get_xaxis_transform()
-        height.text(middle, 1.03, phase.name, transform=place, ha="center")
+        height.text(
+            0.5 * (phase.start + phase.end),
+            1.03,
+            phase.name,
+            transform=height.get_xaxis_transform(),
+            ha="center",
+        )
     write_png(figure, path)
     return path
 
@@ -86,8 +91,7 @@ def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "
     thrust.set_ylabel("rotor thrust / weight", color=_THRUST)
     thrust.tick_params(axis="y", labelcolor=_THRUST)
     thrust.set_ylim(bottom=0.0)
-    panel.set_zorder(thrust.get_zorder() + 1)
-    panel.set_facecolor("none")
+    panel.set(zorder=thrust.get_zorder() + 1, facecolor="none")
     return thrust
 
 
@@ -98,24 +102,33 @@ def _draw_vectors(
     none. The truth is dashed, with its RMSE in the legend.
     """
     if not np.isfinite(mean).any():
-        words = "not estimated: the rotors were measured too seldom"
-        panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center")
+        panel.text(
+            0.5,
+            0.5,
+            "not estimated: the rotors were measured too seldom",
+            transform=panel.transAxes,
+            ha="center",
+        )
         panel.set_yticks([])
         return
     symbol, unit = what
     low, high = mean - 2 * std, mean + 2 * std
-    for i, (axis, colour) in enumerate(zip("xyz", SERIES, strict=False)):
+    true: Iterable[Array | None] = [None] * 3 if truth is None else truth.T
+    for axis, colour, x, least, most, real in zip(
+        "xyz", SERIES, mean.T, low.T, high.T, true, strict=False
+    ):
         name = f"{symbol}$_{axis}$"
-        panel.fill_between(t, low[:, i], high[:, i], color=colour, alpha=0.18, lw=0)
-        (line,) = panel.plot(t, mean[:, i], color=colour, lw=1.1, label=name)
-        if truth is not None:
-            rmse = np.sqrt(np.mean(np.square(mean[:, i] - truth[:, i])))
+        panel.fill_between(t, least, most, color=colour, alpha=0.18, lw=0)
+        (line,) = panel.plot(t, x, color=colour, lw=1.1, label=name)
+        if real is not None:
+            rmse = np.sqrt(np.mean(np.square(x - real)))
             line.set_label(f"{name} (RMSE {rmse:.3g} {unit})")
-            panel.plot(t, truth[:, i], color=colour, lw=1.0, ls="--", label=f"true {name}")
+            panel.plot(t, real, color=colour, lw=1.0, ls="--", label=f"true {name}")
     # the wide band of the filter's first moments must not set the scale
     bottom = min(np.percentile(low, 1, axis=0).min(), mean.min())
     top = max(np.percentile(high, 99, axis=0).max(), mean.max())
-    panel.set_ylim(bottom - 0.05 * (top - bottom), top + 0.05 * (top - bottom))
+    room = 0.05 * (top - bottom)
+    panel.set_ylim(bottom - room, top + room)
 
 
 def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
@@ -123,9 +136,9 @@ def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
     none.
     """
     for phase in phases:
-        if phase.name != FLIGHT:
+        if phase.name in _SHADES:
             panel.axvspan(phase.start, phase.end, color=_SHADES[phase.name], zorder=0, lw=0)
-    poses = np.concatenate([[-np.inf], log.t[log.valid], [np.inf]])
+    poses = np.r_[-np.inf, log.t[log.valid], np.inf]
     after = poses[np.searchsorted(poses, log.t, "left")]
     lost = after - poses[np.searchsorted(poses, log.t, "right") - 1] > _LASTING
     if lost.any() and log.has_pose:
