@@ -18,7 +18,7 @@ _WINDOW = 5_000_000_000  # ns of a rate
 
 
 class _Durations:
-    """_Durations as a histogram with bins 4 % wide."""
+    """Durations as a histogram with bins 4 % wide."""
 
     def __init__(self) -> None:
         self.longest = 1  # ns
