@@ -20,12 +20,12 @@ from ..identification.logs.log_map import (
     constant,
     load_map,
 )
-from ..identification.logs.magnitudes import Magnitudes
+from ..identification.logs.magnitudes import MAGNITUDES
 from ..identification.logs.mapped_log import with_range
 from .messages import SECOND, Array, Malformed, Measurement
 
 _OUTSIDE = 0.01  # tolerance, share of a command's range
-_LARGEST = Magnitudes().largest
+_LARGEST = MAGNITUDES.largest
 _FIELDS = {
     "rotors": "rotor_speeds",
     "commands": "command",

@@ -17,7 +17,7 @@ _QUANTILES = np.array([0.5, 0.99])
 _WINDOW = 5_000_000_000  # ns of a rate
 
 
-class Durations:
+class _Durations:
     """Durations as a histogram with bins 4 % wide."""
 
     def __init__(self) -> None:
@@ -80,8 +80,8 @@ class Tallies:
         self.counts: Counter[str] = Counter()
         self._said: dict[str, bool] = {}  # lines for people: printed or not
         self.rates: defaultdict[str, Rate] = defaultdict(Rate)
-        self.latency = Durations()
-        self.processor = Durations()
+        self.latency = _Durations()
+        self.processor = _Durations()
         self.wrench = np.zeros((2, 6))  # sums of force, N, and torque, Nm, and of their squares
         self.consistency = Consistency()
 

@@ -40,7 +40,7 @@ _MOST_ENDS = 8  # possible ends of sessions: the largest differences between fli
 _LEAST_LOG = -12.0  # below the likeliest way; less likely ways do not count
 
 
-class Difference(NamedTuple):
+class _Difference(NamedTuple):
     """The difference (4,) of two sets, if nothing but the vehicle changed between them: a normal
     density for each of n ways (cuts into sessions and scales of the scatter).
     """
@@ -50,7 +50,7 @@ class Difference(NamedTuple):
     log: Array  # (n,) log-likelihood of the flights in this way, normalised
 
 
-def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
+def difference(after: Sequence[Trim], before: Sequence[Trim]) -> _Difference:
     """Return the difference of two sets of flights in the likeliest ways; either set is in the
     order of time.
     """
@@ -66,7 +66,7 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> Difference:
     mean, variance, log = map(np.concatenate, zip(*parts, strict=True))
     log = log_softmax(log)
     keep = log > log.max() + _LEAST_LOG
-    return Difference(mean[keep], variance[keep], log[keep])
+    return _Difference(mean[keep], variance[keep], log[keep])
 
 
 def _cuts(trims: Sequence[Trim], later: Mask, x: Array) -> Iterator[tuple[Index, float]]:

@@ -49,7 +49,7 @@ MOST_STARTS = 2  # likeliest starts of an effect with nonlinear coefficients, fi
 
 
 @dataclass(frozen=True, eq=False)
-class FittedPosterior:
+class _FittedPosterior:
     """The posterior of flights, and the fit of the likeliest set."""
 
     posterior: Posterior
@@ -67,7 +67,7 @@ def rank(
     flights: RegressedFlights,
     library: Sequence[str],
     report: Report = lambda text: None,
-) -> FittedPosterior:
+) -> _FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -149,7 +149,7 @@ def rank(
     quieter = best.quieter({column: size}, starts) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
     late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
-    return FittedPosterior(posterior, ranking, posterior.best_setting(), best.gusts(), late)
+    return _FittedPosterior(posterior, ranking, posterior.best_setting(), best.gusts(), late)
 
 
 def rank_by_rows(
@@ -158,7 +158,7 @@ def rank_by_rows(
     first: Setting,
     fixed: Setting,
     report: Report = lambda text: None,
-) -> FittedPosterior:
+) -> _FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -238,7 +238,7 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
-    return FittedPosterior(
+    return _FittedPosterior(
         last,
         last.ranking(),
         best,

@@ -150,7 +150,7 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class FlightPiece:
+class _FlightPiece:
     """One unbroken piece of a flight, with its rows."""
 
     log: int  # index of the log
@@ -206,7 +206,7 @@ class RegressedFlights:
         self._drift: np.random.Generator | None = None  # of a copy with other errors of the fusion
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
         self._forget()
-        self._first: list[FlightPiece] = []
+        self._first: list[_FlightPiece] = []
         self._lay_rows()
         # errors of accelerometers from which the motion is read, and time offsets of all signals
         self.biases = self._biases()
@@ -229,7 +229,7 @@ class RegressedFlights:
 
     def _forget(self) -> None:
         """Clear all caches."""
-        self._pieces: dict[tuple[object, ...], list[FlightPiece]] = {}
+        self._pieces: dict[tuple[object, ...], list[_FlightPiece]] = {}
         self._residuals: dict[tuple[object, ...], Array] = {}
 
     def _noisier(self, hidden: bool = False) -> "RegressedFlights":
@@ -382,7 +382,7 @@ class RegressedFlights:
         swing = float(np.median(self.at_rows("rotor_speeds").std(axis=0)))
         return swing > LEAST_STEPS_OF_ROTOR_SPEED * self.vehicle.omega_lsb
 
-    def pieces(self, setting: Setting) -> list[FlightPiece]:
+    def pieces(self, setting: Setting) -> list[_FlightPiece]:
         """Return the pieces, with the vehicle's sensing effects undone in the logs."""
         vehicle = self.amended(setting)
         sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in sensing_of(vehicle))
@@ -390,7 +390,7 @@ class RegressedFlights:
         most = min(max(MEMORY // size, 1), 40)
         return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
 
-    def _cut(self, vehicle: Vehicle) -> list[FlightPiece]:
+    def _cut(self, vehicle: Vehicle) -> list[_FlightPiece]:
         cut = [
             (i, downsampled(s) if self.commanded else s)
             for i, log in enumerate(self.logs)
@@ -415,14 +415,14 @@ class RegressedFlights:
             pieces.append(self._piece(first.log, s, rows))
         return pieces
 
-    def _piece(self, log: int, signals: Signals, rows: Index) -> FlightPiece:
+    def _piece(self, log: int, signals: Signals, rows: Index) -> _FlightPiece:
         needed = _smooth(needed_wrench(signals, self.vehicle), signals)[rows]
         felt = None
         if not self.inertial and (read := _accelerometer(self.logs[log])):
             at = resampled(signals.t, *read)
             force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, at)
             felt = _smooth(force, signals)[rows] - needed[:, :3]
-        return FlightPiece(log, signals, rows, needed, felt)
+        return _FlightPiece(log, signals, rows, needed, felt)
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
         # no effect of the library changes an IMU's readings: each log is fused once

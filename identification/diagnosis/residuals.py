@@ -26,7 +26,7 @@ MARGIN = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Balance:
+class _Balance:
     """The residual of flights (rows, 6), by the declared vehicle and by the amended one."""
 
     before: Array
@@ -45,7 +45,7 @@ class Balance:
         return self.growth[0] < 0.0
 
 
-def balance(flights: RegressedFlights, setting: Setting) -> Balance:
+def balance(flights: RegressedFlights, setting: Setting) -> _Balance:
     """Return the residual with a setting of effects. A sensor's bias is no error of the model: the
     residual before is without it, too.
     """
@@ -63,7 +63,7 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     change = np.mean((np.square(after[held_out]) - old) / (old.mean(axis=0) + 1e-30), axis=1)
     block = flights.block[held_out]
     blocks = np.array([change[block == b].mean() for b in np.unique(block)])
-    return Balance(
+    return _Balance(
         before,
         after,
         floor,

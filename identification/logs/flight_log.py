@@ -179,7 +179,7 @@ def time_notes(t: Array) -> Names:
 
 
 @dataclass(frozen=True)
-class MotorRates:
+class _MotorRates:
     """How often rotor speeds or commands must be measured.
 
     Between samples they are taken along a straight line: 0.9 of an oscillation's amplitude passes
@@ -196,7 +196,7 @@ class MotorRates:
         return rate * self.jitter >= least
 
 
-MOTOR_RATES = MotorRates()
+MOTOR_RATES = _MotorRates()
 
 
 # When values repeat because nothing was measured, and not because they were rounded.

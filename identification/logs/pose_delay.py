@@ -69,7 +69,7 @@ _ANSWERED = 6.0  # standard deviations of a chance correlation
 Spectra = NDArray[np.complex128]
 
 
-class PoseDelay(NamedTuple):
+class _PoseDelay(NamedTuple):
     """A delay of the pose behind the rotor speeds; negative: ahead."""
 
     seconds: float
@@ -99,7 +99,7 @@ class _Response(NamedTuple):
         return float(_DELAYS[np.argmax(self.explained(_DELAYS))])
 
 
-def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
+def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     """Return the delay of a log's pose behind its rotor speeds; None: the flight does not show one.
 
     Args:
@@ -133,7 +133,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> PoseDelay | None:
     as_good = max(
         np.max(response.explained(honest[honest <= _LAGS[-1] - lag] - late, lag)) for lag in _LAGS
     )
-    return PoseDelay(late, std, bool(best - as_good > _BEYOND * scale))
+    return _PoseDelay(late, std, bool(best - as_good > _BEYOND * scale))
 
 
 def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> _Response:

@@ -95,7 +95,7 @@ def _seconds(field: str) -> float | None:
 
 
 @dataclass(frozen=True)
-class TextLayout:
+class _TextLayout:
     """How the lines of a text table are written."""
 
     separator: str = ","  # " ": any white space
@@ -264,7 +264,7 @@ def open_text(path: Path) -> Table:
     return Table(path, tuple(names), rows, load, *lines, units, tuple(notes), numeric)
 
 
-def _lists(layout: TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
+def _lists(layout: _TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Return the fields (from 0) of lists, and the length of each field's first list with items."""
     lengths: dict[int, int] = {}
     for line in lines if layout.separator != " " else ():
@@ -350,7 +350,7 @@ def _text_lines(block: bytes) -> list[str]:
 
 def _walk(
     path: Path,
-    layout: TextLayout,
+    layout: _TextLayout,
     first: int,
     slots: Rows,
     columns: Array,
@@ -384,7 +384,7 @@ def _walk(
     return row
 
 
-def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
+def _layout(path: Path, head: list[str]) -> tuple[_TextLayout, int]:
     """Return the layout with the most numbers in the first lines, and the line (from 0) of the
     first row full of numbers.
 
@@ -394,7 +394,7 @@ def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
     there = {" ", *"".join(head)}
     scores = [
         (*_score(head, layout), layout)
-        for layout in starmap(TextLayout, product(_SEPARATORS, ".,"))
+        for layout in starmap(_TextLayout, product(_SEPARATORS, ".,"))
         if layout.separator in there and layout.decimal in {".", *there - {layout.separator}}
     ]
     best, first, layout = max(scores, key=lambda score: round(score[0], 9))
@@ -408,7 +408,7 @@ def _layout(path: Path, head: list[str]) -> tuple[TextLayout, int]:
     )
 
 
-def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
+def _score(head: list[str], layout: _TextLayout) -> tuple[float, int]:
     """Return how many numbers a line has in a layout, and the line of the first row of them."""
     rows = []
     for i, line in enumerate(head):
@@ -427,14 +427,14 @@ def _score(head: list[str], layout: TextLayout) -> tuple[float, int]:
     return sum(counts) / whole, start
 
 
-def _counts(layout: TextLayout, fields: Sequence[str]) -> tuple[int, int]:
+def _counts(layout: _TextLayout, fields: Sequence[str]) -> tuple[int, int]:
     """Return how many fields are empty, and how many hold a number (``nan`` among them)."""
     empty = sum(map(_is_missing, fields))
     others = sum(number is None for number in map(layout.number, fields))
     return empty, len(fields) - others - empty
 
 
-def _header(path: Path, head: list[str], layout: TextLayout, full: int) -> tuple[int | None, int]:
+def _header(path: Path, head: list[str], layout: _TextLayout, full: int) -> tuple[int | None, int]:
     """Return the lines (from 0) of the header, if any, and of the first row.
 
     The header is the nearest line before the first row with a name for nearly every column. Rows
@@ -469,7 +469,7 @@ def _header(path: Path, head: list[str], layout: TextLayout, full: int) -> tuple
 
 def _fill(
     table: Table,
-    layout: TextLayout,
+    layout: _TextLayout,
     lines: Sequence[str],
     first: int,
     wanted: Sequence[str],

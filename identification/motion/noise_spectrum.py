@@ -39,7 +39,7 @@ _SHARES = np.arange(1, SEGMENT // 2 + 1) / (SEGMENT // 2)  # of half the samplin
 DIFFERENCES = 2  # taken before the spectrum, against leakage of slow motion
 
 
-class ChannelNoise(NamedTuple):
+class _ChannelNoise(NamedTuple):
     """The fall of one channel's noise towards half the sampling rate."""
 
     channel: str  # position, attitude, gyro, accelerometer, rotor speeds
@@ -62,7 +62,7 @@ _MEASURED = 0.9  # measurements a row, below which the reader interpolated the c
 
 
 @lru_cache(maxsize=1)  # a diagnosis asks three times
-def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
+def noise_spectra(log: FlightLog) -> list[_ChannelNoise]:
     """Return the fall of the noise of each of a log's channels, without channels that are too short
     or never change.
     """
@@ -71,7 +71,7 @@ def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
         if (amplitude := _amplitudes(pieces)) is not None:
             low, high = (share * 0.5 / period for share in BAND)
             fall = _fall(amplitude, 0.5 / period)
-            out.append(ChannelNoise(channel, _slope(amplitude), fall, (low, high)))
+            out.append(_ChannelNoise(channel, _slope(amplitude), fall, (low, high)))
     return out
 
 
@@ -154,7 +154,7 @@ def filtering_notes(log: FlightLog) -> Names:
     return tuple(_sentence(group) for group in groups if group)
 
 
-def _sentence(group: Sequence[ChannelNoise]) -> str:
+def _sentence(group: Sequence[_ChannelNoise]) -> str:
     """Return the sentence on channels of one kind; the clearest of them is the evidence."""
     clearest = max(group, key=lambda noise: (noise.slope, noise.fall))
     low, high = clearest.band_hz

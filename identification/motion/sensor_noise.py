@@ -15,7 +15,7 @@ from .smoothing import CUTOFFS, high_pass, robust_std, turned
 
 
 @dataclass(frozen=True)
-class SensorNoise:
+class _SensorNoise:
     """Standard deviations of one sample, per axis."""
 
     position: float  # m
@@ -25,7 +25,7 @@ class SensorNoise:
     accelerometer: float = 0.0  # m/s2, likewise
 
 
-def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
+def sensor_noise(log: FlightLog, vehicle: Vehicle) -> _SensorNoise:
     """Return the noise of a log. A pose's noise is the part above a quarter of the sampling rate,
     taken as white.
 
@@ -34,7 +34,7 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
     if reads_imu(log):  # the few poses beside it show no noise of their own
         mocap = vehicle.mocap if pose_rate(log) > 0.0 else Mocap(0.0, 0.0, 0.0)
-        return SensorNoise(
+        return _SensorNoise(
             mocap.sigma_pos_m, mocap.sigma_att_rad, step / np.sqrt(12.0), *imu_noise(log)
         )
     seen = np.flatnonzero(log.valid)
@@ -42,10 +42,10 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     whole = np.flatnonzero(steps < 1.5 * np.median(steps))
     position = high_pass(log.position[seen], CUTOFFS.noise_share_of_rate)[whole]
     angle = high_pass(turned(log.quaternion[seen]), CUTOFFS.noise_share_of_rate)
-    return SensorNoise(robust_std(position), robust_std(angle), step / np.sqrt(12.0))
+    return _SensorNoise(robust_std(position), robust_std(angle), step / np.sqrt(12.0))
 
 
-def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> FlightLog:
+def with_noise(log: FlightLog, noise: _SensorNoise, rng: np.random.Generator) -> FlightLog:
     """Return a log with this noise added once more."""
     n = len(log.t)
     turn = Rotation.from_rotvec(noise.attitude * rng.standard_normal((n, 3)))

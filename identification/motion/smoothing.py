@@ -17,7 +17,7 @@ from ... import _core
 from ...runtime.arrays import Array, Mask
 
 
-class Cutoffs(NamedTuple):
+class _Cutoffs(NamedTuple):
     """Cut-off frequencies (Hz), of low-passes unless stated."""
 
     # a log's pose before it is differentiated, and rotor speeds from commands: wide enough to leave
@@ -40,7 +40,7 @@ class Cutoffs(NamedTuple):
     noise_share_of_rate: float = 0.25
 
 
-CUTOFFS = Cutoffs()
+CUTOFFS = _Cutoffs()
 _EDGE = 9  # samples added to either end, as its point reflection
 
 

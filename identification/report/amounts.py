@@ -43,7 +43,7 @@ _LEAST_BLOCKS = 4
 _STEADY = 4.0  # least standard errors of a mean over blocks, beyond chance
 
 
-class Amount(NamedTuple):
+class _Amount(NamedTuple):
     """The practical quantity of a coefficient.
 
     Attributes:
@@ -72,7 +72,7 @@ def title(name: str) -> str:
     return plain[:1].lower() + plain[1:] if colon else name
 
 
-def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
+def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> _Amount:
     """Return the quantity of a named effect's coefficient on the declared vehicle."""
     value, std = effect.coefficients[coefficient], effect.std.get(coefficient, 0.0)
     unit = effect.units.get(coefficient, "1")
@@ -94,7 +94,7 @@ def amount(effect: NamedEffect, coefficient: str, vehicle: Vehicle) -> Amount:
         factor, unit = scale_of([value], unit)
     else:
         factor, unit = _SMALL_UNITS.get(unit if abs(value) < _SMALL else "", (1.0, unit))
-    return Amount(factor * value, factor * std, "" if unit == "1" else unit, where, when)
+    return _Amount(factor * value, factor * std, "" if unit == "1" else unit, where, when)
 
 
 def known(effect: NamedEffect) -> list[str]:
@@ -123,7 +123,7 @@ def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
     return f"{title(effect.name)} {most}{told} {first.when}".rstrip()
 
 
-def _wind(effect: NamedEffect) -> Amount:
+def _wind(effect: NamedEffect) -> _Amount:
     """Return the speed of a wind, and its side."""
     names = [name for name in effect.coefficients if effect.units.get(name) == "m/s"]
     wind = np.nan_to_num([effect.coefficients[name] for name in names])
@@ -135,7 +135,7 @@ def _wind(effect: NamedEffect) -> Amount:
         if abs(x) > _BESIDE * speed
     )
     spread = math.hypot(*(wind * std)) / (speed or 1.0)
-    return Amount(speed, spread, "m/s", f"from {' '.join(sides)}", "")
+    return _Amount(speed, spread, "m/s", f"from {' '.join(sides)}", "")
 
 
 def steady_wrench(pieces: Sequence[Array], periods: Sequence[float], floors: Pair) -> str:

@@ -28,7 +28,7 @@ _SAID = ("unit", "samples", "rate_hz", "gaps", "longest_gap_s")  # attributes of
 
 
 @dataclass(frozen=True)
-class LogCheck:
+class _LogCheck:
     """The result of a check."""
 
     log: FlightLog
@@ -85,7 +85,7 @@ def check_log(
     vehicle: Vehicle | None = None,
     log_map: str | None = None,
     piece: int | None = None,
-) -> LogCheck:
+) -> _LogCheck:
     """Return the check of a log; a table of unknown columns is read by a guessed map.
 
     Args:
@@ -128,7 +128,7 @@ def check_log(
     ]
     if vehicle is None:
         limits.append("no vehicle is given: the rotor speeds were not checked against its weight")
-    return LogCheck(log, read_by, log_channels(log), doubts, tuple(limits), guess, text)
+    return _LogCheck(log, read_by, log_channels(log), doubts, tuple(limits), guess, text)
 
 
 def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:

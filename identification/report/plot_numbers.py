@@ -34,7 +34,7 @@ _GROUPS = (("force", slice(0, 3), "N"), ("torque", slice(3, 6), "Nm"))
 _SYMBOLS = ("Fx", "Fy", "Fz", "τx", "τy", "τz")
 
 
-class PlotTable(NamedTuple):
+class _PlotTable(NamedTuple):
     """A caption, the heads of the columns, and the rows as texts."""
 
     caption: str
@@ -46,7 +46,7 @@ class Plot(NamedTuple):
     """One plot of the page."""
 
     packed: Data  # ``key`` is the plot's name in the page
-    table: PlotTable
+    table: _PlotTable
     title: str  # quantity and unit
     axis: str  # quantity of the x axis
     alt: str  # words for readers without sight of the plot
@@ -98,7 +98,7 @@ class _Joined:
         ]
 
 
-class PagePlots(NamedTuple):
+class _PagePlots(NamedTuple):
     """The plots of a page, and the script's plain data; empty without anything to draw."""
 
     time: list[Plot]  # one a channel
@@ -107,7 +107,7 @@ class PagePlots(NamedTuple):
     data: Data
 
 
-def page_plots(diagnosis: Diagnosis) -> PagePlots:
+def page_plots(diagnosis: Diagnosis) -> _PagePlots:
     """Return all plots of a diagnosis's page.
 
     Over time the residual before and after, with held-out blocks shaded and pieces of flight side
@@ -138,7 +138,7 @@ def page_plots(diagnosis: Diagnosis) -> PagePlots:
     signatures = [_plot_of_signature(s, number) for number, s in enumerate(diagnosis.signatures)]
     drawn = {"frequency": frequency, "signatures": signatures}
     data |= {name: [plot.packed for plot in plots] for name, plots in drawn.items() if plots}
-    return PagePlots(time, frequency, signatures, plain(data, 8))
+    return _PagePlots(time, frequency, signatures, plain(data, 8))
 
 
 def _plot_over_time(joined: _Joined, i: int) -> Plot:
@@ -201,7 +201,7 @@ def _plot_of_spectrum(
             "before": before,
             "after": after,
         },
-        PlotTable(
+        _PlotTable(
             f"Amplitude of the residual {name}",
             ("Frequency (Hz)", "Before", "After"),
             [(rounded(x[i]), rounded(before[i], 2), rounded(after[i], 2)) for i in rows],
@@ -252,7 +252,7 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
             "middle": middle,
             "mean": mean,
         },
-        PlotTable(
+        _PlotTable(
             f"{signature.effect}: {symbol} ({unit}) over {signature.regressor}, means of "
             f"{len(middle)} groups of equally many points",
             (signature.regressor, "Residual without it", "Effect"),
@@ -294,7 +294,7 @@ def telling_samples(lines: Array, columns: int) -> Rows:
     return np.unique(np.concatenate([[0, n - 1], *extremes]))
 
 
-def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> PlotTable:
+def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> _PlotTable:
     """Return the residual's rms before and after in a channel, interval by interval."""
     each = max(_ROWS // len(traces), 1)
     head: Names = ("Piece", "Time (s)", "Held out", "Before", "After")
@@ -309,7 +309,7 @@ def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) 
         head, rows = head[1:], [row[1:] for row in rows]
     more = f", the first {_MOST_PIECES} of {len(traces)} pieces"
     more = more if len(traces) > _MOST_PIECES else ""
-    return PlotTable(f"Residual {_SYMBOLS[i]}, rms ({unit}){more}", head, rows)
+    return _PlotTable(f"Residual {_SYMBOLS[i]}, rms ({unit}){more}", head, rows)
 
 
 class Bar(NamedTuple):

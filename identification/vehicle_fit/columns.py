@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...runtime.arrays import Array
+from ...runtime.arrays import Array, Mask
 from ..logs.table import NamedArrays, Names
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece, Pieces
@@ -65,24 +65,26 @@ class BalanceSpectra:
 
 def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about a drive in its ``nonlinear`` parameters."""
-    segments = []
+    segments: list[Segment] = []
     names: Names = ()
     for piece in pieces:
         here = rotor_columns(piece, drive)
-        air = air_columns(piece, drive)
+        every = here | air_columns(piece, drive)
         slow = [i for i, name in enumerate(here) if name[0] in "XYZ"]
-        names = (*here, *air, *(f"slow {name}" for name in here if name[0] in "XYZ"))
-        base = np.column_stack([piece.measured(), *here.values(), *air.values()])
-        parts, count = [base], len(here) + len(air)
+        names = (*every, *(f"slow {name}" for name in here if name[0] in "XYZ"))
+        base = np.column_stack([*every.values()])
+        parts = [piece.measured(), base]
         for name in nonlinear:
             if name in _STEP:
                 there = replace(drive, **{name: getattr(drive, name) + _STEP[name]})
-                moved = np.column_stack(list(rotor_columns(piece, there).values()))
-                change = (moved - base[:, 6 : 6 + len(here)]) / _STEP[name]
-                parts += [change, np.zeros((len(piece.t), count - len(here)))]
+                moved = every | rotor_columns(piece, there)
+                parts.append((np.column_stack([*moved.values()]) - base) / _STEP[name])
         stacked = low_pass(np.column_stack(parts), drive.band, piece.period)
-        for s in segments_of(stacked, piece.period, piece.log, drive.band):
-            segments.append(_with_delay(s, drive, nonlinear, count, len(here), slow))
+        late = np.array([name in here for name in every])
+        segments += [
+            _with_delay(s, drive, nonlinear, late, slow)
+            for s in segments_of(stacked, piece.period, piece.log, drive.band)
+        ]
     seconds = np.array([len(p.t) * p.period for p in pieces])
     noise = _rotor_noise(pieces, drive, names, seconds)
     return BalanceSpectra(drive, names, nonlinear, tuple(segments), float(seconds.sum()), noise)
@@ -91,14 +93,11 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
 def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     """Return the columns (n,) of the rotors."""
     speed = lagged(piece.rotors, drive.lag, piece.period)  # (n, 4), or the command
-    phi = np.stack([speed**e for e in drive.exponents], axis=2)  # of each rotor's thrust
+    phi = np.stack([speed**e for e in drive.exponents])  # of each rotor's thrust
     if drive.voltage_ref > 0.0 and piece.voltage is not None:
-        phi *= np.power(piece.voltage / drive.voltage_ref, drive.gamma)[:, None, None]
-    x, y = drive.positions[:, 0], drive.positions[:, 1]
-    out = {}
-    for j in range(phi.shape[2]):
-        for letter, share in drive.shares.items():
-            out[f"{letter}{j}"] = phi[:, :, j] @ share
+        phi *= np.power(piece.voltage / drive.voltage_ref, drive.gamma)[:, None]
+    shares = drive.shares
+    out = {f"{n}{j}": part @ shares[n] for j, part in enumerate(phi) for n in shares}
     momentum = speed @ drive.spin
     w = piece.angular_velocity
     smooth = low_pass(momentum[:, None], 2.0 * BAND, piece.period)
@@ -106,12 +105,12 @@ def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     out["spin x"], out["spin y"] = -w[:, 1] * momentum, w[:, 0] * momentum
     if piece.velocity is not None:
         drag = -speed[:, :, None] * _local(piece, piece.velocity, drive)
-        for i, axis in enumerate("xyz"):
-            out[f"rotor drag {axis}"] = drag[:, :, i].sum(axis=1)
-        out["moment of rotor drag x"] = -drag[:, :, 0] @ y
-        out["moment of rotor drag y"] = drag[:, :, 1] @ x
-        out["moment x of rotor drag z"] = drag[:, :, 2] @ y
-        out["moment y of rotor drag z"] = -drag[:, :, 2] @ x
+        along = np.moveaxis(drag, 2, 0)
+        for axis, force in zip("xyz", along, strict=True):
+            out[f"rotor drag {axis}"] = force.sum(axis=1)
+        for axis, force in zip("xy", along[:2], strict=True):
+            out[f"moment of rotor drag {axis}"] = -force @ shares[axis.upper()]
+            out[f"moment {axis} of rotor drag z"] = along[2] @ shares[axis.upper()]
     return out
 
 
@@ -131,16 +130,15 @@ def air_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
         for j in range(i, 3):
             out[f"w{a}w{'xyz'[j]}"] = w[:, i] * w[:, j]
     if piece.velocity is not None:
-        v = piece.velocity
-        speed = np.linalg.norm(v, axis=1)
-        for i, a in enumerate("xyz"):
-            out[f"linear drag {a}"] = -v[:, i]
-            out[f"quadratic drag {a}"] = -speed * v[:, i]
-        local = _local(piece, v, drive)
-        lift = 0.25 * (local[:, :, 0] ** 2 + local[:, :, 1] ** 2)
+        speed = np.linalg.norm(piece.velocity, axis=1)
+        for a, v in zip("xyz", piece.velocity.T, strict=True):
+            out[f"linear drag {a}"] = -v
+            out[f"quadratic drag {a}"] = -speed * v
+        across = _local(piece, piece.velocity, drive)[:, :, :2]
+        lift = 0.25 * np.sum(across**2, axis=2)
         out["lift"] = lift.sum(axis=1)
-        out["moment x of lift"] = lift @ drive.positions[:, 1]
-        out["moment y of lift"] = -lift @ drive.positions[:, 0]
+        for a in "xy":
+            out[f"moment {a} of lift"] = lift @ drive.shares[a.upper()]
     return out
 
 
@@ -148,25 +146,21 @@ def _with_delay(
     s: Segment,
     drive: Drive,
     nonlinear: Names,
-    count: int,
-    rotors: int,
+    late: Mask,
     torques: list[int],
 ) -> Segment:
-    """Return a segment with its rotors' columns delayed and their derivative by the delay.
+    """Return a segment with its ``late`` columns delayed and their derivative by the delay.
 
     Blocks are in the order of ``nonlinear``, each with the slow part of ``torques`` behind it.
     """
-    turn = 2j * np.pi * s.frequency[None, :, None]
-    measured, rest = s.columns[:, :, :6], s.columns[:, :, 6:]
-    blocks = [rest[:, :, i : i + count].copy() for i in range(0, rest.shape[2], count)]
-    for block in blocks:
-        block[:, :, :rotors] *= np.exp(-turn * drive.delay)
-    late = np.zeros_like(blocks[0])
-    late[:, :, :rotors] = -turn * blocks[0][:, :, :rotors]
-    others = iter(blocks[1:])
-    ordered = [late if name == "delay" else next(others) for name in nonlinear]
-    share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[None, :, None]
-    every = [x for block in (blocks[0], *ordered) for x in (block, share * block[:, :, torques])]
+    turn = -2j * np.pi * s.frequency[:, None] * late
+    ends = range(6, s.columns.shape[2], len(late))
+    measured, *blocks = np.split(s.columns, ends, axis=2)
+    first, *others = (block * np.exp(turn * drive.delay) for block in blocks)
+    rest = iter(others)
+    ordered = [turn * first if name == "delay" else next(rest) for name in nonlinear]
+    share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[:, None]
+    every = [x for block in (first, *ordered) for x in (block, share * block[:, :, torques])]
     return replace(s, columns=np.concatenate([measured, *every], axis=2))
 
 

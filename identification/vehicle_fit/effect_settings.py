@@ -17,16 +17,18 @@ def estimate_name(role: Role, index: int) -> str:
 
 def coefficient_of(vehicle: Vehicle, role: Role, index: int) -> float:
     """Return a coefficient of a vehicle's effects of a role; 0 without one."""
-    settings = [e for e in vehicle.effects if get(e.name).role == role]
-    return sum(float(get(e.name).vector(e.coefficients)[index]) for e in settings)
+    return sum(
+        float(get(e.name).vector(e.coefficients)[index])
+        for e in vehicle.effects
+        if get(e.name).role == role
+    )
 
 
-def linear_drag(vehicle: Vehicle) -> tuple[float, float, float]:
+def linear_drag(vehicle: Vehicle) -> list[float]:
     """Return the drag along body x, y and z at hover, of rotors and body together, N/(m/s)."""
     turning = 4.0 * vehicle.hover_rate
     along = ((Role.ROTOR_DRAG, 0), (Role.ROTOR_DRAG, 1), (Role.INFLOW_THRUST, 0))
-    x, y, z = (
+    return [
         turning * coefficient_of(vehicle, role, index) + coefficient_of(vehicle, Role.BODY_DRAG, i)
         for i, (role, index) in enumerate(along)
-    )
-    return x, y, z
+    ]

@@ -30,7 +30,6 @@ from .effect_settings import coefficient_of, effect_of, linear_drag
 from .result import ASSUMED, IDENTIFIED, Identified
 
 AIR_DENSITY = 1.225  # kg/m3, at sea level, as in both autopilots
-NO_BLUFF_BODY = 0.0  # BCOEF: both autopilots leave this part out then
 _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
 _CRAZYFLIE = [3, 2, 1, 0]  # front-right, rear-right, rear-left, front-left
 
@@ -49,7 +48,8 @@ def _autopilot(
     if max(*linear, *quadratic) > 0.0:
         values[momentum] = max(float(np.mean(linear)), 0.0)
         for p, c in zip(ballistic, quadratic, strict=True):
-            values[p] = 0.5 * AIR_DENSITY * vehicle.mass / c if c > 0.0 else NO_BLUFF_BODY
+            # both autopilots leave the part of 0 out
+            values[p] = 0.5 * AIR_DENSITY * vehicle.mass / c if c > 0.0 else 0.0
     if vehicle.motor_curve is not None:
         u = np.linspace(0.0, 1.0, 41)
         thrust = np.polynomial.polynomial.polyval(u, vehicle.motor_curve.thrust)
@@ -81,14 +81,10 @@ def _simulator(name: str, identified: Identified) -> str:
     """Return a simulator's parameters."""
     v = identified.vehicle
     lag, drag = identified.estimates[effect_of(Role.LAG)], linear_drag(v)
-    rows = [
-        np.sign(v.positions[_CRAZYFLIE, 1]),
-        -np.sign(v.positions[_CRAZYFLIE, 0]),
-        -v.spin[_CRAZYFLIE],
-    ]
+    x, y, _ = np.sign(v.positions[_CRAZYFLIE].T)
     notes = ""
     if identified.fit.drive.commands:
-        notes += (
+        notes = (
             "# these logs hold commands, no rotor speeds: k and p are scaled so that rotors hover "
             f"at {v.hover_rate:.0f} rad/s; thrust and torque are right, speeds are not\n"
         )
@@ -103,7 +99,7 @@ def _simulator(name: str, identified: Identified) -> str:
         drag=-np.diag(drag) if any(drag) else None,
         linear_drag=0.5 * sum(coefficient_of(v, Role.ROTOR_DRAG, i) for i in range(2)),
         effect=partial(coefficient_of, v),
-        mixing=rows,
+        mixing=(y, -x, -v.spin[_CRAZYFLIE]),
         per_rpm=_PER_RPM,
         Role=Role,
     ).removesuffix("\n")

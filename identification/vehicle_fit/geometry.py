@@ -14,7 +14,7 @@ GRAVITY = 9.81  # m/s2
 
 
 @dataclass(frozen=True)
-class Usual:
+class _Usual:
     """Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Behind
     the value stands a range, low and high, claimed in place of an interval.
     """
@@ -36,7 +36,7 @@ class Usual:
     hover_speed: float = 1000.0  # rad/s, for logs without rotor speeds
 
 
-USUAL = Usual()
+USUAL = _Usual()
 
 
 @dataclass(frozen=True, eq=False)

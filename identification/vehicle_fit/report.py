@@ -53,16 +53,12 @@ def identified_data(identified: Identified) -> Data:
         "advice": identified.advice,
         "status": identified.vehicle.status,
     }
+    keys = ("unit", "model", "if_nothing_changes", "thrust_and_drag")
     for where, errors in identified.predicted.items():
-        ends = errors.model, errors.still, identified.simplest[where].model
         data[where] = {"starts": errors.starts, "horizon_s": errors.horizon}
-        for (name, unit), model, still, simple in zip(QUANTITIES.items(), *ends, strict=True):
-            data[where][name.replace(" ", "_")] = {
-                "unit": unit,
-                "model": model,
-                "if_nothing_changes": still,
-                "thrust_and_drag": simple,
-            }
+        ends = errors.model, errors.still, identified.simplest[where].model
+        for name, *of in zip(QUANTITIES, QUANTITIES.values(), *ends, strict=True):
+            data[where][name.replace(" ", "_")] = dict(zip(keys, of, strict=True))
     told: Data = plain(data)
     return told
 
@@ -176,24 +172,27 @@ def explained(identified: Identified) -> Array:
 
 @styled()
 def _picture(identified: Identified) -> "Figure":
-    mass, inertia = identified.vehicle.mass, np.diag(identified.vehicle.inertia)
-    scale = np.concatenate([np.full(3, mass), inertia])
+    vehicle, band = identified.vehicle, identified.fit.drive.band
+    scale = [*3 * [vehicle.mass], *np.diag(vehicle.inertia)]
     longest = max(identified.pieces, key=lambda p: len(p.t))
-    measured, model = fitted(identified, longest)
-    share, band = explained(identified), identified.fit.drive.band
-    middle = longest.t[len(longest.t) // 2]
-    shown = np.abs(longest.t - middle) <= 0.5 * _SHOWN_SECONDS
+    t = longest.t
+    shown = np.abs(t - t[len(t) // 2]) <= 0.5 * _SHOWN_SECONDS
+    curves = ((x[shown] * scale).T for x in fitted(identified, longest))
     figure = new_figure(4.8)
     axes = figure.subplots(2, 3, sharex=True)
-    for i, axis in enumerate("xyz"):
-        for row, (what, unit) in enumerate((("force", "N"), ("torque", "Nm"))):
-            j = 3 * row + i
-            plot, t = axes[row, i], longest.t[shown]
-            plot.plot(t, scale[j] * measured[shown, j], TRUTH, lw=1.6, label="measured")
-            plot.plot(t, scale[j] * model[shown, j], ESTIMATE, lw=1.0, label="fitted")
-            told = "not measured" if np.isnan(share[j]) else f"{share[j]:.0%} explained"
-            plot.set_title(f"{what} {axis} ({unit}), {told}")
-        axes[1, i].set_xlabel("time (s)")
+    titles = [
+        f"{what} {axis} ({unit})"
+        for what, unit in (("force", "N"), ("torque", "Nm"))
+        for axis in "xyz"
+    ]
+    rows = zip(axes.flat, titles, explained(identified), *curves, strict=True)
+    for plot, title, share, measured, model in rows:
+        plot.plot(t[shown], measured, TRUTH, lw=1.6, label="measured")
+        plot.plot(t[shown], model, ESTIMATE, lw=1.0, label="fitted")
+        told = "not measured" if np.isnan(share) else f"{share:.0%} explained"
+        plot.set_title(f"{title}, {told}")
+    for plot in axes[1]:
+        plot.set_xlabel("time (s)")
     axes[0, 0].legend()
     figure.suptitle(
         f"explained: of the power from {LEAST_HZ:g} to {band:g} Hz, each frequency by its noise; "

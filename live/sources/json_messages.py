@@ -30,7 +30,7 @@ _PIECE = 65_536  # bytes read at once
 _PIPE_WAITS = 1.0  # s: the writer of a pipe may fly; a pipe holds more than 1 s at 200 Hz
 
 
-class JsonSource(Source):
+class _JsonSource(Source):
     """Rows from JSON objects."""
 
     strict = True
@@ -82,7 +82,7 @@ class JsonSource(Source):
         return True
 
 
-class UdpJson(JsonSource):
+class UdpJson(_JsonSource):
     """Datagrams.
 
     ``udp-json://HOST:PORT`` listens there. ``?reply=1`` sends each estimate back to the sender of
@@ -125,7 +125,7 @@ class UdpJson(JsonSource):
             self.link.write(json.dumps(as_fields(output)).encode())
 
 
-class JsonLines(JsonSource):
+class JsonLines(_JsonSource):
     """Lines of text on standard input, ``-``: the stream ends with the input."""
 
     kind = "-"

@@ -249,18 +249,18 @@ def _sensor(topic: str, t: Array, fields: ArrayMap, field: str, gained: str) -> 
     return ChannelGroup(t, axes, topic)
 
 
-class TooMuchError(Exception):
+class _TooMuchError(Exception):
     """Ends the parser: after all usual errors the parser goes on."""
 
 
 def counting(parser: Any) -> Any:
-    """Return pyulog's class ``ULog``, with a TooMuchError beyond ``FileLimits``."""
+    """Return pyulog's class ``ULog``, with a _TooMuchError beyond ``FileLimits``."""
     counts: Counter[str] = Counter()
 
     def count(what: str, most: int, more: int = 1) -> None:
         counts[what] += more
         if counts[what] > most:
-            raise TooMuchError(f"more than {most} {what}")
+            raise _TooMuchError(f"more than {most} {what}")
 
     class AddLogged(parser._MessageAddLogged):  # type: ignore[misc]
         def _parse_format(self, message_formats: Mapping[str, Any]) -> None:
@@ -296,7 +296,7 @@ def counting(parser: Any) -> Any:
 def _fields(name: str, formats: Mapping[str, Any], known: dict[str, int], depth: int) -> int:
     """Return the number of a topic's fields, with its arrays and inner topics written out."""
     if depth > _DEEPEST:
-        raise TooMuchError(f"topic {name[:100]!r} lies more than {_DEEPEST} deep in others")
+        raise _TooMuchError(f"topic {name[:100]!r} lies more than {_DEEPEST} deep in others")
     if name not in known:
         known[name] = sum(
             max(1, size) * (_fields(kind, formats, known, depth + 1) if kind in formats else 1)

@@ -204,7 +204,7 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
     with ExitStack() as opened:
         what = f"{path}: cannot be read as a ROS {1 if is_ros1 else 2} bag"
         with one_line(what, "a whole bag"):
-            opened.enter_context(limited_unpacking())
+            opened.enter_context(_limited_unpacking())
             reader = opened.enter_context((rosbag1 if is_ros1 else rosbag2).Reader(path))
             types = {connection.topic: connection.msgtype for connection in reader.connections}
         yield types, messages
@@ -279,7 +279,7 @@ def _at_most(make: Callable[[], Any], spent: list[int]) -> Callable[..., bytes]:
 
 
 @contextmanager
-def limited_unpacking() -> Iterator[None]:
+def _limited_unpacking() -> Iterator[None]:
     """Limit rosbags' unpacking within the block: a chunk to ``LARGEST`` bytes, all chunks and their
     index by ``FileLimits``.
     """
