@@ -91,11 +91,11 @@ class Trace:
 
     log: str
     period: float
-    t: Array
-    before: Array
-    after: Array
-    held_out: Mask
-    parts: ArrayMap = field(default_factory=dict)
+    t: Array = field(repr=False)
+    before: Array = field(repr=False)
+    after: Array = field(repr=False)
+    held_out: Mask = field(repr=False)
+    parts: ArrayMap = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +115,9 @@ class Signature:
     effect: str
     channel: str
     regressor: str
-    x: Array
-    residual: Array
-    fitted: Array
+    x: Array = field(repr=False)
+    residual: Array = field(repr=False)
+    fitted: Array = field(repr=False)
 
 
 @dataclass(frozen=True)
