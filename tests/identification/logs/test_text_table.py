@@ -115,7 +115,7 @@ def test_the_memory_of_a_check_is_in_proportion_to_the_numbers_that_are_read(tmp
         read, taken[columns.nbytes] = map(int, said(sys.executable, "-c", CHECK, path).split())
         assert read == rows
     (few, before), (many, after) = taken.items()
-    assert after - before < 5.0 * (many - few)  # 3.5 over three hours
+    assert after - before < 7.5 * (many - few)  # 4.8 over an hour
 
 
 NUMBER = st.one_of(
