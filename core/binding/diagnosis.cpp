@@ -59,8 +59,7 @@ void write_prediction(std::uintptr_t model, In<-1> t, In<-1, 4> speeds, In<-1> v
   auto *loop = reaction.size() ? reinterpret_cast<const LoopReaction *>(reaction.data()) : nullptr;
   predict_flight(model_at(model), rotors_of(speeds, voltage), t.data(), rows(states), starts.data(),
                  std::int64_t(starts.size()), period, keeps_velocity, loop,
-                 std::int64_t(path.shape(1)),
-                 reinterpret_cast<double (*)[FLOWN]>(path.data()));
+                 std::int64_t(path.shape(1)), reinterpret_cast<double (*)[FLOWN]>(path.data()));
 }
 
 void choose_states(Ints<-1> last, Bools posed, In<-1, -1> numbers, In<-1, 12> innovations,

@@ -37,19 +37,18 @@ Pair walk_dataflash(Bytes data, Array<std::int32_t, nb::shape<-1>> places,
   return Pair(nb::make_tuple(n.messages, n.bytes));
 }
 
-Pair read_text_rows(nb::bytes text, std::int64_t begin, char separator,
-                    Ints<nb::shape<-1>> slots, Array<double, nb::shape<-1, -1>> columns,
-                    std::int64_t row) {
+Pair read_text_rows(nb::bytes text, std::int64_t begin, char separator, Ints<nb::shape<-1>> slots,
+                    Array<double, nb::shape<-1, -1>> columns, std::int64_t row) {
   std::int64_t size = std::int64_t(text.size()), rows = std::int64_t(columns.shape(1));
   if (begin < 0 || begin > size || row < 0 || row > rows)
     throw nb::value_error("text: expected a place in the text, and a row of the columns");
   for (std::size_t i = 0; i < slots.size(); i++)
     if (slots.data()[i] >= std::int64_t(columns.shape(0)))
       throw nb::value_error("text: expected a column for each slot");
-  text_table::Count n = text_table::read(
-      reinterpret_cast<const std::uint8_t *>(text.c_str()) + begin, size - begin,
-      std::uint8_t(separator), slots.data(), std::int64_t(slots.size()), columns.data() + row, rows,
-      rows - row);
+  text_table::Count n =
+      text_table::read(reinterpret_cast<const std::uint8_t *>(text.c_str()) + begin, size - begin,
+                       std::uint8_t(separator), slots.data(), std::int64_t(slots.size()),
+                       columns.data() + row, rows, rows - row);
   return Pair(nb::make_tuple(n.rows, n.bytes));
 }
 

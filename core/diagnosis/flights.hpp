@@ -68,7 +68,7 @@ constexpr double LONGEST_ROTOR_STEP = 0.005;  // s, over which rotors are held
 constexpr double STEP_TOLERANCE = 0.1;  // of a period: a step so little too long is still one step
 // of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
 constexpr int MOTION_STEPS = 4;
-constexpr int FLOWN = 13;  // numbers of a state: position, quaternion, velocity, rate
+constexpr int FLOWN = 13;        // numbers of a state: position, quaternion, velocity, rate
 constexpr double TINY = 1e-300;  // no share of nothing
 
 inline int rotor_steps(double length) {
@@ -78,13 +78,13 @@ inline int rotor_steps(double length) {
 // How a flight loop answers moments that nothing measures: angular accelerations for each unit of
 // velocity, tilt and rate. The reaction stands in for those moments, too, and is no part of a plant
 struct LoopReaction {
-  double gain[3];        // of the model's angular acceleration
-  double unmeasured;     // rad/s2, standard deviation of what nothing measures, about x or y
-  double damping;        // 1/s, of roll and pitch, where nothing is measured
-  double stiffness;      // 1/s2, to level, where all is measured
-  double flapping;       // rad/s2/(m/s), measured as the rotors' torque is
-  double never_answered; // rad/s2/(m/s)
-  double yaw_damping;    // 1/s
+  double gain[3];         // of the model's angular acceleration
+  double unmeasured;      // rad/s2, standard deviation of what nothing measures, about x or y
+  double damping;         // 1/s, of roll and pitch, where nothing is measured
+  double stiffness;       // 1/s2, to level, where all is measured
+  double flapping;        // rad/s2/(m/s), measured as the rotors' torque is
+  double never_answered;  // rad/s2/(m/s)
+  double yaw_damping;     // 1/s
 };
 constexpr int REACTIONS = sizeof(LoopReaction) / sizeof(double);
 
@@ -100,13 +100,14 @@ inline void measured_turning(const Model<double> &m, const double *x, const doub
 
 // Put the torque of the loop's reaction into the model's effects; `shares` (2) of the moments about
 // x and y are measured
-inline void react(Model<double> &m, const LoopReaction &loop, const double *shares,
-                  const double *x, const double R[3][3]) {
+inline void react(Model<double> &m, const LoopReaction &loop, const double *shares, const double *x,
+                  const double R[3][3]) {
   const double *w = x + RATE, tilt[2] = {R[2][1], -R[2][0]};
   double model[3], across[2], more[3];
   measured_turning(m, x, R, model, across);
   for (int i = 0; i < 2; i++) {
-    double measured = loop.gain[i] * model[i] + loop.flapping * across[i] - loop.stiffness * tilt[i];
+    double measured =
+        loop.gain[i] * model[i] + loop.flapping * across[i] - loop.stiffness * tilt[i];
     more[i] = shares[i] * measured + loop.never_answered * across[i] -
               (1 - shares[i]) * loop.damping * w[i] - model[i];
   }
@@ -186,7 +187,8 @@ inline void predict_flight(Model<double> &along, const LoggedRotors &rotors, con
         double model[3], across[2];
         apply_effects(m, x, R);
         measured_turning(m, x, R, model, across);
-        for (int i = 0; i < 2; i++) squares[i] += std::pow(model[i] + loop->flapping * across[i], 2);
+        for (int i = 0; i < 2; i++)
+          squares[i] += std::pow(model[i] + loop->flapping * across[i], 2);
       });
       for (int i = 0; i < 2; i++) shares[i] = squares[i] / (squares[i] + least);
     }

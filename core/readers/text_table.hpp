@@ -51,8 +51,8 @@ inline bool number(const uint8_t *at, const uint8_t *end, double *out) {
                                 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
   while (at < end && *at == ' ') at++;
   while (at < end && end[-1] == ' ') end--;
-  if (at == end || (end - at == 3 && (at[0] | 32) == 'n' && (at[1] | 32) == 'a' &&
-                    (at[2] | 32) == 'n')) {
+  if (at == end ||
+      (end - at == 3 && (at[0] | 32) == 'n' && (at[1] | 32) == 'a' && (at[2] | 32) == 'n')) {
     *out = std::nan("");
     return true;
   }
@@ -86,14 +86,11 @@ inline bool number(const uint8_t *at, const uint8_t *end, double *out) {
     exponent += is_below ? -stated : stated;
   }
   double value;
-  if (!digits)
-    value = 0.0;
-  else if (exponent < -MOST_EXPONENT || exponent > MOST_EXPONENT)
-    return false;
+  if (!digits) value = 0.0;
+  else if (exponent < -MOST_EXPONENT || exponent > MOST_EXPONENT) return false;
   else if (digits >> 53 == 0 && exponent >= -22 && exponent <= 22)
     value = exponent < 0 ? double(digits) / TENS[-exponent] : double(digits) * TENS[exponent];
-  else
-    value = scaled(digits, exponent);
+  else value = scaled(digits, exponent);
   *out = is_negative ? -value : value;
   return true;
 }
