@@ -1,9 +1,8 @@
 """The probability of a cause outside the library, and of a name beside such a cause.
 
 Two signs speak for a cause outside: columns of the dictionary with much of the likeliest set's
-residual, and a transient disturbance. The first is a Bayes factor. The weight of the
-second is fitted to flights with known truth. A gust is neither: the likelihood has a
-disturbance of its own.
+residual, and a transient disturbance. The first is a Bayes factor. The weight of the second is
+fitted to flights with known truth. A gust is neither: the likelihood has a disturbance of its own.
 """
 
 import math
