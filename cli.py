@@ -73,10 +73,12 @@ def windwrench(
     ] = False,
 ) -> None:
     """Estimate the external force and torque (the wrench) on a quadrotor, in flight or from a log.
-    Find what the model of the vehicle lacks. Simulate flights in wind; compare and train
-    controllers.
+    Find what the vehicle's model lacks. Fly, compare and train controllers in simulated wind.
 
-    windwrench LOG says of a flight log all that it allows, on one page.
+    First step: windwrench demo shows all of this, on one page.
+
+    Your own log: windwrench flight.ulg checks the log, estimates the wrench and names missing
+    effects, on one page.
 
     Example: windwrench fly --scenario base --seed 4
     """

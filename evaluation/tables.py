@@ -91,10 +91,9 @@ def _lost(row: Standing) -> str:
     return losses
 
 
-# titles of the columns: figures of a controller, comparisons, and those of a page alone
+# titles of the columns: figures of a controller, and comparisons
 FIGURES = ("law", "RMSE after 3 s", "IQM", "first 3 s", "return", "activity", "at bound", "term")
 COMPARED = ("law", "against", "p", "P", "score", "to the")
-_OF_A_PAGE = ("95 % of P", "wins", "whole")
 
 
 def table(rows: Sequence[Standing]) -> dict[str, list[str]]:
@@ -114,9 +113,7 @@ def table(rows: Sequence[Standing]) -> dict[str, list[str]]:
             "at bound": f"{100 * row.saturated_fraction:.0f} %",
             "terminated": _lost(row),
             "score": "-" if math.isnan(row.score) else f"{row.score:.2f}",
-            "wins": f"{100 * row.wins_over_rival:.0f} %",
             "P": f"{row.improvement_over_rival:.2f}",
-            "95 % of P": "-".join(f"{end:.2f}" for end in row.improvement_ci95),
         }
         if not math.isnan(row.share_of_limit):
             cells["to the limit"] = f"{100 * row.share_of_limit:.0f} %"
@@ -136,7 +133,6 @@ def _by_error(row: Standing) -> dict[str, str]:
         f"against {row.rival}, 95 %": _change_text(row.change_over_rival, row.change_ci95),
         "against the best, 95 %": _change_text(row.change_over_best, row.change_over_best_ci95),
         "p": "-" if p is None else f"{p:.3f}",
-        "whole (mm), 95 %": in_mm(row.rmse_m, row.rmse_ci95_m),
     }
 
 
@@ -152,15 +148,9 @@ def part_of(columns: dict[str, list[str]], titles: Sequence[str]) -> dict[str, l
 
 
 def markdown(rows: Sequence[Standing]) -> str:
-    """Return the rows as two tables for a page: figures, and comparisons."""
-    columns = table(rows)
-    titles = ("scenario", *FIGURES), ("scenario", *COMPARED, *_OF_A_PAGE)
-    parts = [part_of(columns, some) for some in titles]
-    return "\n".join(_markdown(part) for part in parts if part)
-
-
-def _markdown(columns: dict[str, list[str]]) -> str:
-    left_aligned = ("scenario", "law", "RMSE", "return, ", "against", "whole")
+    """Return the rows as a table for a page: the figures of each controller."""
+    columns = part_of(table(rows), ("scenario", *FIGURES))
+    left_aligned = ("scenario", "law", "RMSE", "return, ")
     rule = ["-" if title.startswith(left_aligned) else "-:" for title in columns]
     lines = [list(columns), rule, *zip(*columns.values(), strict=True)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)

@@ -63,7 +63,8 @@ def test_a_figure_without_a_source_and_a_wrong_one_are_seen():
 
 
 def test_a_quote_of_a_row_that_is_not_there_is_refused(tmp_path):
-    value = {"from": "docs/results/leaderboard.json", "where": {"controller": "none"}, "key": "x"}
+    value = {"from": "docs/results/board/FanTracking.json.gz", "where_in": "rows"}
+    value |= {"where": {"controller": "none"}, "key": "x"}
     listed = {
         "quotes": {"README.md": [{"says": "{}", "values": [value]}]},
         "not results": {},

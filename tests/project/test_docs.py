@@ -29,7 +29,7 @@ from windwrench.cli import app
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 DRY_RUN = "<!-- dry run -->"
 NOT_CODE = {"", "text", "yaml"}
-QUICK = {"effects.md", "estimator.md", "index.md", "own-task.md"}  # the others fly for long
+QUICK = {"effects.md", "estimator.md", "index.md", "tasks.md"}  # the others fly for long
 
 
 def blocks(page):
@@ -92,7 +92,7 @@ def run_shell(content, environment, dry, where):
 
 def prepare(page, folder):
     """Put there what a page takes for given: logs of others, and a law of the reader's."""
-    if page.name in ("cite.md", "leaderboard.md"):
+    if page.name == "leaderboard.md":
         law = "class MyLaw:\n    def __call__(self, observation, info):\n        return [0.0] * 3\n"
         (folder / "my_law.py").write_text(law)
     if page.name == "diagnose.md":
