@@ -53,14 +53,6 @@ def summary(rows: Sequence[Standing]) -> str:
         worse = [row for row in judged if row.change_over_best > 0]
         truth = ", ".join(f"`{row.controller}`" for row in some if row.uses_truth)
         line = f"* **{scenario}**, {some[0].episodes} episodes each. Terminated: {losses}."
-        means = [
-            f"`{row.controller}` {row.rmse_settled_m:.3f} m, interquartile mean "
-            f"{row.iqm_rmse_m:.3f} m"
-            for row in some
-            if row.lost_episodes and row.ranked_by == SETTLED
-        ]
-        if means:
-            line += f" Their rest counts 2.5 m in the mean: {'; '.join(means)}."
         if truth:
             line += f" With the truth or a preview: {truth}."
         if some[0].ranked_by == SETTLED:

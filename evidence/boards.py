@@ -9,7 +9,7 @@ from windwrench.evaluation.tables import markdown, summary
 from windwrench.evidence.kept_results import kept
 from windwrench.runtime.provenance import made_by
 
-TASKS = ("WindHover", "FanTracking")
+TASKS = ("WindHover", "WindTrajectory", "FanTracking", "FanTracking2D")
 
 
 def page() -> dict[str, Any]:
