@@ -140,9 +140,14 @@ def part_of(columns: dict[str, list[str]], titles: Sequence[str]) -> dict[str, l
 
 
 def markdown(rows: Sequence[Standing]) -> str:
-    """Return the rows as a table for a page: the figures of each controller."""
-    columns = part_of(table(rows), ("scenario", *FIGURES))
-    left_aligned = ("scenario", "law", "RMSE", "return, ")
+    """Return the rows as two tables for a page: figures, and comparisons."""
+    columns = table(rows)
+    titles = ("scenario", *FIGURES), ("scenario", *COMPARED)
+    return "\n".join(_markdown(part) for some in titles if (part := part_of(columns, some)))
+
+
+def _markdown(columns: dict[str, list[str]]) -> str:
+    left_aligned = ("scenario", "law", "RMSE", "return, ", "against")
     rule = ["-" if title.startswith(left_aligned) else "-:" for title in columns]
     lines = [list(columns), rule, *zip(*columns.values(), strict=True)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)

@@ -25,7 +25,8 @@ def _board(submission: dict[str, Any]) -> dict[str, str]:
         f"--controllers {','.join(asked['controllers'])} --seed {asked['seed']}"
     )
     made = made_by(command, [submission["commit"]], submission["windwrench"])
-    return {"made": made, "table": f"{summary(rows)}\n{markdown(rows)}"}
+    figures = markdown(rows).partition("\n\n")[0]  # of its two tables
+    return {"made": made, "table": f"{summary(rows)}\n{figures}\n"}
 
 
 def standing(row: dict[str, Any]) -> Standing:
