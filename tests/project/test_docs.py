@@ -97,7 +97,6 @@ def prepare(page, folder):
         (folder / "my_law.py").write_text(law)
     if page.name == "diagnose.md":
         from tests.support.converted_flights import write_bag, write_ulog
-        from windwrench.cli import app
         from windwrench.identification.logs.reading import read_log
 
         drag = ("--effect", "rotor_drag:kdx=1.2e-4,kdy=1.2e-4", "--seconds", "40", "--seed", "1")
