@@ -102,7 +102,7 @@ def _diagnose(
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
     from ..identification.report.headline import headline
-    from ..identification.report.words import doubts, error_sentences, remainder_sentence
+    from ..identification.report.words import doubts, remainder_sentence
 
     (every, model), count = read, len(paths)
     folder = results_folder(out)
@@ -113,12 +113,7 @@ def _diagnose(
     written = write_report(diagnosis, folder, command_line())
     log_notes([*(own := doubts(diagnosis)), *(x for x in diagnosis.notes if x not in own)])
     faults = [data["headline"] for data in diagnosis.rotor_faults if data["rotor"] is not None]
-    sentences = (
-        headline(diagnosis),
-        *error_sentences(diagnosis),
-        remainder_sentence(diagnosis),
-        *faults,
-    )
+    sentences = (headline(diagnosis), remainder_sentence(diagnosis), *faults)
     for sentence in (*sentences, f"vehicle: {model.name}"):
         console.print(sentence)
     _show(diagnosis)
@@ -131,8 +126,7 @@ def _diagnose(
 def _show(diagnosis: "Diagnosis") -> None:
     """Print the tables of effects and of the error before and after."""
     from ..identification.report.amounts import amount
-    from ..identification.report.page import error_table
-    from ..identification.report.words import by_energy, chance, name_in_words
+    from ..identification.report.words import by_energy, chance, error_table, name_in_words
 
     stated = diagnosis.probabilities.names
     rows: list[tuple[str, ...]] = []
