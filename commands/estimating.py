@@ -59,6 +59,7 @@ def estimate(
     from ..estimator.noise_scale import noise_warning
     from ..identification.motion.inertial_signals import reads_imu
     from ..identification.report.headline import wrench_headline
+    from ..identification.report.words import rounded, scale_of
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
         counts,
@@ -133,8 +134,8 @@ def estimate(
             measures["RMSE to truth"] = truth[i]
         # a log may tell no torque
         for measure, value in measures.items() if np.isfinite(values).any() else ():
-            sign = "+" if measure == "mean" else ""
-            table.append((f"{name}, {measure} ({unit})", *(f"{v:{sign}.4g}" for v in value)))
+            factor, small = scale_of(value, unit)
+            table.append((f"{name}, {measure} ({small})", *(rounded(factor * v) for v in value)))
             result[f"{name}_{measure.lower().replace(' ', '_')}_{unit}"] = value
     show_table(("", "x", "y", "z"), table)
     say(*written)

@@ -112,11 +112,13 @@ def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
     if effect.name in library.names() and library.get(effect.name).sets_wind:
         return f"{title(effect.name)} {_wind(effect)}"
     names = known(effect) or list(effect.coefficients)[:1]
+    if not (told := amount(effect, names[0], vehicle)).unit:
+        meaning = coefficient_meaning(effect.name, names[0]).partition(";")[0] or names[0]
+        return f"{title(effect.name)}, {meaning} {told}"
     names = [name for name in names if effect.units.get(name) == effect.units.get(names[0])]
     largest = max(names, key=lambda name: abs(effect.coefficients[name]))
     told, most = amount(effect, largest, vehicle), "up to " if len(names) > 1 else ""
-    symbol = "" if told.unit else f"{largest} = "
-    return f"{title(effect.name)} {most}{symbol}{told} {told.when}".rstrip()
+    return f"{title(effect.name)} {most}{told} {told.when}".rstrip()
 
 
 def _wind(effect: NamedEffect) -> _Amount:

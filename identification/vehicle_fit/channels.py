@@ -104,8 +104,8 @@ def _sources_of(logs: Logs) -> Sources:
         rates = [f"{x} {log.rates[x]:.3g}" for x in ("rotors", "commands") if x in log.rates]
         raise InputError(
             f"{log.source or logs[0].name}: expected rotor speeds (omega1..omega4) in every log, "
-            "or motor commands (cmd1..cmd4) in every log, "
-            f"{MOTOR_RATES.torque_hz:g} times a second; found {' and '.join(rates) or 'neither'}"
+            f"or motor commands (cmd1..cmd4) in every log, {MOTOR_RATES.torque_hz:g} times a "
+            f"second; found {' and '.join(rates) or 'none'} a second"
         )
     accelerometer = all(log.accelerometer is not None for log in logs)
     gyro = all(log.gyro is not None for log in logs)

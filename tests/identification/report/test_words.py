@@ -50,7 +50,7 @@ def named(name, tentative=False, **values):
         (named("mass", tentative=True, dm=0.005), "mass 5.00 ± 0.50 g"),
         (named("wind", wx=-8.4, wy=0.5, wz=0.0, cd=0.02), "wind 8.41 ± 0.84 m/s from +x"),
         (named("wind", wx=3.0, wy=-4.0), "wind 5.00 ± 0.37 m/s from −x +y"),
-        (named("battery_sag", n=1.0), "battery sag n = 1.00 ± 0.10"),
+        (named("battery_sag", n=1.0), "battery sag, exponent of the voltage ratio 1.00 ± 0.10"),
         (
             named("body_drag", dx=0.1, dy=0.2, dz=0.3, cx=0.4),
             "body drag up to 0.300 ± 0.030 N along z at 1 m/s",
@@ -128,12 +128,12 @@ def test_causes_stand_by_their_energy():
     undecided = replace(scale, indistinguishable_from=("rotor_efficiency",))
     weak = replace(sag, evidence={"energy_explained": 0.01}, tentative=True)
     assert said(weak, undecided) == (
-        "The model lacks thrust scale −5.00 ± 0.50 % or rotor efficiency; battery sag n = 1.00 ± "
-        "0.10 (perhaps)."
+        "The model lacks thrust scale −5.00 ± 0.50 % or rotor efficiency; battery sag, exponent of "
+        "the voltage ratio 1.00 ± 0.10 (perhaps)."
     )
     gusts = (Disturbance("Fx", 0.031, 0.3),)
     assert said(weak, gusts=gusts).endswith(
-        "; the model perhaps lacks battery sag n = 1.00 ± 0.10."
+        "; the model perhaps lacks battery sag, exponent of the voltage ratio 1.00 ± 0.10."
     )
 
 
