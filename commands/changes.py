@@ -38,7 +38,9 @@ def compare(
 
     if example:
         if logs or against:
-            raise InputError(f"--example: has logs of its own; expected it without {_AGAINST}")
+            raise InputError(
+                f"--example: has logs of its own and takes no other log and no {_AGAINST}"
+            )
         console.print(_EXAMPLE)
         logs, reading = [_FLOWN / "cut.csv.gz"], AS_THEY_ARE
         against = sorted(_FLOWN.glob("normal-*.csv.gz"))

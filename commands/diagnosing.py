@@ -44,7 +44,7 @@ def diagnose(
         given = {"LOGS": logs, **{f"--{name}": x for name, x in vars(reading).items()}}
         given |= {"--test": test, "--rotor-faults": rotor_faults}
         if unwanted := [name for name, value in given.items() if value]:
-            raise InputError(f"--example: has a log of its own; expected it without {unwanted[0]}")
+            raise InputError(f"--example: has a log of its own and takes no {unwanted[0]}")
         with example_flight() as flight:
             console.print(f"{flight.what} ({flight.source})\nKnown before the diagnosis:")
             for why in (*(known.why for known in flight.known), flight.unknown):
@@ -59,7 +59,7 @@ def diagnose(
     if rotor_faults:
         if test or reading.piece:
             option = "--test" if test else "--piece"
-            raise InputError(f"--rotor-faults: expected no {option} with it")
+            raise InputError(f"--rotor-faults: takes no {option}")
         return _rotor_faults(logs, reading, out)
     read = read_flights([*logs, *(test or [])], reading)
     return _diagnose(read, logs, without, out)

@@ -56,7 +56,7 @@ def look(
             raise
         write_text(unread.map_text, own_map)
         raise InputError(
-            f"{unread}. The map so far is {own_map}: edit it, then windwrench {log} --map {own_map}"
+            f"{unread}; edit {own_map}, then: windwrench {log} --map {own_map}"
         ) from unread
     if checked["fields"]:  # its map was guessed
         write_text(checked["map"], own_map)
@@ -97,7 +97,6 @@ def look(
         console.print(line, soft_wrap=True)
     say(page)
     show_page(page, not no_open)
-    console.print(sentence)
     return {**results, "sentence": sentence, "page": page}
 
 
