@@ -101,11 +101,11 @@ def _sources_of(logs: Logs) -> Sources:
     ]
     if not all(speeds) and not all(commands):
         log = logs[speeds.index(False)]
-        rates = [f"{x} {log.rates[x]:.3g}" for x in ("rotors", "commands") if x in log.rates]
+        rates = [f"{x} {log.rates[x]:.3g} Hz" for x in ("rotors", "commands") if x in log.rates]
         raise InputError(
             f"{log.source or logs[0].name}: expected rotor speeds (omega1..omega4) in every log, "
-            f"or motor commands (cmd1..cmd4) in every log, {MOTOR_RATES.torque_hz:g} times a "
-            f"second; found {' and '.join(rates) or 'none'} a second"
+            "or motor commands (cmd1..cmd4) in every log, "
+            f"{MOTOR_RATES.torque_hz:g} times a second; found {' and '.join(rates) or 'neither'}"
         )
     accelerometer = all(log.accelerometer is not None for log in logs)
     gyro = all(log.gyro is not None for log in logs)
