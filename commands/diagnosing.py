@@ -126,12 +126,14 @@ def _diagnose(
 def _show(diagnosis: "Diagnosis") -> None:
     """Print the tables of effects and of the error before and after."""
     from ..identification.report.amounts import amount
-    from ..identification.report.words import by_energy, chance, error_table, name_in_words
+    from ..identification.report.words import by_energy, chance, error_table
 
     stated = diagnosis.probabilities.names
     rows: list[tuple[str, ...]] = []
     for effect in by_energy(diagnosis):
-        head = [name_in_words(effect), *([chance(stated[effect.name])] if stated else [])]
+        name = " or ".join((effect.name, *effect.indistinguishable_from))
+        head = [f"{name} (tentative)" if effect.tentative else name]
+        head += [chance(stated[effect.name])] if stated else []
         for name in effect.coefficients:
             acts = amount(effect, name, diagnosis.declared)
             rows.append((head[0], name, f"{acts} {acts.when}".rstrip(), *head[1:]))

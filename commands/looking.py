@@ -97,6 +97,7 @@ def look(
         console.print(line, soft_wrap=True)
     say(page)
     show_page(page, not no_open)
+    console.print(sentence)
     return {**results, "sentence": sentence, "page": page}
 
 

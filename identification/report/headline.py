@@ -93,10 +93,11 @@ def wrench_headline(series: WrenchSeries) -> str:
     """
     rows = finite_rows(series.force)
     wrench = np.nan_to_num(np.hstack([series.force, series.torque])[rows])
-    stated = np.hstack([series.std_force, series.std_torque])[rows]
-    std = np.median(np.nan_to_num(stated), axis=0)
-    floors = std[:3].max(), std[3:].max()
-    told = steady_wrench([wrench], [median_step(series.t)], floors)
+    floors = [
+        float(np.median(np.nan_to_num(std[rows]), axis=0).max())
+        for std in (series.std_force, series.std_torque)
+    ]
+    told = steady_wrench([wrench], [median_step(series.t)], (floors[0], floors[1]))
     mean = f"Unmodelled {told}" if told else f"No unmodelled force above {in_unit(floors[0], 'N')}"
     spread = in_unit(math.sqrt(wrench[:, :3].var(axis=0).sum()), "N")
     doubt = first_doubt(warnings_in(series.notes))

@@ -130,12 +130,9 @@ def by_energy(diagnosis: Diagnosis) -> list[NamedEffect]:
 
 def doubts(diagnosis: Diagnosis) -> list[str]:
     """Return the reasons to doubt the logs, and then the names."""
-    doubted = (
-        text
-        for text in diagnosis.notes
-        if _WARNING in text or any(text in some for some in diagnosis.doubts.values())
-    )
-    return sorted(doubted, key=lambda text: _WARNING not in text)
+    of_names = [text for some in diagnosis.doubts.values() for text in some]
+    said = [text for text in diagnosis.notes if _WARNING in text or text in of_names]
+    return sorted(said, key=lambda text: _WARNING not in text)
 
 
 def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
@@ -214,13 +211,6 @@ def disturbance_at(diagnosis: Diagnosis) -> str:
     size = in_unit(largest.peak, _unit_of(largest.channel))
     where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
     return f"{size} in {largest.channel} at {rounded(largest.t)}{SPACE}s{where}"
-
-
-def name_in_words(effect: NamedEffect) -> str:
-    """Return an effect's name with its alternatives, and a mark of a tentative one."""
-    others = in_words(effect.indistinguishable_from, "or")
-    tentative = " (tentative)" if effect.tentative else ""
-    return f"{effect.name}{f' (or {others})' if others else ''}{tentative}"
 
 
 def next_step(diagnosis: Diagnosis) -> str:

@@ -46,7 +46,6 @@ def named(name, **values):
         (named("world_tilt", ax=0.01), "world tilt 0.573 ± 0.057 degrees about x"),
         (named("wind", wx=-8.4, wy=0.5, wz=0.0, cd=0.02), "wind 8.41 ± 0.84 m/s from +x"),
         (named("wind", wx=3.0, wy=-4.0), "wind 5.00 ± 0.37 m/s from −x +y"),
-        (named("battery_sag", n=1.0), "battery sag, exponent of the voltage ratio 1.00 ± 0.10"),
         (
             named("body_drag", dx=0.1, dy=0.2, dz=0.3, cx=0.4),
             "body drag up to 0.300 ± 0.030 N along z at 1 m/s",
