@@ -59,9 +59,9 @@ def compare(
     ]
     change = find_change(trims[: len(logs)], trims[len(logs) :])
     written = write_change(change, folder)
-    log_notes(text for log in every for text in log.notes)
     console.print(change_headline(change))
     console.print(f"vehicle: {model.name}")
+    log_notes(text for log in every for text in log.notes)
     for session in dict.fromkeys(sessions) if by_folder else ():
         after, before = (
             part.count(session) for part in (sessions[: len(logs)], sessions[len(logs) :])

@@ -111,7 +111,7 @@ def _diagnose(
     diagnosis = _with_rotor_faults(diagnosis, paths, every[:count])
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(diagnosis, folder, command_line())
-    log_notes([*(own := doubts(diagnosis)), *(x for x in diagnosis.notes if x not in own)])
+    log_notes(doubted := doubts(diagnosis))
     faults = [data["headline"] for data in diagnosis.rotor_faults if data["rotor"] is not None]
     sentences = (headline(diagnosis), remainder_sentence(diagnosis), *faults)
     for sentence in (*sentences, f"vehicle: {model.name}"):
@@ -119,6 +119,7 @@ def _diagnose(
     _show(diagnosis)
     for line in diagnosis.advice:
         console.print(line)
+    log_notes(text for text in diagnosis.notes if text not in doubted)
     say(*written)
     return report_data(diagnosis)
 

@@ -96,11 +96,11 @@ def estimate(
     written = [track, plot_wrench(series, flight, track.with_suffix(".png"))]
     written.append(folder / f"{begin}tuning.yaml")
     save_tuning(series.tuning, flight.period, written[2])
-    log_notes(series.notes)
     seconds = float(flight.t[-1] - flight.t[0])
     headline = wrench_headline(series)
     console.print(headline)
     console.print(f"{flight.name}: {len(flight.t)} samples, {seconds:.1f} s, vehicle {model.name}")
+    log_notes(series.notes)
     result: dict[str, Any] = {
         "headline": headline,
         "log": flight.name,
