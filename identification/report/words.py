@@ -129,8 +129,11 @@ def by_energy(diagnosis: Diagnosis) -> list[NamedEffect]:
 
 
 def doubts(diagnosis: Diagnosis) -> list[str]:
-    """Return the reasons to doubt the logs, and then the names."""
-    of_names = [text for some in diagnosis.doubts.values() for text in some]
+    """Return the reasons to doubt the logs, and then the names; a likely cause outside the library
+    stands in the headline.
+    """
+    checks = {**diagnosis.doubts, "unknown": ()}
+    of_names = [text for some in checks.values() for text in some]
     said = [text for text in diagnosis.notes if _WARNING in text or text in of_names]
     return sorted(said, key=lambda text: _WARNING not in text)
 
