@@ -48,7 +48,7 @@ def fly(
     from ..runtime.whole_files import replaced
 
     if view and gif:
-        raise InputError("--view shows the flight in a window; expected it without --gif")
+        raise InputError("--view: shows the flight in a window; expected no --gif")
     effects = [parse_setting(e) for e in effect or []]
     import_files(imports or ())
     known = task_of(task)

@@ -221,30 +221,27 @@ def counts(series: WrenchSeries) -> dict[str, int]:
 
 def uncertainty_note(series: WrenchSeries) -> str:
     """Return the accuracy of force and torque in words, with the largest part of it."""
-    force = _largest_part(series, series.std_force, 3, "N")
-    force = f"One standard deviation of the force is {force}"
+    force = f"Standard deviation an axis: force {_largest_part(series, series.std_force, 3, 'N')}"
     if not np.isfinite(series.std_torque).any():
         return force
-    return f"{force}; of the torque, {_largest_part(series, series.std_torque, 0, 'Nm')}"
+    return f"{force}, torque {_largest_part(series, series.std_torque, 0, 'Nm')}"
 
 
 def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> str:
     """Return the deviation (N, 3) of three numbers in words; ``first`` of torque and force."""
     parts = {
         f"{NAMES[name]}, +-{100.0 * getattr(series.vehicle.uncertainty, name):.3g} %"
-        f"{' between days' if name == 'command' else ''},": np.mean(
+        f"{' between days' if name == 'command' else ''}": np.mean(
             variances_along(factors, series.loads)[:, first : first + 3]
         )
         for name, factors in factors_alone(series.vehicle).items()
     }
     parts["noise"] = np.mean(np.square(series.std[:, 12 + first : 15 + first]))
     total = np.mean(np.square(std))
-    parts["what the rotors do between samples"] = total - sum(parts.values())
+    parts["the rotors between samples"] = total - sum(parts.values())
     name = max(parts, key=parts.__getitem__)
-    return (
-        f"{np.sqrt(total):.2g} {unit} an axis, and {name} makes up "
-        f"{100.0 * parts[name] / total:.0f} % of its square"
-    )
+    share = f"{100.0 * parts[name] / total:.0f} % of the variance"
+    return f"{1e3 * np.sqrt(total):.2g} m{unit} ({share}: {name})"
 
 
 def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[str]:

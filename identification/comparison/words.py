@@ -30,14 +30,14 @@ _NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
 
-def _cannot_tell(chances: Values) -> str:
+def _undecided(chances: Values) -> str:
     """Return a sentence on an unsure finding and its rivals."""
-    likeliest, *rivals = (
-        f"{name} ({p:.2f})"
+    likeliest = (
+        f"{name} {p:.2f}"
         for name, p in sorted(chances.items(), key=itemgetter(1), reverse=True)
         if p >= _NAMED
     )
-    return f"Cannot tell {likeliest} from {' or '.join(rivals) or 'the other possibilities'}."
+    return f"Undecided, by probability: {', '.join(likeliest)}."
 
 
 def change_headline(change: Change) -> str:
@@ -48,18 +48,16 @@ def change_headline(change: Change) -> str:
         if change.sure:
             return f"Nothing changed (probability {chance:.2f})."
         other = sorted(change.places, key=change.places.__getitem__, reverse=True)[1]
-        return (
-            f"Cannot tell whether anything changed: nothing with probability {chance:.2f}; if "
-            f"something did, it is likeliest at {other} ({change.places[other]:.2f})."
-        )
+        where = f"{other} ({change.places[other]:.2f})"
+        return f"Undecided: nothing changed (probability {chance:.2f}), or likeliest {where}."
     kind = _kind(change)
     if change.sure:
         return f"Changed: {place}, probability {chance:.2f}; {kind}"
-    return f"{_cannot_tell(change.places)} {kind[:1].upper()}{kind[1:]}"
+    return f"{_undecided(change.places)} If the first: {kind}"
 
 
 def _kind(change: Change) -> str:
-    size = f"{100 * change.amount:.0f} % (+- {100 * change.amount_std:.0f})"
+    size = f"{100 * change.amount:.0f} ± {100 * change.amount_std:.0f} %"
     if change.place == SOMETHING_ELSE:
         return "the rotors share the work otherwise than one weaker rotor or one weight would ask."
     if change.place == "all rotors":
@@ -73,8 +71,8 @@ def _kind(change: Change) -> str:
     if change.carries_more >= 0.95:
         return f"the vehicle carries {size} of its weight more there."
     return (
-        f"either that rotor delivers less (probability {change.weaker:.2f}) or the vehicle carries "
-        f"more there ({change.carries_more:.2f}), by about {size}; these look alike."
+        f"the rotor delivers {size} less (probability {change.weaker:.2f}), or the vehicle carries "
+        f"as much more there ({change.carries_more:.2f}): these look alike."
     )
 
 
@@ -167,7 +165,7 @@ def fault_headline(fault: RotorFault) -> str:
     chance = fault.probabilities[likeliest]
     sure = f"(probability {chance:.2f})" if chance < 0.9995 else "(probability above 0.999)"
     if not fault.sure:
-        return _cannot_tell({_finding(fault, k): p for k, p in fault.probabilities.items()})
+        return _undecided({_finding(fault, k): p for k, p in fault.probabilities.items()})
     if likeliest == NOTHING:
         return f"No rotor lost thrust {sure}."
     if likeliest == OTHER:

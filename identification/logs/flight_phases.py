@@ -72,7 +72,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
             )
         x, y, z = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
         far = np.linalg.norm((x, y, z))
-        said = f"the motors turn, and the position spans {far:.3g} m, {z:.3g} m of height"
+        said = f"the position spans {far:.3g} m, {z:.3g} m in height"
         drove = np.hypot(x, y) > _DROVE[0] and z < _DROVE[1]
         return "not shown" if far < _MOVES or drove else told, said
     if log.gyro is not None:
@@ -80,9 +80,9 @@ def flew(log: FlightLog) -> tuple[str, str]:
         count = max(1, round(_MEAN / log.period))
         means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
         turns = np.std(means, axis=0).max(initial=0.0) if len(means) else 0.0
-        said = f"the motors turn, and the body by {turns:.2g} rad/s"
+        said = f"the motors run, and the body turns at {turns:.2g} rad/s"
         return "unknown" if turns < _TURNS else told, said
-    return "unknown", "the motors turn, and no motion was logged"
+    return "unknown", "the motors run, and no motion was logged"
 
 
 class Phase(NamedTuple):

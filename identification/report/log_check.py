@@ -22,7 +22,7 @@ from ..logs.screening import LEAST_SECONDS, convention_doubt, screen_log
 from ..logs.table import Data, Names, Table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
-from .words import without_warning
+from .words import first_doubt, warnings_in, without_warning
 
 _SAID = ("unit", "samples", "rate_hz", "gaps", "longest_gap_s")  # attributes of each channel
 
@@ -42,12 +42,12 @@ class _LogCheck:
     def headline(self) -> str:
         """Return the gravest doubt, and what flew how long and how far."""
         answer, by = flew(self.log)
-        what = self.log.vehicle or self.log.flown.airframe or "a vehicle of four rotors"
-        told = [f"Doubt: {doubt}." for doubt in self.doubts[:1]]
+        what = self.log.vehicle or self.log.flown.airframe
+        told = first_doubt(self.doubts)
         if answer.startswith("yes"):
-            told.append(f"Flight of {answer[5:]} by {what}: {by}.")
+            told.append(f"Flight of {answer[5:]}{f' by {what}' if what else ''}: {by}.")
         elif answer == "unknown":
-            told.append(f"Nothing shows whether {what} flew: {by}.")
+            told.append(f"Nothing shows a flight: {by}.")
         return " ".join(told)
 
     def what_flew(self) -> list[tuple[str, str, str]]:
@@ -114,7 +114,7 @@ def check_log(
             named = re.search(r"\(reader ([^()]+)\)$", log.source)
             read_by = f"the reader {named[1]}" if named else "this kit's own format"
     guessed = [
-        f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}"
+        f"{f'{r.section} {r.field}'.rstrip()} guessed: {r.why}"
         for r in (guess.doubts if guess else ())
     ]
     vehicle = flown_vehicle(vehicle, log.vehicle)
@@ -152,15 +152,15 @@ def _doubts(log: FlightLog, guessed: Sequence[str], vehicle: Vehicle | None) -> 
     answer, by = flew(log)
     grounded = [f"the log does not show a flight: {by}"] if answer in ("no", "not shown") else []
     doubts = [*grounded, *guessed]
-    told = [note for note in log.notes if note.startswith("warning")]
+    told = warnings_in(log.notes)
     if vehicle is None:
         told += filter(None, [convention_doubt(log, None)])
     else:
         least = DIAGNOSIS.least_seconds_each if log.commanded else LEAST_SECONDS
         try:
-            told += screen_log(log, vehicle, least)[1]
+            told += map(without_warning, screen_log(log, vehicle, least)[1])
         except InputError as error:
             refusal = str(error).removeprefix(f"{log.source}: ")
             doubts.append(f"diagnose refuses this log: {refusal}")
-            told = [text for text in told if without_warning(text) != refusal]
-    return tuple(dict.fromkeys([*doubts, *map(without_warning, told)]))
+            told = [text for text in told if text != refusal]
+    return tuple(dict.fromkeys([*doubts, *told]))

@@ -8,7 +8,6 @@ nothing from elsewhere.
 import base64
 import hashlib
 import json
-import math
 from collections.abc import Iterable
 from functools import cache
 from importlib import resources
@@ -42,7 +41,7 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         amounts=amounts,
         headline=headline(diagnosis),
         tone=_TONES[diagnosis.verdict],
-        table=error_table(diagnosis),
+        table=words.error_table(diagnosis),
         plots=plots,
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
@@ -81,27 +80,3 @@ def _policy(scripts: Iterable[str]) -> str:
     )
     allowed = " ".join(hashes) or "'none'"
     return f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}"
-
-
-def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the rows of the error table: name, unit, and three rounded numbers (before, after,
-    floor).
-    """
-    floors = {
-        "force_rms": ("Force, rms", "N", diagnosis.floor_force_rms),
-        "torque_rms": ("Torque, rms", "Nm", diagnosis.floor_torque_rms),
-        "rollout_1s_position_rms": ("Position after 1 s of prediction, rms", "m", math.nan),
-        "nis_without_wrench_state": ("NIS of a filter without wrench states, mean", "", 6.0),
-    }
-    table = []
-    for name, (what, unit, floor) in floors.items():
-        before, after = (getattr(side, name) for side in (diagnosis.before, diagnosis.after))
-        factor, unit = words.scale_of((before, after, floor), unit) if unit else (1.0, "")
-        # zero before and after: these logs cannot tell this error
-        told = before or after
-        old, new, least = (
-            words.rounded(factor * x) if told else words.MISSING for x in (before, after, floor)
-        )
-        least = (least if unit else "6") if told and math.isfinite(floor) else ""
-        table.append({"what": what, "unit": unit, "before": old, "after": new, "floor": least})
-    return table

@@ -101,7 +101,7 @@ def _sources_of(logs: Logs) -> Sources:
     ]
     if not all(speeds) and not all(commands):
         log = logs[speeds.index(False)]
-        rates = [f"{x} {log.rates[x]:.3g}" for x in ("rotors", "commands") if x in log.rates]
+        rates = [f"{x} {log.rates[x]:.3g} Hz" for x in ("rotors", "commands") if x in log.rates]
         raise InputError(
             f"{log.source or logs[0].name}: expected rotor speeds (omega1..omega4) in every log, "
             "or motor commands (cmd1..cmd4) in every log, "

@@ -21,9 +21,9 @@ from tests.support.diagnoses import made_diagnosis, made_trace
 from windwrench.identification.findings import CHANNELS
 from windwrench.identification.report import log_channels
 from windwrench.identification.report.files import write_report
-from windwrench.identification.report.page import error_table, report_page
+from windwrench.identification.report.page import report_page
 from windwrench.identification.report.plot_numbers import page_plots, telling_samples
-from windwrench.identification.report.words import rounded
+from windwrench.identification.report.words import error_table, rounded
 
 UPLOT = {
     "uPlot.iife.min.js": "19c8d4c6ad88929a79f4ae49d6f7161566dfd0ba3d15cc495e974f787eb78f1f",
