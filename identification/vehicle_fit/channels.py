@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import MOTOR_RATES, FlightLog, Logs
+from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
 from ..motion.signals import log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
@@ -28,8 +29,6 @@ _GAP = 0.1  # s without a sample: a piece ends
 _PRODUCT_HZ = 8.0
 # Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
 _FASTEST_HZ = 200.0
-# share of the hover thrust's command: a vehicle below it stands on the ground
-_FLYING_SHARE = 0.3
 # share of different values among all: rotor speeds below it are rounded
 _FEW_VALUES = 0.2
 
@@ -169,7 +168,7 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
             piece = _piece(log, moved, sources)
             inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
             for part in _cut(piece, inside):
-                pieces += _cut(part, _flying(part))
+                pieces += _cut(part, carried(part.rotors, part.period))
     moving = [piece for piece in pieces if piece.velocity is not None]
     pieces, sources = moving or pieces, replace(sources, velocity=bool(moving))
     if not pieces:
@@ -254,13 +253,6 @@ def _velocity(log: FlightLog, t: Array) -> Array:
             body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
             out[inside] = resampled(t[inside], s.t, body)
     return out
-
-
-def _flying(piece: MotionPiece) -> Mask:
-    """Return where the rotors carry the vehicle, without take-off and landing."""
-    load = low_pass(np.mean(np.square(piece.rotors), axis=1), 1.0, piece.period)
-    usual = float(np.median(load[load > 0.1 * np.quantile(load, 0.95)]))
-    return load > _FLYING_SHARE * usual
 
 
 def _cut(piece: MotionPiece, keep: Mask) -> Pieces:
