@@ -163,6 +163,7 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     sources = _sources_of(logs)
     pieces = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
+        log = _without_bias(log)
         motion = _posed if "pose" in (sources.rate, sources.force) else _inertial
         for moved in motion(log, number, sources):
             piece = _piece(log, moved, sources)
@@ -177,6 +178,22 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
             "there; expected a longer flight, or another --from and --to"
         )
     return pieces, sources
+
+
+def _without_bias(log: FlightLog) -> FlightLog:
+    """Return a log whose accelerometer agrees with the pose on the mean of each axis: over a flight
+    the mean force carries the weight, however the sensor is calibrated.
+    """
+    if log.accelerometer is None or not log.has_pose:
+        return log
+    off = []
+    for s in log_signals(log, wide_hz=np.inf):
+        felt = s.acceleration + np.array([0.0, 0.0, GRAVITY])
+        off.append(
+            _sensor(log, log.accelerometer, s.t)
+            - Rotation.from_matrix(s.rotation).inv().apply(felt)
+        )
+    return replace(log, accelerometer=log.accelerometer - np.concatenate(off).mean(axis=0))
 
 
 def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
