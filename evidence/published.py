@@ -42,9 +42,13 @@ PUBLISHED = {
     "NeuroBEM, torque": (5.9, 20.0, 3.4),
     "TR-NeuroMHE, torque": (3.1, 15.9, 2.5),
 }
-# parts of the logs, s, and what the notebook of sysid.tools prints of them. A motor's thrust in N at
-# a command u is 0.0212656 - 0.0111750 u + 0.1201299 u^2
-PARTS = {"log10": [(35.0, 65.0)], "log15": [(55.0, 90.0)], "log16": [(32.0, 38.0), (45.0, 49.0)]}
+# parts of the logs, s after their start, and the result of the notebook of sysid.tools. A motor's
+# thrust in N at a command u is 0.0212656 - 0.0111750 u + 0.1201299 u^2
+PARTS = {
+    "log10": [(8.67, 38.67)],
+    "log15": [(15.76, 50.76)],
+    "log16": [(15.1, 21.1), (28.1, 32.1)],
+}
 CRAZYFLIE_MASS, CRAZYFLIE_ARM = 0.027, 0.028  # kg, m
 OF_SYSID_TOOLS = {
     "Jxx": 1.0286e-5,
