@@ -218,12 +218,6 @@ class PredictionErrors:
     model: Array  # (4, m)
     still: Array  # (4, m) with velocity and body rate as at the start
 
-    @property
-    def worse(self) -> list[str]:
-        """The quantities with a larger error than the guess, at the horizon's end."""
-        ends = zip(QUANTITIES, self.model[:, -1], self.still[:, -1], strict=True)
-        return [name for name, model, still in ends if model > still]
-
     @classmethod
     def pooled(cls, parts: Sequence[PredictionErrors]) -> PredictionErrors:
         """Return the errors over all starts of several, at the samples of the slowest."""
@@ -237,38 +231,24 @@ class PredictionErrors:
         return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))
 
 
-def prediction_errors(
-    logs: Sequence[FlightLog],
-    vehicle: Vehicle,
-    horizon_s: float = 0.5,
-    windows: Sequence[Segments] | None = None,
-) -> PredictionErrors:
-    """Return a model's prediction errors, beside the guess of an unchanged velocity.
-
-    A prediction starts every 0.25 s, as in ``predict``, and the guess from the same state. Both are
-    compared with the pose below 15 Hz; the angle between two attitudes is their distance.
-
-    Args:
-        logs: with a pose; flights outside the model's fit, or the errors mean little. For commands
-            alone the vehicle's motor curve gives the rotor speeds.
-        vehicle: the predicting model, with its declared effects.
-        horizon_s: s.
-        windows: for each log, its parts: from and to in s after its start; None: all of it.
-
-    Raises:
-        InputError: no stretch of pose is long enough.
-    """
-    return errors_of_models(logs, [vehicle], horizon_s, windows)[0]
-
-
 def errors_of_models(
     logs: Sequence[FlightLog],
     vehicles: Sequence[Vehicle],
     horizon_s: float = 0.5,
     windows: Sequence[Segments] | None = None,
 ) -> list[PredictionErrors]:
-    """Return ``prediction_errors`` of several models of one vehicle, from the same starts: by the
-    first one's filters.
+    """Return prediction errors of models of one vehicle, beside the guess of an unchanged velocity.
+
+    A prediction starts every 0.25 s of flight, as in ``predict``, by the first model's filters, and
+    the guess from the same state. Both are compared with the pose below 15 Hz; the angle between
+    two attitudes is their distance.
+
+    Args:
+        logs: with a pose; flights outside the model's fit, or the errors mean little. For commands
+            alone the vehicle's motor curve gives the rotor speeds.
+        vehicles: the predicting models, with their declared effects.
+        horizon_s: s.
+        windows: for each log, its parts: from and to in s after its start; None: all of it.
 
     Raises:
         InputError: no stretch of pose is long enough.

@@ -18,7 +18,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import MOTOR_RATES, FlightLog, Logs
 from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
-from ..motion.signals import log_signals
+from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 from .geometry import GRAVITY
 
@@ -186,14 +186,21 @@ def _without_bias(log: FlightLog) -> FlightLog:
     """
     if log.accelerometer is None or not log.has_pose:
         return log
-    off = []
-    for s in log_signals(log, wide_hz=np.inf):
-        felt = s.acceleration + np.array([0.0, 0.0, GRAVITY])
-        off.append(
-            _sensor(log, log.accelerometer, s.t)
-            - Rotation.from_matrix(s.rotation).inv().apply(felt)
-        )
-    return replace(log, accelerometer=log.accelerometer - np.concatenate(off).mean(axis=0))
+    weight = np.array([0.0, 0.0, GRAVITY])
+    off = [
+        _sensor(log, log.accelerometer, s.t)
+        - Rotation.from_matrix(s.rotation).inv().apply(s.acceleration + weight)
+        for s in _posed_pieces(log)
+    ]
+    return (
+        replace(log, accelerometer=log.accelerometer - np.vstack(off).mean(axis=0)) if off else log
+    )
+
+
+def _posed_pieces(log: FlightLog) -> Iterator[Signals]:
+    """Yield the signals of a pose, if a stretch is long enough."""
+    with suppress(InputError):
+        yield from log_signals(log)
 
 
 def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
@@ -264,11 +271,10 @@ def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
 def _velocity(log: FlightLog, t: Array) -> Array:
     """Return the velocity (n, 3) in body axes at times, NaN in gaps of the pose."""
     out = np.full((len(t), 3), np.nan)
-    with suppress(InputError):  # no stretch of pose is long enough
-        for s in log_signals(log):
-            inside = (t >= s.t[0]) & (t <= s.t[-1])
-            body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
-            out[inside] = resampled(t[inside], s.t, body)
+    for s in _posed_pieces(log):
+        inside = (t >= s.t[0]) & (t <= s.t[-1])
+        body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
+        out[inside] = resampled(t[inside], s.t, body)
     return out
 
 

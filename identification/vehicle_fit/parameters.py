@@ -22,7 +22,7 @@ from .spectra import BAND
 # sensors
 FORCE_BIAS = 0.2
 # m/s2, beside a pose: what a sensor a centimetre off the centre of mass feels on the mean
-_POSED_BIAS = 0.03
+POSED_BIAS = 0.03
 TILT = 0.02
 # s, offset between the motion's clock and the rotors': sensors' own filters, transport
 DELAY = 0.02
@@ -130,8 +130,7 @@ def first_model(
     prior = {"delay": DELAY}
     if sources.force == "accelerometer":
         free = (*free, *BIASES)
-        bias = _POSED_BIAS if sources.velocity else FORCE_BIAS
-        prior |= {**dict.fromkeys(BIASES, bias), "tilt x": TILT, "tilt y": TILT}
+        prior |= {**dict.fromkeys(BIASES, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
     known = {**{f"a{j}": share for j in range(len(each))}, "reach": 1.0}
     known |= {name: getattr(drive, name) for name in nonlinear}
     model = Model(mass, len(each), (*free, *nonlinear), size, prior)
