@@ -223,7 +223,7 @@ def _reason(errors: Errors) -> str:
             figures = f"{what} of {where.replace('_', ' ')} worse than the simplest guess "
             figures += f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
             said.append((end / best, figures))
-    return f"not identifiable: torques predict the {max(said)[1]}"
+    return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"
 
 
 def _by_balance(fit: VehicleFit) -> HeldOut:
