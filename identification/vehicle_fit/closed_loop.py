@@ -95,7 +95,7 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
     group = np.concatenate([*(numbers[::every] for numbers in groups), [-1]])
-    sizes = np.concatenate([_unchanged(part) for part in thin])
+    sizes: Array = np.concatenate([_unchanged(part) for part in thin])
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
