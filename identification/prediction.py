@@ -29,6 +29,7 @@ from ..runtime.errors import InputError
 from .causal_states import STATE, causal_states, scaled_tuning
 from .logs.commanded_speeds import with_commanded_speeds
 from .logs.flight_log import NORM_TOLERANCE, FlightLog
+from .logs.flight_phases import carried
 from .logs.table import Array, finite_rows
 from .motion.residual import loaded_model
 from .motion.sensing_effects import undo_log_sensing
@@ -217,12 +218,6 @@ class PredictionErrors:
     model: Array  # (4, m)
     still: Array  # (4, m) with velocity and body rate as at the start
 
-    @property
-    def worse(self) -> list[str]:
-        """The quantities with a larger error than the guess, at the horizon's end."""
-        ends = zip(QUANTITIES, self.model[:, -1], self.still[:, -1], strict=True)
-        return [name for name, model, still in ends if model > still]
-
     @classmethod
     def pooled(cls, parts: Sequence[PredictionErrors]) -> PredictionErrors:
         """Return the errors over all starts of several, at the samples of the slowest."""
@@ -236,38 +231,24 @@ class PredictionErrors:
         return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))
 
 
-def prediction_errors(
-    logs: Sequence[FlightLog],
-    vehicle: Vehicle,
-    horizon_s: float = 0.5,
-    windows: Sequence[Segments] | None = None,
-) -> PredictionErrors:
-    """Return a model's prediction errors, beside the guess of an unchanged velocity.
-
-    A prediction starts every 0.25 s, as in ``predict``, and the guess from the same state. Both are
-    compared with the pose below 15 Hz; the angle between two attitudes is their distance.
-
-    Args:
-        logs: with a pose; flights outside the model's fit, or the errors mean little. For commands
-            alone the vehicle's motor curve gives the rotor speeds.
-        vehicle: the predicting model, with its declared effects.
-        horizon_s: s.
-        windows: for each log, its parts: from and to in s after its start; None: all of it.
-
-    Raises:
-        InputError: no stretch of pose is long enough.
-    """
-    return errors_of_models(logs, [vehicle], horizon_s, windows)[0]
-
-
 def errors_of_models(
     logs: Sequence[FlightLog],
     vehicles: Sequence[Vehicle],
     horizon_s: float = 0.5,
     windows: Sequence[Segments] | None = None,
 ) -> list[PredictionErrors]:
-    """Return ``prediction_errors`` of several models of one vehicle, from the same starts: by the
-    first one's filters.
+    """Return prediction errors of models of one vehicle, beside the guess of an unchanged velocity.
+
+    A prediction starts every 0.25 s of flight, as in ``predict``, by the first model's filters, and
+    the guess from the same state. Both are compared with the pose below 15 Hz; the angle between
+    two attitudes is their distance.
+
+    Args:
+        logs: with a pose; flights outside the model's fit, or the errors mean little. For commands
+            alone the vehicle's motor curve gives the rotor speeds.
+        vehicles: the predicting models, with their declared effects.
+        horizon_s: s.
+        windows: for each log, its parts: from and to in s after its start; None: all of it.
 
     Raises:
         InputError: no stretch of pose is long enough.
@@ -279,7 +260,7 @@ def errors_of_models(
         starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
     if not any(len(part.rows) for part in starts):
         names = ", ".join(log.name for log in logs)
-        raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s")
+        raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s of flight")
     return errors_at(starts, vehicles)
 
 
@@ -334,7 +315,8 @@ def logged_starts(
     log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float
 ) -> LoggedStarts:
     """Return starts every 0.25 s whose horizon (s) lies in one of the segments, times (s) from and
-    to, by the filters of a vehicle.
+    to, by the filters of a vehicle. The rotors carry the vehicle at both ends: no model has the
+    ground's force.
 
     Raises:
         InputError: no stretch of pose is unbroken for 3 s.
@@ -343,11 +325,14 @@ def logged_starts(
     ahead = log.period * np.arange(1, max(1, round(horizon / log.period)) + 1)
     each = (np.arange(t0, min(t1, log.t[-1]) - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
+    aloft = carried(log.rotor_speeds, log.period)
     starts, seen = [], []
     for piece in log_signals(log):
         first, last = piece.t[0] + _START_MARGIN, piece.t[-1] - horizon - _END_MARGIN
         inside = times[(times >= first) & (times <= last)]
         rows = np.unique(np.searchsorted(log.t, inside - 0.5 * log.period))
+        ends = np.searchsorted(log.t, log.t[rows] + ahead[-1], side="right") - 1
+        rows = rows[aloft[rows] & aloft[ends]]
         rows = rows[:: math.ceil(len(rows) / _MOST_STARTS) or 1]
         starts.append(rows)
         turned = continuous(Rotation.from_matrix(piece.rotation).as_quat(scalar_first=True))

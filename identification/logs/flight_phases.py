@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
+from ..motion.smoothing import CUTOFFS, low_pass
 from .flight_log import FlightLog
 from .table import Array, Mask, finite_rows
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
 
 _TURNING = 0.1  # share of the weight: less thrust is a rotor at rest
+_CARRIED = 0.3  # share of the usual load: a vehicle below it stands on the ground
 _CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
 _WELL_ABOVE = 0.2  # of the typical height
 _CLIMB = 0.1  # m/s: slower is not climbing or sinking
@@ -45,6 +47,14 @@ def carrying(total: Array) -> Mask:
     vehicle: more than half of the usual thrust.
     """
     return total > 0.5 * usual_thrust(total)
+
+
+def carried(rotors: Array, period: float) -> Mask:
+    """Return the samples (N,), ``period`` s apart, where rotors carry a vehicle, dives included:
+    by the squares of their speeds or commands (N, 4), slowly averaged.
+    """
+    load = low_pass(np.mean(np.square(rotors), axis=1), CUTOFFS.flying_hz, period)
+    return load > _CARRIED * usual_thrust(load)
 
 
 def flew(log: FlightLog) -> tuple[str, str]:

@@ -16,8 +16,9 @@ from scipy.spatial.transform import Rotation
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import MOTOR_RATES, FlightLog, Logs
+from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
-from ..motion.signals import log_signals
+from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 from .geometry import GRAVITY
 
@@ -28,8 +29,6 @@ _GAP = 0.1  # s without a sample: a piece ends
 _PRODUCT_HZ = 8.0
 # Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
 _FASTEST_HZ = 200.0
-# share of the hover thrust's command: a vehicle below it stands on the ground
-_FLYING_SHARE = 0.3
 # share of different values among all: rotor speeds below it are rounded
 _FEW_VALUES = 0.2
 
@@ -164,12 +163,13 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     sources = _sources_of(logs)
     pieces = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
+        log = _without_bias(log)
         motion = _posed if "pose" in (sources.rate, sources.force) else _inertial
         for moved in motion(log, number, sources):
             piece = _piece(log, moved, sources)
             inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
             for part in _cut(piece, inside):
-                pieces += _cut(part, _flying(part))
+                pieces += _cut(part, carried(part.rotors, part.period))
     moving = [piece for piece in pieces if piece.velocity is not None]
     pieces, sources = moving or pieces, replace(sources, velocity=bool(moving))
     if not pieces:
@@ -178,6 +178,29 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
             "there; expected a longer flight, or another --from and --to"
         )
     return pieces, sources
+
+
+def _without_bias(log: FlightLog) -> FlightLog:
+    """Return a log whose accelerometer agrees with the pose on the mean of each axis: over a flight
+    the mean force carries the weight, however the sensor is calibrated.
+    """
+    if log.accelerometer is None or not log.has_pose:
+        return log
+    weight = np.array([0.0, 0.0, GRAVITY])
+    off = [
+        _sensor(log, log.accelerometer, s.t)
+        - Rotation.from_matrix(s.rotation).inv().apply(s.acceleration + weight)
+        for s in _posed_pieces(log)
+    ]
+    return (
+        replace(log, accelerometer=log.accelerometer - np.vstack(off).mean(axis=0)) if off else log
+    )
+
+
+def _posed_pieces(log: FlightLog) -> Iterator[Signals]:
+    """Yield the signals of a pose, if a stretch is long enough."""
+    with suppress(InputError):
+        yield from log_signals(log)
 
 
 def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
@@ -248,19 +271,11 @@ def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
 def _velocity(log: FlightLog, t: Array) -> Array:
     """Return the velocity (n, 3) in body axes at times, NaN in gaps of the pose."""
     out = np.full((len(t), 3), np.nan)
-    with suppress(InputError):  # no stretch of pose is long enough
-        for s in log_signals(log):
-            inside = (t >= s.t[0]) & (t <= s.t[-1])
-            body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
-            out[inside] = resampled(t[inside], s.t, body)
+    for s in _posed_pieces(log):
+        inside = (t >= s.t[0]) & (t <= s.t[-1])
+        body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
+        out[inside] = resampled(t[inside], s.t, body)
     return out
-
-
-def _flying(piece: MotionPiece) -> Mask:
-    """Return where the rotors carry the vehicle, without take-off and landing."""
-    load = low_pass(np.mean(np.square(piece.rotors), axis=1), 1.0, piece.period)
-    usual = float(np.median(load[load > 0.1 * np.quantile(load, 0.95)]))
-    return load > _FLYING_SHARE * usual
 
 
 def _cut(piece: MotionPiece, keep: Mask) -> Pieces:

@@ -1,8 +1,8 @@
 """The flight loop's reaction, fitted to predictions of half a second.
 
-The loss is the mean distance of prediction and flight in ``QUANTITIES``, each against the distance
-where nothing changes. Gauss-Newton minimises the mean norm, with norms weighted by their inverse in
-turn.
+The loss is the mean distance of prediction and flight in ``QUANTITIES``, each against the flight's
+own distance where nothing changes: a brisk flight counts as much as a calm one. Gauss-Newton
+minimises the mean norm, with norms weighted by their inverse in turn.
 """
 
 from collections.abc import Callable, Sequence
@@ -93,10 +93,9 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
         vehicle: with the force, inertia and rotors that stay.
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
-    thin = [part.those(slice(None, None, every)) for part in starts]
+    thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
     group = np.concatenate([*(numbers[::every] for numbers in groups), [-1]])
-    still = _compared(thin, lambda part: part.unchanged)
-    sizes: Array = np.linalg.norm(still[:, -1], axis=-1).mean(axis=0)[:, None]
+    sizes: Array = np.concatenate([_unchanged(part) for part in thin])
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
@@ -136,6 +135,15 @@ def _loss(e: Array, away: Array) -> float:
     """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (9,)."""
     prior = 1.0 + _PRIOR * np.sum(np.square(away / (3.0 * _SIZES)))
     return float(prior * np.linalg.norm(e, axis=-1).mean())
+
+
+def _unchanged(part: LoggedStarts) -> Array:
+    """Return the mean distances (n, 1, 4, 1) of a flight at the horizon's end if nothing changes,
+    once for each start.
+    """
+    off = _compared([part], lambda part: part.unchanged)[:, -1]
+    sizes = np.maximum(np.linalg.norm(off, axis=-1).mean(axis=0), _LEAST)
+    return np.broadcast_to(sizes[:, None], (len(off), 1, len(sizes), 1))
 
 
 def _turning(starts: Sequence[LoggedStarts], vehicle: Vehicle) -> float:

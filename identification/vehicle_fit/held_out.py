@@ -217,10 +217,10 @@ def _reason(errors: Errors) -> str:
     said = []
     for where, each in errors.items():
         whole, simple = (PredictionErrors.pooled(each[name]) for name in (WHOLE, SIMPLEST))
-        ends = (of[:, -1] for of in (whole.model, whole.still, simple.model))
-        for (what, unit), end, still, least in zip(QUANTITIES.items(), *ends, strict=True):
-            best, other = min((still, "no change"), (least, "thrust and drag alone"))
-            figures = f"{what} of {where.replace('_', ' ')} worse than {other} "
+        least = np.minimum(whole.still, simple.model)
+        ends = whole.model[:, -1], least[:, -1]
+        for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True):
+            figures = f"{what} of {where.replace('_', ' ')} worse than the simplest guess "
             figures += f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
             said.append((end / best, figures))
     return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"

@@ -29,7 +29,7 @@ from .estimates import Estimates, thrust_of
 from .geometry import SPIN, Geometry, Interval
 from .held_out import HeldOut, held_out, loops_of, models_of, warnings_of
 from .motors import motor_response
-from .parameters import FORCE_BIAS, FURTHER, first_model
+from .parameters import BIASES, FORCE_BIAS, FURTHER, POSED_BIAS, first_model
 from .plausible import check_thrust
 from .result import ASSUMED, IDENTIFIED, NOTHING, REFUTED, Estimate, Identified, told
 from .solve import VehicleFit, nearest_body, score_tests, solve
@@ -101,6 +101,9 @@ def identify(
             "logs do that were smoothed before they were written, or whose rotor speeds are noisy: "
             "only what is slower was used"
         )
+    if sources.force == "accelerometer" and sources.velocity:
+        prior = fit.model.prior | dict.fromkeys(BIASES, POSED_BIAS)
+        fit = solve(pieces, fit.drive, replace(fit.model, prior=prior), fit.theta)
     report(0.5, "asking what else shows")
     fit, kept, hidden = _with_optional(pieces, fit, sources)
     if "answered torque" in kept:
@@ -116,7 +119,7 @@ def identify(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
             "above): the opposite ones were taken"
         )
-    if sources.force == "accelerometer":
+    if sources.force == "accelerometer" and not sources.velocity:
         notes.append(
             "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
             "thrust"

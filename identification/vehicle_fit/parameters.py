@@ -21,6 +21,8 @@ from .spectra import BAND
 # accelerometer with its factory's calibration alone, m/s2 and rad: 20 mg, as in data sheets of such
 # sensors
 FORCE_BIAS = 0.2
+# m/s2, beside a pose: what a sensor a centimetre off the centre of mass feels on the mean
+POSED_BIAS = 0.03
 TILT = 0.02
 # s, offset between the motion's clock and the rotors': sensors' own filters, transport
 DELAY = 0.02
