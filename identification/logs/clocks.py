@@ -26,6 +26,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
 from .evidence import GOOD
+from .excerpt import excerpt
 from .flight_log import FlightLog, with_rows
 from .inertial import (
     STILL,
@@ -74,13 +75,13 @@ def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Na
 
 def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Names]:
     """Return a log with IMU and pose on one clock, and a note on an offset beyond 10 ms."""
-    late, std = _imu_delay(log)
-    if not abs(late) > max(LEAST, SURE * std):
+    late, std, changes = _imu_delay(log)
+    if not (changes or abs(late) > max(LEAST, SURE * std)):
         return log, ()
-    if abs(late) > FARTHEST - _COARSE:
+    if changes or abs(late) > FARTHEST - _COARSE:
         return replace(log, gyro=None, accelerometer=None), (
-            f"the IMU's clock is off by more than {FARTHEST:g} s against the pose's: gyro and "
-            "accelerometer were left out",
+            f"the IMU's clock is off by {changes or f'more than {FARTHEST:g} s'} against the "
+            "pose's: gyro and accelerometer were left out",
         )
     whose, other = "IMU", "pose"
     rotors = ", by less than the rotor speeds tell whose clock is wrong"
@@ -143,11 +144,13 @@ def _note(whose: str, late: float, std: float, against: str, done: str) -> str:
     )
 
 
-def _imu_delay(log: FlightLog) -> Pair:
+def _imu_delay(log: FlightLog) -> tuple[float, float, str]:
     """Return the delay in s of the IMU against the pose, and its standard deviation; 0: unknown.
+    And the delays of the parts, in words, where one delay leaves twice the error of a part's own.
 
-    The gyro tells, else the accelerometer.
+    The gyro tells, else the accelerometer; of a long flight, in windows spread over it.
     """
+    log = excerpt([log])[0]
     seen = np.flatnonzero(log.valid)
     sensors = (
         (log.gyro, 0.0, STILL),
@@ -172,10 +175,13 @@ def _imu_delay(log: FlightLog) -> Pair:
             felt = _mean_forces(t, measured[read], pose_times, attitude)
         late, left = _likeliest(felt, begins, needed)
         if left <= GOOD * (median_square(unbiased(needed)) + least**2):
-            parts = zip(*(np.array_split(x, _PARTS) for x in (begins, needed)), strict=True)
-            scatter = np.std([_likeliest(felt, *part)[0] for part in parts])
-            return late, float(scatter / np.sqrt(_PARTS))
-    return 0.0, 0.0
+            parts = [*zip(*(np.array_split(x, _PARTS) for x in (begins, needed)), strict=True)]
+            delays, own = zip(*(_likeliest(felt, *part) for part in parts), strict=True)
+            common = [median_square(unbiased(y - felt(late, x))) for x, y in parts]
+            changes = np.less(own, GOOD * np.array(common)).any() and np.ptp(delays) > LEAST
+            said = ", ".join(f"{x:.3f}" for x in delays) + " s in turn"
+            return late, float(np.std(delays) / np.sqrt(_PARTS)), said if changes else ""
+    return 0.0, 0.0, ""
 
 
 def _likeliest(felt: _Felt, begins: Array, needed: Array) -> Pair:
@@ -197,7 +203,7 @@ def _mean_rates(t: Array, gyro: Array) -> _Felt:
 
 def _mean_forces(t: Array, force: Array, pose_times: Array, attitude: Rotation) -> _Felt:
     """Return an accelerometer's acceleration around times, by its samples (N, 3)."""
-    times = np.linspace(pose_times[0], pose_times[-1], len(t))
+    times = t[(t >= pose_times[0]) & (t <= pose_times[-1])]
     turn = Slerp(pose_times, attitude)(times)
     return lambda late, at: mean_force(at, times, turn.apply(resampled(times + late, t, force)))
 

@@ -210,17 +210,20 @@ _ON_LINE = 1e-3
 _ROUNDED = 1.001  # rounding steps by which three rounded values leave a line, at most
 _MOST_CORNERS = 2 / 3  # of the rows; with more no two corners can be told apart
 _LEAST_CHANGES = 8  # for a spacing
+_MOST_ROWS = 100_000  # from the middle of a long flight
 
 
 def source_rate(t: Array, values: Array) -> float:
-    """Return a channel's rate of measurement, Hz; 0: less than two samples.
+    """Return a channel's rate of measurement, Hz; 0: less than two samples. The middle tells for a
+    long flight.
 
     Args:
         t: (N,) s, increasing.
         values: (N, K); a row with NaN is no sample.
     """
-    finite = finite_rows(values)
-    t, values = t[finite], values[finite]
+    middle = slice(max(0, len(t) - _MOST_ROWS) // 2, (len(t) + _MOST_ROWS) // 2)
+    finite = finite_rows(values[middle])
+    t, values = t[middle][finite], values[middle][finite]
     if len(t) < 2:
         return 0.0
     changes = np.flatnonzero(np.diff(values, axis=0).any(axis=1))

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
 from .evidence import GOOD, likelihood, remedies
+from .excerpt import excerpt
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 from .magnitudes import MAGNITUDES
 from .readings import (
@@ -66,26 +67,27 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
 
 
 def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
-    """Return a log without the inertial sensors contradicting its pose, and a note on each."""
+    """Return a log without the inertial sensors contradicting its pose, and a note on each. Windows
+    of a long flight are asked.
+    """
     notes = []
-    seen = np.flatnonzero(log.valid)
-    pose = log.t[seen], Rotation.from_quat(log.quaternion[seen], scalar_first=True)
+    part = excerpt([log])[0]
+    seen = np.flatnonzero(part.valid)
+    pose = part.t[seen], Rotation.from_quat(part.quaternion[seen], scalar_first=True)
     for field, names in (("gyro", GYRO), ("accelerometer", ACCELEROMETER)):
-        values, columns = getattr(log, field), ", ".join(names)
+        values, columns = getattr(part, field), ", ".join(names)
         if values is None or not (read := np.isfinite(values[:, 0])).any():
             continue
-        t, measured = log.t[read], values[read]
+        t, measured = part.t[read], values[read]
         if field == "gyro":
             shares = gyro_shares(t, measured, *pose, (AS_DECLARED, *GYRO_READINGS))
             doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
             fast = np.quantile(np.abs(measured), 0.99) > MAGNITUDES.fastest_gyro
             alone = GYRO_READINGS[0].says if fast else ""
         else:
-            shares, turned = _force_shares(t, measured, *pose, log.position[seen], gravity)
-            if turned is not None:
-                values = np.full_like(values, np.nan)
-                values[read] = turned
-                log = replace(log, accelerometer=values)
+            shares, up = _force_shares(t, measured, *pose, part.position[seen], gravity)
+            if up is not None:
+                log = replace(log, accelerometer=_in_body_axes(log, getattr(log, field) + up))
                 notes.append(
                     f"{columns} are an acceleration in world axes, by the position's own: they "
                     "were turned into body axes by the attitude"
@@ -102,6 +104,16 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
         elif shares is None and alone:  # no pose shows the error
             notes.append(f"{columns} {alone}")
     return log, tuple(notes)
+
+
+def _in_body_axes(log: FlightLog, vectors: Array) -> Array:
+    """Return vectors (N, 3) in world axes of a log in its body axes."""
+    attitude = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
+    times, turned = log.t[log.valid], np.full_like(vectors, np.nan)
+    read = np.isfinite(vectors[:, 0])
+    body = Slerp(times, attitude)(np.clip(log.t[read], times[0], times[-1]))
+    turned[read] = body.inv().apply(vectors[read])
+    return turned
 
 
 def is_stuck(measured: Array) -> bool:
@@ -190,8 +202,8 @@ def _force_shares(
     gravity: float,
 ) -> tuple[list[float] | None, Array | None]:
     """Return the shares of acceleration and gravity left by an accelerometer, as declared and by
-    each reading; None: too little is measured. For an acceleration in world axes return the
-    specific force in body axes (N, 3), too, else None.
+    each reading; None: too little is measured. For an acceleration in world axes return the gravity
+    (3,) that the specific force has in addition, too, else None.
 
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
@@ -205,7 +217,7 @@ def _force_shares(
     def mean(force: Array) -> Array:
         return mean_force(middles, t[inside], force[inside])
 
-    up, turned = np.zeros(3), None
+    up, lacks = np.array([0.0, 0.0, gravity]), None
     needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2
     moves = np.linalg.norm(needed[:, :2], axis=1) > _MOVING
     if np.count_nonzero(moves) >= _FEWEST:
@@ -215,15 +227,14 @@ def _force_shares(
         )
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
         if in_world <= GOOD and lead >= OTHER:
-            up[2] = gravity if np.median(measured[inside, 2]) < 0.5 * gravity else 0.0
-            turned = measured = body.inv().apply(measured + up)
-    up[2] = gravity
+            lacks = up * (np.median(measured[inside, 2]) < 0.5 * gravity)
+            measured = body.inv().apply(measured + lacks)
     needed += up
     return [
         median_square(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
         / median_square(needed)
         for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
-    ], turned
+    ], lacks
 
 
 def _blown_up(force: Array) -> str:

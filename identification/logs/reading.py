@@ -77,7 +77,7 @@ READERS["betaflight_csv"] = Reader(
 
 
 def read_log(
-    path: str | Path,
+    path: str | Path | Table,
     reader: str | None = None,
     vehicle: Vehicle | None = None,
     map: str | Path | None = None,
@@ -87,7 +87,7 @@ def read_log(
 
     Args:
         path: the log, in the kit's own form (``.csv``, ``.csv.gz`` or ``.parquet``) or in the form
-            of a reader in ``identification/logs/readers/``.
+            of a reader in ``identification/logs/readers/``; or its open table.
         reader: name of a reader, with an option behind a colon (``rosbag:topics.yaml``); None:
             chosen by the file's content.
         vehicle: the vehicle, for checking units and for converting commands into rotor speeds;
@@ -105,7 +105,7 @@ def read_log(
         UserWarning: numbers look as if they were in other units. The same text is in the log's
             notes.
     """
-    path = Path(path)
+    path = Path(path) if isinstance(path, str) else path
     with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for themselves
         log = _read(path, reader, vehicle, map, piece)
     return finished(log, vehicle)
@@ -138,40 +138,45 @@ def is_own(header: Sequence[str]) -> bool:
     return has(("t",)) and moves and (has(ROTORS) or has(COMMANDS))
 
 
-def unknown_table(path: Path) -> Table | None:
-    """Return a file's table of unknown columns, neither the kit's nor a reader's; None: any other
-    file.
+def opened(path: Path) -> Table | None:
+    """Return a file's table; None: the file is another one, or a reader knows it by its first
+    bytes.
 
     Raises:
         InputError: the file is a table by its name, but unreadable.
     """
-    if not is_table(path) or reader_by_content(path) is not None:
-        return None
-    table = open_table(path)
-    known = is_own(table.header) or reader_by_columns(path, table.header) is not None
-    return None if known else table
+    return open_table(path) if is_table(path) and reader_by_content(path) is None else None
+
+
+def is_known(table: Table) -> bool:
+    """Return whether a table has columns of the kit or of a reader."""
+    return is_own(table.header) or reader_by_columns(table.path, table.header) is not None
 
 
 def _read(
-    path: Path,
+    source: Path | Table,
     reader: str | None,
     vehicle: Vehicle | None,
     map: str | Path | None,
     piece: int | None,
 ) -> FlightLog:
     """Read a log by the given map or reader, else by its content."""
+    path = source.path if isinstance(source, Table) else source
     if map is not None:
         if reader is not None:
             raise InputError(f"{path}: both a reader and a map; expected one of them")
         if reader_by_content(path) is READERS["rosbag"]:
             return rosbag.read(path, vehicle, str(map), piece)
         return map_table(open_table(path), load_map(map), vehicle, piece=piece)
-    chosen = reader_by_content(path) if reader is None else find_reader(reader)
-    if chosen is not None and not chosen.signature:
-        return chosen.read(path, vehicle, piece=piece)
-    if chosen is None and not is_table(path):
-        raise _unknown_content(path)
-    table = open_table(path)
+    if isinstance(source, Table):
+        chosen, table = None, source
+    else:
+        chosen = reader_by_content(path) if reader is None else find_reader(reader)
+        if chosen is not None and not chosen.signature:
+            return chosen.read(path, vehicle, piece=piece)
+        if chosen is None and not is_table(path):
+            raise _unknown_content(path)
+        table = open_table(path)
     header = set(table.header)
     if chosen is None and is_own(table.header):
         return map_table(table, load_map(OWN_MAP), vehicle, piece=piece)
