@@ -26,8 +26,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
 from .evidence import GOOD
-from .excerpt import excerpt
-from .flight_log import FlightLog, with_rows
+from .flight_log import FlightLog, excerpt, with_rows
 from .inertial import (
     STILL,
     WINDOW,
@@ -91,15 +90,10 @@ def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog,
         rotors = " and the rotor speeds"
         if abs(delay.seconds - lag) > abs(delay.seconds - lag + late):
             whose, other, late = "pose", "IMU", -late  # rotors and IMU share a clock
-    if whose == "pose":
-        pose = np.where(log.valid[:, None], np.hstack([log.position, log.quaternion]), np.nan)
-        pose = _moved(log.t, pose, late)
-        seen = np.isfinite(pose[:, 0])
-        log = replace(log, position=pose[:, :3], quaternion=pose[:, 3:], valid=seen)
-    else:
-        sensors = {"gyro": log.gyro, "accelerometer": log.accelerometer}
-        moved: Data = {k: _moved(log.t, x, late) for k, x in sensors.items() if x is not None}
-        log = replace(log, **moved)
+    names = ("position", "quaternion") if whose == "pose" else ("gyro", "accelerometer")
+    known = {name: x for name in names if (x := getattr(log, name)) is not None}
+    moved: Data = {name: _moved(log.t, x, late) for name, x in known.items()}
+    log = replace(log, **moved, valid=np.empty(0, np.bool_))
     return log, (_note(whose, late, std, f"{other}{rotors}", f"the {whose} was moved"),)
 
 
@@ -150,7 +144,7 @@ def _imu_delay(log: FlightLog) -> tuple[float, float, str]:
 
     The gyro tells, else the accelerometer; of a long flight, in windows spread over it.
     """
-    log = excerpt([log])[0]
+    log = excerpt(log)
     seen = np.flatnonzero(log.valid)
     sensors = (
         (log.gyro, 0.0, STILL),

@@ -18,8 +18,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
 from .evidence import GOOD, likelihood, remedies
-from .excerpt import excerpt
-from .flight_log import ACCELEROMETER, GYRO, FlightLog
+from .flight_log import ACCELEROMETER, GYRO, FlightLog, excerpt
 from .magnitudes import MAGNITUDES
 from .readings import (
     ACCELEROMETER_READINGS,
@@ -71,7 +70,7 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
     of a long flight are asked.
     """
     notes = []
-    part = excerpt([log])[0]
+    part = excerpt(log)
     seen = np.flatnonzero(part.valid)
     pose = part.t[seen], Rotation.from_quat(part.quaternion[seen], scalar_first=True)
     for field, names in (("gyro", GYRO), ("accelerometer", ACCELEROMETER)):
@@ -87,11 +86,10 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
         else:
             shares, up = _force_shares(t, measured, *pose, part.position[seen], gravity)
             if up is not None:
-                log = replace(log, accelerometer=_in_body_axes(log, getattr(log, field) + up))
-                notes.append(
-                    f"{columns} are an acceleration in world axes, by the position's own: they "
-                    "were turned into body axes by the attitude"
-                )
+                checked, more = _agreeing(_in_body_axes(log, up), gravity)
+                turned = "they were turned into body axes by the attitude"
+                says = f"{columns} are an acceleration in world axes, by the position's own"
+                return checked, (*notes, f"{says}: {turned}", *more)
             otherwise = "contradict the position's acceleration and gravity"
             doubt = _blown_up(measured)
             doubt = doubt or _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
@@ -106,14 +104,12 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
     return log, tuple(notes)
 
 
-def _in_body_axes(log: FlightLog, vectors: Array) -> Array:
-    """Return vectors (N, 3) in world axes of a log in its body axes."""
-    attitude = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
-    times, turned = log.t[log.valid], np.full_like(vectors, np.nan)
-    read = np.isfinite(vectors[:, 0])
-    body = Slerp(times, attitude)(np.clip(log.t[read], times[0], times[-1]))
-    turned[read] = body.inv().apply(vectors[read])
-    return turned
+def _in_body_axes(log: FlightLog, up: Array) -> FlightLog:
+    """Return a log with its accelerometer, in world axes and less ``up`` (3,), in body axes."""
+    assert log.accelerometer is not None
+    at = Slerp(log.t[log.valid], Rotation.from_quat(log.quaternion[log.valid], scalar_first=True))
+    body = at(np.clip(log.t, at.times[0], at.times[-1]))
+    return replace(log, accelerometer=body.inv().apply(log.accelerometer + up))
 
 
 def is_stuck(measured: Array) -> bool:
@@ -202,8 +198,8 @@ def _force_shares(
     gravity: float,
 ) -> tuple[list[float] | None, Array | None]:
     """Return the shares of acceleration and gravity left by an accelerometer, as declared and by
-    each reading; None: too little is measured. For an acceleration in world axes return the gravity
-    (3,) that the specific force has in addition, too, else None.
+    each reading; None: too little is measured. For an acceleration in world axes return what the
+    specific force (3,) has beside, too, else None.
 
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
@@ -217,7 +213,7 @@ def _force_shares(
     def mean(force: Array) -> Array:
         return mean_force(middles, t[inside], force[inside])
 
-    up, lacks = np.array([0.0, 0.0, gravity]), None
+    up = np.array([0.0, 0.0, gravity])
     needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2
     moves = np.linalg.norm(needed[:, :2], axis=1) > _MOVING
     if np.count_nonzero(moves) >= _FEWEST:
@@ -227,14 +223,13 @@ def _force_shares(
         )
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
         if in_world <= GOOD and lead >= OTHER:
-            lacks = up * (np.median(measured[inside, 2]) < 0.5 * gravity)
-            measured = body.inv().apply(measured + lacks)
+            return None, up * (np.median(measured[inside, 2]) < 0.5 * gravity)
     needed += up
     return [
         median_square(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
         / median_square(needed)
         for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
-    ], lacks
+    ], None
 
 
 def _blown_up(force: Array) -> str:

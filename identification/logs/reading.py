@@ -19,9 +19,8 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.regular_files import open_regular
 from .clocks import on_one_clock
 from .flight_log import (
-    ACCELEROMETER,
     COMMANDS,
-    GYRO,
+    IMU,
     POSE,
     REQUIRED,
     ROTORS,
@@ -129,15 +128,6 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
 
 
-def is_own(header: Sequence[str]) -> bool:
-    """Return whether a table has this kit's own columns: a time; a pose, or an inertial sensor; and
-    rotor speeds or motor commands. Further rules are in the map.
-    """
-    has = set(header).issuperset
-    moves = has(POSE) or has((*ACCELEROMETER, *GYRO))
-    return has(("t",)) and moves and (has(ROTORS) or has(COMMANDS))
-
-
 def opened(path: Path) -> Table | None:
     """Return a file's table; None: the file is another one, or a reader knows it by its first
     bytes.
@@ -146,11 +136,6 @@ def opened(path: Path) -> Table | None:
         InputError: the file is a table by its name, but unreadable.
     """
     return open_table(path) if is_table(path) and reader_by_content(path) is None else None
-
-
-def is_known(table: Table) -> bool:
-    """Return whether a table has columns of the kit or of a reader."""
-    return is_own(table.header) or reader_by_columns(table.path, table.header) is not None
 
 
 def _read(
@@ -178,8 +163,6 @@ def _read(
             raise _unknown_content(path)
         table = open_table(path)
     header = set(table.header)
-    if chosen is None and is_own(table.header):
-        return map_table(table, load_map(OWN_MAP), vehicle, piece=piece)
     chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
         if missing := [name for name in chosen.signature if name not in header]:
@@ -195,8 +178,8 @@ def _read(
         said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
         return replace(log, notes=(said, *log.notes))
     known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in _table_readers())
-    has_imu = header.issuperset((*ACCELEROMETER, *GYRO))
-    missing = [name for name in (("t", *ROTORS) if has_imu else REQUIRED) if name not in header]
+    needed = ("t", *ROTORS) if header.issuperset(IMU) else REQUIRED
+    missing = [name for name in needed if name not in header]
     raise InputError(
         f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
         f"columns of {known}, found {', '.join(table.header[:_SHOWN])}. A table of "
@@ -287,12 +270,16 @@ def _unknown_content(path: Path) -> InputError:
 
 
 def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
-    """Return the reader by a table's columns; None: no reader's.
+    """Return the reader by a table's columns; None: no reader's. This kit's own are a time; a pose,
+    or an inertial sensor; and rotor speeds or motor commands; further rules are in the map.
 
     Raises:
         InputError: the columns fit several readers.
     """
-    readers = [reader for reader in _table_readers() if set(header).issuperset(reader.signature)]
+    has = set(header).issuperset
+    if has(("t",)) and (has(POSE) or has(IMU)) and (has(ROTORS) or has(COMMANDS)):
+        return Reader(OWN_MAP, "", partial(map_table, log_map=load_map(OWN_MAP)))
+    readers = [reader for reader in _table_readers() if has(reader.signature)]
     if len(readers) > 1:
         raise InputError(
             f"{path}: its columns are those of {' and of '.join(r.what for r in readers)}; "

@@ -52,7 +52,7 @@ def mended_log():
     return with_rows(log, np.isfinite(log.gyro[:, 0]))
 
 
-@pytest.mark.parametrize("rows", [-30, -16, -3, 3, 6, 30])
+@pytest.mark.parametrize("rows", [-30, -3, 3, 6])
 @pytest.mark.parametrize("whose", ["IMU", "pose"])
 def test_a_late_clock_is_found_and_mended(mended_log, whose, rows):
     log = mended_log
@@ -79,7 +79,7 @@ def test_an_imu_whose_clock_jumps_is_left_out(mended_log):
     assert "s in turn against the pose" in notes[0]
 
 
-@pytest.mark.parametrize("rows", [-30, -6, 6, 30])
+@pytest.mark.parametrize("rows", [-30, 6])
 def test_without_a_gyro_the_accelerometer_tells_its_clock(mended_log, rows):
     log = mended_log
     late = replace(log, gyro=None, accelerometer=np.roll(log.accelerometer, rows, axis=0))
