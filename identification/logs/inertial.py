@@ -69,7 +69,7 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
     """Return a log without the inertial sensors contradicting its pose, and a note on each. Windows
     of a long flight are asked.
     """
-    notes = []
+    notes: list[str] = []
     part = excerpt(log)
     seen = np.flatnonzero(part.valid)
     pose = part.t[seen], Rotation.from_quat(part.quaternion[seen], scalar_first=True)
