@@ -87,9 +87,11 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
             shares, up = _force_shares(t, measured, *pose, part.position[seen], gravity)
             if up is not None:
                 checked, more = _agreeing(_in_body_axes(log, up), gravity)
-                turned = "they were turned into body axes by the attitude"
-                says = f"{columns} are an acceleration in world axes, by the position's own"
-                return checked, (*notes, f"{says}: {turned}", *more)
+                notes.append(
+                    f"{columns} are an acceleration in world axes, by the position's own: they "
+                    "were turned into body axes by the attitude"
+                )
+                return checked, (*notes, *more)
             otherwise = "contradict the position's acceleration and gravity"
             doubt = _blown_up(measured)
             doubt = doubt or _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)

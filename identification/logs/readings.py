@@ -322,7 +322,7 @@ def as_written(columns: Array, attitude: Attitude) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     good = finite_rows(columns)
     if not attitude.euler:
-        good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
+        good &= np.isclose(np.linalg.norm(columns, axis=1), 1.0, atol=0.5)
     turns = quaternions(attitude, scaled(attitude, columns[good]))
     rotation = Rotation.from_quat(turns, scalar_first=True)
     return good, rotation if attitude.sense == SENSES[0] else rotation.inv()

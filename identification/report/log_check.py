@@ -100,7 +100,7 @@ def check_log(
         UnreadLogError: the guessed map, in the error, cannot read the log yet.
     """
     guess, text = None, ""
-    table = opened(path) if reader is None and log_map is None else None
+    table = None if reader or log_map else opened(path)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
         if log_map is not None:
