@@ -73,7 +73,7 @@ def test_a_late_clock_is_found_and_mended(mended_log, whose, rows):
 
 def test_an_imu_whose_clock_jumps_is_left_out(mended_log):
     gyro = mended_log.gyro.copy()
-    gyro[len(gyro) // 2 :] = np.roll(gyro, 10, axis=0)[len(gyro) // 2 :]
+    gyro[2000:] = np.roll(gyro, 10, axis=0)[2000:]
     log, notes = on_one_clock(replace(mended_log, gyro=gyro), None)
     assert log.gyro is None
     assert "s in turn against the pose" in notes[0]
