@@ -40,7 +40,7 @@ from ..estimator.ukf import CALL, IMU_PARTS, make_calls
 from ..runtime.errors import InputError
 from ..runtime.threads import one_thread
 from .inertial_wrench import inertial_wrench
-from .logs.flight_log import MOTOR_RATES, FlightLog, between_samples
+from .logs.flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, between_samples, serves
 from .logs.screening import screen_log
 from .logs.table import Array, ArrayPair, Names, Rows, finite_rows
 from .logs.tables import write_csv
@@ -180,14 +180,14 @@ def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> 
     """Take the torque out of an estimate with seldom measured rotors, and widen the force with even
     fewer measurements; return the notes on both.
     """
-    rate, least = log.motor_rate, MOTOR_RATES
-    if least.serves(rate, least.torque_hz):
+    rate = log.motor_rate
+    if serves(rate, TORQUE_HZ):
         return ()
     estimate.numbers[:, TORQUE] = np.nan
     estimate.numbers[:, MODEL][:, :3] = np.nan
     said = f"{'motor commands' if log.commanded else 'rotor speeds'} come {rate:.3g} times a second"
-    if least.serves(rate, least.force_hz):
-        return (f"warning: {said}: no torque is estimated. It takes {least.torque_hz:g}",)
+    if serves(rate, FORCE_HZ):
+        return (f"warning: {said}: no torque is estimated. It takes {TORQUE_HZ:g}",)
     slopes = 2.0 * log.rotor_speeds * vehicle.k  # of thrust, N/(rad/s)
     std = np.linalg.norm(slopes * between_samples(log.t, log.rotor_speeds, rate), axis=1)
     up = Rotation.from_quat(estimate.quaternion, scalar_first=True).apply([0.0, 0.0, 1.0])
@@ -195,7 +195,7 @@ def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> 
     return (
         f"warning: {said}: no torque is estimated, and what the thrust does between them, "
         f"{np.sqrt(np.mean(np.square(std))):.2g} N, is in the force's deviation. A force takes "
-        f"{least.force_hz:g} a second, a torque {least.torque_hz:g}",
+        f"{FORCE_HZ:g} a second, a torque {TORQUE_HZ:g}",
     )
 
 

@@ -20,8 +20,7 @@ from ...dynamics.effects import Need, Role, get, names, needing, playing
 from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
-from ..logs.excerpt import excerpt
-from ..logs.flight_log import FlightLog, Logs
+from ..logs.flight_log import FlightLog, Logs, excerpt
 from ..logs.table import Array, ArrayPair, Mask, Pair, Rows, Values, finite_rows, median_step
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
@@ -201,7 +200,8 @@ class RegressedFlights:
         self.has_raw_poses = not (self.commanded or self.inertial or self.filtered) and np.allclose(
             [log.period for log in self.logs], self.logs[0].period, rtol=0.01
         )
-        self.logs = tuple(excerpt(self.logs))
+        seconds = sum(log.t[-1] - log.t[0] for log in self.logs)
+        self.logs = tuple(excerpt(log, seconds) for log in self.logs)
         self._fit_logs = len(logs)
         self._drift: np.random.Generator | None = None  # of a copy with other errors of the fusion
         self._fused: dict[FlightLog, list[InertialSignals]] = {}

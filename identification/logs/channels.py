@@ -111,7 +111,7 @@ class Stream:
         out = resampled(t, times, self.values)
         step = np.diff(times)
         after = np.clip(np.searchsorted(times, t), 1, len(step))
-        there = (step[after - 1] <= _SENSOR_GAP * np.median(step)) | np.isin(t, times)
+        there = (step[after - 1] <= _SENSOR_GAP * np.median(step)) | among(t, times)
         out[~there | (t < times[0]) | (t > times[-1])] = np.nan
         return out
 
@@ -120,6 +120,12 @@ def readable(stream: Stream | None) -> Stream | None:
     """Return the finite samples (N, K); None: fewer than two."""
     finite = None if stream is None else stream.whole()
     return None if finite is None or len(finite.t) < 2 else finite
+
+
+def among(t: Array, times: Array) -> Mask:
+    """Return which of times (M,) are among increasing ones (N,)."""
+    padded = np.append(times, np.inf)
+    return np.asarray(padded[np.searchsorted(times, t)] == t)
 
 
 def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
@@ -131,7 +137,7 @@ def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
     good = np.linalg.norm(attitude.values, axis=1) > 0.5  # False where NaN
     times, values = attitude.t[good], attitude.values[good]
     after = np.searchsorted(times, t)
-    exact = np.isin(t, times)
+    exact = among(t, times)
     if exact.all():
         return np.asarray(values[after])
     if len(times) < 2:

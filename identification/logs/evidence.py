@@ -35,8 +35,7 @@ from ..motion.smoothing import (
     turning,
     unbroken,
 )
-from .excerpt import excerpt
-from .flight_log import FlightLog
+from .flight_log import FlightLog, excerpt
 from .flight_phases import usual_thrust
 from .log_map import UNITS, Attitude
 from .readings import (
@@ -431,7 +430,7 @@ def remedies(
             spins = replace(vehicle, spin=-vehicle.spin)
         return log_ranking(Evidence.of_log(applied(log, reading), spins, by_imu)).best is DECLARED
 
-    log = excerpt([log])[0]
+    log = excerpt(log)
     evidence = Evidence.of_log(log, vehicle, by_imu)
     ranking = log_ranking(evidence)
     if not ranking.departures():

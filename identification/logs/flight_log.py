@@ -54,6 +54,7 @@ ROTORS = ("omega1", "omega2", "omega3", "omega4")
 TRUTH = ("fx", "fy", "fz", "tx", "ty", "tz")
 ACCELEROMETER = ("ax", "ay", "az")
 GYRO = ("gx", "gy", "gz")
+IMU = (*ACCELEROMETER, *GYRO)
 COMMANDS = ("cmd1", "cmd2", "cmd3", "cmd4")
 REQUIRED = ("t", *POSE, *ROTORS)
 
@@ -178,25 +179,17 @@ def time_notes(t: Array) -> Names:
     )
 
 
-@dataclass(frozen=True)
-class _MotorRates:
-    """How often rotor speeds or commands must be measured.
-
-    Between samples they are taken along a straight line: 0.9 of an oscillation's amplitude passes
-    up to 0.18 of their rate. Forces are judged up to 3.5 Hz. Torques turn a vehicle within a tenth
-    of a second: they need the rate of a pose and a gyro.
-    """
-
-    force_hz: float = 20.0
-    torque_hz: float = 45.0
-    jitter: float = 1.1  # tolerance of a rate, as a factor
-
-    def serves(self, rate: float, least: float) -> bool:
-        """Return whether a rate is high enough, Hz."""
-        return rate * self.jitter >= least
+# How often rotor speeds or commands must be measured, Hz. Between samples they are taken along a
+# straight line: 0.9 of an oscillation's amplitude passes up to 0.18 of their rate. Forces are
+# judged up to 3.5 Hz. Torques turn a vehicle within a tenth of a second: they need the rate of a
+# pose and a gyro.
+FORCE_HZ, TORQUE_HZ = 20.0, 45.0
+_JITTER = 1.1  # tolerance of a rate, as a factor
 
 
-MOTOR_RATES = _MotorRates()
+def serves(rate: float, least: float) -> bool:
+    """Return whether a rate is high enough, Hz."""
+    return rate * _JITTER >= least
 
 
 # When values repeat because nothing was measured, and not because they were rounded.
@@ -210,17 +203,20 @@ _ON_LINE = 1e-3
 _ROUNDED = 1.001  # rounding steps by which three rounded values leave a line, at most
 _MOST_CORNERS = 2 / 3  # of the rows; with more no two corners can be told apart
 _LEAST_CHANGES = 8  # for a spacing
+_MOST_ROWS = 100_000  # from the middle of a long flight
 
 
 def source_rate(t: Array, values: Array) -> float:
-    """Return a channel's rate of measurement, Hz; 0: less than two samples.
+    """Return a channel's rate of measurement, Hz; 0: less than two samples. The middle tells for a
+    long flight.
 
     Args:
         t: (N,) s, increasing.
         values: (N, K); a row with NaN is no sample.
     """
-    finite = finite_rows(values)
-    t, values = t[finite], values[finite]
+    middle = slice(max(0, len(t) - _MOST_ROWS) // 2, (len(t) + _MOST_ROWS) // 2)
+    finite = finite_rows(values[middle])
+    t, values = t[middle][finite], values[middle][finite]
     if len(t) < 2:
         return 0.0
     changes = np.flatnonzero(np.diff(values, axis=0).any(axis=1))
@@ -277,6 +273,33 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
         return log
     parts: Data = {name: x[keep] for name, x in vars(log).items() if isinstance(x, np.ndarray)}
     return replace(log, **parts, extra={name: x[keep] for name, x in log.extra.items()})
+
+
+LONGEST = 480.0  # s of flight, all logs together, used whole
+_WINDOW = 60.0  # s, a window of longer flights
+
+
+def excerpt(log: FlightLog, seconds: float = 0.0) -> FlightLog:
+    """Return a log, or windows of a minute spread evenly over a flight of more than ``LONGEST``.
+    They give the same diagnosis as a whole hour, in a tenth of the memory. A note says so.
+
+    Args:
+        log: the flight; the rest becomes a gap.
+        seconds: s, of all logs that are used together.
+    """
+    length = log.t[-1] - log.t[0]
+    share = LONGEST / max(seconds, length, LONGEST)
+    if share == 1.0 or length <= _WINDOW:
+        return log
+    count, spare = max(1, round(share * length / _WINDOW)), length - _WINDOW
+    first = 0.0 if count > 1 else 0.5 * spare
+    begins = log.t[0] + np.linspace(first, spare, count)
+    keep = np.any([(log.t >= at) & (log.t <= at + _WINDOW) for at in begins], axis=0)
+    note = (
+        f"of {length:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "
+        "rest was left out"
+    )
+    return replace(with_rows(log, keep), notes=(*log.notes, note))
 
 
 def parts_of(log: FlightLog) -> list[tuple[Names, Array]]:

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, second_difference
 from .evidence import GOOD, likelihood, remedies
-from .flight_log import ACCELEROMETER, GYRO, FlightLog
+from .flight_log import ACCELEROMETER, GYRO, FlightLog, excerpt
 from .magnitudes import MAGNITUDES
 from .readings import (
     ACCELEROMETER_READINGS,
@@ -66,30 +66,32 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
 
 
 def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
-    """Return a log without the inertial sensors contradicting its pose, and a note on each."""
-    notes = []
-    seen = np.flatnonzero(log.valid)
-    pose = log.t[seen], Rotation.from_quat(log.quaternion[seen], scalar_first=True)
+    """Return a log without the inertial sensors contradicting its pose, and a note on each. Windows
+    of a long flight are asked.
+    """
+    notes: list[str] = []
+    part = excerpt(log)
+    seen = np.flatnonzero(part.valid)
+    pose = part.t[seen], Rotation.from_quat(part.quaternion[seen], scalar_first=True)
     for field, names in (("gyro", GYRO), ("accelerometer", ACCELEROMETER)):
-        values, columns = getattr(log, field), ", ".join(names)
+        values, columns = getattr(part, field), ", ".join(names)
         if values is None or not (read := np.isfinite(values[:, 0])).any():
             continue
-        t, measured = log.t[read], values[read]
+        t, measured = part.t[read], values[read]
         if field == "gyro":
             shares = gyro_shares(t, measured, *pose, (AS_DECLARED, *GYRO_READINGS))
             doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
             fast = np.quantile(np.abs(measured), 0.99) > MAGNITUDES.fastest_gyro
             alone = GYRO_READINGS[0].says if fast else ""
         else:
-            shares, turned = _force_shares(t, measured, *pose, log.position[seen], gravity)
-            if turned is not None:
-                values = np.full_like(values, np.nan)
-                values[read] = turned
-                log = replace(log, accelerometer=values)
+            shares, up = _force_shares(t, measured, *pose, part.position[seen], gravity)
+            if up is not None:
+                checked, more = _agreeing(_in_body_axes(log, up), gravity)
                 notes.append(
                     f"{columns} are an acceleration in world axes, by the position's own: they "
                     "were turned into body axes by the attitude"
                 )
+                return checked, (*notes, *more)
             otherwise = "contradict the position's acceleration and gravity"
             doubt = _blown_up(measured)
             doubt = doubt or _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
@@ -102,6 +104,14 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
         elif shares is None and alone:  # no pose shows the error
             notes.append(f"{columns} {alone}")
     return log, tuple(notes)
+
+
+def _in_body_axes(log: FlightLog, up: Array) -> FlightLog:
+    """Return a log with its accelerometer, in world axes and less ``up`` (3,), in body axes."""
+    assert log.accelerometer is not None
+    at = Slerp(log.t[log.valid], Rotation.from_quat(log.quaternion[log.valid], scalar_first=True))
+    body = at(np.clip(log.t, at.times[0], at.times[-1]))
+    return replace(log, accelerometer=body.inv().apply(log.accelerometer + up))
 
 
 def is_stuck(measured: Array) -> bool:
@@ -190,8 +200,8 @@ def _force_shares(
     gravity: float,
 ) -> tuple[list[float] | None, Array | None]:
     """Return the shares of acceleration and gravity left by an accelerometer, as declared and by
-    each reading; None: too little is measured. For an acceleration in world axes return the
-    specific force in body axes (N, 3), too, else None.
+    each reading; None: too little is measured. For an acceleration in world axes return what the
+    specific force (3,) has beside, too, else None.
 
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
@@ -205,7 +215,7 @@ def _force_shares(
     def mean(force: Array) -> Array:
         return mean_force(middles, t[inside], force[inside])
 
-    up, turned = np.zeros(3), None
+    up = np.array([0.0, 0.0, gravity])
     needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2
     moves = np.linalg.norm(needed[:, :2], axis=1) > _MOVING
     if np.count_nonzero(moves) >= _FEWEST:
@@ -215,15 +225,13 @@ def _force_shares(
         )
         lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
         if in_world <= GOOD and lead >= OTHER:
-            up[2] = gravity if np.median(measured[inside, 2]) < 0.5 * gravity else 0.0
-            turned = measured = body.inv().apply(measured + up)
-    up[2] = gravity
+            return None, up * (np.median(measured[inside, 2]) < 0.5 * gravity)
     needed += up
     return [
         median_square(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
         / median_square(needed)
         for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
-    ], turned
+    ], None
 
 
 def _blown_up(force: Array) -> str:

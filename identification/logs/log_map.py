@@ -74,24 +74,13 @@ MAPS = Path(__file__).parent / "maps"  # the kit's own maps
 OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # a field that a person must choose
 
-WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
+WORLDS: dict[str, str] = WORDS["worlds"]
 BODIES = ("flu", "frd", "y_up")
 UNITS: dict[str, NamedNumbers] = WORDS["factors"]
 COMMAND_UNITS: dict[str, Pair | None] = {
     unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()
 }
-SECTIONS = {  # columns of each
-    "position": 3,
-    "attitude": 4,
-    "rotors": 4,
-    "commands": 4,
-    "wrench": 4,
-    "battery": 1,
-    "accelerometer": 3,
-    "gyro": 3,
-    "force": 3,
-    "torque": 3,
-}
+SECTIONS: dict[str, int] = WORDS["sections"]  # columns of each
 SENSES = ("body_to_world", "world_to_body")
 QUATERNIONS = ("wxyz", "xyzw")
 EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")

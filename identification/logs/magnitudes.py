@@ -6,65 +6,22 @@ The guess of a map, the reading of a log and its screening decide here, with the
 import re
 from dataclasses import replace
 from itertools import combinations
-from typing import ClassVar
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, Group
 from .flight_log import FlightLog, parts_of
 from .flight_phases import carrying, usual_thrust
 from .log_map import UNITS
 from .table import Array, Mask, Pair, finite_rows
 
-
-class _Magnitudes:
-    """How large and how small the numbers of a log may be."""
-
-    # sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
-    units: ClassVar[dict[str, tuple[Pair, Pair]]] = {
-        "time": ((2e-4, 0.2), (4e-4, 1.0 / 15.0)),
-        "battery": ((2.7, 100.0), (2.7, 60.0)),
-        "accelerometer": ((8.335, 11.278), (8.335, 11.278)),
-    }
-
-    shortest_period = 1e-5  # s, of the median step: 100 kHz, far above any pose's rate
-    # s, of any step. A log in nanoseconds has steps of 1e7; a step of a year is no flight
-    longest_step = 1e12
-    largest = 1e9  # SI units, all other numbers; millimetres or rpm stay far below
-    widest = 300.0  # m, spread of one flight's positions
-    flies = 0.2, 5.0  # median thrust by weight; beyond, another vehicle flew
-    doubtful = 0.5, 2.0  # the same; beyond, another may have flown
-    strongest = 300.0  # m/s2 of specific force, above all racers and most sensors' range
-    fastest_gyro = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
-    fast_gyro = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
-    slow_gyro = 6.0  # rad/s: 99.5 % of a flight's angular velocities are less
-    named_rates = 0.5, 20_000.0  # Hz of rows; beyond, no name counts
-    # limits of four motors' median. Above the first, only rpm is left: no propeller turns as fast
-    # in rad/s. Above the second, rpm is likelier: in rad/s only palm-sized vehicles hover as fast.
-    # Above the third, rpm may also be a command of 16 bits
-    rpm, fast, counts = 4500.0, 2600.0, 20_000.0
-    # rad/s: the largest drones' rotors (1.4 m across) hover at 150; slower, the unit is wrong
-    slow = 100.0
-    uneven = 2.0  # ratio of two rotors' medians in flight, at most
-    # power of the specific force's growth: with rotor speeds, and with pulses at least
-    squares = 1.5, 2.5
-    offset = 2.8
-
-
-MAGNITUDES = _Magnitudes()
-# thrust by weight of rotors in their right unit; mass and thrust curve may be off
-_CARRIES = 0.55, 1.8
-# changes of a column: fewer are no measurement, and equal by chance
-_CHANGES = 20
-_TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
-_SPEEDS = {
-    "rad/s": ("", 1.0),
-    "rpm": ("revolutions per minute", UNITS["rotors"]["rpm"]),
-    "Hz": ("revolutions per second", UNITS["rotors"]["Hz"]),
-    "deg/s": ("degrees per second", np.pi / 180.0),
-}
+# limits, with their reasons
+MAGNITUDES = SimpleNamespace(**read_yaml(Path(__file__).with_name("magnitudes.yaml"), "limits"))
 
 
 def within(value: float, limits: Pair) -> bool:
@@ -88,8 +45,8 @@ def time_doubt(step: float) -> str:
     """Return a doubt on the time's unit by a median step (s), or nothing."""
     unit, is_sure = likely_unit("time", step)
     words = (
-        f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: divide t "
-        f"by {1.0 / UNITS['time'][unit]:g}"
+        f"t looks like {MAGNITUDES.times[unit]}: its median step is {step:.4g}; expected seconds: "
+        f"divide t by {1.0 / UNITS['time'][unit]:g}"
     )
     return words if is_sure and unit != "s" else ""
 
@@ -109,7 +66,11 @@ def _carrying_units(thrust: float) -> list[str]:
     """Return the units of rotor speeds able to carry the vehicle, by the median thrust by weight of
     the numbers as rad/s.
     """
-    return [u for u, (_, factor) in _SPEEDS.items() if within(thrust * factor**2, _CARRIES)]
+    return [
+        u
+        for u, (_, factor) in MAGNITUDES.speeds.items()
+        if within(thrust * factor**2, MAGNITUDES.carries)
+    ]
 
 
 def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
@@ -117,7 +78,7 @@ def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     if within(thrust, MAGNITUDES.flies):
         return ""
     for unit in _carrying_units(thrust):
-        name, factor = _SPEEDS[unit]
+        name, factor = MAGNITUDES.speeds[unit]
         what = f"divide by {1 / factor:.4g}" if factor < 1 else f"multiply by {factor:.4g}"
         return (
             f"omega1..omega4 look like {name}: read as rad/s they make {thrust:.3g} times the "
@@ -142,7 +103,7 @@ def motor_doubts(log: FlightLog) -> list[str]:
         f"{what} of motors {i + 1} and {j + 1} are equal in every row; expected four motors"
         for i, j in combinations(range(4), 2)
         if np.array_equal(motors[:, i], motors[:, j])
-        and np.count_nonzero(np.diff(motors[:, i])) >= _CHANGES
+        and np.count_nonzero(np.diff(motors[:, i])) >= MAGNITUDES.changes
     ]
     doubts = [] if len(alike) == 2 else alike[:1]  # two pairs: a flight in one plane without noise
     medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
@@ -274,9 +235,6 @@ def interpolated(log: FlightLog, broken: Mask) -> FlightLog:
     return replace(log, rotor_speeds=speeds)
 
 
-_BROKEN = 3.0  # times the speed that 99 % of a rotor's samples stay below: 9 times their thrust
-
-
 def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     """Return a log without broken rotor speeds, and a doubt where there are some: no rotor triples
     its speed in a sample or two and falls back. Neighbours are interpolated.
@@ -284,7 +242,7 @@ def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     if not log.has_rotor_speeds or log.commanded:
         return log, []
     high = np.nanquantile(log.rotor_speeds, 0.99, axis=0)
-    fast = log.rotor_speeds > _BROKEN * np.where(high > 0.0, high, np.inf)
+    fast = log.rotor_speeds > MAGNITUDES.broken * np.where(high > 0.0, high, np.inf)
     # a sample counts if the third before it and the third behind it are sound
     far = np.pad(fast, ((3, 3), (0, 0)))
     broken = fast & ~far[:-6] & ~far[6:]

@@ -33,7 +33,7 @@ from .column_parts import (
     named_columns,
 )
 from .evidence import GOOD, GOOD_TORQUE, TURNING_RATE, Evidence, Fit, RankedFits, likelihood
-from .excerpt import LONGEST
+from .flight_log import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
     COMMAND_UNITS,

@@ -25,6 +25,7 @@ from .channels import (
     LONGEST_STEPS,
     ChannelGroup,
     Stream,
+    among,
     check_rows,
     in_kit_axes,
     in_kit_units,
@@ -307,7 +308,7 @@ def _pose(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
         )
-    alone = np.count_nonzero(~np.isin(t[placed], attitude.t))
+    alone = np.count_nonzero(~among(t[placed], attitude.t))
     if turned is samples and alone:
         notes.append(
             f"{alone} of {placed.sum()} positions stand in rows without an attitude, which "

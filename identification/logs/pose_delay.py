@@ -31,8 +31,7 @@ from ..motion.smoothing import (
     unbroken,
 )
 from .evidence import SIDES
-from .excerpt import excerpt
-from .flight_log import FlightLog
+from .flight_log import FlightLog, excerpt
 from .table import Array, Pair, Rows, median_step
 
 FARTHEST = 0.3  # s, of the search
@@ -106,7 +105,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
         log: the flight, with rotor speeds.
         vehicle: as declared; None: rotors on one side turn the body to the other.
     """
-    log = excerpt([log])[0]
+    log = excerpt(log)
     late = 0.0
     for _ in range(_ROUNDS):  # a window over delayed signals cuts the two of them differently
         segments = _segments(log, vehicle, late)
@@ -223,7 +222,7 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
         late: s, of the pose behind the rotor speeds. Turns by moments of so much earlier, a row
             more or less, are no noise.
     """
-    log = excerpt([log])[0]
+    log = excerpt(log)
     rows = np.flatnonzero(log.valid)
     step, fine = median_step(log.t[rows]), max(log.period, _FINEST)
     apart = max(1, round(_APART / step))  # rows

@@ -55,7 +55,6 @@ def _frames(
 
 _USUAL_FRAMES = tuple(_frames(**stated) for stated in _STATED["frames"])
 MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.map_world)  # with names in a map
-PLAIN = MAP_FRAMES[0]
 
 
 _FACTS: dict[str, str] = _STATED["positions"]
@@ -104,7 +103,7 @@ class Convention:
     """One way to read a flight's columns: frames, units, order, sense, clock and sensors."""
 
     attitude: Attitude = AS_WRITTEN
-    frames: Frames = PLAIN
+    frames: Frames = MAP_FRAMES[0]
     length: str = "m"  # unit of the position
     gyro: SensorReading = AS_DECLARED
     rotors: Order = ROTORS  # the kit's rotor, from 1, in each column
@@ -323,7 +322,7 @@ def as_written(columns: Array, attitude: Attitude) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     good = finite_rows(columns)
     if not attitude.euler:
-        good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
+        good &= np.isclose(np.linalg.norm(columns, axis=1), 1.0, atol=0.5)
     turns = quaternions(attitude, scaled(attitude, columns[good]))
     rotation = Rotation.from_quat(turns, scalar_first=True)
     return good, rotation if attitude.sense == SENSES[0] else rotation.inv()

@@ -23,7 +23,7 @@ from ..motion.inertial_signals import inertial_pieces, reads_imu
 from ..motion.signals import SHORTEST_PIECE, pose_pieces
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of, turn_between
 from .evidence import remedies
-from .flight_log import MOTOR_RATES, FlightLog
+from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, serves
 from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import MAGNITUDES, interpolated, motor_doubts, rotor_doubt, time_doubt, within
@@ -194,8 +194,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
             f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
             f"{vehicle.name}: is it this vehicle, and did it fly?"
         )
-    least = MOTOR_RATES.force_hz if log.commanded else MOTOR_RATES.torque_hz
-    if not MOTOR_RATES.serves(log.motor_rate, least):
+    least = FORCE_HZ if log.commanded else TORQUE_HZ
+    if not serves(log.motor_rate, least):
         what = "motor commands" if log.commanded else "rotor speeds"
         yield _Needed(
             f"{what} come {log.motor_rate:.3g} times a second; expected at least {least:g}: what "

@@ -39,7 +39,7 @@ MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
-_BUFFER = 2**18  # bytes read or unpacked at a time: less than a longest line
+_BUFFER = 2**16  # bytes read or unpacked at a time: within the cache of a core
 _UNUSED = 2**21  # packed bytes without a line yet
 
 _BLOCK = 200  # lines turned into numbers at a time; their texts stay in the cache of the processor

@@ -26,14 +26,6 @@ PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of rotors 1
 ORDERS: dict[str, Order] = {name: tuple(order) for name, order in WORDS["rotor_orders"].items()}
 
 QUADROTOR = "a quadrotor"
-_ROTORS = {
-    QUADROTOR: 4,
-    "a tricopter": 3,
-    "a hexarotor": 6,
-    "an octorotor": 8,
-    "a decarotor": 10,
-    "a dodecarotor": 12,
-}
 # motors 1 to 4 of PX4's and ArduPilot's plus: right, left, front, rear; x forward, y left
 PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
 _QUADRANTS = np.radians([45.0, 135.0, 225.0, 315.0])  # of rotors 1 to 4, from forward to the left
@@ -90,7 +82,7 @@ class WhatFlew:
         Raises:
             InputError: the log states another vehicle.
         """
-        count = _ROTORS.get(self.airframe) if self.rotors is None else self.rotors
+        count = WORDS["airframes"].get(self.airframe) if self.rotors is None else self.rotors
         with_rotors = "" if count in (None, 4) else f" with {count} rotors"
         if self.airframe not in ("", QUADROTOR) or with_rotors:
             what = f"{self.airframe or 'a vehicle'}{with_rotors}"

@@ -11,13 +11,13 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, UnreadLogError
 from ..diagnosis.settings import DIAGNOSIS
-from ..logs.flight_log import FlightLog, flown_vehicle
+from ..logs.flight_log import FlightLog, excerpt, flown_vehicle
 from ..logs.flight_phases import flew
 from ..logs.log_map import MAPS, map_names
 from ..logs.map_guess import Guess, guess_map
 from ..logs.map_text import map_yaml
 from ..logs.mapped_log import map_table
-from ..logs.reading import finished, read_log, unknown_table
+from ..logs.reading import finished, opened, read_log, reader_by_columns
 from ..logs.screening import LEAST_SECONDS, convention_doubt, screen_log
 from ..logs.table import Data, Names, Table
 from ..motion.noise_spectrum import noise_spectra
@@ -100,17 +100,18 @@ def check_log(
         UnreadLogError: the guessed map, in the error, cannot read the log yet.
     """
     guess, text = None, ""
+    table = None if reader or log_map else opened(path)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
         if log_map is not None:
             log = read_log(path, reader, vehicle, log_map, piece)
             shipped = MAPS / f"{log_map}.yaml" if log_map in map_names() else Path(log_map)
             read_by, text = f"the map {log_map}", shipped.read_text(encoding="utf-8-sig")
-        elif reader is None and (table := unknown_table(path)) is not None:
+        elif table is not None and reader_by_columns(path, table.header) is None:
             log, guess = _guessed(table, vehicle, piece)
             read_by, text = "a map that was guessed", map_yaml(guess)
         else:
-            log = read_log(path, reader, vehicle, piece=piece)
+            log = read_log(table or path, reader, vehicle, piece=piece)
             named = re.search(r"\(reader ([^()]+)\)$", log.source)
             read_by = f"the reader {named[1]}" if named else "this kit's own format"
     guessed = [
@@ -123,7 +124,7 @@ def check_log(
         f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
         f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "
         "how large it was"
-        for c in noise_spectra(log)
+        for c in noise_spectra(excerpt(log))
         if c.filtered
     ]
     if vehicle is None:

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
-from ..logs.flight_log import MOTOR_RATES, FlightLog, Logs
+from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
 from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
 from ..motion.signals import Signals, log_signals
@@ -104,7 +104,7 @@ def _sources_of(logs: Logs) -> Sources:
         raise InputError(
             f"{log.source or logs[0].name}: expected rotor speeds (omega1..omega4) in every log, "
             "or motor commands (cmd1..cmd4) in every log, "
-            f"{MOTOR_RATES.torque_hz:g} times a second; found {' and '.join(rates) or 'neither'}"
+            f"{TORQUE_HZ:g} times a second; found {' and '.join(rates) or 'neither'}"
         )
     accelerometer = all(log.accelerometer is not None for log in logs)
     gyro = all(log.gyro is not None for log in logs)
@@ -124,7 +124,7 @@ def _sources_of(logs: Logs) -> Sources:
 
 def _is_fast(log: FlightLog, channel: str) -> bool:
     """Return whether a channel of the rotors was measured often enough to tell their torque."""
-    return MOTOR_RATES.serves(log.rates.get(channel, np.inf), MOTOR_RATES.torque_hz)
+    return serves(log.rates.get(channel, np.inf), TORQUE_HZ)
 
 
 def rounding_step(logs: Logs) -> float:

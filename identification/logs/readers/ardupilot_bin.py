@@ -36,7 +36,7 @@ from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import ChannelGroup, Stream, in_order
+from ..channels import ChannelGroup, in_order
 from ..flight_log import FlightLog
 from ..log_map import LogMap, shipped_map, stated
 from ..mapped_log import MOST_VOLTS, log_of
@@ -248,15 +248,15 @@ def _telemetry(messages: Messages, parameters: Values) -> tuple[list[ChannelGrou
     slots, which = slots_of_motors(_functions(parameters), _MOTOR1), messages["Instance"]
     if not slots or not np.isin(slots, which).all():
         slots = list(range(4))
-    each = []
+    each, known = [], np.isfinite(messages["RPM"])
     for slot in slots:
-        times, rpm = (x[which == slot] for x in (_times(messages), messages["RPM"]))
+        times, rpm = (x[known & (which == slot)] for x in (_times(messages), messages["RPM"]))
         if len(rpm) < 2 or not np.any(rpm > 0.0):
             return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
         rows, _ = in_order(times)
-        each.append(Stream("ESC", times[rows], rpm[rows, None]))
-    t = each[0].t
-    columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
+        each.append((times[rows], rpm[rows]))
+    t = each[0][0]
+    columns = {f"RPM {motor}": np.interp(t, *one) for motor, one in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)
     told = f"measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took them"
     return [ChannelGroup(t, columns, "ESC")], [f"rotor speeds: {told}"]

@@ -34,6 +34,7 @@ import sqlite3
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -334,9 +335,11 @@ def _check_bag_files(path: Path) -> None:
             continue
         # a view or a computed column of a few bytes of SQL may give any number of rows of any size
         tables = []
-        with suppress(sqlite3.Error):  # the reader states the error
+        # the reader states the error, of any letters
+        with suppress(sqlite3.Error, UnicodeDecodeError):
             uri = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:
+                database.text_factory = partial(str, errors="replace")
                 query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
                 tables = database.execute(query).fetchmany(_TABLES)
         for name, kind, sql in tables:

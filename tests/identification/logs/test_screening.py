@@ -78,7 +78,6 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
     [
         ((2, 1, 0), (1, 1, 1), "px and pz are swapped"),
         ((1, 2, 0), (1, 1, 1), r"take \(pz, px, py\) as the position"),
-        ((2, 0, 1), (1, 1, 1), r"take \(py, pz, px\) as the position"),
         ((1, 0, 2), (-1, -1, 1), r"take \(-py, -px, pz\) as the position"),
         ((0, 1, 2), (1, 1, -1), r"position's z points down; expected .* take \(px, py, -pz\)"),
     ],
@@ -157,10 +156,6 @@ TORN = {
         lambda log: with_rows(log, log.t < 6.0),
         r"6 of 6 s of flight lie in unbroken runs.*expected at least 10 s",
     ),
-    "very short": (
-        lambda log: with_rows(log, log.t < 2.0),
-        r"0 of 2 s of flight lie in unbroken runs",
-    ),
     "slow": (
         lambda log: with_rows(log, np.arange(len(log.t)) % 8 == 0),
         r"25 new poses a second; expected at least 50: acceler",
@@ -172,10 +167,6 @@ TORN = {
     "lost often": (
         lambda log: without_pose(log, log.t % 2.0 < 0.2),
         r"pose is lost in 8 run\(s\).*0 of .* s of flight lie in unbroken runs",
-    ),
-    "lost long": (
-        lambda log: without_pose(log, log.t > 8.0),
-        r"lost in 1 run\(s\).*8\.\d* of .* s of flight lie in unbroken runs",
     ),
     "no pose": (lambda log: without_pose(log, log.t > -1.0), "no row has a pose"),
     "uneven clock": (
@@ -205,7 +196,7 @@ TORN = {
 }
 
 
-ENOUGH = ("short", "very short", "slow", "held", "lost often", "lost long", "uneven clock")
+ENOUGH = ("short", "slow", "held", "lost often", "uneven clock")
 PARTS = ("clock jump", "rows cut out")
 
 
