@@ -109,7 +109,7 @@ def diagnose(
         *((log, pose_notes(log, vehicle)) for log, _ in checked),
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
-    said = Judged(flights, [n for n in names() if n not in without], settings, report)
+    said = _Judged(flights, [n for n in names() if n not in without], settings, report)
     effects = said.effects
     residuals = said.balance
     sure = said.remainder == "none" and not any(
@@ -131,6 +131,7 @@ def diagnose(
         verdict=verdict,
         remainder=said.remainder,
         effects=effects,
+        not_needed=said.not_needed,
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
         before=Errors(*residuals.error_before, *predicted[vehicle]),
         after=Errors(*residuals.error_after, *predicted[amended]),
@@ -151,7 +152,7 @@ def diagnose(
         pushes=said.pushes,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
-        amended=amended if residuals.better else vehicle,
+        amended=amended,
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in every)),
@@ -164,7 +165,7 @@ def diagnose(
     )
 
 
-class Judged:
+class _Judged:
     """The effects behind flights, by the evidence of sets of effects, and the residual.
 
     Args:
@@ -201,11 +202,14 @@ class Judged:
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
         self.ranking = fitted.ranking
-        best = self._best = fitted.ranking.sets[0]
-        self.setting = {e: dict(x) for e, x in {**given.fixed, **fitted.setting}.items()}
-        if fitted.sensors:
-            self.setting[""] = {name: value for name, (value, _) in fitted.sensors.items()}
+        self._best = fitted.ranking.sets[0]
+        sensors = {name: value for name, (value, _) in fitted.sensors.items()}
+        self.setting = {**given.fixed, **fitted.setting} | ({"": sensors} if sensors else {})
         self.balance = balance(flights, self.setting)
+        if not self.balance.better:  # no set with a larger error on held-out flight is printed
+            fitted = self._fitted = replace(fitted, setting={}, behind={})
+            self.setting = {"": sensors} if sensors else {}
+            self.balance = balance(flights, self.setting)
         self.parts = {
             e: flights.residual(without(self.setting, e)) - self.balance.after
             for e in self.setting
@@ -213,8 +217,9 @@ class Judged:
         }
         self.gusts = fitted.gusts
         self.pushes = tuple(transient_disturbances(flights, self.setting))
-        known = {e: self._differs(e) for e in given.first if e in best.effects}
-        named = [e for e in fitted.setting if known.get(e, 1.0) >= rule.least_sure_probability]
+        known = {e: self._differs(e) for e in given.first if e in self._best.effects}
+        said = [e for e in self._best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
+        named = [e for e in fitted.setting if e in said]
         structure = fitted.ranking.structure
         strange = unknown(structure, bool(self.pushes))
         rivals = {e: self._rivals(e) for e in named}
@@ -227,11 +232,14 @@ class Judged:
         sizes = worth(flights, given.fixed, given.first, fitted.setting)
         effects = [self._named(e, known[e], sizes[e], unsure, rivals[e]) for e in named]
         names = {e: known[e] for e in named}
-        if late := given.late:
+        if (late := given.late) and late.name in self.setting:
             names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
             doubted = unsure or names[late.name] < rule.least_sure_probability
             effects.append(replace(late, tentative=doubted))
         self.effects = tuple(effects)
+        self.not_needed = tuple(self._stated(e) for e in said if e not in fitted.setting)
+        if late and late.name not in self.setting:
+            self.not_needed += (late,)
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
         if structured:  # the dictionary's best column beside the likeliest set
@@ -268,7 +276,8 @@ class Judged:
         flights = self._flights
         varies = flights.commanded and get(effect).role in THRUST_FACTORS
         spread = varies * THRUST_STD / math.sqrt(len(flights.logs))
-        return self._widened(effect, self._best.std[effect], spread)
+        std = self._fitted.std.get(effect) or self._best.std[effect]
+        return self._widened(effect, std, spread)
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
         """Return standard deviations of coefficients with a relative one besides."""
@@ -309,7 +318,7 @@ class Judged:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
         flights = self._flights
         rule = self._rule
-        alike = composites(flights.vehicle, self._fitted.setting, self._best.std)
+        alike = composites(flights.vehicle, self._fitted.setting, self._fitted.std)
         doubts = {"composite": tuple(alike)}
         if strange > rule.most_unknown:
             doubts["unknown"] = (
@@ -320,12 +329,6 @@ class Judged:
             doubts["short"] = (
                 f"{flights.seconds:.1f} s of flight are too few for a sure name: fly at least "
                 f"{rule.least_seconds:g} s",
-            )
-        if named and not self.balance.better:
-            growth, std = (100.0 * x for x in self.balance.growth)
-            doubts["held out"] = (
-                "on held-out flight the named effects do not make the squared error smaller "
-                f"({growth:+.2g} +- {std:.2g} %): the model stays as it was declared",
             )
         if flights.filtered and named:
             doubts["filtered pose"] = (FILTERED,)
@@ -343,24 +346,42 @@ class Judged:
             )
         return {check: sentences for check, sentences in doubts.items() if sentences}
 
+    def _stated(self, effect: str) -> NamedEffect:
+        """Return an effect of the likeliest set, with its gain where it was not fitted."""
+        std = self._std(effect)
+        if self._is_assumed(effect):
+            std = self._widened(effect, std, self._flights.thrust_std)
+        own = self._fitted.setting.get(effect) or self._best.coefficients[effect]
+        # the point of action of an effect at the rotors, as declared, is nothing to report
+        values = {
+            name: x
+            for name, x in own.items()
+            if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
+        }
+        gained, spread = self._fitted.gains[effect]
+        return NamedEffect(
+            name=effect,
+            coefficients=values,
+            std={name: std.get(name, 0.0) for name in values},
+            units={name: coefficient((effect, name)).unit for name in values},
+            tentative=True,
+            indistinguishable_from=(),
+            evidence={"held_out_gain": gained, "held_out_gain_std": spread},
+        )
+
+    def _is_assumed(self, effect: str) -> bool:
+        """Return whether an effect may be the error of an assumed thrust alone."""
+        return self._flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
+
     def _named(
         self, effect: str, probability: float, size: float, unsure: bool, others: Names
     ) -> NamedEffect:
         flights = self._flights
         fitted = self._fitted
-        std = self._std(effect)
-        # the point of action of an effect at the rotors, as declared, is nothing to report
-        values = {
-            name: x
-            for name, x in fitted.setting[effect].items()
-            if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
-        }
-        uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
-        if uncertain:
-            std = self._widened(effect, std, flights.thrust_std)
+        stated = self._stated(effect)
         sizes = [
             abs(x) / typical_size((effect, name), flights.vehicle)
-            for name, x in values.items()
+            for name, x in stated.coefficients.items()
             if name != CENTRAL
         ]
         # shares of the residual's energy without it, each channel over its sensors' noise
@@ -370,13 +391,10 @@ class Judged:
             float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
             for x in (after, after + self.parts[effect])
         )
-        return NamedEffect(
-            name=effect,
-            coefficients=values,
-            std={name: std.get(name, 0.0) for name in values},
-            units={name: coefficient((effect, name)).unit for name in values},
+        return replace(
+            stated,
             tentative=unsure
-            or uncertain
+            or self._is_assumed(effect)
             or probability < self._rule.least_sure_probability
             or size < self._rule.least_worth,
             indistinguishable_from=others,
@@ -385,6 +403,7 @@ class Judged:
                 "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
                 "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
                 "size_over_what_is_left": size,
+                **stated.evidence,
             },
             channels=carrying_channels(flights, fitted.setting, effect),
         )

@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +16,13 @@ from ..findings import RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
+    Index,
     Marginal,
     SetEvidence,
     evidence_of_one_more,
     tempering,
 )
+from .left_out import LeftOut
 from .priors import (
     PRIORS,
     WHOLE_PREFIX,
@@ -130,6 +133,8 @@ class Posterior:
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[Effects, _Candidate] = {}
         self.scores: dict[Effects, float] = {}
+        # the likeliest set without needless effects, once asked
+        self._needed: _Candidate | None = None
         # beside the noise of nothing explained no effect shows: only sets found elsewhere go there
         for i in range(1 if given is None else 0, len(bases)):
             self._search(i)
@@ -138,8 +143,42 @@ class Posterior:
             self._search(0, [self.known[k].variants for k in likeliest[:KEPT_ASKED]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
-        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        best = self._needed or self.known[max(self.scores, key=self.scores.__getitem__)]
         return best.base, best
+
+    def needed(self, probability: Values) -> tuple["Posterior", dict[str, Pair]]:
+        """Return the posterior with, in place of the likeliest set, its effects that help where
+        they were not fitted; and the gain of each effect with its standard error, nats.
+
+        The least probable effect goes first: another may need its place.
+
+        Args:
+            probability: of each effect.
+        """
+        base, best = self._likeliest()
+        left_out = LeftOut(base, best.columns, self.power)
+        m = base.marginal(best.columns, base.plain, self.power)
+
+        def index(variants: Variants) -> Index:
+            return np.array([m.place[c] for v in variants for c in v], dtype=np.intp)
+
+        odds = math.log(1.0 / self.inclusion - 1.0)  # before the flight, against an effect
+        gains: dict[str, Pair] = {}
+        while True:
+            weak = []
+            for v in best.variants:
+                effect = v[0][0]
+                rest = tuple(x for x in best.variants if x != v)
+                gained, std = gains[effect] = left_out.gain(index(best.variants), index(rest))
+                if gained < odds + left_out.least * std:
+                    weak.append((probability[effect], gained / (std + 1e-9), rest))
+            fewer = (_Candidate(base, rest, m.evidence(index(rest))) for *_, rest in sorted(weak))
+            if (smaller := next(filter(self._possible, fewer), None)) is None:
+                break
+            best = smaller
+        out = copy(self)
+        out._needed = best
+        return out, gains
 
     def tempering(self) -> float:
         """Return the power of the likelihood by the scatter beside the likeliest set."""
@@ -359,6 +398,12 @@ class Posterior:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._at_mode(self.known[key])[0]
+
+    def likeliest_setting(self) -> tuple[Setting, Setting]:
+        """Return the coefficients of the likeliest set, or of its needed effects, and their
+        standard deviations.
+        """
+        return self._at_mode(self._likeliest()[1])
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects with, each alone, at least half of
