@@ -237,7 +237,11 @@ class _Judged:
             doubted = unsure or names[late.name] < rule.least_sure_probability
             effects.append(replace(late, tentative=doubted))
         self.effects = tuple(effects)
-        self.not_needed = tuple(self._stated(e) for e in said if e not in fitted.setting)
+        self.not_needed = tuple(
+            self._stated(e, self._best.coefficients[e], self._best.std[e])
+            for e in said
+            if e not in fitted.setting
+        )
         if late and late.name not in self.setting:
             self.not_needed += (late,)
         structured = strange > 0.5 and structure > 0.0
@@ -276,7 +280,7 @@ class _Judged:
         flights = self._flights
         varies = flights.commanded and get(effect).role in THRUST_FACTORS
         spread = varies * THRUST_STD / math.sqrt(len(flights.logs))
-        std = self._fitted.std.get(effect) or self._best.std[effect]
+        std = {**self._best.std, **self._fitted.std}[effect]
         return self._widened(effect, std, spread)
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
@@ -346,42 +350,24 @@ class _Judged:
             )
         return {check: sentences for check, sentences in doubts.items() if sentences}
 
-    def _stated(self, effect: str) -> NamedEffect:
-        """Return an effect of the likeliest set, with its gain where it was not fitted."""
-        std = self._std(effect)
-        if self._is_assumed(effect):
-            std = self._widened(effect, std, self._flights.thrust_std)
-        own = self._fitted.setting.get(effect) or self._best.coefficients[effect]
-        # the point of action of an effect at the rotors, as declared, is nothing to report
-        values = {
-            name: x
-            for name, x in own.items()
-            if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
-        }
-        gained, spread = self._fitted.gains[effect]
-        return NamedEffect(
-            name=effect,
-            coefficients=values,
-            std={name: std.get(name, 0.0) for name in values},
-            units={name: coefficient((effect, name)).unit for name in values},
-            tentative=True,
-            indistinguishable_from=(),
-            evidence={"held_out_gain": gained, "held_out_gain_std": spread},
-        )
-
-    def _is_assumed(self, effect: str) -> bool:
-        """Return whether an effect may be the error of an assumed thrust alone."""
-        return self._flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
-
     def _named(
         self, effect: str, probability: float, size: float, unsure: bool, others: Names
     ) -> NamedEffect:
         flights = self._flights
         fitted = self._fitted
-        stated = self._stated(effect)
+        std = self._std(effect)
+        # the point of action of an effect at the rotors, as declared, is nothing to report
+        values = {
+            name: x
+            for name, x in fitted.setting[effect].items()
+            if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
+        }
+        uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
+        if uncertain:
+            std = self._widened(effect, std, flights.thrust_std)
         sizes = [
             abs(x) / typical_size((effect, name), flights.vehicle)
-            for name, x in stated.coefficients.items()
+            for name, x in values.items()
             if name != CENTRAL
         ]
         # shares of the residual's energy without it, each channel over its sensors' noise
@@ -392,9 +378,9 @@ class _Judged:
             for x in (after, after + self.parts[effect])
         )
         return replace(
-            stated,
+            self._stated(effect, values, std),
             tentative=unsure
-            or self._is_assumed(effect)
+            or uncertain
             or probability < self._rule.least_sure_probability
             or size < self._rule.least_worth,
             indistinguishable_from=others,
@@ -403,10 +389,21 @@ class _Judged:
                 "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
                 "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
                 "size_over_what_is_left": size,
-                **stated.evidence,
+                **self._gain(effect),
             },
             channels=carrying_channels(flights, fitted.setting, effect),
         )
+
+    def _gain(self, effect: str) -> NamedNumbers:
+        return dict(
+            zip(("held_out_gain", "held_out_gain_std"), self._fitted.gains[effect], strict=True)
+        )
+
+    def _stated(self, effect: str, values: Values, std: Values) -> NamedEffect:
+        """Return an effect with its gain where it was not fitted."""
+        units = {name: coefficient((effect, name)).unit for name in values}
+        known = {name: std.get(name, 0.0) for name in values}
+        return NamedEffect(effect, values, known, units, True, (), self._gain(effect))
 
     def traces(self) -> Iterator[Trace]:
         """Yield the residual of each piece of flight over time."""

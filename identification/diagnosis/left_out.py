@@ -58,20 +58,15 @@ class LeftOut:
             for own in (base.blocks[part == i] for i in np.unique(part))
         ]
 
-    def gain(self, own: Index, less: Index) -> Pair:
-        """Return the gain in log predictive density of all blocks, nats, and its standard error.
-
-        Args:
-            own: (k,) indices of the set's columns.
-            less: (l,) the same without the effect asked about.
+    def gain(self, less: Index) -> Pair:
+        """Return the gain in log predictive density of all blocks, nats, and its standard error, of
+        all columns over some (l,), by their indices.
         """
         gained = square = 0.0
         for rest, blocks in self._parts:
-            fitted, other = np.zeros((2, len(rest.right)))
-            fitted[own], other[less] = (
-                set_evidence(rest, x, *self._bounds).mode for x in (own, less)
-            )
-            change = fitted - other
+            fitted = set_evidence(rest, range(len(rest.right)), *self._bounds).mode
+            change = fitted.copy()
+            change[less] -= set_evidence(rest, less, *self._bounds).mode
             for block in blocks:
                 off = float(change @ (block.right - block.normal @ fitted))
                 gained += off + 0.5 * float(change @ block.normal @ change)

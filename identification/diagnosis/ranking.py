@@ -246,8 +246,7 @@ def rank_by_rows(
     ranking = last.ranking()
     last, gains = last.needed(ranking.probability)
     setting, std = last.likeliest_setting()
-    if setting.keys() == best.keys():
-        setting = best
+    setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
     return _FittedPosterior(
         last,
         ranking,

@@ -16,7 +16,6 @@ from ..findings import RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
 from .evidence import (
-    Index,
     Marginal,
     SetEvidence,
     evidence_of_one_more,
@@ -148,37 +147,41 @@ class Posterior:
 
     def needed(self, probability: Values) -> tuple["Posterior", dict[str, Pair]]:
         """Return the posterior with, in place of the likeliest set, its effects that help where
-        they were not fitted; and the gain of each effect with its standard error, nats.
+        they were not fitted; and the gain of each with the effects already left out, nats, and its
+        standard error.
 
-        The least probable effect goes first: another may need its place.
+        A gain must exceed the odds against these effects before the flight. The least probable
+        effect goes first: another may need its place.
 
         Args:
             probability: of each effect.
         """
         base, best = self._likeliest()
-        left_out = LeftOut(base, best.columns, self.power)
-        m = base.marginal(best.columns, base.plain, self.power)
-
-        def index(variants: Variants) -> Index:
-            return np.array([m.place[c] for v in variants for c in v], dtype=np.intp)
-
-        odds = math.log(1.0 / self.inclusion - 1.0)  # before the flight, against an effect
+        columns = best.columns
+        left_out = LeftOut(base, columns, self.power)
+        m = base.marginal(columns, base.plain, self.power)
+        odds = math.log(1.0 / self.inclusion - 1.0)
+        every = frozenset(e for e, _ in columns)
         gains: dict[str, Pair] = {}
         while True:
             weak = []
-            for v in best.variants:
-                effect = v[0][0]
-                rest = tuple(x for x in best.variants if x != v)
-                gained, std = gains[effect] = left_out.gain(index(best.variants), index(rest))
-                if gained < odds + left_out.least * std:
-                    weak.append((probability[effect], gained / (std + 1e-9), rest))
-            fewer = (_Candidate(base, rest, m.evidence(index(rest))) for *_, rest in sorted(weak))
-            if (smaller := next(filter(self._possible, fewer), None)) is None:
+            for variant in best.variants:
+                effect = variant[0][0]
+                rest = tuple(x for x in best.variants if x != variant)
+                kept = {v[0][0] for v in rest}
+                less = np.flatnonzero([e in kept for e, _ in columns])
+                gained, std = gains[effect] = left_out.gain(less)
+                against = odds * len(every - kept - (self.given or frozenset()))
+                if gained < against + left_out.least * std:
+                    smaller = _Candidate(base, rest, m.evidence(less))
+                    weak.append((probability[effect], gained / (std + 1e-9), smaller))
+            likely = (x for *_, x in sorted(weak, key=lambda x: x[:2]) if self._possible(x))
+            if (smaller := next(likely, best)) is best:
                 break
             best = smaller
-        out = copy(self)
-        out._needed = best
-        return out, gains
+        chosen = copy(self)
+        chosen._needed = best
+        return chosen, gains
 
     def tempering(self) -> float:
         """Return the power of the likelihood by the scatter beside the likeliest set."""
@@ -401,9 +404,15 @@ class Posterior:
 
     def likeliest_setting(self) -> tuple[Setting, Setting]:
         """Return the coefficients of the likeliest set, or of its needed effects, and their
-        standard deviations.
+        standard deviations. These contain the changes by needless effects left out.
         """
-        return self._at_mode(self._likeliest()[1])
+        whole = self.best_setting(len(self.library))
+        setting, std = self._at_mode(self._likeliest()[1])
+        wide = {
+            e: {n: math.hypot(x, setting[e][n] - whole[e][n]) for n, x in own.items()}
+            for e, own in std.items()
+        }
+        return setting, wide
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects with, each alone, at least half of
