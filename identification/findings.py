@@ -281,7 +281,7 @@ class Diagnosis:
             these, ``structure`` is a doubt of all names.
         ranking: the posterior of sets of effects.
         probabilities: of the findings.
-        not_needed: effects of the likeliest set that do not help where they were not fitted.
+        not_needed: effects of the likeliest set without help on flight left out of their fit.
     """
 
     verdict: str

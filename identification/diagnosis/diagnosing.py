@@ -204,11 +204,12 @@ class _Judged:
         self.ranking = fitted.ranking
         self._best = fitted.ranking.sets[0]
         sensors = {name: value for name, (value, _) in fitted.sensors.items()}
-        self.setting = {**given.fixed, **fitted.setting} | ({"": sensors} if sensors else {})
+        known_apart = {**given.fixed, **({"": sensors} if sensors else {})}
+        self.setting = known_apart | fitted.setting
         self.balance = balance(flights, self.setting)
         if not self.balance.better:  # no set with a larger error on held-out flight is printed
             fitted = self._fitted = replace(fitted, setting={}, behind={})
-            self.setting = {"": sensors} if sensors else {}
+            self.setting = known_apart
             self.balance = balance(flights, self.setting)
         self.parts = {
             e: flights.residual(without(self.setting, e)) - self.balance.after
@@ -232,7 +233,7 @@ class _Judged:
         sizes = worth(flights, given.fixed, given.first, fitted.setting)
         effects = [self._named(e, known[e], sizes[e], unsure, rivals[e]) for e in named]
         names = {e: known[e] for e in named}
-        if (late := given.late) and late.name in self.setting:
+        if late := given.late:
             names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
             doubted = unsure or names[late.name] < rule.least_sure_probability
             effects.append(replace(late, tentative=doubted))
@@ -242,8 +243,6 @@ class _Judged:
             for e in said
             if e not in fitted.setting
         )
-        if late and late.name not in self.setting:
-            self.not_needed += (late,)
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
         if structured:  # the dictionary's best column beside the likeliest set
@@ -377,8 +376,9 @@ class _Judged:
             float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
             for x in (after, after + self.parts[effect])
         )
+        stated = self._stated(effect, values, std)
         return replace(
-            self._stated(effect, values, std),
+            stated,
             tentative=unsure
             or uncertain
             or probability < self._rule.least_sure_probability
@@ -389,21 +389,23 @@ class _Judged:
                 "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
                 "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
                 "size_over_what_is_left": size,
-                **self._gain(effect),
+                **stated.evidence,
             },
             channels=carrying_channels(flights, fitted.setting, effect),
         )
 
-    def _gain(self, effect: str) -> NamedNumbers:
-        return dict(
-            zip(("held_out_gain", "held_out_gain_std"), self._fitted.gains[effect], strict=True)
-        )
-
     def _stated(self, effect: str, values: Values, std: Values) -> NamedEffect:
-        """Return an effect with its gain where it was not fitted."""
-        units = {name: coefficient((effect, name)).unit for name in values}
-        known = {name: std.get(name, 0.0) for name in values}
-        return NamedEffect(effect, values, known, units, True, (), self._gain(effect))
+        """Return an effect with its gain on flight left out of its fit."""
+        gained, spread = self._fitted.gains[effect]
+        return NamedEffect(
+            name=effect,
+            coefficients=values,
+            std={name: std.get(name, 0.0) for name in values},
+            units={name: coefficient((effect, name)).unit for name in values},
+            tentative=True,
+            indistinguishable_from=(),
+            evidence={"held_out_gain": gained, "held_out_gain_std": spread},
+        )
 
     def traces(self) -> Iterator[Trace]:
         """Yield the residual of each piece of flight over time."""

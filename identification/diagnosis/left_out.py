@@ -32,7 +32,7 @@ class LeftOut:
     Args:
         base: the likelihood.
         columns: (c,) of the effects asked about.
-        power: of the likelihood.
+        power: the likelihood's power.
 
     Attributes:
         least: standard errors of a gain beyond chance; minus infinity for a single block, with no

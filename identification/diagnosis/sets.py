@@ -146,15 +146,14 @@ class Posterior:
         return best.base, best
 
     def needed(self, probability: Values) -> tuple["Posterior", dict[str, Pair]]:
-        """Return the posterior with, in place of the likeliest set, its effects that help where
-        they were not fitted; and the gain of each with the effects already left out, nats, and its
-        standard error.
+        """Return the posterior with the likeliest set's needed effects in its place, and each
+        effect's gain together with the effects already left out: nats, and its standard error.
 
         A gain must exceed the odds against these effects before the flight. The least probable
         effect goes first: another may need its place.
 
         Args:
-            probability: of each effect.
+            probability: each effect's probability.
         """
         base, best = self._likeliest()
         columns = best.columns
