@@ -188,8 +188,7 @@ def test_a_wind_is_named_and_no_tilt():
     windy = diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
     found = {e.name: e for e in windy.effects}
     assert "wind" in found
-    assert "world_tilt" not in found
-    assert "thrust_axis_tilt" not in found
+    assert not {"world_tilt", "thrust_axis_tilt"} & found.keys()
     wind = found["wind"]
     for name, true in (("wx", -4.0), ("wy", 1.0)):
         assert wind.coefficients[name] == pytest.approx(true, abs=3.0 * wind.std[name] + 0.1)
@@ -201,9 +200,8 @@ def test_a_wind_is_named_and_no_tilt():
 def test_in_still_air_nothing_is_sure():
     found = diagnose([flown()], VEHICLE)
     assert not [e.name for e in found.effects if not e.tentative]
-    winds = [e.coefficients for e in found.effects if e.name == "wind"]
-    assert all(abs(x) < 0.2 for wind in winds for x in (wind["wx"], wind["wy"], wind["wz"]))
-    assert found.after.force_rms < 1.2 * found.before.force_rms
+    assert "wind" not in found.probabilities.names
+    assert found.after.force_rms <= found.before.force_rms
 
 
 @pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 2, 3), marks=pytest.mark.slow)])
