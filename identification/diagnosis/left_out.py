@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from ..logs.table import Array, Pair
-from .evidence import Index, Marginal, marginal, set_evidence
+from .evidence import Marginal, marginal, set_evidence
 from .priors import Base
 from .regression import Column
 
@@ -58,7 +58,7 @@ class LeftOut:
             for own in (base.blocks[part == i] for i in np.unique(part))
         ]
 
-    def gain(self, less: Index) -> Pair:
+    def gain(self, less: Sequence[int]) -> Pair:
         """Return the gain in log predictive density of all blocks, nats, and its standard error, of
         all columns over some (l,), by their indices.
         """

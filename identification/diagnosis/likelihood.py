@@ -519,7 +519,7 @@ class Likelihood:
         still = np.zeros_like(self._base)
         most = sum(len([*self._blocks(track)]) for track in self.tracks)
         products = np.empty((most, len(names) + 1, len(names) + 1))
-        flown = []
+        flown: list[int] = []
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
             state = np.zeros((6, 3, len(names)))
             counts = self._counts(i)

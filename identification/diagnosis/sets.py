@@ -168,7 +168,7 @@ class Posterior:
                 effect = variant[0][0]
                 rest = tuple(x for x in best.variants if x != variant)
                 kept = {v[0][0] for v in rest}
-                less = np.flatnonzero([e in kept for e, _ in columns])
+                less = [i for i, (e, _) in enumerate(columns) if e in kept]
                 gained, std = gains[effect] = left_out.gain(less)
                 against = odds * len(every - kept - (self.given or frozenset()))
                 if gained < against + left_out.least * std:
