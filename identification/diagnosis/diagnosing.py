@@ -109,7 +109,7 @@ def diagnose(
         *((log, pose_notes(log, vehicle)) for log, _ in checked),
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
-    said = Judged(flights, [n for n in names() if n not in without], settings, report)
+    said = _Judged(flights, [n for n in names() if n not in without], settings, report)
     effects = said.effects
     residuals = said.balance
     sure = said.remainder == "none" and not any(
@@ -131,6 +131,7 @@ def diagnose(
         verdict=verdict,
         remainder=said.remainder,
         effects=effects,
+        not_needed=said.not_needed,
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
         before=Errors(*residuals.error_before, *predicted[vehicle]),
         after=Errors(*residuals.error_after, *predicted[amended]),
@@ -151,7 +152,7 @@ def diagnose(
         pushes=said.pushes,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
-        amended=amended if residuals.better else vehicle,
+        amended=amended,
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in every)),
@@ -164,7 +165,7 @@ def diagnose(
     )
 
 
-class Judged:
+class _Judged:
     """The effects behind flights, by the evidence of sets of effects, and the residual.
 
     Args:
@@ -201,11 +202,15 @@ class Judged:
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
         self.ranking = fitted.ranking
-        best = self._best = fitted.ranking.sets[0]
-        self.setting = {e: dict(x) for e, x in {**given.fixed, **fitted.setting}.items()}
-        if fitted.sensors:
-            self.setting[""] = {name: value for name, (value, _) in fitted.sensors.items()}
+        self._best = fitted.ranking.sets[0]
+        sensors = {name: value for name, (value, _) in fitted.sensors.items()}
+        known_apart = {**given.fixed, **({"": sensors} if sensors else {})}
+        self.setting = known_apart | fitted.setting
         self.balance = balance(flights, self.setting)
+        if not self.balance.better:  # no set with a larger error on held-out flight is printed
+            fitted = self._fitted = replace(fitted, setting={}, behind={})
+            self.setting = known_apart
+            self.balance = balance(flights, self.setting)
         self.parts = {
             e: flights.residual(without(self.setting, e)) - self.balance.after
             for e in self.setting
@@ -213,8 +218,9 @@ class Judged:
         }
         self.gusts = fitted.gusts
         self.pushes = tuple(transient_disturbances(flights, self.setting))
-        known = {e: self._differs(e) for e in given.first if e in best.effects}
-        named = [e for e in fitted.setting if known.get(e, 1.0) >= rule.least_sure_probability]
+        known = {e: self._differs(e) for e in given.first if e in self._best.effects}
+        said = [e for e in self._best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
+        named = [e for e in fitted.setting if e in said]
         structure = fitted.ranking.structure
         strange = unknown(structure, bool(self.pushes))
         rivals = {e: self._rivals(e) for e in named}
@@ -232,6 +238,11 @@ class Judged:
             doubted = unsure or names[late.name] < rule.least_sure_probability
             effects.append(replace(late, tentative=doubted))
         self.effects = tuple(effects)
+        self.not_needed = tuple(
+            self._stated(e, self._best.coefficients[e], self._best.std[e])
+            for e in said
+            if e not in fitted.setting
+        )
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
         if structured:  # the dictionary's best column beside the likeliest set
@@ -268,7 +279,8 @@ class Judged:
         flights = self._flights
         varies = flights.commanded and get(effect).role in THRUST_FACTORS
         spread = varies * THRUST_STD / math.sqrt(len(flights.logs))
-        return self._widened(effect, self._best.std[effect], spread)
+        std = {**self._best.std, **self._fitted.std}[effect]
+        return self._widened(effect, std, spread)
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
         """Return standard deviations of coefficients with a relative one besides."""
@@ -309,7 +321,7 @@ class Judged:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
         flights = self._flights
         rule = self._rule
-        alike = composites(flights.vehicle, self._fitted.setting, self._best.std)
+        alike = composites(flights.vehicle, self._fitted.setting, self._fitted.std)
         doubts = {"composite": tuple(alike)}
         if strange > rule.most_unknown:
             doubts["unknown"] = (
@@ -320,12 +332,6 @@ class Judged:
             doubts["short"] = (
                 f"{flights.seconds:.1f} s of flight are too few for a sure name: fly at least "
                 f"{rule.least_seconds:g} s",
-            )
-        if named and not self.balance.better:
-            growth, std = (100.0 * x for x in self.balance.growth)
-            doubts["held out"] = (
-                "on held-out flight the named effects do not make the squared error smaller "
-                f"({growth:+.2g} +- {std:.2g} %): the model stays as it was declared",
             )
         if flights.filtered and named:
             doubts["filtered pose"] = (FILTERED,)
@@ -370,11 +376,9 @@ class Judged:
             float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
             for x in (after, after + self.parts[effect])
         )
-        return NamedEffect(
-            name=effect,
-            coefficients=values,
-            std={name: std.get(name, 0.0) for name in values},
-            units={name: coefficient((effect, name)).unit for name in values},
+        stated = self._stated(effect, values, std)
+        return replace(
+            stated,
             tentative=unsure
             or uncertain
             or probability < self._rule.least_sure_probability
@@ -385,8 +389,22 @@ class Judged:
                 "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
                 "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
                 "size_over_what_is_left": size,
+                **stated.evidence,
             },
             channels=carrying_channels(flights, fitted.setting, effect),
+        )
+
+    def _stated(self, effect: str, values: Values, std: Values) -> NamedEffect:
+        """Return an effect with its gain on flight left out of its fit."""
+        gained, spread = self._fitted.gains[effect]
+        return NamedEffect(
+            name=effect,
+            coefficients=values,
+            std={name: std.get(name, 0.0) for name in values},
+            units={name: coefficient((effect, name)).unit for name in values},
+            tentative=True,
+            indistinguishable_from=(),
+            evidence={"held_out_gain": gained, "held_out_gain_std": spread},
         )
 
     def traces(self) -> Iterator[Trace]:

@@ -77,6 +77,7 @@ class Base:
     high: Array
     total: Array  # (c + 1, c + 1) sums of products, true to rounding
     blocks: Array  # (blocks, k + 1, k + 1), the same of each block, of the columns ``single``
+    flight: Index  # (blocks,) index of the log
     single: Index  # (k,) columns without the dictionary, nine tenths of all
     penalty: float
     effects: Effects  # of the setting
@@ -220,6 +221,7 @@ def in_prior_units(
     flights: RegressedFlights,
     names: Sequence[Column],
     blocks: Array,
+    flight: Index,
     penalty: float,
     setting: Setting,
     starts: Starts,
@@ -232,6 +234,7 @@ def in_prior_units(
         names: (c,) columns.
         blocks: (blocks, c + 1, c + 1) sums of products, of columns and of the residual at the
             setting (last), whitened. They are changed in place: ten minutes take 0.2 GB.
+        flight: (blocks,) index of the log of each block.
         penalty: twice the sum over samples of the logarithm of the standard deviations.
         setting: the setting of effects.
         starts: columns of whole effects.
@@ -261,6 +264,7 @@ def in_prior_units(
         high,
         total + np.diag(1e-12 * np.diagonal(total)),
         blocks[:, held[:, None], held],
+        flight,
         single,
         penalty,
         frozenset(k for k in setting if k),

@@ -54,7 +54,9 @@ class _FittedPosterior:
 
     posterior: Posterior
     ranking: Ranking
-    setting: Setting  # coefficients of the likeliest set
+    setting: Setting  # coefficients of the likeliest set's needed effects
+    std: Setting  # their standard deviations
+    gains: Mapping[str, Pair]  # as in ``Posterior.needed``
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
@@ -148,8 +150,11 @@ def rank(
     by_chance = 2.0 * math.log(len(whole.dictionary))
     quieter = best.quieter({column: size}, starts) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
+    posterior, gains = posterior.needed(ranking.probability)
     late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
-    return _FittedPosterior(posterior, ranking, posterior.best_setting(), best.gusts(), late)
+    return _FittedPosterior(
+        posterior, ranking, *posterior.likeliest_setting(), gains, best.gusts(), late
+    )
 
 
 def rank_by_rows(
@@ -238,12 +243,18 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
+    ranking = last.ranking()
+    last, gains = last.needed(ranking.probability)
+    setting, std = last.likeliest_setting()
+    setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
     return _FittedPosterior(
         last,
-        last.ranking(),
-        best,
-        sensors=likelihood.sensors(best),
-        behind=_behind(likelihood, best),
+        ranking,
+        setting,
+        std,
+        gains,
+        sensors=likelihood.sensors(setting),
+        behind=_behind(likelihood, setting),
     )
 
 

@@ -127,7 +127,8 @@ class RowLikelihood:
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
         parts = (p.reshape(-1, x.shape[2]) for p in np.split(x, ends))
         blocks = np.array([p.T @ p for p in parts])
-        return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
+        flight = rows.log[self._use][[0, *ends]]
+        return in_prior_units(flights, list(columns), blocks, flight, 0.0, setting, starts)
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns, changing coefficients among them."""

@@ -45,6 +45,7 @@ class Rows:
         fit: (n,) rows in the fit.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
+        log: (n,) index of the log.
         t: (n,) s.
         channels: 3, 6 or 9.
         least: (channels,) best accuracy of a motion.
@@ -66,6 +67,7 @@ class Rows:
         self.t: Array = flights.t[self._at]
         self.fit: Mask = flights.fit_rows[self._at]
         self.block = blocks(self.t, self.begins, BLOCK)
+        self.log = flights.log[self._at]
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
         self._inertias = flights.inertias

@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from .evidence import (
     evidence_of_one_more,
     tempering,
 )
+from .left_out import LeftOut
 from .priors import (
     PRIORS,
     WHOLE_PREFIX,
@@ -130,6 +132,8 @@ class Posterior:
         self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
         self.known: dict[Effects, _Candidate] = {}
         self.scores: dict[Effects, float] = {}
+        # the likeliest set without needless effects, once asked
+        self._needed: _Candidate | None = None
         # beside the noise of nothing explained no effect shows: only sets found elsewhere go there
         for i in range(1 if given is None else 0, len(bases)):
             self._search(i)
@@ -138,8 +142,45 @@ class Posterior:
             self._search(0, [self.known[k].variants for k in likeliest[:KEPT_ASKED]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
-        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        best = self._needed or self.known[max(self.scores, key=self.scores.__getitem__)]
         return best.base, best
+
+    def needed(self, probability: Values) -> tuple["Posterior", dict[str, Pair]]:
+        """Return the posterior with the likeliest set's needed effects in its place, and each
+        effect's gain together with the effects already left out: nats, and its standard error.
+
+        A gain must exceed the odds against these effects before the flight. The least probable
+        effect goes first: another may need its place.
+
+        Args:
+            probability: each effect's probability.
+        """
+        base, best = self._likeliest()
+        columns = best.columns
+        left_out = LeftOut(base, columns, self.power)
+        m = base.marginal(columns, base.plain, self.power)
+        odds = math.log(1.0 / self.inclusion - 1.0)
+        every = frozenset(e for e, _ in columns)
+        gains: dict[str, Pair] = {}
+        while True:
+            weak = []
+            for variant in best.variants:
+                effect = variant[0][0]
+                rest = tuple(x for x in best.variants if x != variant)
+                kept = {v[0][0] for v in rest}
+                less = [i for i, (e, _) in enumerate(columns) if e in kept]
+                gained, std = gains[effect] = left_out.gain(less)
+                against = odds * len(every - kept - (self.given or frozenset()))
+                if gained < against + left_out.least * std:
+                    smaller = _Candidate(base, rest, m.evidence(less))
+                    weak.append((probability[effect], gained / (std + 1e-9), smaller))
+            likely = (x for *_, x in sorted(weak, key=lambda x: x[:2]) if self._possible(x))
+            if (smaller := next(likely, best)) is best:
+                break
+            best = smaller
+        chosen = copy(self)
+        chosen._needed = best
+        return chosen, gains
 
     def tempering(self) -> float:
         """Return the power of the likelihood by the scatter beside the likeliest set."""
@@ -359,6 +400,18 @@ class Posterior:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._at_mode(self.known[key])[0]
+
+    def likeliest_setting(self) -> tuple[Setting, Setting]:
+        """Return the coefficients of the likeliest set, or of its needed effects, and their
+        standard deviations. These contain the changes by needless effects left out.
+        """
+        whole = self.best_setting(len(self.library))
+        setting, std = self._at_mode(self._likeliest()[1])
+        wide = {
+            e: {n: math.hypot(x, setting[e][n] - whole[e][n]) for n, x in own.items()}
+            for e, own in std.items()
+        }
+        return setting, wide
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects with, each alone, at least half of

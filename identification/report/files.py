@@ -19,12 +19,13 @@ from .page import report_page
 
 # MAJOR.MINOR of ``report.json`` (see ``report.schema.json`` beside this file): a new key is a new
 # minor version, a removed key or a new meaning a new major one
-SCHEMA_VERSION = "1.2"
+SCHEMA_VERSION = "1.3"
 # attributes of a diagnosis under their own names in ``report.json``
 _AS_FOUND = (
     *("advice", "notes", "needs_pose", "candidates", "structure", "rotor_faults"),
     *("logs", "test_logs", "seconds", "cutoff_hz"),
 )
+_STATED = ("name", "coefficients", "std", "units", "evidence")  # of an effect not needed
 
 
 def write_report(
@@ -82,6 +83,7 @@ def report_data(diagnosis: Diagnosis) -> Data:
         "unknown": stated.unknown,
         "error": error,
         **{name: getattr(diagnosis, name) for name in _AS_FOUND},
+        "not_needed": [{key: getattr(x, key) for key in _STATED} for x in diagnosis.not_needed],
         "headline": headline(diagnosis),
         "floor_is_lower_bound": diagnosis.floor_is_bound,
         "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],

@@ -227,6 +227,6 @@ def next_step(diagnosis: Diagnosis) -> str:
         return f"{use}, and confirm it on another flight (--test)."
     if diagnosis.advice:
         return diagnosis.advice[0]
-    better = diagnosis.effects and "held out" not in diagnosis.doubts and not is_outside(diagnosis)
+    better = diagnosis.effects and not is_outside(diagnosis)
     use = "Use vehicle.yaml, which holds the named effects. " if better else ""
     return f"{use}To see whether the rest is wind, fly again in still air."

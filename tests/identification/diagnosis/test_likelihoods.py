@@ -5,6 +5,7 @@ forces are known by construction.
 import math
 from dataclasses import replace
 from math import inf
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,8 +27,9 @@ from windwrench.identification.diagnosis.evidence import (
     set_evidence,
     tempering,
 )
+from windwrench.identification.diagnosis.left_out import LeftOut
 from windwrench.identification.diagnosis.regression import RegressedFlights
-from windwrench.identification.diagnosis.row_noise import RowNoise, fitted_noise
+from windwrench.identification.diagnosis.row_noise import fitted_noise
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
 
@@ -95,6 +97,22 @@ def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
 
     assert power(x, noise) > 0.75
     assert power(slow, alike) < 0.1
+
+
+def test_a_coefficient_helps_where_blocks_agree_on_it():
+    rng = default_rng(6)
+    x = rng.standard_normal((12, 40, 3))
+    # one coefficient everywhere, and one whose sign each block draws
+    x[..., 2] += 0.4 * x[..., 0] + x[..., 1] * rng.choice([-0.4, 0.4], (12, 1))
+    blocks = np.einsum("bni,bnj->bij", x, x)
+    base = SimpleNamespace(
+        blocks=blocks, flight=np.arange(12) % 3, single=[0, 1], plain=[], at=lambda c: [0, 1]
+    )
+    base.low, base.high = np.array([[-inf], [inf]]) * np.ones(2)
+    left_out = LeftOut(base, [], 1.0)
+    (steady, std), (erratic, spread) = (left_out.gain(np.array([i])) for i in (1, 0))
+    assert steady > left_out.least * std
+    assert erratic < left_out.least * spread
 
 
 def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
@@ -170,8 +188,7 @@ def test_a_wind_is_named_and_no_tilt():
     windy = diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
     found = {e.name: e for e in windy.effects}
     assert "wind" in found
-    assert "world_tilt" not in found
-    assert "thrust_axis_tilt" not in found
+    assert not {"world_tilt", "thrust_axis_tilt"} & found.keys()
     wind = found["wind"]
     for name, true in (("wx", -4.0), ("wy", 1.0)):
         assert wind.coefficients[name] == pytest.approx(true, abs=3.0 * wind.std[name] + 0.1)
@@ -183,9 +200,8 @@ def test_a_wind_is_named_and_no_tilt():
 def test_in_still_air_nothing_is_sure():
     found = diagnose([flown()], VEHICLE)
     assert not [e.name for e in found.effects if not e.tentative]
-    winds = [e.coefficients for e in found.effects if e.name == "wind"]
-    assert all(abs(x) < 0.2 for wind in winds for x in (wind["wx"], wind["wy"], wind["wz"]))
-    assert found.after.force_rms < 1.2 * found.before.force_rms
+    assert "wind" not in found.probabilities.names
+    assert found.after.force_rms <= found.before.force_rms
 
 
 @pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 2, 3), marks=pytest.mark.slow)])
@@ -233,12 +249,6 @@ def test_the_noise_of_an_autoregression_is_found():
     assert_allclose(np.cov(found.white(x)[found.known].T), np.eye(2), atol=0.15)
     assert not found.known[:3].any()
     assert not found.known[5000:5003].any()
-
-
-def test_noise_without_memory_only_scales():
-    noise = RowNoise(np.zeros((0, 1, 1)), np.array([[4.0]]), np.array([True, False, False]))
-    assert_allclose(noise.white(np.array([[2.0], [4.0], [6.0]]))[:, 0], [1.0, 2.0, 3.0])
-    assert noise.known.all()
 
 
 def test_a_column_of_factors_is_their_product_a_part_at_a_time():
