@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...dynamics.effects import get, names, playing
+from ...dynamics.effects import Role, get, names, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.threads import one_thread
@@ -53,7 +53,7 @@ from .regression import (
     without,
 )
 from .residuals import balance, is_beyond_calm, transient_disturbances
-from .row_nuisances import THRUST_STD
+from .row_nuisances import between_flights
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .traces import carrying_channels, signature
 from .unknown import beside_unknown, unknown
@@ -230,7 +230,8 @@ class Judged:
         if late := given.late:
             names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
             doubted = unsure or names[late.name] < rule.least_sure_probability
-            effects.append(replace(late, tentative=doubted))
+            std = self._of_any_flight(late.name, late.std)
+            effects.append(replace(late, std=std, tentative=doubted))
         self.effects = tuple(effects)
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
@@ -262,16 +263,21 @@ class Judged:
         self.probabilities = Probabilities(names, stated, strange)
 
     def _std(self, effect: str) -> NamedNumbers:
-        """Return the standard deviations of an effect in the likeliest set. For a factor on the
-        thrust of commands, they include the spread of thrust from flight to flight.
+        """Return the standard deviations of an effect in the likeliest set, with the spread from
+        flight to flight.
         """
+        return self._of_any_flight(effect, self._best.std[effect])
+
+    def _of_any_flight(self, effect: str, std: Values) -> NamedNumbers:
+        """Return standard deviations with the spread from flight to flight."""
         flights = self._flights
-        varies = flights.commanded and get(effect).role in THRUST_FACTORS
-        spread = varies * THRUST_STD / math.sqrt(len(flights.logs))
-        return self._widened(effect, self._best.std[effect], spread)
+        spread = between_flights(effect, flights.commanded) / math.sqrt(len(flights.logs))
+        return self._widened(effect, std, spread)
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
-        """Return standard deviations of coefficients with a relative one besides."""
+        """Return standard deviations of coefficients with another besides, relative to the declared
+        quantity.
+        """
         return {
             name: math.hypot(x, relative * unit_of_change((effect, name), self._flights.vehicle))
             for name, x in std.items()
@@ -283,7 +289,9 @@ class Judged:
         """
         own = self._flights.coefficients({}, effect)
         apart = [0.0]
-        for name, std in self._std(effect).items():
+        # these flights are late, however late others are
+        delays = get(effect).role == Role.DELAY
+        for name, std in (self._best.std[effect] if delays else self._std(effect)).items():
             off = abs(self._best.coefficients[effect][name] - own.get(name, 0.0))
             if off > LEAST_SIZE * typical_size((effect, name), self._flights.vehicle) and std:
                 apart.append(_apart(off, std))

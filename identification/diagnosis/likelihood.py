@@ -99,6 +99,7 @@ class Likelihood:
             finer = iter(near.finer if near else ())
             self.pieces: list[Poses] = []
             self._fit: list[Mask] = []  # (n,) samples open to the fit
+            self._log: list[int] = []  # of each piece
             for i, log in enumerate(flights.logs):
                 rows = flights.log == i
                 if not flights.fit_rows[rows].any():  # a test log
@@ -106,10 +107,12 @@ class Likelihood:
                 for piece in _read_poses(log, self.vehicle, finer):
                     at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
                     self.pieces.append(piece)
+                    self._log.append(i)
                     self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
         else:
             self.pieces = near.pieces
             self._fit = near._fit
+            self._log = near._log
         self.period = self.pieces[0].period
         lengths = [len(piece.t) for piece in self.pieces]
         if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
@@ -516,7 +519,7 @@ class Likelihood:
         still = np.zeros_like(self._base)
         most = sum(len([*self._blocks(track)]) for track in self.tracks)
         products = np.empty((most, len(names) + 1, len(names) + 1))
-        count = 0
+        flight = []
         for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
             state = np.zeros((6, 3, len(names)))
             counts = self._counts(i)
@@ -536,11 +539,14 @@ class Likelihood:
                 kept = (inverse @ out[counts[at]]).reshape(-1, out.shape[2])
                 samples += int(counts[at].sum())
                 if len(kept):
-                    np.matmul(kept.T, kept, out=products[count])
-                    count += 1
+                    np.matmul(kept.T, kept, out=products[len(flight)])
+                    flight.append(self._log[i])
             first += len(track.position)
         penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
-        return in_prior_units(self.flights, names, products[:count], penalty, self.setting, starts)
+        products = products[: len(flight)]
+        return in_prior_units(
+            self.flights, names, products, np.array(flight), penalty, self.setting, starts
+        )
 
     def _changes(
         self,

@@ -125,9 +125,10 @@ class RowLikelihood:
             columns |= self._dictionary(setting)
         x = self._white(np.stack([*columns.values(), residual], axis=2))
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
+        flight = flights.log[rows.at[self._use]][np.append(0, ends)]
         parts = (p.reshape(-1, x.shape[2]) for p in np.split(x, ends))
         blocks = np.array([p.T @ p for p in parts])
-        return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
+        return in_prior_units(flights, list(columns), blocks, flight, 0.0, setting, starts)
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns, changing coefficients among them."""

@@ -26,6 +26,7 @@ from windwrench.identification.diagnosis.evidence import (
     set_evidence,
     tempering,
 )
+from windwrench.identification.diagnosis.priors import Base
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_noise import RowNoise, fitted_noise
 from windwrench.identification.diagnosis.rows import Rows
@@ -74,6 +75,28 @@ def test_the_mode_of_many_coefficients_is_the_best_within_bounds(seed):
     assert_allclose(free.mode, solve(A.T @ A, x[:, index].T @ y), rtol=1e-9)
     gained = 0.5 * free.mode @ (x[:, index].T @ y) - 0.5 * slogdet(A.T @ A)[1]
     assert free.log_evidence == pytest.approx(gained)
+
+
+@pytest.mark.parametrize("blocks", [1, 5])
+def test_deviations_hold_a_coefficient_that_changes(blocks):
+    """Each number changes from block to block, or from one flight of five blocks to the next."""
+    rng = default_rng(blocks)
+    flight = np.arange(40) // blocks
+    names = [("", "nuisance"), ("mass", "dm")]
+    stated, widened = [], []
+    for _ in range(100):
+        x = rng.standard_normal((40, 50, 3))
+        slope = 0.5 * rng.standard_normal((flight[-1] + 1, 2))[flight, None]
+        x[:, :, 2] += np.sum(slope * x[:, :, :2], axis=2)
+        sums = x.swapaxes(1, 2) @ x
+        base = Base(names, *np.ones((3, 2)), sums.sum(axis=0), sums, np.arange(2), flight, 0.0,
+                    frozenset(), np.arange(1), np.ones(2), [], {})  # fmt: skip
+        base.low[:], base.high[:] = -inf, inf
+        found = base.marginal(names[1:], base.plain).evidence([0])
+        stated.append(found.mode / found.std)
+        widened.append(stated[-1] / base.scatter(names[1:], found.mode, 1.0))
+    assert np.mean(np.abs(stated) > 2.0) > 0.3
+    assert np.mean(np.abs(widened) > 2.0) < 0.12
 
 
 def test_columns_that_no_prior_tells_apart_have_no_evidence():
