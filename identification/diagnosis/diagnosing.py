@@ -230,7 +230,7 @@ class Judged:
         if late := given.late:
             names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
             doubted = unsure or names[late.name] < rule.least_sure_probability
-            std = self._of_any_flight(late.name, late.std)
+            std = self._of_any_flight(late.name, late.coefficients, late.std)
             effects.append(replace(late, std=std, tentative=doubted))
         self.effects = tuple(effects)
         structured = strange > 0.5 and structure > 0.0
@@ -266,18 +266,17 @@ class Judged:
         """Return the standard deviations of an effect in the likeliest set, with the spread from
         flight to flight.
         """
-        return self._of_any_flight(effect, self._best.std[effect])
+        return self._of_any_flight(effect, self._best.coefficients[effect], self._best.std[effect])
 
-    def _of_any_flight(self, effect: str, std: Values) -> NamedNumbers:
-        """Return standard deviations with the spread from flight to flight."""
-        flights = self._flights
-        spread = between_flights(effect, flights.commanded) / math.sqrt(len(flights.logs))
-        return self._widened(effect, std, spread)
+    def _of_any_flight(self, effect: str, values: Values, std: Values) -> NamedNumbers:
+        """Return standard deviations of coefficients with the spread from flight to flight."""
+        return {
+            name: math.hypot(x, between_flights((effect, name), values[name], self._flights))
+            for name, x in std.items()
+        }
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
-        """Return standard deviations of coefficients with another besides, relative to the declared
-        quantity.
-        """
+        """Return standard deviations of coefficients with a relative one besides."""
         return {
             name: math.hypot(x, relative * unit_of_change((effect, name), self._flights.vehicle))
             for name, x in std.items()
