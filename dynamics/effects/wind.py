@@ -21,7 +21,7 @@ _LEAST_DRAG = 0.1
 
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
-    """Return winds along the mean force, and along the force's part with the form of a slow wind's
+    """Return winds with the mean force, along it and along its part with the form of a slow wind's
     drag: a wind does nothing without a drag, nor this drag without a wind. If the vehicle has
     another drag, a wind may act on this one alone.
 
@@ -38,7 +38,9 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     slope = np.linalg.lstsq(
         np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None
     )[0][:2]
-    along_force = [(scale * speed, drag) for scale in (0.5, 1.0, 2.0)]
+    mean = math.hypot(*force.mean(axis=0))
+    speeds = [scale * speed for scale in (0.5, 1.0, 2.0, 4.0)]
+    along_force = [(x, max(mean / x**2, _LEAST_DRAG * drag)) for x in speeds]
     other = [(speed, 0.0)] if Family.DRAG in flights.beside else []
     return [
         {"wx": size * math.cos(heading), "wy": size * math.sin(heading), "wz": 0.0, "cd": cd}

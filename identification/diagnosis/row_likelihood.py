@@ -21,10 +21,12 @@ from .priors import (
     in_prior_units,
     prior_size,
 )
-from .regression import Column, RegressedFlights, delivered, without
+from .regression import Column, Effects, RegressedFlights, delivered, without
 from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
-from .row_nuisances import answered, followers, row_nuisances
+from .row_nuisances import answered, followers, gusts, row_nuisances
 from .rows import Rows
+
+GUSTY_ROUNDS = 2  # of the noise beside gusts, and of the wind beside this noise
 
 
 class RowLikelihood:
@@ -47,6 +49,8 @@ class RowLikelihood:
         self.rows = Rows(flights, fixed)
         self.nuisances = _named(row_nuisances(self.rows))
         self.power = 1.0
+        # of sets whose wind is gusty
+        self._gusty: dict[Effects, RowNoise] = {}
         self.noise: RowNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
 
@@ -65,6 +69,30 @@ class RowLikelihood:
             answers = _named(answered(rows, signals, y - explained))
             noise, explained = self._noise_beside(y, own, answers)
         self.nuisances |= answers
+        self._own = own
+        return noise
+
+    def _gusts(self, setting: Setting) -> dict[Column, Array]:
+        return _named(gusts(self.rows, {**self.rows.fixed, **setting}))
+
+    def _noise_beside_gusts(self, setting: Setting) -> RowNoise:
+        """Return the noise of a set with a gusty wind: the residual without the whole library and
+        the gusts, by a draw of their posterior. Their mode would leave too little noise.
+
+        Source: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82.
+        """
+        rows = self.rows
+        y = rows.residual(setting)
+        X = np.stack([*self._own, *(self.nuisances | self._gusts(setting)).values()], axis=2)
+        noise = self.noise
+        draw = np.random.default_rng(0).standard_normal(X.shape[2])
+        for _ in range(ROUNDS):
+            use = rows.fit & noise.known
+            x = noise.white(X)[use].reshape(-1, X.shape[2])
+            factor = np.linalg.cholesky(x.T @ x + np.eye(x.shape[1]))
+            right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
+            left = y - X @ np.linalg.solve(factor.T, right + draw)
+            noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
         return noise
 
     def _noise_beside(
@@ -91,9 +119,6 @@ class RowLikelihood:
             noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
         return noise, X[:, :, : len(own)] @ mode[: len(own)]
 
-    def _white(self, x: Array) -> Array:
-        return self.noise.white(x)[self._use]
-
     def base(
         self,
         setting: Setting,
@@ -114,7 +139,10 @@ class RowLikelihood:
         residual = self.rows.residual(setting)
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
+        noise = self._gusty.get(frozenset(setting), self.noise)
         columns = dict(self.nuisances)
+        if noise is not self.noise:
+            columns |= self._gusts(setting)
         if not flights.commanded and playing(Role.LAG, among=list(setting)):
             # lagging rotors may speed up sooner than they slow down
             columns |= rows.columns(setting, [LAG_ASYMMETRY])
@@ -123,12 +151,15 @@ class RowLikelihood:
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
         if unknown:
             columns |= self._dictionary(setting)
-        x = self._white(np.stack([*columns.values(), residual], axis=2))
+        x = noise.white(np.stack([*columns.values(), residual], axis=2))[self._use]
+        sizes = np.linalg.slogdet(noise.covariance)[1] - np.linalg.slogdet(self.noise.covariance)[1]
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
         flight = flights.log[rows.at[self._use]][np.append(0, ends)]
         parts = (p.reshape(-1, x.shape[2]) for p in np.split(x, ends))
         blocks = np.array([p.T @ p for p in parts])
-        return in_prior_units(flights, list(columns), blocks, flight, 0.0, setting, starts)
+        return in_prior_units(
+            flights, list(columns), blocks, flight, len(x) * sizes, setting, starts
+        )
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns, changing coefficients among them."""
@@ -184,8 +215,21 @@ class RowLikelihood:
         return height(setting, self._height)[0]
 
     def fitted(self, setting: Setting) -> Setting:
-        """Return the mode of the posterior of a setting's effects."""
-        return mode(setting, self._height)
+        """Return the mode of the posterior of a setting's effects; a wind is steady or gusty, as
+        is likelier.
+        """
+        key = frozenset(setting)
+        self._gusty.pop(key, None)
+        steady = best = mode(setting, self._height)
+        if self._gusts(setting):
+            least = self.objective(steady)
+            for _ in range(GUSTY_ROUNDS):
+                self._gusty[key] = self._noise_beside_gusts(setting)
+                best = setting = mode(setting, self._height)
+            if self.objective(best) > least:
+                del self._gusty[key]
+                best = steady
+        return best
 
     def sensors(self, setting: Setting) -> dict[str, Pair]:
         """Return the likeliest biases of accelerometers from which the motion was read, and the

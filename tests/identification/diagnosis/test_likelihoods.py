@@ -189,6 +189,16 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     return replace(log, accelerometer=noisy, gyro=np.zeros_like(felt))
 
 
+def test_a_gust_in_step_with_the_flight_is_no_drag():
+    t = np.arange(0.0, 25.0, 0.01)
+    gusty = np.outer(1.8 * np.sin(0.9 * t + 1.6) - 6.0, [1.0, 0.0, 0.0])
+    found = diagnose([flown(wind=gusty)], VEHICLE)
+    (wind,) = (e for e in found.effects if e.name == "wind")
+    assert wind.coefficients["wx"] == pytest.approx(-6.0, abs=2.0 * wind.std["wx"])
+    assert wind.std["wx"] < 0.8
+    assert not {"body_drag", "rotor_drag", "constant_force"} & {e.name for e in found.effects}
+
+
 def test_a_wind_is_named_and_no_tilt():
     windy = diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
     found = {e.name: e for e in windy.effects}
