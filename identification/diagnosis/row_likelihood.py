@@ -2,11 +2,12 @@
 settings.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...dynamics.effects import Role, playing
+from ...dynamics.effects import Role, get, playing
 from ..logs.table import Array, ArrayMap, Pair
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
@@ -23,9 +24,14 @@ from .priors import (
 )
 from .regression import Column, Effects, RegressedFlights, delivered, without
 from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
-from .row_nuisances import answered, followers, gusts, row_nuisances
+from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
+# of a wind beside its mean: standard deviation, relative to the mean, correlation time, s, and the
+# fastest change, Hz, that the rows' noise does not hold
+GUST_STD = 0.2
+GUST_TIME = 2.0
+GUST_HZ = 0.4
 GUSTY_ROUNDS = 2  # of the noise beside gusts, and of the wind beside this noise
 
 
@@ -67,57 +73,79 @@ class RowLikelihood:
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
-            noise, explained = self._noise_beside(y, own, answers)
+            X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
+            begun = white_noise(y, rows.begins, rows.fit, rows.least)
+            noise, z = self._noise_beside(y, X, X.shape[2] - len(answers), begun)
+            explained = X[:, :, : len(own)] @ z[: len(own)]
         self.nuisances |= answers
         self._own = own
         return noise
 
     def _gusts(self, setting: Setting) -> dict[Column, Array]:
-        return _named(gusts(self.rows, {**self.rows.fixed, **setting}))
+        """Return the columns of a wind's change beside its mean: an Ornstein-Uhlenbeck process, as
+        cosines over the flight.
+
+        A gust acts like the wind, through each drag and by the flight's airspeed. As a force of its
+        own, or as a noise, the gusts of a periodic flight pass for more drag and less wind.
+        """
+        setting = {**self.rows.fixed, **setting}
+        winds = [
+            (e, c.name)
+            for e in setting
+            if get(e).sets_wind
+            for c in get(e).coefficients
+            if c.unit == "m/s"
+        ]
+        std = GUST_STD * math.hypot(*(setting[e].get(name, 0.0) for e, name in winds))
+        t = np.concatenate([[0.0], np.cumsum(np.diff(self.rows.t) * ~self.rows.begins[1:])])
+        rate = np.arange(1, int(2.0 * GUST_HZ * t[-1]) + 1) * math.pi / t[-1]
+        size = std * np.sqrt(4.0 * GUST_TIME / t[-1] / (1.0 + np.square(rate * GUST_TIME)))
+        shape = np.cos(np.outer(t, rate)) * size
+        slopes = self.rows.columns(setting, winds)
+        return _named(
+            {
+                f"gust {k} of {name}": x[:, None] * slope
+                for (_, name), slope in slopes.items()
+                for k, x in enumerate(shape.T)
+            }
+        )
 
     def _noise_beside_gusts(self, setting: Setting) -> RowNoise:
-        """Return the noise of a set with a gusty wind: the residual without the whole library and
-        the gusts, by a draw of their posterior. Their mode would leave too little noise.
+        """Return the noise of a set with a gusty wind, by a draw of the gusts' posterior: their
+        mode would leave too little noise.
 
         Source: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82.
         """
-        rows = self.rows
-        y = rows.residual(setting)
-        X = np.stack([*self._own, *(self.nuisances | self._gusts(setting)).values()], axis=2)
-        noise = self.noise
-        draw = np.random.default_rng(0).standard_normal(X.shape[2])
-        for _ in range(ROUNDS):
-            use = rows.fit & noise.known
-            x = noise.white(X)[use].reshape(-1, X.shape[2])
-            factor = np.linalg.cholesky(x.T @ x + np.eye(x.shape[1]))
-            right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
-            left = y - X @ np.linalg.solve(factor.T, right + draw)
-            noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
-        return noise
+        columns = self.nuisances | self._gusts(setting)
+        X = np.stack([*self._own, *columns.values()], axis=2)
+        count = X.shape[2]
+        draw = np.random.default_rng(0).standard_normal(count)
+        return self._noise_beside(self.rows.residual(setting), X, count, self.noise, draw)[0]
 
     def _noise_beside(
-        self, y: Array, own: Sequence[Array], answers: Mapping[Column, Array]
+        self, y: Array, X: Array, known: int, noise: RowNoise, draw: Array | float = 0.0
     ) -> tuple[RowNoise, Array]:
-        """Return the noise of the residual ``y`` (n, channels) and the effects' part of it.
+        """Return the noise of the residual ``y`` (n, channels), and the coefficients beside it.
 
         A signal that follows disturbances explains them without making them less: they stay noise.
 
         Args:
             y: with the given effects of every set.
-            own: columns of effects, in standard deviations of their priors.
-            answers: columns of signals that follow disturbances.
+            X: (n, channels, c) columns, in standard deviations of their priors.
+            known: number of the first columns; the others follow disturbances.
+            noise: at the start.
+            draw: (c,) standard deviations of the posterior from its mode.
         """
         rows = self.rows
-        X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
-        known = X.shape[2] - len(answers)
-        noise = white_noise(y, rows.begins, rows.fit, rows.least)
         for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
-            mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ noise.white(y)[use].ravel())
-            left = y - X[:, :, :known] @ mode[:known]
+            factor = np.linalg.cholesky(x.T @ x + np.eye(x.shape[1]))
+            right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
+            z = np.linalg.solve(factor.T, right + draw)
+            left = y - X[:, :, :known] @ z[:known]
             noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
-        return noise, X[:, :, : len(own)] @ mode[: len(own)]
+        return noise, z
 
     def base(
         self,

@@ -12,7 +12,7 @@ from ..logs.table import Array, NamedArrays
 from .commanded_rotors import THRUST_FACTORS
 from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import MODEL_ERROR, PRIORS
-from .regression import Column, RegressedFlights, Setting, coefficient, unit_of_change
+from .regression import Column, RegressedFlights, coefficient, unit_of_change
 from .rows import Rows
 
 # standard deviations of the differences from flight to flight
@@ -26,11 +26,6 @@ SCALE_STD = 0.02  # relative, of an accelerometer
 SESSION_STD = 0.012
 # relative, of the swing of a load: by a load's own track a cable of .51 m swung like .46 to .56 m
 SWING_STD = 0.08
-# of a wind beside its mean: standard deviation, relative to the mean, correlation time, s, and the
-# fastest change, Hz, that the rows' noise does not hold
-GUST_STD = 0.2
-GUST_TIME = 2.0
-GUST_HZ = 0.4
 STOPPED_WITHIN = 0.1  # s, in which a flight loop stops an unwanted angular velocity
 # signals (n,) by name, each with the channels of the disturbances that it follows
 Followers = dict[str, tuple[Array, Sequence[int]]]
@@ -137,33 +132,6 @@ def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedA
         torque = gain * turning * along
         out[f"{MODEL_ERROR} of force {name}"] = rows.from_body(force)
         out[f"{MODEL_ERROR} of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)
-    return out
-
-
-def gusts(rows: Rows, setting: Setting) -> NamedArrays:
-    """Return the columns of a wind's change beside its mean: an Ornstein-Uhlenbeck process, as
-    cosines over each piece of flight.
-
-    A gust acts like the wind, through each drag and by the flight's airspeed. As a force of its
-    own, or as a noise, the gusts of a periodic flight pass for more drag and less wind.
-    """
-    winds = [
-        (e, c.name)
-        for e in setting
-        if get(e).sets_wind
-        for c in get(e).coefficients
-        if c.unit == "m/s"
-    ]
-    std = GUST_STD * math.hypot(*(setting[e].get(name, 0.0) for e, name in winds))
-    out: NamedArrays = {}
-    for c, slope in rows.columns(setting, winds).items():
-        for i, run in enumerate(np.split(np.arange(len(rows.t)), np.flatnonzero(rows.begins)[1:])):
-            t = rows.t[run] - rows.t[run[0]]
-            for k in range(1, int(2.0 * GUST_HZ * t[-1]) + 1):
-                rate = math.pi * k / t[-1]
-                size = std * math.sqrt(4.0 * GUST_TIME / t[-1] / (1.0 + (rate * GUST_TIME) ** 2))
-                column = out[f"gust {k} of {c[1]} {i}"] = np.zeros_like(slope)
-                column[run] = size * np.cos(rate * t)[:, None] * slope[run]
     return out
 
 

@@ -33,7 +33,7 @@ BAND_HZ = (1.0, 8.0)
 # log-likelihood ratio over no visible moments, with one number less an axis
 LEAST_LOG_LIKELIHOOD_RATIO = 40.0
 SEGMENT = 2.0  # s, of a spectrum
-MEMORY = 4  # overlapping segments
+MEMORY = 5  # overlapping segments
 LONGEST_DELAY = 0.12  # s
 
 
@@ -113,27 +113,18 @@ def turning_delay(
     # the slopes' own scatter counts where larger
     slopes = [x for _, x in seen(seconds)]
     count = len(slopes)
-    flights = sum(float(x.sum()) ** 2 for x in slopes) * count / max(count - 1, 1)
-    scatter = max(2.0 * bend, flights, _variance(np.concatenate(slopes)))
-    std = math.sqrt(scatter) / max(bend, 1e-6)
+    flights = np.array([x.sum() for x in slopes]) * math.sqrt(count / max(count - 1, 1))
+    # W. K. Newey and K. D. West, Econometrica 55 (1987), 703-708
+    x = np.concatenate(slopes)
+    lagged = [x[i:] @ x[: len(x) - i] for i in range(MEMORY)]
+    lasting = 2.0 * np.linspace(1.0, 0.0, MEMORY + 1)[:-1] @ lagged - lagged[0]
+    std = math.sqrt(max(2.0 * bend, flights @ flights, lasting)) / max(bend, 1e-6)
     # a lag delays each frequency differently, and the frequencies shown by the loop are not known
     omega = spectra[0].omega
     spread = float(np.std(behind(omega, 0.0) / omega))
     std = math.hypot(std, spread, 0.5 * held / math.sqrt(12.0))
     clear = -least > LEAST_LOG_LIKELIHOOD_RATIO and seconds - 0.25 * held > 2.0 * std
     return (seconds, std, -least) if clear else None
-
-
-def _variance(x: Array) -> float:
-    """Return the variance of the sum of a sequence (n,) of mean zero, with a memory (W. K. Newey
-    and K. D. West, Econometrica 55 (1987), 703-708).
-    """
-    left = x - x.mean()
-    lags = min(MEMORY, len(x) - 1)
-    weighted = (
-        (1.0 - i / (lags + 1)) * (left[i:] @ left[: len(x) - i]) for i in range(1, lags + 1)
-    )
-    return float(left @ left + 2.0 * sum(weighted))
 
 
 def _spectra(piece: Signals, vehicle: Vehicle) -> _Spectra:
