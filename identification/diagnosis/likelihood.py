@@ -99,7 +99,7 @@ class Likelihood:
             finer = iter(near.finer if near else ())
             self.pieces: list[Poses] = []
             self._fit: list[Mask] = []  # (n,) samples open to the fit
-            self._log: list[int] = []  # of each piece
+            self._log: list[int] = []  # log of each piece
             for i, log in enumerate(flights.logs):
                 rows = flights.log == i
                 if not flights.fit_rows[rows].any():  # a test log

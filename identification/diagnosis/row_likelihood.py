@@ -27,12 +27,12 @@ from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
-# of a wind beside its mean: standard deviation, relative to the mean, correlation time, s, and the
-# fastest change, Hz, that the rows' noise does not hold
+# a wind beside its mean: standard deviation, relative to the mean, correlation time, s, and fastest
+# change, Hz, outside the rows' noise
 GUST_STD = 0.2
 GUST_TIME = 2.0
 GUST_HZ = 0.4
-GUSTY_ROUNDS = 2  # of the noise beside gusts, and of the wind beside this noise
+GUSTY_ROUNDS = 2  # fits of the noise beside gusts, each with a fit of the wind
 
 
 class RowLikelihood:
@@ -55,8 +55,7 @@ class RowLikelihood:
         self.rows = Rows(flights, fixed)
         self.nuisances = _named(row_nuisances(self.rows))
         self.power = 1.0
-        # of sets whose wind is gusty
-        self._gusty: dict[Effects, RowNoise] = {}
+        self._gusty: dict[Effects, RowNoise] = {}  # sets with a gusty wind, and their noise
         self.noise: RowNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
 
