@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...dynamics.effects import get, names, playing
+from ...dynamics.effects import Role, get, names, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.threads import one_thread
@@ -53,7 +53,7 @@ from .regression import (
     without,
 )
 from .residuals import balance, is_beyond_calm, transient_disturbances
-from .row_nuisances import THRUST_STD
+from .row_nuisances import between_flights
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .traces import carrying_channels, signature
 from .unknown import beside_unknown, unknown
@@ -236,7 +236,8 @@ class _Judged:
         if late := given.late:
             names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
             doubted = unsure or names[late.name] < rule.least_sure_probability
-            effects.append(replace(late, tentative=doubted))
+            std = self._of_any_flight(late.name, late.coefficients, late.std)
+            effects.append(replace(late, std=std, tentative=doubted))
         self.effects = tuple(effects)
         self.not_needed = tuple(
             self._stated(e, self._best.coefficients[e], self._best.std[e])
@@ -273,14 +274,18 @@ class _Judged:
         self.probabilities = Probabilities(names, stated, strange)
 
     def _std(self, effect: str) -> NamedNumbers:
-        """Return the standard deviations of an effect in the likeliest set. For a factor on the
-        thrust of commands, they include the spread of thrust from flight to flight.
+        """Return the standard deviations of an effect in the likeliest set, with the spread from
+        flight to flight.
         """
-        flights = self._flights
-        varies = flights.commanded and get(effect).role in THRUST_FACTORS
-        spread = varies * THRUST_STD / math.sqrt(len(flights.logs))
         std = {**self._best.std, **self._fitted.std}[effect]
-        return self._widened(effect, std, spread)
+        return self._of_any_flight(effect, self._best.coefficients[effect], std)
+
+    def _of_any_flight(self, effect: str, values: Values, std: Values) -> NamedNumbers:
+        """Return standard deviations of coefficients with the spread from flight to flight."""
+        return {
+            name: math.hypot(x, between_flights((effect, name), values[name], self._flights))
+            for name, x in std.items()
+        }
 
     def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
         """Return standard deviations of coefficients with a relative one besides."""
@@ -295,7 +300,9 @@ class _Judged:
         """
         own = self._flights.coefficients({}, effect)
         apart = [0.0]
-        for name, std in self._std(effect).items():
+        # these flights are late, however late others are
+        delays = get(effect).role == Role.DELAY
+        for name, std in (self._best.std[effect] if delays else self._std(effect)).items():
             off = abs(self._best.coefficients[effect][name] - own.get(name, 0.0))
             if off > LEAST_SIZE * typical_size((effect, name), self._flights.vehicle) and std:
                 apart.append(_apart(off, std))

@@ -107,8 +107,8 @@ class Likelihood:
                 for piece in _read_poses(log, self.vehicle, finer):
                     at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
                     self.pieces.append(piece)
-                    self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
                     self._log.append(i)
+                    self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
         else:
             self.pieces = near.pieces
             self._fit = near._fit
@@ -586,7 +586,7 @@ class Likelihood:
             track.heading[at],
             track.rotors[at, :1, None] * track.rotation[at, :, 1::-1] * [-1.0, 1.0],
             track.angular_velocity[at],
-            gyration(self.vehicle, track.angular_velocity[at]),
+            _gyration(self.vehicle, track.angular_velocity[at]),
             acting,
             moved,
             jumps,
@@ -601,7 +601,7 @@ class Likelihood:
         return out
 
 
-def gyration(vehicle: Vehicle, rate: Array) -> Array:
+def _gyration(vehicle: Vehicle, rate: Array) -> Array:
     """Return the derivative of the angular acceleration (n, 3, 3) by the angular velocity."""
     # -u x J v over the inertia J, of all pairs of axes u and v
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)

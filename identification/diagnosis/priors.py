@@ -129,6 +129,44 @@ class Base:
         modes = zip(chosen, mode.tolist(), std.tolist(), strict=True)
         return {self.names[i]: (x, s) for i, x, s in modes}
 
+    def scatter(self, columns: Iterable[Column], mode: Array, power: float) -> Array:
+        """Return the deviations of coefficients (c,) by their scatter over blocks and over flights,
+        in those of the likelihood; at least one.
+
+        The likelihood takes all samples as independent, but an error of the model lasts for
+        seconds, and differs from flight to flight. The covariance of the sums over blocks, or over
+        flights, is true for any such error (K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986),
+        13-22). Few sums estimate a small variance badly, so the largest of the three counts (J. D.
+        Angrist and J.-S. Pischke, Mostly Harmless Econometrics, 2009, section 8.2).
+
+        Args:
+            columns: the columns of a set.
+            mode: (c,) their coefficients. One at its bound keeps its deviation.
+            power: of the likelihood.
+        """
+        own = self.at(columns)
+        inside = (mode > self.low[own]) & (mode < self.high[own])
+        free = np.append(self.plain, own[inside])
+        there = np.zeros(len(self.total))
+        there[own] = -mode
+        there[free] = 0.0
+        there[-1] = 1.0
+        inverse = np.linalg.inv(power * self.total[np.ix_(free, free)] + np.eye(len(free)))
+        there[free] = -power * inverse @ (self.total[free] @ there)
+        kept = np.append(self.single, len(self.names))
+        each = power * self.blocks[:, np.searchsorted(self.single, free)] @ there[kept] @ inverse
+        stated = np.diagonal(inverse)
+        largest = stated.copy()
+        for group in (np.arange(len(each)), self.flight):
+            sums = np.array([each[group == i].sum(axis=0) for i in np.unique(group)])
+            if (count := len(sums)) > 1:
+                by_prior = np.square(inverse).sum(axis=0)
+                spread = np.square(sums).sum(axis=0) * count / (count - 1)
+                largest = np.maximum(largest, spread + by_prior)
+        out = np.ones(len(own))
+        out[inside] = np.sqrt(largest / stated)[len(self.plain) :]
+        return out
+
 
 @dataclass(frozen=True, eq=False)
 class _Asked:

@@ -43,6 +43,7 @@ class Rows:
 
     Attributes:
         fit: (n,) rows in the fit.
+        at: (n,) rows of ``flights``.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
         log: (n,) index of the log.
@@ -62,12 +63,11 @@ class Rows:
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
         self.flights = flights
         self.fixed = fixed
-        self._at: Index = np.concatenate([rows[::step] for rows in flights.runs])
-        self.begins: Mask = flights.start[self._at]
-        self.t: Array = flights.t[self._at]
-        self.fit: Mask = flights.fit_rows[self._at]
+        self.at: Index = np.concatenate([rows[::step] for rows in flights.runs])
+        self.begins: Mask = flights.start[self.at]
+        self.t: Array = flights.t[self.at]
+        self.fit: Mask = flights.fit_rows[self.at]
         self.block = blocks(self.t, self.begins, BLOCK)
-        self.log = flights.log[self._at]
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
         self._inertias = flights.inertias
@@ -104,7 +104,7 @@ class Rows:
 
     def at_rows(self, x: Array) -> Array:
         """Return samples of ``flights`` at the rows (n, ...), low-passed."""
-        return self.flights.low_passed(x, self._cutoff)[self._at]
+        return self.flights.low_passed(x, self._cutoff)[self.at]
 
     def residual(self, setting: Setting) -> Array:
         """Return the residual (n, channels) with these effects.

@@ -435,12 +435,17 @@ class Posterior:
             for name, value in values.items()
         )
 
-    def _at_mode(self, candidate: _Candidate) -> tuple[Setting, Setting]:
-        """Return the coefficients of a set at the mode, and their standard deviations."""
+    def _at_mode(self, candidate: _Candidate, widened: bool = False) -> tuple[Setting, Setting]:
+        """Return the coefficients of a set at the mode, and their standard deviations; ``widened``:
+        by the scatter over blocks and flights.
+        """
         base = candidate.base
         setting = {}
         std = {}
-        modes = zip(candidate.evidence.mode.tolist(), candidate.evidence.std.tolist(), strict=True)
+        mode, deviations = candidate.evidence.mode, candidate.evidence.std
+        if widened:
+            deviations = deviations * base.scatter(candidate.columns, mode, self.power)
+        modes = zip(mode.tolist(), deviations.tolist(), strict=True)
         for columns in candidate.variants:
             effect = columns[0][0]
             own = dict(self.flights.coefficients({}, effect))
@@ -470,7 +475,7 @@ class Posterior:
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)
         sets = tuple(
-            RankedSet(tuple(sorted(key)), p[key], *self._at_mode(self.known[key]))
+            RankedSet(tuple(sorted(key)), p[key], *self._at_mode(self.known[key], key == best[0]))
             for key in best
             if p[key] >= LEAST_PROBABILITY
         )

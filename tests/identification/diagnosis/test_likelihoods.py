@@ -28,6 +28,7 @@ from windwrench.identification.diagnosis.evidence import (
     tempering,
 )
 from windwrench.identification.diagnosis.left_out import LeftOut
+from windwrench.identification.diagnosis.priors import Base
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_noise import fitted_noise
 from windwrench.identification.diagnosis.rows import Rows
@@ -76,6 +77,28 @@ def test_the_mode_of_many_coefficients_is_the_best_within_bounds(seed):
     assert_allclose(free.mode, solve(A.T @ A, x[:, index].T @ y), rtol=1e-9)
     gained = 0.5 * free.mode @ (x[:, index].T @ y) - 0.5 * slogdet(A.T @ A)[1]
     assert free.log_evidence == pytest.approx(gained)
+
+
+@pytest.mark.parametrize("blocks", [1, 5])
+def test_deviations_hold_a_coefficient_that_changes(blocks):
+    """The number changes from block to block, or from one flight of five blocks to the next."""
+    rng = default_rng(blocks)
+    flight = np.arange(40) // blocks
+    column = ("mass", "dm")
+    off = []
+    for _ in range(100):
+        x = rng.standard_normal((40, 50, 2))
+        x[:, :, 1] += 0.5 * rng.standard_normal(40)[flight, None] * x[:, :, 0]
+        sums = x.swapaxes(1, 2) @ x
+        one, none = np.ones(1), np.arange(0)
+        base = Base([column], one, -inf * one, inf * one, sums.sum(axis=0), sums, np.arange(1),
+                    flight, 0.0, frozenset(), none, one, [], {})  # fmt: skip
+        found = base.marginal([column], none).evidence([0])
+        wide = base.scatter([column], found.mode, 1.0)
+        off.append(found.mode / found.std / np.array([1.0, wide[0]]))
+    stated, widened = np.mean(np.abs(off) > 2.0, axis=0)
+    assert stated > 0.3
+    assert widened < 0.12
 
 
 def test_columns_that_no_prior_tells_apart_have_no_evidence():
@@ -182,6 +205,16 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     felt = np.einsum("nji,nj->ni", rotation, need + air + gust) / VEHICLE.mass
     noisy = felt + [0.15, -0.1, 0.2] + 0.05 * rng.standard_normal(felt.shape)
     return replace(log, accelerometer=noisy, gyro=np.zeros_like(felt))
+
+
+def test_a_gust_in_step_with_the_flight_is_no_drag():
+    t = np.arange(0.0, 25.0, 0.01)
+    gusty = np.outer(1.8 * np.sin(0.9 * t + 1.6) - 6.0, [1.0, 0.0, 0.0])
+    found = diagnose([flown(wind=gusty)], VEHICLE)
+    (wind,) = (e for e in found.effects if e.name == "wind")
+    assert wind.coefficients["wx"] == pytest.approx(-6.0, abs=2.0 * wind.std["wx"])
+    assert wind.std["wx"] < 0.8
+    assert not {"body_drag", "rotor_drag", "constant_force"} & {e.name for e in found.effects}
 
 
 def test_a_wind_is_named_and_no_tilt():
