@@ -1,5 +1,7 @@
 // What a diagnosis computes at each row of a log, for Python. A model's memory is Python's: a NumPy
 // record, laid out as `Model<double>` at its beginning, given by its address.
+#include <nanobind/stl/vector.h>
+
 #include "../diagnosis/causal_filter.hpp"
 #include "../diagnosis/evidence.hpp"
 #include "../diagnosis/flights.hpp"
@@ -94,32 +96,40 @@ void run_causal_filter(std::uintptr_t model, double period, In<-1, 4> speeds, In
 
 void write_sensitivities(double period, In<6, 3, 2> gain, In<6> keep, In<-1, 2> heading,
                          In<-1, 3, 2> pull, In<-1, 3> rate, In<-1, 3, 3> gyration,
-                         In<-1, 6, -1> acting, In<-1, 6, -1> moved, In<-1, 6, -1> jumps,
-                         Ints<-1> jump_state, In<6, 7, -1> slopes, In<-1, 6> innovations,
-                         In<-1, 6> disturbance, Out<6, 3, -1> state, Out<-1, 6, -1> out) {
-  std::size_t columns = acting.shape(2) + jumps.shape(2) + slopes.shape(2);
-  check_rows(acting.shape(0), heading, pull, rate, gyration, moved, jumps, innovations, disturbance,
-             out);
-  if (state.shape(2) != columns || out.shape(2) != columns || jump_state.size() != jumps.shape(2) ||
-      moved.shape(2) > acting.shape(2))
+                         std::vector<In<-1, 6>> acting, std::vector<In<-1, 6>> moved,
+                         In<-1, 6, -1> jumps, Ints<-1> jump_state, In<6, 7, -1> slopes,
+                         In<-1, 6> innovations, In<-1, 6> disturbance, In<6, 6> whiten,
+                         Out<6, 3, -1> state, Out<-1, 6, -1> out) {
+  const std::size_t n = heading.shape(0),
+                    columns = acting.size() + jumps.shape(2) + slopes.shape(2);
+  check_rows(n, pull, rate, gyration, jumps, innovations, disturbance, out);
+  if (state.shape(2) != columns || out.shape(2) != columns + 1 ||
+      jump_state.size() != jumps.shape(2) || moved.size() > acting.size())
     throw nb::value_error("sensitivities: the columns do not match");
+  for (std::size_t j = 0; j < jump_state.size(); j++)
+    if (jump_state.data()[j] < 0 || jump_state.data()[j] > 2)
+      throw nb::value_error("sensitivities: expected a state of 0, 1 or 2");
+  std::vector<const double *> first, last;
+  for (const auto &x : acting) check_rows(n, x), first.push_back(x.data());
+  for (const auto &x : moved) check_rows(n, x), last.push_back(x.data());
   SteadyGains steady = {period, reinterpret_cast<const double (*)[3][2]>(gain.data()), keep.data()};
-  SensitivityInput input = {std::int64_t(acting.shape(0)),
-                            int(acting.shape(2)),
-                            int(moved.shape(2)),
+  SensitivityInput input = {std::int64_t(n),
+                            int(acting.size()),
+                            int(moved.size()),
                             int(jumps.shape(2)),
                             int(slopes.shape(2)),
                             rows(heading),
                             rows(pull),
                             rows(rate),
                             rows(gyration),
-                            acting.data(),
-                            moved.data(),
+                            first.data(),
+                            last.data(),
                             jumps.data(),
                             jump_state.data(),
                             slopes.data(),
                             rows(innovations),
-                            rows(disturbance)};
+                            rows(disturbance),
+                            reinterpret_cast<const double (*)[6]>(whiten.data())};
   sensitivities(steady, input, state.data(), out.data());
 }
 
@@ -201,8 +211,11 @@ void bind_diagnosis(nb::module_ &m) {
         "Run the causal filter of a model over poses; write the fields of its track.");
   m.def("sensitivities", &write_sensitivities, "period"_a, "gain"_a, "keep"_a, "heading"_a,
         "pull"_a, "rate"_a, "gyration"_a, "acting"_a, "moved"_a, "jumps"_a, "jump_state"_a,
-        "slopes"_a, "innovations"_a, "disturbance"_a, "state"_a.noconvert(), "out"_a.noconvert(),
-        "Write the change of the innovations' predictions (n, 6, c) with a unit of each column.");
+        "slopes"_a, "innovations"_a, "disturbance"_a, "whiten"_a, "state"_a.noconvert(),
+        "out"_a.noconvert(),
+        "Write rows (n, 6, c + 1): the whitened change of the innovations' predictions with a unit "
+        "of\n"
+        "each column, and the innovations, whitened by a lower triangle.");
   m.def("evidence", &write_evidence, "normal"_a, "right"_a, "low"_a, "high"_a, "mode"_a.noconvert(),
         "std"_a.noconvert(),
         "Return the logarithm of the evidence of n columns of a quadratic log-likelihood; write "
