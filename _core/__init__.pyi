@@ -455,17 +455,18 @@ def bounded_mode(
     there is one.
     """
 
-def low_pass(
+def run_sections(
     x: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
-    section: Annotated[
-        NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu", writable=False)
+    sections: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
     ],
-    start: Annotated[
-        NDArray[numpy.float64], dict(shape=(2), order="C", device="cpu", writable=False)
+    starts: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 2), order="C", device="cpu", writable=False)
     ],
+    ways: int,
 ) -> None:
-    """Run a second-order section (6,) over columns (n, k) in place, forwards and backwards;
-    start (2,): the memory of a one.
+    """Run second-order sections (m, 6) over columns (n, k) in place: forwards, and backwards where
+    there are two ways; starts (m, 2): the memories for a first row of ones.
     """
 
 def level_attitude(

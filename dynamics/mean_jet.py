@@ -29,7 +29,6 @@ def jet_table(radius: float, hub_radius: float) -> tuple[Array, Array]:
     """Return axial and radial speed for U0 = 1 over the grid of distances and radii, each (137,
     151).
     """
-    from scipy.integrate import cumulative_trapezoid
     from scipy.special import chndtr
 
     x = FIRST_X + STEP_X * np.arange(COUNT_X)
@@ -42,7 +41,9 @@ def jet_table(radius: float, hub_radius: float) -> tuple[Array, Array]:
     )
     axial = np.sqrt(np.maximum(momentum, 0.0))
     slope = (axial[2:] - axial[:-2]) / (2.0 * STEP_X)
-    flux = cumulative_trapezoid(slope * r, dx=STEP_R, axis=1, initial=0.0)
+    each = slope * r
+    flux = np.zeros_like(each)
+    np.cumsum(STEP_R * (each[:, 1:] + each[:, :-1]) / 2.0, axis=1, out=flux[:, 1:])
     radial = np.zeros_like(flux)
     radial[:, 1:] = -flux[:, 1:] / r[1:]
     return np.ascontiguousarray(axial[1:-1]), radial

@@ -147,9 +147,10 @@ bool write_bounded_mode(In<-1, -1> normal, In<-1> right, In<-1> low, In<-1> high
                       mode.data());
 }
 
-void low_pass_columns(Out<-1, -1> x, In<6> section, In<2> start) {
-  low_pass(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(), section.data(),
-           start.data());
+void run_over_columns(Out<-1, -1> x, In<-1, 6> sections, In<-1, 2> starts, int ways) {
+  check_rows(sections.shape(0), starts);
+  run_sections(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(),
+               std::int64_t(sections.shape(0)), rows(sections), rows(starts), ways);
 }
 
 void level_from(In<-1, 3> gyro, In<-1, 3> force, double dt, double time, In<4> start,
@@ -226,9 +227,10 @@ void bind_diagnosis(nb::module_ &m) {
         "mode"_a.noconvert(),
         "Write the maximum (n,) of `right @ x - x @ normal @ x / 2` within bounds; return whether\n"
         "there is one.");
-  m.def("low_pass", &low_pass_columns, "x"_a.noconvert(), "section"_a, "start"_a,
-        "Run a second-order section (6,) over columns (n, k) in place, forwards and backwards;\n"
-        "start (2,): the memory of a one.");
+  m.def("run_sections", &run_over_columns, "x"_a.noconvert(), "sections"_a, "starts"_a, "ways"_a,
+        "Run second-order sections (m, 6) over columns (n, k) in place: forwards, and backwards "
+        "where\n"
+        "there are two ways; starts (m, 2): the memories for a first row of ones.");
   m.def("level_attitude", &level_from, "gyro"_a, "force"_a, "dt"_a, "time"_a, "start"_a,
         "out"_a.noconvert(),
         "Write the attitude (n, 4) integrated from the gyro (n, 3) and levelled over `time` s by "

@@ -1,5 +1,6 @@
 // Series of a log, smoothed: a low-pass of zero phase, and a motion by inertial measurements.
 #pragma once
+#include <algorithm>
 #include <cstdint>
 
 #include "../linear_algebra.hpp"
@@ -8,21 +9,26 @@
 
 namespace windwrench {
 
-// Run a second-order section, b0 b1 b2 1 a1 a2, over columns x (n, width) in place, forwards and
-// then backwards, each as if its first row had lasted; start (2): the memory of a one
-inline void low_pass(int64_t n, int64_t width, double *x, const double section[6],
-                     const double start[2]) {
-  const double *b = section, *a = section + 4;
-  Numbers first(width), second(width);
-  for (int way = 0; way < 2; way++) {
-    for (int64_t i = 0; i < n; i++) {
-      double *row = x + width * (way == 0 ? i : n - 1 - i);
-      for (int64_t j = 0; j < width; j++) {
-        if (i == 0) first[j] = start[0] * row[j], second[j] = start[1] * row[j];
-        double given = row[j], made = b[0] * given + first[j];
-        first[j] = b[1] * given - a[0] * made + second[j];
-        second[j] = b[2] * given - a[1] * made;
-        row[j] = made;
+// Run second-order sections (count), b0 b1 b2 1 a1 a2, over columns x (n, width) in place:
+// forwards, and then backwards where there are two ways. starts (count, 2): memories before the
+// first row of a way, for a first row of ones
+inline void run_sections(int64_t n, int64_t width, double *x, int64_t count,
+                         const double (*sections)[6], const double (*starts)[2], int ways) {
+  Numbers begun(width), first(width), second(width);
+  for (int way = 0; way < ways && n > 0; way++) {
+    std::copy_n(x + width * (way == 0 ? 0 : n - 1), width, begun.begin());
+    for (int64_t s = 0; s < count; s++) {
+      const double *b = sections[s], *a = b + 4;
+      for (int64_t j = 0; j < width; j++)
+        first[j] = starts[s][0] * begun[j], second[j] = starts[s][1] * begun[j];
+      for (int64_t i = 0; i < n; i++) {
+        double *row = x + width * (way == 0 ? i : n - 1 - i);
+        for (int64_t j = 0; j < width; j++) {
+          double given = row[j], made = b[0] * given + first[j];
+          first[j] = b[1] * given - a[0] * made + second[j];
+          second[j] = b[2] * given - a[1] * made;
+          row[j] = made;
+        }
       }
     }
   }

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.signal import bilinear, lfilter
 
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array, ArrayMap, NamedArrays, median_step
 from ..motion.signals import in_body
+from ..motion.smoothing import filtered
 from .causal_filter import FlightState
 from .priors import UNKNOWN
 from .regression import Column, RegressedFlights
@@ -156,9 +156,13 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
     # s'' = -a - rate^2 s - 2 damping rate s'; the pull is rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
-    damping = 2.0 * DAMPING_RATIO * rate
-    shape = bilinear([-damping, -(rate**2)], [1.0, damping, rate**2], 1.0 / period)
-    return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
+    # by the bilinear transform, in steps of half a period
+    speed = 4.0 * DAMPING_RATIO * rate / period
+    pull, own = rate**2, 4.0 / period**2
+    reaction = (-speed - pull, -2.0 * pull, speed - pull)
+    motion = (own + speed + pull, 2.0 * (pull - own), own - speed + pull)
+    section = np.array([*reaction, *motion]) / motion[0]
+    return np.concatenate([filtered(x, section) for x in np.split(drive, ends)])
 
 
 def variables(whole: FlightState) -> NamedArrays:

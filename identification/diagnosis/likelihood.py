@@ -14,7 +14,6 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from ... import _core
@@ -27,7 +26,7 @@ from ..logs.table import Array, ArrayPair, Mask
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
-from ..motion.smoothing import continuous, turn_between
+from ..motion.smoothing import continuous, filtered, turn_between
 from .causal_filter import Poses, Track, level, run
 from .discrepancy import Columns, changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import (
@@ -265,7 +264,7 @@ class Likelihood:
         own = (self.flights.inertias, self.noise.disturbance, self.noise.time)
         for axis, (inertia, std, time) in enumerate(np.transpose(own).tolist()):
             keep = math.exp(-self.period / time)
-            shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
+            shown = [filtered(x[:, axis, 2], (1, 0, 0, 1, -keep, 0)) for x in self.known]
             size = inertia * std
             said = inertia * float(np.concatenate(shown).std())
             out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
