@@ -460,14 +460,30 @@ def run_sections(
     sections: Annotated[
         NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
     ],
-    starts: Annotated[
-        NDArray[numpy.float64], dict(shape=(None, 2), order="C", device="cpu", writable=False)
-    ],
+    steady: bool,
     ways: int,
 ) -> None:
     """Run second-order sections (m, 6) over columns (n, k) in place: forwards, and backwards where
-    there are two ways; starts (m, 2): the memories for a first row of ones.
+    there are two ways; steady: as if the first row of a way had lasted, else from rest.
     """
+
+def filter_both_ways(
+    x: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+    order: int,
+    share_of_nyquist: float,
+    high: bool,
+) -> None:
+    """Run a Butterworth low-pass or high-pass over columns (n, k) in place, forwards and backwards."""
+
+def differentiate(
+    x: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    period: float,
+    order: int,
+    out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+) -> None:
+    """Write the derivative of columns (n, k) by the polynomial through five samples."""
 
 def level_attitude(
     gyro: Annotated[

@@ -157,16 +157,14 @@ def _with_rotor_faults(
 ) -> "Diagnosis":
     """Add losses of a rotor's thrust during a flight, for logs fit to show one."""
     from ..identification.comparison.fault_channels import read_channels
+    from ..identification.comparison.fault_detection import find_fault
+    from ..identification.comparison.words import fault_data
 
     faults = []
     with working("looking for a rotor that lost thrust"):
         for path, log in zip(paths, flights, strict=True):
             try:
-                channels = read_channels(path, log=log)[0]
-                from ..identification.comparison.fault_detection import find_fault
-                from ..identification.comparison.words import fault_data
-
-                faults.append(fault_data(find_fault(channels)))
+                faults.append(fault_data(find_fault(read_channels(path, log=log)[0])))
             except InputError:
                 continue  # no gyro, no accelerometer, no command, or too little flight
     notes = tuple(data["headline"] for data in faults if data["rotor"] is not None)

@@ -53,8 +53,8 @@ def chi2_band(dof: int, runs: int, probability: float = 0.95) -> tuple[float, fl
             f"{dof}, {runs}, {probability}"
         )
     tail = 0.5 * (1.0 - probability)
-    low, high = (2.0 * float(gammaincinv(0.5 * dof * runs, x)) for x in (tail, 1.0 - tail))
-    return low / runs, high / runs
+    low, high = (2.0 / runs * gammaincinv(0.5 * dof * runs, [tail, 1.0 - tail])).tolist()
+    return low, high
 
 
 class Consistency:

@@ -147,10 +147,25 @@ bool write_bounded_mode(In<-1, -1> normal, In<-1> right, In<-1> low, In<-1> high
                       mode.data());
 }
 
-void run_over_columns(Out<-1, -1> x, In<-1, 6> sections, In<-1, 2> starts, int ways) {
-  check_rows(sections.shape(0), starts);
+void run_over_columns(Out<-1, -1> x, In<-1, 6> sections, bool steady, int ways) {
   run_sections(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(),
-               std::int64_t(sections.shape(0)), rows(sections), rows(starts), ways);
+               std::int64_t(sections.shape(0)), rows(sections), steady, ways);
+}
+
+void filter_columns(Out<-1, -1> x, int order, double share_of_nyquist, bool high) {
+  if (order < 2 || order % 2 != 0 || !(share_of_nyquist > 0 && share_of_nyquist < 1))
+    throw nb::value_error("filter_both_ways: expected an even order, and a share within (0, 1)");
+  if (x.shape(0) > 0)
+    filter_both_ways(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(), order,
+                     share_of_nyquist, high);
+}
+
+void differentiate_columns(In<-1, -1> x, double period, int order, Out<-1, -1> out) {
+  if (x.shape(0) < 5 || x.shape(0) != out.shape(0) || x.shape(1) != out.shape(1) ||
+      (order != 1 && order != 2))
+    throw nb::value_error("differentiate: expected five samples, and an order of 1 or 2");
+  differentiate(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(), period, order,
+                out.data());
 }
 
 void level_from(In<-1, 3> gyro, In<-1, 3> force, double dt, double time, In<4> start,
@@ -227,10 +242,16 @@ void bind_diagnosis(nb::module_ &m) {
         "mode"_a.noconvert(),
         "Write the maximum (n,) of `right @ x - x @ normal @ x / 2` within bounds; return whether\n"
         "there is one.");
-  m.def("run_sections", &run_over_columns, "x"_a.noconvert(), "sections"_a, "starts"_a, "ways"_a,
+  m.def("run_sections", &run_over_columns, "x"_a.noconvert(), "sections"_a, "steady"_a, "ways"_a,
         "Run second-order sections (m, 6) over columns (n, k) in place: forwards, and backwards "
         "where\n"
-        "there are two ways; starts (m, 2): the memories for a first row of ones.");
+        "there are two ways; steady: as if the first row of a way had lasted, else from rest.");
+  m.def("filter_both_ways", &filter_columns, "x"_a.noconvert(), "order"_a, "share_of_nyquist"_a,
+        "high"_a,
+        "Run a Butterworth low-pass or high-pass over columns (n, k) in place, forwards and "
+        "backwards.");
+  m.def("differentiate", &differentiate_columns, "x"_a, "period"_a, "order"_a, "out"_a.noconvert(),
+        "Write the derivative of columns (n, k) by the polynomial through five samples.");
   m.def("level_attitude", &level_from, "gyro"_a, "force"_a, "dt"_a, "time"_a, "start"_a,
         "out"_a.noconvert(),
         "Write the attitude (n, 4) integrated from the gyro (n, 3) and levelled over `time` s by "

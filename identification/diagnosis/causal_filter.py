@@ -92,7 +92,11 @@ def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> T
     _core.run_causal_filter(
         models.ctypes.data,
         poses.period,
-        *map(np.ascontiguousarray, (*measured, begun, steady.gain, steady.keep, known)),
+        *measured,
+        begun,
+        steady.gain,
+        steady.keep,
+        known,
         *(getattr(out, field.name) for field in fields(out)[1:]),
     )
     raise_errors()

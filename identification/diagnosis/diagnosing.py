@@ -109,7 +109,7 @@ def diagnose(
         *((log, pose_notes(log, vehicle)) for log, _ in checked),
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
-    said = Judged(flights, [n for n in names() if n not in without], settings, report)
+    said = _Judged(flights, [n for n in names() if n not in without], settings, report)
     effects = said.effects
     residuals = said.balance
     sure = said.remainder == "none" and not any(
@@ -164,7 +164,7 @@ def diagnose(
     )
 
 
-class Judged:
+class _Judged:
     """The effects behind flights, by the evidence of sets of effects, and the residual.
 
     Args:

@@ -156,13 +156,11 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
     # s'' = -a - rate^2 s - 2 damping rate s'; the pull is rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
-    # by the bilinear transform, in steps of half a period
-    speed = 4.0 * DAMPING_RATIO * rate / period
-    pull, own = rate**2, 4.0 / period**2
-    reaction = (-speed - pull, -2.0 * pull, speed - pull)
-    motion = (own + speed + pull, 2.0 * (pull - own), own - speed + pull)
-    section = np.array([*reaction, *motion]) / motion[0]
-    return np.concatenate([filtered(x, section) for x in np.split(drive, ends)])
+    back = np.array([0.0, 4.0 * DAMPING_RATIO * rate / period, rate**2])
+    motion = np.array([4.0 / period**2, 0.0, 0.0]) + back
+    # by the bilinear transform
+    section = np.hstack([-back, motion]) @ np.kron(np.eye(2), [[1, -2, 1], [1, 0, -1], [1, 2, 1]])
+    return np.concatenate([filtered(x, section / section[3]) for x in np.split(drive, ends)])
 
 
 def variables(whole: FlightState) -> NamedArrays:

@@ -28,7 +28,7 @@ from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
 from ..motion.smoothing import continuous, filtered, turn_between
 from .causal_filter import Poses, Track, level, run
-from .discrepancy import Columns, changing_columns, discrepancy_columns, joined, variables
+from .discrepancy import Columns, Product, changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -219,7 +219,6 @@ class Likelihood:
         def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
             self._run(steady, self._said(jumps, gains))
             for i, track in enumerate(self.tracks):
-                none = np.empty((len(track.t), 6, 0))
                 counts = self._counts(i)
                 if explained is not None:
                     pose, force = explained[i].swapaxes(0, 1)
@@ -228,13 +227,12 @@ class Likelihood:
                     left = (rows[:, :, 1] - rows[:, :, 0]) @ np.linalg.inv(steady.whitening).T
                     track = replace(track, innovations=left)
                 if slopes is None:
-                    yield track.innovations[counts], none
+                    yield track.innovations[counts], track.innovations
                     continue
                 state = np.zeros((6, 3, gains.size + slopes.shape[2]))
                 for at in self._blocks(track):
-                    each = jumps[i][at, ..., None] * self._units
-                    own = each.reshape(-1, 6, 1, len(JUMP_STATE)) * OWN[:, :, None]
-                    own = own.reshape(-1, 6, gains.size)
+                    each = jumps[i][at, :, None, :, None] * self._units
+                    own = (each * OWN[:, :, None, None]).reshape(-1, 6, gains.size)
                     rows = self._changes(track, steady, at, state, (), (), own, slopes)
                     if counts[at].any():
                         yield track.innovations[at][counts[at]], rows[counts[at]]
@@ -440,11 +438,12 @@ class Likelihood:
         share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
         for i, axis in enumerate("xyz"):
-            force, torque, hidden = np.zeros((3, len(whole.t), 6))
-            force[:, :3] = whole.rotors[:, :1] * whole.rotation[:, :, i]
-            torque[:, 3 + i] = whole.rotors[:, 1 + i]
-            hidden[:, 3 + i] = scale[i] * expected[:, i]
-            errors = {"force": force, "torque": torque, "expected torque": hidden}
+            own = None, slice(3 + i, 4 + i)
+            errors = {
+                "force": Product(1.0, whole.rotors[:, 0], whole.rotation[:, :, i], slice(3)),
+                "torque": Product(1.0, whole.rotors[:, 1 + i], *own),
+                "expected torque": Product(scale[i], expected[:, i], *own),
+            }
             self._acting |= {
                 ("", f"{MODEL_ERROR} of {name} {axis}"): x for name, x in errors.items()
             }
@@ -473,13 +472,11 @@ class Likelihood:
             size = max(rotors.std(), 1e-9)
             answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
             change = np.diff(rotors, prepend=rotors[:1])
+            along = (
+                (None, slice(axis, axis + 1)) if axis > 2 else (whole.rotation[:, :, 2], slice(3))
+            )
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
-                column = np.zeros((len(x), 6))
-                along = answer * x / max(x.std(), 1e-9)
-                if axis == DRIVEN[0]:
-                    column[:, :3] = along[:, None] * whole.rotation[:, :, 2]
-                else:
-                    column[:, axis] = along
+                column = Product(answer / max(x.std(), 1e-9), x, *along)
                 self._acting["", f"answer {i} of axis {axis}"] = column
 
     def _jumps(self) -> list[Array]:
@@ -529,8 +526,7 @@ class Likelihood:
                 y = [column[here] for column in moved.values()]
                 driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
                 driven[:, :3, 0] = jumps[at, :3, :1] * self._units
-                for j in range(1, len(DRIVEN)):
-                    driven[:, 2 + j, j] = jumps[at, 2 + j, 1:2] * self._units
+                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1:2] * self._units
                 out = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
                 kept = (out if counts[at].all() else out[counts[at]]).reshape(-1, out.shape[2])
                 samples += int(counts[at].sum())
@@ -628,7 +624,7 @@ def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> lis
             Poses(
                 raw.t,
                 raw.period,
-                np.ascontiguousarray(raw.position),
+                raw.position,
                 continuous(q),
                 raw.rotor_speeds,
                 np.zeros(len(raw.t)) if raw.voltage is None else raw.voltage,

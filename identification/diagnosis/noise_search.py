@@ -132,7 +132,7 @@ class NoiseSearch:
         gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
         slopes = np.concatenate([gain, (there.keep - here.keep)[..., None]], axis=2) / STEP
         change = (there.covariance - here.covariance) / STEP
-        return np.ascontiguousarray(np.moveaxis(slopes, 0, -1)), change
+        return np.moveaxis(slopes, 0, -1), change
 
 
 def _free(noise: PoseNoise) -> Array:

@@ -56,8 +56,8 @@ def worth(
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
         x = X.reshape(-1, X.shape[2])
-        bound = np.full(x.shape[1], BY_CHANCE)
-        normal = x.T @ x + LEAST_KNOWN * np.eye(len(bound))
-        done = bounded_mode(normal, x.T @ y.ravel(), -bound, bound)
+        far = np.full(x.shape[1], BY_CHANCE)
+        normal = x.T @ x + LEAST_KNOWN * np.eye(len(far))
+        done = bounded_mode(normal, x.T @ y.ravel(), -far, far)
         out[effect] = float(np.sqrt(mean_square(y - X @ done)).max())
     return out

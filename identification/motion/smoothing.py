@@ -5,9 +5,7 @@ pass the same filter: a causal filter's output against unfiltered regressors bia
 quarter.
 """
 
-import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -43,8 +41,6 @@ class _Cutoffs(NamedTuple):
 
 
 CUTOFFS = _Cutoffs()
-# samples added to either end, as its point reflection, for a section and for two
-_EDGE, _LONG_EDGE = 9, 15
 
 
 def low_pass(x: Array, cutoff_hz: float, period: float) -> Array:
@@ -55,57 +51,31 @@ def low_pass(x: Array, cutoff_hz: float, period: float) -> Array:
     """
     if cutoff_hz >= 0.49 / period:
         return x
-    return _both_ways(x, _EDGE, *_butterworth(2, 2.0 * cutoff_hz * period))
+    return _both_ways(x, 2, 2.0 * cutoff_hz * period)
 
 
 def high_pass(x: Array, share_of_rate: float) -> Array:
     """Return ``x`` (n, ...) through a zero-phase eighth-order high-pass along its first axis, with
     the cut-off as a share of the sampling rate. White noise keeps its standard deviation.
     """
-    sections = _butterworth(4, 2.0 * share_of_rate, high=True)
-    impulse = np.zeros(201)
-    impulse[100] = 1.0
-    kept = np.linalg.norm(_both_ways(impulse, _LONG_EDGE, *sections))  # of white noise
-    return _both_ways(x, _LONG_EDGE, *sections) / kept
+    filters = 4, 2.0 * share_of_rate, True
+    kept = np.linalg.norm(_both_ways(np.eye(201)[100], *filters))  # of white noise
+    return _both_ways(x, *filters) / kept
 
 
-def _both_ways(x: Array, edge: int, sections: Array, starts: Array) -> Array:
-    edge = min(edge, len(x) - 1)
-    columns = x.reshape(len(x), -1)
-    out = np.pad(columns, ((edge, edge), (0, 0)), "reflect", reflect_type="odd")
-    _core.run_sections(out, sections, starts, 2)
-    return out[edge : edge + len(x)].reshape(x.shape)
-
-
-def filtered(x: Array, section: Sequence[float], start: tuple[float, float] = (0.0, 0.0)) -> Array:
-    """Return ``x`` (n, ...) through a second-order section b0, b1, b2, 1, a1, a2 along its first
-    axis; ``start``: its memory before a first sample of one.
-    """
-    out = np.array(x, dtype=np.float64).reshape(len(x), -1)
-    _core.run_sections(out, np.array([section]), np.array([start]), 1)
+def _both_ways(x: Array, order: int, share_of_nyquist: float, high: bool = False) -> Array:
+    out = x.reshape(len(x), -1).copy()
+    _core.filter_both_ways(out, order, share_of_nyquist, high)
     return out.reshape(x.shape)
 
 
-@lru_cache(maxsize=64)
-def _butterworth(order: int, share_of_nyquist: float, high: bool = False) -> ArrayPair:
-    """Return the second-order sections (order / 2, 6) of a low-pass or high-pass of even order, by
-    the bilinear transform, and their memories (order / 2, 2) of a first sample of one.
+def filtered(x: Array, section: Sequence[float], steady: bool = False) -> Array:
+    """Return ``x`` (n, ...) through a second-order section b0, b1, b2, 1, a1, a2 along its first
+    axis; ``steady``: as if the first sample had lasted, else from rest.
     """
-    c = 1.0 / math.tan(0.5 * math.pi * share_of_nyquist)
-    sections = []
-    starts = []
-    seen = 1.0  # by a section, of a one
-    for k in range(order // 2):
-        damping = 2.0 * c * math.sin(0.5 * math.pi * (2 * k + 1) / order)
-        whole = 1.0 + damping + c * c
-        b = np.array([c * c, -2.0 * c * c, c * c] if high else [1.0, 2.0, 1.0]) / whole
-        a = 2.0 * (1.0 - c * c) / whole, (1.0 - damping + c * c) / whole
-        gain = b.sum() / (1.0 + sum(a))
-        last = b[2] - a[1] * gain
-        sections.append([*b, 1.0, *a])
-        starts.append([seen * (b[1] - a[0] * gain + last), seen * last])
-        seen *= gain
-    return np.array(sections), np.array(starts)
+    out = x.reshape(len(x), -1).copy()
+    _core.run_sections(out, np.array([section]), steady, 1)
+    return out.reshape(x.shape)
 
 
 def mean_square(x: Array) -> Array:
@@ -125,7 +95,7 @@ def lagged(x: Array, lag: float, period: float) -> Array:
     if lag <= 1e-9:
         return x
     keep = np.exp(-period / lag)
-    return filtered(x, (1.0 - keep, 0.0, 0.0, 1.0, -keep, 0.0), (keep, 0.0))
+    return filtered(x, (1.0 - keep, 0.0, 0.0, 1.0, -keep, 0.0), steady=True)
 
 
 def resampled(t: Array, times: Array, x: Array) -> Array:
@@ -163,12 +133,9 @@ def derivative(x: Array, period: float, order: int = 1) -> Array:
     direction of thrust loses nothing. The difference, 0.08 mm times the angular acceleration at 200
     Hz, would look like an offset of the centre of mass.
     """
-    # of the polynomial through five samples: at the middle one, and at an end at all of them
-    powers = np.vander(np.arange(5.0), increasing=True)
-    lowered = np.linalg.matrix_power(np.diag(np.arange(1.0, 5.0), 1), order)
-    weights = powers @ lowered @ np.linalg.inv(powers) / period**order
-    middle = sum(w * x[j : len(x) - 4 + j] for j, w in enumerate(weights[2].tolist()))
-    return np.concatenate([weights[:2] @ x[:5], middle, weights[3:] @ x[-5:]])
+    out = np.empty_like(x)
+    _core.differentiate(x, period, order, out)
+    return out
 
 
 def running_integral(x: Array, t: Array) -> Array:
@@ -185,12 +152,11 @@ def power_spectrum(x: Array, period: float, length: int) -> ArrayPair:
     (1967), 70-73), without their means.
     """
     length = min(length, len(x))
-    window = np.hanning(length + 1)[:-1, None]
     begins = range(0, len(x) - length + 1, length - length // 2)
     parts = np.array([x[i : i + length] for i in begins])
-    parts -= parts.mean(axis=1, keepdims=True)
-    power = mean_square(np.abs(np.fft.rfft(window * parts, axis=1)))
-    power *= 2.0 * period / np.square(window).sum()
+    window = np.hanning(length + 1)[:-1, None]
+    parts = window * (parts - parts.mean(axis=1, keepdims=True))
+    power = 2.0 * period * mean_square(np.abs(np.fft.rfft(parts, axis=1))) / np.sum(window**2)
     power[[0, -1] if length % 2 == 0 else 0] /= 2.0
     return np.fft.rfftfreq(length, period), power
 
