@@ -473,7 +473,7 @@ def filter_both_ways(
     share_of_nyquist: float,
     high: bool,
 ) -> None:
-    """Run a Butterworth low-pass or high-pass over columns (n, k) in place, forwards and backwards."""
+    """Run a Butterworth low-pass or high-pass over columns (n, k) in place, both ways."""
 
 def differentiate(
     x: Annotated[

@@ -248,8 +248,7 @@ void bind_diagnosis(nb::module_ &m) {
         "there are two ways; steady: as if the first row of a way had lasted, else from rest.");
   m.def("filter_both_ways", &filter_columns, "x"_a.noconvert(), "order"_a, "share_of_nyquist"_a,
         "high"_a,
-        "Run a Butterworth low-pass or high-pass over columns (n, k) in place, forwards and "
-        "backwards.");
+        "Run a Butterworth low-pass or high-pass over columns (n, k) in place, both ways.");
   m.def("differentiate", &differentiate_columns, "x"_a, "period"_a, "order"_a, "out"_a.noconvert(),
         "Write the derivative of columns (n, k) by the polynomial through five samples.");
   m.def("level_attitude", &level_from, "gyro"_a, "force"_a, "dt"_a, "time"_a, "start"_a,

@@ -597,7 +597,7 @@ def gyration(vehicle: Vehicle, rate: Array) -> Array:
     return np.asarray((rate @ _twist(vehicle)).reshape(-1, 3, 3))
 
 
-@lru_cache(maxsize=1)  # of each block of a flight
+@lru_cache(maxsize=1)  # asked at each block of a flight
 def _twist(vehicle: Vehicle) -> Array:
     """Return -u x J v over the inertia J, of all pairs of axes u and v, (3, 9)."""
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)

@@ -99,7 +99,7 @@ def with_time_offsets(signals: Signals, offsets: Values) -> Signals:
         speeds = resampled(n - rotors / signals.period, n, signals.rotor_speeds)
         signals = replace(signals, rotor_speeds=speeds)
     if spread := offsets.get(ROTOR_SPREAD[1]):
-        from scipy.ndimage import gaussian_filter1d  # of flights without a pose alone
+        from scipy.ndimage import gaussian_filter1d  # needed without a pose alone
 
         over = np.sqrt(spread) / signals.period
         smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")

@@ -201,7 +201,7 @@ def with_drift(s: InertialSignals, rng: np.random.Generator, gravity: float) -> 
     """Return signals with other errors of the fusion, drawn from its standard deviations: slow
     drifts of attitude, velocity and position.
     """
-    from scipy.ndimage import gaussian_filter1d  # of flights without a pose alone
+    from scipy.ndimage import gaussian_filter1d  # needed without a pose alone
 
     slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), DRIFT_TIME / s.period, axis=0)
     slow /= np.sqrt(mean_square(slow)) + 1e-30
