@@ -302,7 +302,7 @@ class Likelihood:
             change = self._change(there) / delta
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
-            self._acting[column] = change
+            self._acting[column] = _without_zeros(change)
 
     def _moved(self, column: Column) -> Array:
         """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
@@ -338,7 +338,7 @@ class Likelihood:
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
-                acting[c] = self._change({**self.setting, c[0]: dict(start)})
+                acting[c] = _without_zeros(self._change({**self.setting, c[0]: dict(start)}))
         for effect in library:
             for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
@@ -590,6 +590,13 @@ class Likelihood:
             out,
         )
         return out
+
+
+def _without_zeros(column: Array) -> Array | Product:
+    """Return a column (n, 6); without the torque's zeros, half of the memory, if a force alone."""
+    if column[:, 3:].any():
+        return column
+    return Product(1.0, np.broadcast_to(1.0, len(column)), column[:, :3].copy(), slice(3))
 
 
 def gyration(vehicle: Vehicle, rate: Array) -> Array:
