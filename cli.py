@@ -101,7 +101,7 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     train,
 )
 # earlier names of commands' options: taken, and not shown
-_EARLIER: dict[str, dict[str, str]] = {
+_EARLIER = {
     "live": {"view": "browser"},
 }
 app.command(command_name(look), hidden=True)(as_command(look))

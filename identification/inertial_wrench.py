@@ -8,7 +8,6 @@ poses, if there are some); their uncertainty is in the standard deviations.
 """
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.spatial.transform import Rotation
 
@@ -35,7 +34,7 @@ from .logs.flight_log import FlightLog
 from .logs.table import Array, ArrayPair, Names, Pair
 from .motion.inertial_signals import InertialSignals, imu_noise, inertial_signals, pose_rate
 from .motion.residual import acting_wrench, needed_wrench
-from .motion.smoothing import continuous, resampled
+from .motion.smoothing import continuous, resampled, running_integral
 
 
 def inertial_wrench(
@@ -102,7 +101,7 @@ def _piece(
     needs = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
     inverse = np.linalg.inv(body.inertia)
     driven = np.einsum("ij,cnj->nic", inverse, np.stack([acting[:, 3:], *turns]))
-    rates = cumulative_trapezoid(driven, dx=s.period, axis=0, initial=0)
+    rates = running_integral(driven, s.t)
     rates[:, :, 0] = s.angular_velocity - rates[:, :, 0]
     force, torque, spread = np.empty_like(needs), np.empty_like(rates), np.empty(6)
     for i, own in enumerate(np.diagonal(inverse).tolist()):

@@ -14,7 +14,6 @@ import math
 
 import numpy as np
 from scipy.linalg import toeplitz
-from scipy.ndimage import maximum_filter1d
 
 from ...runtime.arrays import Array, Index, Mask
 from .fault_channels import STEP, Samples
@@ -37,6 +36,8 @@ class FaultBalance:
     """
 
     def __init__(self, samples: Samples, lag: float, bend: float, dead: float) -> None:
+        from scipy.ndimage import maximum_filter1d  # as late as can be: it takes .1 s
+
         w = samples.angular_velocity
         turning = samples.angular_acceleration
         self.follows = samples.follows

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.arrays import Array, Mask
@@ -207,6 +205,8 @@ def _between(command: Stream, t: Array) -> Array:
 
 def _means(times: Array, values: Array, middles: Array) -> Array:
     """Return the means (N, d) over the grid's intervals; values are linear between ``times``."""
+    from scipy.interpolate import make_interp_spline
+
     new = np.diff(times, prepend=-np.inf) > 0.0
     integral = make_interp_spline(times[new], values[new], k=1).antiderivative()
     ends = np.clip([middles - 0.5 * STEP, middles + 0.5 * STEP], times[0], times[-1])
@@ -215,6 +215,8 @@ def _means(times: Array, values: Array, middles: Array) -> Array:
 
 def _end(c: Channels) -> tuple[float, str]:
     """Return the end of the model's validity, and its reason: a clipped gyro, or an impact."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     ends = [(np.inf, "")]
     count = max(3, round(CLIPPED_SECONDS / median_step(c.gyro.t)))
     rate, size = c.gyro.values, np.abs(c.gyro.values)

@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
-from scipy.stats import norm
 
 from ...runtime.arrays import Array, Index
 from .fault_balance import PARTS, FaultBalance
@@ -166,6 +165,8 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
 
     Beside it stand the shares (E,) of a loss and their probabilities for each rotor (4, E).
     """
+    from scipy.stats import norm  # as late as can be: it takes .6 s
+
     shares = np.linspace(*_LOSSES, _STEPS)
     lost = shares[shares <= _ALL_LOSE, None]
     share = best.balance.share(best.row, best.ramp)

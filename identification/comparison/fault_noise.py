@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.signal import lfilter
 
 from ...runtime.arrays import Array, Mask
 
@@ -33,6 +32,8 @@ class Noise(NamedTuple):
 
     def filtered(self, values: Array) -> Array:
         """Return the filter's output (N, ...); rows outside ``whole`` mean nothing."""
+        from scipy.signal import lfilter  # as late as can be: it takes .6 s
+
         return np.asarray(lfilter(self.filter, 1.0, (values.T / self.scale).T, axis=0))
 
     def log_likelihood(self, rest: Array | float) -> Array:

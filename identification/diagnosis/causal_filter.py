@@ -86,13 +86,18 @@ def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> T
     n = len(poses.t)
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
     out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
-    measured = (poses.rotor_speeds, poses.voltage, poses.position, poses.quaternion)
-    begun = np.append(poses.velocity, poses.angular_velocity)
     models = loaded_model(vehicle)[0].copy()
     _core.run_causal_filter(
         models.ctypes.data,
         poses.period,
-        *map(np.ascontiguousarray, (*measured, begun, steady.gain, steady.keep, known)),
+        poses.rotor_speeds,
+        poses.voltage,
+        poses.position,
+        poses.quaternion,
+        np.append(poses.velocity, poses.angular_velocity),
+        steady.gain,
+        steady.keep,
+        known,
         *(getattr(out, field.name) for field in fields(out)[1:]),
     )
     raise_errors()

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.signal import bilinear, lfilter
 
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array, ArrayMap, NamedArrays, median_step
 from ..motion.signals import in_body
+from ..motion.smoothing import filtered
 from .causal_filter import FlightState
 from .priors import UNKNOWN
 from .regression import Column, RegressedFlights
@@ -156,9 +156,11 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
     # s'' = -a - rate^2 s - 2 damping rate s'; the pull is rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
-    damping = 2.0 * DAMPING_RATIO * rate
-    shape = bilinear([-damping, -(rate**2)], [1.0, damping, rate**2], 1.0 / period)
-    return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
+    back = np.array([0.0, 4.0 * DAMPING_RATIO * rate / period, rate**2])
+    motion = np.array([4.0 / period**2, 0.0, 0.0]) + back
+    # the bilinear transform of both
+    section = np.hstack([-back, motion]) @ np.kron(np.eye(2), [[1, -2, 1], [1, 0, -1], [1, 2, 1]])
+    return np.concatenate([filtered(x, section / section[3]) for x in np.split(drive, ends)])
 
 
 def variables(whole: FlightState) -> NamedArrays:

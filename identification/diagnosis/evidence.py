@@ -91,7 +91,7 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
     """
     at = np.array(index, dtype=np.intp)
     mode, std = np.empty((2, len(at)))
-    value = _core.evidence(*(m.normal[np.ix_(at, at)], m.right[at], low[at], high[at]), mode, std)
+    value = _core.evidence(m.normal[at[:, None], at], m.right[at], low[at], high[at], mode, std)
     if math.isnan(value):
         raise np.linalg.LinAlgError("no prior tells columns of the set apart")
     return SetEvidence(m.constant + value, mode, std)

@@ -11,14 +11,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from ... import _core
 from ...dynamics.effects import Role, get, playing
-from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
@@ -27,9 +26,9 @@ from ..logs.table import Array, ArrayPair, Mask
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
-from ..motion.smoothing import continuous, turn_between
+from ..motion.smoothing import continuous, filtered, turn_between
 from .causal_filter import Poses, Track, level, run
-from .discrepancy import Columns, changing_columns, discrepancy_columns, joined, variables
+from .discrepancy import Columns, Product, changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -178,11 +177,10 @@ class Likelihood:
             run(piece, self.vehicle, steady, x) for piece, x in zip(self.pieces, known, strict=True)
         ]
 
-    @staticmethod
-    def _said(jumps: Iterable[Array], gains: Array) -> list[Array]:
+    def _said(self, jumps: Iterable[Array], gains: Array) -> list[Array]:
         """Return the jumps of each piece's states (n, 6, 3) by the rotors' innovations."""
-        said = (x * (OWN @ gains) for x in jumps)
-        return [x.reshape(len(x), 6, -1, len(STATES)).sum(axis=2) for x in said]
+        each = (OWN @ gains).reshape(6, -1, len(STATES)) * self._units
+        return [(x.swapaxes(0, 1) @ each).swapaxes(0, 1) for x in jumps]
 
     # Noise
 
@@ -224,24 +222,23 @@ class Likelihood:
         def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
             self._run(steady, self._said(jumps, gains))
             for i, track in enumerate(self.tracks):
-                none = np.empty((len(track.t), 6, 0))
                 counts = self._counts(i)
                 if explained is not None:
-                    pose = explained[i][:, 0, :, None]
-                    force = explained[i][:, 1, :, None]
+                    pose, force = explained[i].swapaxes(0, 1)
                     begun = np.zeros((6, 3, 1))
-                    change = self._changes(track, steady, slice(None), begun, force, pose)
-                    track = replace(track, innovations=track.innovations - change[:, :, 0])
+                    rows = self._changes(track, steady, slice(None), begun, [force], [pose])
+                    left = (rows[:, :, 1] - rows[:, :, 0]) @ np.linalg.inv(steady.whitening).T
+                    track = replace(track, innovations=left)
                 if slopes is None:
-                    yield track.innovations[counts], none[counts]
+                    yield track.innovations[counts], track.innovations
                     continue
                 state = np.zeros((6, 3, gains.size + slopes.shape[2]))
                 for at in self._blocks(track):
-                    own = (jumps[i][at, :, None] * OWN[:, :, None]).reshape(-1, 6, gains.size)
-                    changes = self._changes(
-                        track, steady, at, state, none[at], none[at], own, slopes
-                    )
-                    yield track.innovations[at][counts[at]], changes[counts[at]]
+                    each = jumps[i][at, :, None, :, None] * self._units
+                    own = (each * OWN[:, :, None, None]).reshape(-1, 6, gains.size)
+                    rows = self._changes(track, steady, at, state, (), (), own, slopes)
+                    if counts[at].any():
+                        yield track.innovations[at][counts[at]], rows[counts[at]]
 
         held = np.array(PRIORS.gains)[JUMP_STATE]
         search = NoiseSearch(see, held, self.period, self.vehicle.gravity)
@@ -268,7 +265,7 @@ class Likelihood:
         own = (self.flights.inertias, self.noise.disturbance, self.noise.time)
         for axis, (inertia, std, time) in enumerate(np.transpose(own).tolist()):
             keep = math.exp(-self.period / time)
-            shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
+            shown = [filtered(x[:, axis, 2], (1, 0, 0, 1, -keep, 0)) for x in self.known]
             size = inertia * std
             said = inertia * float(np.concatenate(shown).std())
             out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
@@ -279,8 +276,9 @@ class Likelihood:
     def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> Array:
         """Return the accelerations (n, 6) of a setting along the pieces' signals."""
         wrench = np.concatenate([self.flights.acting(s, setting) for s in signals])
-        turning = np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T
-        return np.column_stack([wrench[:, :3] / self.flights.vehicle.mass, turning])
+        wrench[:, :3] /= self.flights.vehicle.mass
+        wrench[:, 3:] = wrench[:, 3:] @ np.linalg.inv(self.flights.vehicle.inertia).T
+        return wrench
 
     def _change(self, setting: Setting) -> Array:
         """Return the change of the acceleration (n, 6) with another setting."""
@@ -307,7 +305,7 @@ class Likelihood:
             change = self._change(there) / delta
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
-            self._acting[column] = change
+            self._acting[column] = _without_zeros(change)
 
     def _moved(self, column: Column) -> Array:
         """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
@@ -343,7 +341,7 @@ class Likelihood:
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
-                acting[c] = self._change({**self.setting, c[0]: dict(start)})
+                acting[c] = _without_zeros(self._change({**self.setting, c[0]: dict(start)}))
         for effect in library:
             for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
@@ -443,11 +441,12 @@ class Likelihood:
         share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
         for i, axis in enumerate("xyz"):
-            force, torque, hidden = np.zeros((3, len(whole.t), 6))
-            force[:, :3] = whole.rotors[:, :1] * whole.rotation[:, :, i]
-            torque[:, 3 + i] = whole.rotors[:, 1 + i]
-            hidden[:, 3 + i] = scale[i] * expected[:, i]
-            errors = {"force": force, "torque": torque, "expected torque": hidden}
+            own = None, slice(3 + i, 4 + i)
+            errors = {
+                "force": Product(1.0, whole.rotors[:, 0], whole.rotation[:, :, i], slice(3)),
+                "torque": Product(1.0, whole.rotors[:, 1 + i], *own),
+                "expected torque": Product(scale[i], expected[:, i], *own),
+            }
             self._acting |= {
                 ("", f"{MODEL_ERROR} of {name} {axis}"): x for name, x in errors.items()
             }
@@ -476,25 +475,22 @@ class Likelihood:
             size = max(rotors.std(), 1e-9)
             answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
             change = np.diff(rotors, prepend=rotors[:1])
+            along = (
+                (None, slice(axis, axis + 1)) if axis > 2 else (whole.rotation[:, :, 2], slice(3))
+            )
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
-                column = np.zeros((len(x), 6))
-                along = answer * x / max(x.std(), 1e-9)
-                if axis == DRIVEN[0]:
-                    column[:, :3] = along[:, None] * whole.rotation[:, :, 2]
-                else:
-                    column[:, axis] = along
+                column = Product(answer / max(x.std(), 1e-9), x, *along)
                 self._acting["", f"answer {i} of axis {axis}"] = column
 
     def _jumps(self) -> list[Array]:
-        """Return the jumps of the states (n, 6, e) of each piece for a unit of each gain of a pair
-        of axes.
+        """Return the accelerations (n, 6, 3) of each piece for a unit of the gains of a pair of
+        axes on thrust, on torque and on the turn; ``_units`` makes jumps of the states.
 
         Thrust and torques inform about the axes they drive. A loop that rolls or pitches the
         vehicle has seen its position and the force aside.
         """
         out = []
         tilt = SIDEWAYS * self.flights.vehicle.gravity
-        units = np.array([self.period**2, self.period, 1.0])  # states after a period, of one m/s2
         for answer, track in zip(self.answers, self.tracks, strict=True):
             # the innovation of sample k changes the state after k: the jump is before sample k + 1
             answer = np.vstack([np.zeros(4), answer[:-1]])
@@ -502,8 +498,13 @@ class Likelihood:
             x[:, :3, 0] = answer[:, :1] * track.rotation[:, :, 2]
             x[:, 3:, 1] = level(track.heading, answer[:, 1:])
             x[:, 0, 2], x[:, 1, 2] = tilt * x[:, 4, 1], tilt * x[:, 3, 1]
-            out.append((x[..., None] * units).reshape(len(x), 6, -1))
+            out.append(x)
         return out
+
+    @property
+    def _units(self) -> Array:
+        """The states (3,) after a period of one m/s2 or rad/s2."""
+        return np.array([self.period**2, self.period, 1.0])
 
     def _products(self, starts: Starts) -> Base:
         moved = self._posed
@@ -512,8 +513,6 @@ class Likelihood:
         # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
         names = (*asked, *drives)
-        root = np.linalg.cholesky(steady.covariance)
-        inverse = np.linalg.inv(root)
         samples = 0
         first = 0
         still = np.zeros_like(self._base)
@@ -526,23 +525,19 @@ class Likelihood:
             for at in self._blocks(track):
                 rows = at.stop - at.start
                 here = slice(first + at.start, first + at.stop)
-                x = np.stack([self._acting.get(c, still)[here] for c in asked], axis=2)
-                y = np.stack([column[here] for column in moved.values()], axis=2)
+                x = [self._acting.get(c, still)[here] for c in asked]
+                y = [column[here] for column in moved.values()]
                 driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
-                driven[:, :3, 0] = jumps[at, :3, : len(STATES)]
-                for j in range(1, len(DRIVEN)):
-                    driven[:, 2 + j, j] = jumps[at, 2 + j, len(STATES) : 2 * len(STATES)]
-                out = np.empty((rows, 6, len(names) + 1))
-                changes = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
-                out[:, :, :-1] = changes
-                out[:, :, -1] = track.innovations[at]
-                kept = (inverse @ out[counts[at]]).reshape(-1, out.shape[2])
+                driven[:, :3, 0] = jumps[at, :3, :1] * self._units
+                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1:2] * self._units
+                out = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
+                kept = (out if counts[at].all() else out[counts[at]]).reshape(-1, out.shape[2])
                 samples += int(counts[at].sum())
                 if len(kept):
                     np.matmul(kept.T, kept, out=products[len(flown)])
                     flown.append(self._log[i])
             first += len(track.position)
-        penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
+        penalty = -2.0 * samples * float(np.log(np.diagonal(steady.whitening)).sum())
         blocks = products[: len(flown)]
         return in_prior_units(
             self.flights, names, blocks, np.array(flown), penalty, self.setting, starts
@@ -554,39 +549,41 @@ class Likelihood:
         steady: SteadyFilter,
         at: slice,
         state: Array,
-        acting: Array,
-        moved: Array,
+        acting: Sequence[Array] = (),
+        moved: Sequence[Array] = (),
         jumps: Array | None = None,
         slopes: Array | None = None,
     ) -> Array:
-        """Return the change of the predictions (n, 6, c) of a part of a piece with each column.
+        """Return the change of the predictions of a part of a piece with each of c columns, and the
+        innovations, whitened (n, 6, c + 1).
 
         Args:
             track: the piece.
             steady: the filter.
             at: the part.
             state: (6, 3, c) carried from one part to the next.
-            acting: (n, 6, a) acceleration of the model by a unit of the first ``a`` columns.
-            moved: (n, 6, b) shift of the measured pose by a unit of the last ``b`` of these.
+            acting: acceleration of the model (n, 6) by a unit of each of the first columns.
+            moved: shift of the measured pose (n, 6) by a unit of the last of these.
             jumps: (n, 6, e) jump of one state of each axis, of the states in turn, by a unit of
                 the next columns, before the pose of a sample is read; default: none.
             slopes: (6, 7, m) change of the gains of each axis, in the order of
                 ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns; default:
                 none.
         """
-        jumps = np.empty((len(acting), 6, 0)) if jumps is None else jumps
+        rate = track.angular_velocity[at]
+        jumps = np.empty((len(rate), 6, 0)) if jumps is None else jumps
         slopes = np.empty((6, 7, 0)) if slopes is None else slopes
         disturbance = track.disturbance[at].copy()
         disturbance[:, 3:] = level(track.heading[at], disturbance[:, 3:])
-        out = np.empty((len(acting), 6, state.shape[2]))
+        out = np.empty((len(rate), 6, state.shape[2] + 1))
         _core.sensitivities(
             self.period,
             steady.gain,
             steady.keep,
             track.heading[at],
             track.rotors[at, :1, None] * track.rotation[at, :, 1::-1] * [-1.0, 1.0],
-            track.angular_velocity[at],
-            _gyration(self.vehicle, track.angular_velocity[at]),
+            rate,
+            _gyration(self.vehicle, rate),
             acting,
             moved,
             jumps,
@@ -594,18 +591,30 @@ class Likelihood:
             slopes,
             track.innovations[at],
             disturbance,
+            steady.whitening,
             state,
             out,
         )
-        raise_errors()
         return out
+
+
+def _without_zeros(column: Array) -> Array | Product:
+    """Return a column (n, 6); without the torque's zeros, half of the memory, if a force alone."""
+    if column[:, 3:].any():
+        return column
+    return Product(1.0, np.broadcast_to(1.0, len(column)), column[:, :3].copy(), slice(3))
 
 
 def _gyration(vehicle: Vehicle, rate: Array) -> Array:
     """Return the derivative of the angular acceleration (n, 3, 3) by the angular velocity."""
-    # -u x J v over the inertia J, of all pairs of axes u and v
+    return np.asarray((rate @ _twist(vehicle)).reshape(-1, 3, 3))
+
+
+@lru_cache(maxsize=1)  # asked at each block of a flight
+def _twist(vehicle: Vehicle) -> Array:
+    """Return -u x J v over the inertia J, of all pairs of axes u and v, (3, 9)."""
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)
-    return np.asarray(np.einsum("nk,kji->nij", rate, twist + twist.swapaxes(0, 1)))
+    return np.asarray((twist + twist.swapaxes(0, 1)).swapaxes(1, 2).reshape(3, 9))
 
 
 def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
@@ -628,7 +637,7 @@ def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> lis
             Poses(
                 raw.t,
                 raw.period,
-                np.ascontiguousarray(raw.position),
+                raw.position,
                 continuous(q),
                 raw.rotor_speeds,
                 np.zeros(len(raw.t)) if raw.voltage is None else raw.voltage,

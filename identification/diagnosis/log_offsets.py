@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Role, get, playing
@@ -100,6 +99,8 @@ def with_time_offsets(signals: Signals, offsets: Values) -> Signals:
         speeds = resampled(n - rotors / signals.period, n, signals.rotor_speeds)
         signals = replace(signals, rotor_speeds=speeds)
     if spread := offsets.get(ROTOR_SPREAD[1]):
+        from scipy.ndimage import gaussian_filter1d  # needed without a pose alone
+
         over = np.sqrt(spread) / signals.period
         smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")
         signals = replace(signals, rotor_speeds=smooth)

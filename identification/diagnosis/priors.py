@@ -36,7 +36,7 @@ MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown 
 
 
 @dataclass(frozen=True)
-class PriorSettings:
+class _PriorSettings:
     """Beliefs before a flight is seen."""
 
     expected: float = 1.0  # number of effects missing in a model
@@ -61,7 +61,7 @@ class PriorSettings:
     between_samples: float = 0.5
 
 
-PRIORS = PriorSettings()
+PRIORS = _PriorSettings()
 # columns of one variant of an effect: all coefficients, or one of its starting points
 Variant = tuple[Column, ...]
 Variants = tuple[Variant, ...]  # of a set, one of each effect

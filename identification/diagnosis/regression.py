@@ -14,11 +14,11 @@ from functools import cached_property, lru_cache
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Need, Role, get, names, needing, playing
 from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
+from ...runtime.arrays import Index
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog, Logs, excerpt
 from ..logs.table import Array, ArrayPair, Mask, Pair, Rows, Values, finite_rows, median_step
@@ -50,7 +50,6 @@ from .log_offsets import (
     with_uneven_lag,
 )
 
-Index = NDArray[np.int64]
 K = TypeVar("K")
 V = TypeVar("V")
 
@@ -212,8 +211,7 @@ class RegressedFlights:
         self.biases = self._biases()
         self.offsets = self._timings() | self.biases
         # in a log read by its IMU: effects without any trace, and effects a pose would show
-        self.without_trace: Effects = frozenset()
-        self.needs_pose: Effects = frozenset()
+        self.without_trace = self.needs_pose = Effects()
         # the noise is added to the logs once more; the change is the effect of noise
         noisy = self._noisier()
         self.visible_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
@@ -593,13 +591,12 @@ def _accelerometer(log: FlightLog) -> ArrayPair | None:
         return None
     read = finite_rows(log.accelerometer)
     times = log.t[read]
-    values = log.accelerometer[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
     if not len(times) or np.diff(ends).max() >= LONGEST_GAP:
         return None
     period = median_step(times)
     even = np.arange(times[0], times[-1], period)
-    return even, low_pass(resampled(even, times, values), CUTOFFS.pose_hz, period)
+    return even, low_pass(resampled(even, times, log.accelerometer[read]), CUTOFFS.pose_hz, period)
 
 
 def _smooth(x: Array, signals: Signals) -> Array:

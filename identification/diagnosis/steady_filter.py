@@ -8,6 +8,7 @@ whatever the yaw. Up and yaw are a pair without a link.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -44,6 +45,11 @@ class SteadyFilter:
     gain: Array
     keep: Array
     covariance: Array
+
+    @cached_property
+    def whitening(self) -> Array:
+        """The inverse (6, 6) of the root of the covariance, a lower triangle."""
+        return np.linalg.inv(np.linalg.cholesky(self.covariance))
 
 
 def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilter:

@@ -19,12 +19,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import Akima1DInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.vehicle import Vehicle
-from ..motion.smoothing import resampled, second_difference
+from ..motion.smoothing import resampled, running_integral, second_difference
 from .evidence import GOOD
 from .flight_log import FlightLog, excerpt, with_rows
 from .inertial import (
@@ -191,7 +189,7 @@ def _likeliest(felt: _Felt, begins: Array, needed: Array) -> Pair:
 
 def _mean_rates(t: Array, gyro: Array) -> _Felt:
     """Return a gyro's angular velocity in windows, by its samples (N, 3)."""
-    sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
+    sum_of = running_integral(gyro, t)
     return lambda late, at: mean_rate(at + late, t, sum_of)
 
 
@@ -209,6 +207,8 @@ def _rotors_later(log: FlightLog, late: float, std: float) -> FlightLog:
     Rotor speeds answer noise from row to row, and an interpolation would smooth the answer. Whole
     rows are taken where the uncertainty ``std`` in s allows.
     """
+    from scipy.interpolate import Akima1DInterpolator  # few logs need one
+
     whole = round(late / log.period) * log.period
     late = whole if abs(whole - late) < _WHOLE * std else late
     source = log.t - late

@@ -12,11 +12,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.vehicle import Vehicle
-from ..motion.smoothing import resampled, second_difference
+from ..motion.smoothing import resampled, running_integral, second_difference
 from .evidence import GOOD, likelihood, remedies
 from .flight_log import ACCELEROMETER, GYRO, FlightLog, excerpt
 from .magnitudes import MAGNITUDES
@@ -162,7 +161,7 @@ def gyro_shares(
     if len(begins) < _FEWEST:
         return None
     motion = unbiased(turn_rates(begins, pose_times, attitude))
-    sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
+    sum_of = running_integral(gyro, t)
     seen = unbiased(mean_rate(begins, t, sum_of))
     size = median_square(motion) + STILL**2
     return [median_square(motion - seen @ reading.turn.T) / size for reading in readings]
@@ -182,7 +181,7 @@ def mean_rate(begins: Array, t: Array, sum_of: Array) -> Array:
 def mean_force(middles: Array, t: Array, force: Array) -> Array:
     """Return a force's (N, 3) means (n, 3) over two windows, weighted as by a second difference."""
     for _ in range(2):
-        force = cumulative_trapezoid(force, t, axis=0, initial=0.0)
+        force = running_integral(force, t)
     return second_difference(middles, WINDOW, t, force) / WINDOW**2
 
 

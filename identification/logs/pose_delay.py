@@ -19,13 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import (
     high_pass,
     resampled,
     robust_std,
+    running_integral,
     second_difference,
     turned,
     unbroken,
@@ -194,7 +194,7 @@ def _means(at: Array, width: float, t: Array, x: Array) -> Array:
     """Return means (m, k) over ``width`` s around times (m,) of columns (n, k), linear between
     times (n,).
     """
-    sums = cumulative_trapezoid(x, t, axis=0, initial=0.0)
+    sums = running_integral(x, t)
     return (resampled(at + 0.5 * width, t, sums) - resampled(at - 0.5 * width, t, sums)) / width
 
 
@@ -233,7 +233,7 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
     moments = _moments(log, vehicle)
     turns = moments - moments.mean(axis=0)
     for _ in range(2):
-        turns = cumulative_trapezoid(turns, log.t, axis=0, initial=0.0)
+        turns = running_integral(turns, log.t)
     for piece in unbroken(log.t, rows, 1.5 * step, _FEWEST_POSES):
         t, angles = log.t[piece], _angles(log, piece)[:, :2]
         at = t[apart:-apart]

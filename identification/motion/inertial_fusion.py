@@ -126,8 +126,8 @@ def fuse(
     T, end = stride * dt, count * stride + 1
     moved = _integrate(imu.gyro[:end], imu.force[:end], dt, stride)
     times = imu.t[0] + T * np.arange(count + 1)
-    rates, forces = (np.ascontiguousarray(x[:end:stride]) for x in (imu.gyro, imu.force))
-    at_knots = imu._replace(t=times, gyro=rates, force=forces)
+    rates = imu.gyro[:end:stride]
+    at_knots = imu._replace(t=times, gyro=rates, force=imu.force[:end:stride])
     rotation, heading_std = _first_guess(at_knots, positions, attitudes)
     linear = np.zeros((count + 1, 12))
     if positions is None:

@@ -10,8 +10,6 @@ states.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
-from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
@@ -27,6 +25,7 @@ from .smoothing import (
     mean_square,
     resampled,
     robust_std,
+    running_integral,
     unbroken,
 )
 
@@ -193,7 +192,7 @@ def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:
     """Return the attitude (n, 3, 3) at all samples: from the knot before, by the gyro."""
     knot = np.searchsorted(fused.t, t + 1e-9, side="right") - 1
     first = np.searchsorted(t, fused.t - 1e-9)[knot]
-    turned = cumulative_trapezoid(gyro, dx=float(t[1] - t[0]), axis=0, initial=0)
+    turned = running_integral(gyro, t)
     since = Rotation.from_rotvec(turned - turned[first])
     return np.asarray((fused.rotation[knot] * since).as_matrix())
 
@@ -202,6 +201,8 @@ def with_drift(s: InertialSignals, rng: np.random.Generator, gravity: float) -> 
     """Return signals with other errors of the fusion, drawn from its standard deviations: slow
     drifts of attitude, velocity and position.
     """
+    from scipy.ndimage import gaussian_filter1d  # needed without a pose alone
+
     slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), DRIFT_TIME / s.period, axis=0)
     slow /= np.sqrt(mean_square(slow)) + 1e-30
     slow *= s.std

@@ -46,15 +46,6 @@ class Signals:
         }
         return replace(self, **sampled)
 
-    def columns(self) -> tuple[Array, Array, Array, Array, Array, Array]:
-        """Return rotor speeds, voltage (0 where unknown), position, rotation, velocity and angular
-        velocity, contiguous, as the core takes them.
-        """
-        voltage = np.zeros(len(self.t)) if self.voltage is None else self.voltage
-        moving = (self.position, self.rotation, self.velocity, self.angular_velocity)
-        speeds, volts, *motion = map(np.ascontiguousarray, (self.rotor_speeds, voltage, *moving))
-        return speeds, volts, motion[0], motion[1], motion[2], motion[3]
-
 
 def in_body(x: Array, rotation: Array) -> Array:
     """Return world vectors (n, 3) in body axes."""

@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import welch
 
 from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
 from ..logs.table import Array, ArrayPair, Data, Names, Pair, Rows, finite_rows
-from ..motion.smoothing import runs_of
+from ..motion.smoothing import power_spectrum, runs_of
 from .words import percent, rounded, scale_of
 
 # all series over time together, packed: beside library and text a page of 60 s of flight stays
@@ -219,9 +218,8 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
     """
     powers = []
     for trace in traces:
-        x, rate = getattr(trace, side)[:, group], 1.0 / trace.period
-        longest = min(len(x), round(_SPECTRUM_SECONDS * rate))
-        f, power = welch(x, rate, nperseg=longest, axis=0)
+        x, period = getattr(trace, side)[:, group], trace.period
+        f, power = power_spectrum(x, period, round(_SPECTRUM_SECONDS / period))
         powers.append(np.interp(grid, f, power.sum(axis=1)))
     spectrum: Array = np.sqrt(np.average(powers, 0, [len(x.t) * x.period for x in traces]))
     return spectrum

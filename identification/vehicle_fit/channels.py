@@ -10,7 +10,6 @@ from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 
 from ...runtime.arrays import Array, Mask
@@ -18,8 +17,15 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
 from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
-from ..motion.signals import Signals, log_signals
-from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
+from ..motion.signals import log_signals
+from ..motion.smoothing import (
+    derivative,
+    low_pass,
+    power_spectrum,
+    resampled,
+    runs_of,
+    unbroken,
+)
 from .geometry import GRAVITY
 
 _SHORTEST_PIECE = 3.0  # s; shorter ones have no frequency low enough to tell a bias
@@ -145,7 +151,7 @@ def speed_noise(pieces: Sequence[MotionPiece]) -> float:
     powers = []
     for piece in pieces:
         if piece.rotor_speeds is not None:
-            _, power = welch(piece.rotor_speeds, 1.0 / piece.period, nperseg=256, axis=0)
+            _, power = power_spectrum(piece.rotor_speeds, piece.period, 256)
             powers.append(power[-len(power) // 4 :].mean(axis=0) / (2.0 * piece.period))
     return math.sqrt(float(np.median(powers))) if powers else 0.0
 

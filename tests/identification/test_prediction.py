@@ -16,9 +16,9 @@ from tests.support.outcomes import refused
 from tests.support.sizes import rms
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.plant import PlantSettings
+from windwrench.evidence.residual_wrench import residual_wrench
 from windwrench.identification import predict
 from windwrench.identification.causal_states import causal_states
-from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
