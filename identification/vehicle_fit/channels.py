@@ -17,7 +17,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
 from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
-from ..motion.signals import log_signals
+from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import (
     derivative,
     low_pass,
