@@ -123,7 +123,7 @@ def readable(stream: Stream | None) -> Stream | None:
 
 
 def among(t: Array, times: Array) -> Mask:
-    """Return which of times (M,) are among increasing ones (N,)."""
+    """Return a mask of the times (M,) among increasing ones (N,)."""
     padded = np.append(times, np.inf)
     return np.asarray(padded[np.searchsorted(times, t)] == t)
 

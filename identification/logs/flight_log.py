@@ -285,7 +285,7 @@ def excerpt(log: FlightLog, seconds: float = 0.0) -> FlightLog:
 
     Args:
         log: the flight; the rest becomes a gap.
-        seconds: s, of all logs that are used together.
+        seconds: s, of all logs used together.
     """
     length = log.t[-1] - log.t[0]
     share = LONGEST / max(seconds, length, LONGEST)

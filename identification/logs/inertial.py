@@ -199,8 +199,8 @@ def _force_shares(
     gravity: float,
 ) -> tuple[list[float] | None, Array | None]:
     """Return the shares of acceleration and gravity left by an accelerometer, as declared and by
-    each reading; None: too little is measured. For an acceleration in world axes return what the
-    specific force (3,) has beside, too, else None.
+    each reading; None: too little is measured. For an acceleration in world axes return the rest
+    (3,) of the specific force, too, else None.
 
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.

@@ -74,7 +74,7 @@ _EXAMPLES = {
 
 
 @dataclass(frozen=True)
-class Reason:
+class _Reason:
     """The reason for a field's value."""
 
     section: str
@@ -89,9 +89,9 @@ class Guess:
     """A guessed map."""
 
     log_map: LogMap
-    reasons: tuple[Reason, ...]
+    reasons: tuple[_Reason, ...]
     unused: Names = ()  # columns
-    missing: tuple[Reason, ...] = ()  # fields ``?``; the log is not read without them
+    missing: tuple[_Reason, ...] = ()  # fields ``?``; the log is not read without them
 
     @property
     def lacks(self) -> str:
@@ -99,7 +99,7 @@ class Guess:
         return "; ".join(f"{m.section}.{m.field}: {m.why}" for m in self.missing)
 
     @property
-    def doubts(self) -> tuple[Reason, ...]:
+    def doubts(self) -> tuple[_Reason, ...]:
         """The uncertain fields."""
         return tuple(reason for reason in self.reasons if not reason.certain)
 
@@ -163,7 +163,7 @@ class _Guessing:
     def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
         self.sections: Data = {}
-        self.reasons: list[Reason] = []
+        self.reasons: list[_Reason] = []
         self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
         self.unnamed: set[str] = set()  # sections without telling names
@@ -218,7 +218,7 @@ class _Guessing:
         """Return the values (N, k) of columns."""
         return np.column_stack([self.data[name] for name in columns])
 
-    def missing(self) -> list[Reason]:
+    def missing(self) -> list[_Reason]:
         """Return the fields missing for a flight log."""
         lacks: dict[str, str] = {}
         if self.clock is None:
@@ -244,7 +244,7 @@ class _Guessing:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lacks["motors"] = why
         return [
-            Reason(
+            _Reason(
                 "rotors" if part in _MOTORS else part,
                 "column" if part == "time" else "columns",
                 False,
@@ -272,7 +272,7 @@ class _Guessing:
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep the reason for a field's value."""
         certain = certain and section not in self.unnamed
-        self.reasons.append(Reason(section, name, certain, why))
+        self.reasons.append(_Reason(section, name, certain, why))
 
     def take(self, section: str, name: str, choice: _Choice) -> str:
         """Return the choice for a field, and keep the reason."""

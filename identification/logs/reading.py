@@ -129,8 +129,7 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
 
 
 def opened(path: Path) -> Table | None:
-    """Return a file's table; None: the file is another one, or a reader knows it by its first
-    bytes.
+    """Return a file's table; None: the file is another one, or a reader knows its first bytes.
 
     Raises:
         InputError: the file is a table by its name, but unreadable.
