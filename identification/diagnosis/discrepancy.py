@@ -157,9 +157,10 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     # s'' = -a - rate^2 s - 2 damping rate s'; the pull is rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
     back = np.array([0.0, 4.0 * DAMPING_RATIO * rate / period, rate**2])
-    motion = np.array([4.0 / period**2, 0.0, 0.0]) + back
+    both = np.append(-back, back)
+    both[3] = 4.0 / period**2
     # the bilinear transform of both
-    section = np.hstack([-back, motion]) @ np.kron(np.eye(2), [[1, -2, 1], [1, 0, -1], [1, 2, 1]])
+    section = both @ np.kron(np.eye(2), [[1, -2, 1], [1, 0, -1], [1, 2, 1]])
     return np.concatenate([filtered(x, section / section[3]) for x in np.split(drive, ends)])
 
 

@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 
 from ... import _core
 from ...runtime.arrays import Array, Mask
-from ..logs.table import ArrayPair
 
 
 class _Cutoffs(NamedTuple):
@@ -146,7 +145,7 @@ def running_integral(x: Array, t: Array) -> Array:
     return np.concatenate([0.0 * x[:1], np.cumsum(steps * (x[1:] + x[:-1]) / 2.0, axis=0)])
 
 
-def power_spectrum(x: Array, period: float, length: int) -> ArrayPair:
+def power_spectrum(x: Array, period: float, length: int) -> tuple[Array, Array]:
     """Return frequencies (f,), Hz, and the one-sided power per hertz (f, k) of ``x`` (n, k) by
     half-overlapping segments (P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15
     (1967), 70-73), without their means.
