@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..controllers.flight import FlightGains
 from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
+from ..envs.definition import TaskDefinition
 from ..evaluation.episodes import fly_episode
 from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError
@@ -115,6 +117,28 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
     }
 
 
+def flight_of(task: TaskDefinition) -> dict[str, Any]:
+    """Return a task's numbers for a flight of its policy elsewhere: its kind of observation with
+    limits and divisors, its kind of action with the commands of 0, -1 and 1, decisions a second,
+    and the gains of its flight loop.
+    """
+    flown = task.flown
+    numbers = {
+        "limits": task.kept,
+        "divisors": task.divisors,
+        "hover": flown.hover,
+        "below": flown.below,
+        "above": flown.above,
+    }
+    return {
+        "observation": task.observation,
+        "action": task.action,
+        "decision_hz": task.decision_hz,
+        "gains": asdict(task.gains or FlightGains()),
+        **{name: array.tolist() for name, array in numbers.items()},
+    }
+
+
 def validate(
     policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int
 ) -> tuple[float, int, bool]:
@@ -209,8 +233,12 @@ class Run:
     def card(self, steps: int) -> dict[str, Any]:
         """Return the card of the policy after ``steps`` decisions."""
         card = card_of(self.config, self.scenario, self.seed, steps) | self.own
-        unseen = ("features", "repeat") if "task" in card else ()
-        return {key: value for key, value in card.items() if key not in unseen}
+        if "task" not in card:
+            return card
+        for unseen in ("features", "repeat"):
+            del card[unseen]
+        world = self.judge.unwrapped
+        return card | ({"flight": flight_of(world)} if isinstance(world, TaskDefinition) else {})
 
     def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
         """Validate a policy, and save the policy as the last, and as the best if no earlier policy
