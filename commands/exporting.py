@@ -11,6 +11,7 @@ def export_c(
     vehicle: str,
     estimator: str = "ukf",
     effects: str = "declared",
+    controller: str | None = None,
     policy: str | None = None,
     rate: float | None = None,
     rise_time: float = 1.0,
@@ -47,6 +48,7 @@ def export_c(
             flown,
             command_line(),
             precision,
+            controller,
         )
     there = [out / name for name in found.files if (out / name).exists()]
     if there and not overwrite:
