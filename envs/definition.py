@@ -108,13 +108,6 @@ class TaskDefinition:
         # an amended vehicle must not bring its effects into the world a second time
         true = self.vehicle if truth is None else truth
         self.truth = true if isinstance(true, Vehicle) else load_vehicle(true)
-        if self.randomise not in (None, "vehicle"):
-            raise unknown_name("draw", str(self.randomise), ["vehicle"], f"{name}: randomise")
-        if self.randomise and not any(vars(self.truth.uncertainty).values()):
-            raise InputError(
-                f"{name}: randomise: {self.truth.name} states no uncertainty; expected a section "
-                "uncertainty in its file, such as {thrust: 0.03}"
-            )
         self.effects = tuple(check_setting(e, f"{name}: effects") for e in effects)
         self.settings, self.estimator, self.stages = settings, estimator, tuple(stages)
         self.render_mode, self.width, self.height = render_mode, width, height
@@ -129,6 +122,13 @@ class TaskDefinition:
         for field, value in fields.items():
             if value is not None:
                 setattr(self, field, value)
+        if self.randomise not in (None, "vehicle"):
+            raise unknown_name("draw", str(self.randomise), ["vehicle"], f"{name}: randomise")
+        if self.randomise and not any(vars(self.truth.uncertainty).values()):
+            raise InputError(
+                f"{name}: randomise: {self.truth.name} states no uncertainty; expected a section "
+                "uncertainty in its file, such as {thrust: 0.03}"
+            )
         sees = self._source("observe")
         if observation is None and type(self).observation != sees.observation:
             observation = type(self).observation
@@ -308,6 +308,7 @@ class TaskDefinition:
             kind=self.flown.kind,
             stages=self.stages,
             like=self._made,
+            rotors=self.truth.positions,  # lanes share one wind's stations
             **{**defaults, **given},
         )
         return self._made

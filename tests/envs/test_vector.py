@@ -12,14 +12,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
-from tests.support.vector_flights import fly, make
+from tests.support.vector_flights import TASKS, fly, make
 from windwrench import _core
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names
-from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.dynamics.vehicle import EffectSetting, Uncertainty
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import SUBSTEPS, TICK, PlantSettings, load_world
-from windwrench.envs.scenarios import SCENARIOS
+from windwrench.envs.scenarios import SCENARIOS, draw_vehicle
 
 WIDTH = _core.LoopBlocks.lanes
 
@@ -228,6 +228,24 @@ def test_every_effect_flies_in_lanes_as_in_mujoco(name):
         fly(envs, 4)
     ours, theirs = (envs.state.rows for envs in states)
     assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_true_vehicle_is_drawn_anew_by_its_uncertainty(task):
+    shares = {"mass": 0.05, "thrust": 0.1, "rotor": 0.02, "torque": 0.1, "arm_l": 0.05}
+    known = replace(load_vehicle("ardrone2"), uncertainty=Uncertainty(**shares))
+    given = {"task": task, "vehicle": known, "randomise": "vehicle", "max_episode_steps": 2}
+    mujoco, lanes = (make(2, plant, **given) for plant in ("mujoco", "lanes"))
+    assert_allclose(*(fly(envs, 5) for envs in (lanes, mujoco)), rtol=1e-7, atol=1e-7)
+    masses = {loop.true.mass for loop in mujoco.loops} | {known.mass}
+    assert len(masses) == 3
+    assert mujoco.loops[0].ukf.vehicle.mass == known.mass
+    drawn = [draw_vehicle(known, default_rng(seed)) for seed in range(300)]
+    assert np.std([np.log(one.mass) for one in drawn]) == pytest.approx(0.05, rel=0.1)
+    spread = np.std([np.log(one.k) for one in drawn], axis=0)
+    assert_allclose(spread, np.hypot(0.1, 0.02), rtol=0.1)
+    with refused("states no uncertainty"):
+        make(1, task=task, vehicle=replace(known, uncertainty=Uncertainty()), randomise="vehicle")
 
 
 def test_lanes_refuse_effects_in_python_and_other_precisions(tmp_path):
