@@ -85,8 +85,7 @@ class LQG:
         for name in _POSITIVE:
             if not getattr(self, name) > 0.0:
                 raise InputError(f"LQG: {name} must be above 0, got {getattr(self, name)!r}")
-        laws = [self._law(axis) for axis in axis_models(self.vehicle)]
-        self.observers, self.gains, self.ahead = zip(*laws, strict=True)
+        self.laws = [self._law(axis) for axis in axis_models(self.vehicle)]
         self.reset()
 
     def brief(self, briefing: Briefing) -> None:
@@ -96,7 +95,7 @@ class LQG:
 
     def reset(self) -> None:
         """Forget the last episode."""
-        for observer in self.observers:
+        for observer, *_ in self.laws:
             observer.reset()
         self._action = np.zeros(3)
         self._wanted: Wide | None = None  # acceleration of the reference, in tilts and m/s2
@@ -132,12 +131,12 @@ class LQG:
         tilt = rotors / gravity - wanted
         torque = tilting(o[TORQUE])
         action = np.zeros(3)
-        for i, observer in enumerate(self.observers):
+        for i, (observer, gain, ahead) in enumerate(self.laws):
             seen = [place[i], speed[i], o[FORCE][i], felt[i]]
             if i < 2:
                 seen = [place[i], speed[i], tilt[i], o[FORCE][i], torque[i], felt[i]]
             x = observer.update(self._action[i], np.array(seen), turned[i])
-            action[i] = -(self.gains[i] @ x) - self.ahead[i] * turned[i]
+            action[i] = -(gain @ x) - ahead * turned[i]
         self._wanted = wanted
         self._action = np.clip(action, -MAX_ACCELERATION, MAX_ACCELERATION)
         return self._action.astype(np.float32)

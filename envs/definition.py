@@ -122,12 +122,11 @@ class TaskDefinition:
         for field, value in fields.items():
             if value is not None:
                 setattr(self, field, value)
-        if self.randomise not in (None, "vehicle"):
-            raise unknown_name("draw", str(self.randomise), ["vehicle"], f"{name}: randomise")
-        if self.randomise and not any(vars(self.truth.uncertainty).values()):
+        stated = any(vars(self.truth.uncertainty).values())
+        if self.randomise and not (stated and self.randomise == "vehicle"):
             raise InputError(
-                f"{name}: randomise: {self.truth.name} states no uncertainty; expected a section "
-                "uncertainty in its file, such as {thrust: 0.03}"
+                f"{name}: randomise: expected 'vehicle', and an uncertainty in the vehicle's file "
+                f"such as {{thrust: 0.03}}; got {self.randomise!r} and {self.truth.name}"
             )
         sees = self._source("observe")
         if observation is None and type(self).observation != sees.observation:
@@ -328,11 +327,11 @@ class TaskDefinition:
         truth = draw_vehicle(self.truth, rng) if self.randomise else self.truth
         self.drawn = self.scenario.variation.draw(rng) if self.scenario.varied else {}
         drawn = defaultdict(lambda: 1.0, self.drawn)
-        factors = {name: drawn[name] for name in ("rotor_drag", "hull_area")}
         fan = replace(
             self.fan,
             speed=self.fan.speed * drawn["fan_speed"],
-            **{name: getattr(self.fan, name) * factor for name, factor in factors.items()},
+            rotor_drag=self.fan.rotor_drag * drawn["rotor_drag"],
+            hull_area=self.fan.hull_area * drawn["hull_area"],
         )
         mass, inertia = truth.mass * drawn["mass"], truth.inertia * drawn["inertia"]
         return self.make_loop(replace(truth, mass=mass, inertia=inertia), fan)

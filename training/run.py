@@ -19,6 +19,7 @@ from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
+from ..runtime.plain_values import plain
 from ..runtime.provenance import package_versions
 from ..runtime.regular_files import read_json
 from .configuration import Config, features_of
@@ -118,25 +119,22 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
 
 
 def flight_of(task: TaskDefinition) -> dict[str, Any]:
-    """Return a task's numbers for a flight of its policy elsewhere: its kind of observation with
-    limits and divisors, its kind of action with the commands of 0, -1 and 1, decisions a second,
-    and the gains of its flight loop.
+    """Return a task's numbers for a flight of its policy elsewhere: the kind of observation (None:
+    the task's own) with limits and divisors, the action with its commands, decisions a second, and
+    the gains of the flight loop.
     """
-    flown = task.flown
+    own = task.chosen is None and type(task).observe is not TaskDefinition.observe
     numbers = {
+        **vars(task.flown),
+        "action": task.action,
+        "observation": None if own else task.observation,
+        "decision_hz": task.decision_hz,
+        "gains": task.gains or FlightGains(),
         "limits": task.kept,
         "divisors": task.divisors,
-        "hover": flown.hover,
-        "below": flown.below,
-        "above": flown.above,
     }
-    return {
-        "observation": task.observation,
-        "action": task.action,
-        "decision_hz": task.decision_hz,
-        "gains": asdict(task.gains or FlightGains()),
-        **{name: array.tolist() for name, array in numbers.items()},
-    }
+    entries: dict[str, Any] = plain(numbers)
+    return entries
 
 
 def validate(
@@ -235,8 +233,7 @@ class Run:
         card = card_of(self.config, self.scenario, self.seed, steps) | self.own
         if "task" not in card:
             return card
-        for unseen in ("features", "repeat"):
-            del card[unseen]
+        del card["features"], card["repeat"]
         world = self.judge.unwrapped
         return card | ({"flight": flight_of(world)} if isinstance(world, TaskDefinition) else {})
 

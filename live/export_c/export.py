@@ -25,7 +25,7 @@ from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
 from ...estimator.filter_record import FILTER, fields_between
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError, unknown_name
-from .flights import CONTROLLERS, flight_numbers
+from .flights import CONTROLLERS, flight_of
 from .numbers import PRECISIONS, filters
 from .policies import policy_numbers
 
@@ -96,15 +96,11 @@ def export_c(
     tuning = UKFTuning.for_vehicle(vehicle, period, rise_time)
     kind, title, header = _FILTERS[estimator]
     made = kind(vehicle, tuning, period, gate, Recovery())
-    flight = flown = learned = None
-    if policy is not None and policy["kind"] == "flight":
-        learned = policy["policy"]
-    elif policy is not None:
-        flown = policy_numbers(policy, vehicle, tuning, period)
     if controller not in (None, *CONTROLLERS):
         raise unknown_name("controller", str(controller), CONTROLLERS, "--controller")
-    if controller or learned:
-        flight = flight_numbers(vehicle, period, controller, learned)
+    learned = (policy or {}).get("policy")
+    flown = policy_numbers(policy, vehicle, tuning, period) if policy and not learned else None
+    flight = flight_of(vehicle, period, controller, learned) if controller or learned else None
     f = made.record[0]
     names = sorted({str(effect.model) for kind in effects.values() for effect in kind})
     headers = [f"core/{header}.hpp", *(f"core/effects/{name}.hpp" for name in names)]
@@ -150,13 +146,10 @@ def export_c(
     environment.filters |= filters(precision)
     files = {name: environment.get_template(f"{name}.j2").render(context) for name in TEMPLATES}
     files["windwrench.cpp"] = _source("live/export_c/source/windwrench.cpp")
-    sources = {} if flown is None else {"policy.hpp": flown["kind"]}
+    if flown is not None:
+        files["policy.hpp"] = _source(f"live/export_c/source/{flown['kind']}.hpp")
     if flight is not None:
-        sources["flight.hpp"] = "flight"
-    if learned or "dense" in sources.values():
-        sources["network.hpp"] = "network"
-    for name, source in sources.items():
-        files[name] = _source(f"live/export_c/source/{source}.hpp")
+        files["flight.hpp"] = _source("live/export_c/source/flight.hpp")
     for path in headers:
         _add_header(path, files)
     return Exported(files, made, tuple(e.name for e in vehicle.effects), precision)

@@ -54,4 +54,5 @@ def filters(precision: str) -> dict[str, Callable[..., str]]:
         "literal": lambda value, what="a number": literal(value, precision, what),
         "table": lambda values, what="a number": table(values, precision, what),
         "shape": shape,
+        "ravelled": np.ravel,
     }

@@ -15,7 +15,7 @@ from ...controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ...controllers.registry import shipped_policies
 from ...controllers.sensor_model import SETTLED, sensor_model
 from ...controllers.tracker import FEW, STOP, TURN, Tracker, nominal
-from ...controllers.trained_policy import TaskPolicy, TrainedPolicy, cell_of, layers_of, load_policy
+from ...controllers.trained_policy import TrainedPolicy, cell_of, load_policy
 from ...controllers.wrench_lag import ORDER
 from ...dynamics.vehicle import Vehicle
 from ...estimator import UKFTuning
@@ -54,7 +54,11 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
     path = trained.get(name, Path(name))
     policy = load_policy(path)
     if not isinstance(policy, TrainedPolicy):
-        return {"kind": "flight", "policy": policy}  # the rest is ``flights``'
+        return {"kind": "flight", "policy": policy}  # the rest is in ``flights``
+    if cell_of(policy.weights) is not None:
+        raise InputError(
+            f"--policy {name}: is recurrent; only policies of dense layers can be exported"
+        )
     features = policy.features
     summed = next((quantity for quantity in features.frame if QUANTITIES[quantity].summed), None)
     if summed is not None:
@@ -62,7 +66,6 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
             f"--policy {name}: sees {summed}, which is not in an estimate by itself; such a policy "
             "cannot be exported"
         )
-    layers = layer_numbers(policy, name)
     columns = [QUANTITIES[quantity].column for quantity in features.frame]
     return {
         "kind": "dense",
@@ -72,43 +75,13 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
             ("REPEAT", int(policy.card["repeat"]), "decisions that a command is held for"),
             ("HISTORY", features.history, "frames"),
             ("FRAME", len(columns), "numbers of a frame"),
-            *layers["integers"],
         ],
-        "lists": [("PLACES", columns, "of a frame's numbers in an observation"), *layers["lists"]],
+        "lists": [("PLACES", columns, "of a frame's numbers in an observation")],
         "numbers": [
             ("SCALES", np.array(features.scale, dtype=float), "of a frame's numbers"),
-            *layers["numbers"],
         ],
+        "layers": policy,
         "size": (1, features.history * len(columns) + 1),
-    }
-
-
-def layer_numbers(policy: TrainedPolicy | TaskPolicy, name: str) -> dict[str, Any]:
-    """Return the numbers of a policy's dense layers, for ``source/network.hpp``.
-
-    Raises:
-        InputError: the policy is recurrent.
-    """
-    weights, card = policy.weights, policy.card
-    if cell_of(weights) is not None:
-        raise InputError(
-            f"--policy {name}: is recurrent; only policies of dense layers can be exported"
-        )
-    layers = range(layers_of(weights))
-    matrices = [weights[f"weight{i}"] for i in layers]
-    widths = [matrices[0].shape[1], *(len(matrix) for matrix in matrices)]
-    return {
-        "integers": [
-            ("LAYERS", len(matrices), ""),
-            ("WIDEST", max(widths), "layer"),
-            ("RELU", int(card["activation"] == "relu"), "else the hyperbolic tangent"),
-            ("SQUASH", int(card["squash"]), "by a hyperbolic tangent at the end"),
-        ],
-        "lists": [("WIDTHS", widths, "of the layers, the input's first")],
-        "numbers": [
-            ("WEIGHTS", np.concatenate([m.ravel() for m in matrices]), "row by row"),
-            ("OFFSETS", np.concatenate([weights[f"bias{i}"] for i in layers]), ""),
-        ],
     }
 
 

@@ -41,6 +41,7 @@ from windwrench.envs.closed_loop import Stage
 from windwrench.envs.vector import SETTLE_TICKS
 from windwrench.envs.wind_tasks import WindTrajectoryEnv
 from windwrench.estimator import UKFTuning
+from windwrench.evaluation.episodes import fly_episode
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.policies import PARTICLES, briefing_of
 from windwrench.runtime.errors import InputError
@@ -218,11 +219,7 @@ def test_the_law_with_lead(tmp_path):
     assert_allclose(commands(c, seen), wanted, rtol=0, atol=1e-5)
 
 
-class Trajectory(WindTrajectoryEnv):
-    accelerometer = (0.0, 0.0)  # exact, so that a test may compute the specific force
-
-
-class Rates(Trajectory):
+class Rates(WindTrajectoryEnv):
     action, observation, normalize = "rates", "all", True
 
 
@@ -230,48 +227,45 @@ def test_laws_in_c_command_the_rotors_as_in_the_simulator(tmp_path):
     """Beside the simulator's own flight loop, by whose commands the vehicle flies."""
     vehicle = declaring(load_vehicle("crazyflie"), "motor_lag", "rotor_drag")
     rates = Rates(vehicle=vehicle)
-    size, rng = len(rates.kept), default_rng(0)
-    weights = {"weight0": rng.normal(0, 0.1, (8, size)), "weight1": rng.normal(0, 0.1, (4, 8))}
-    weights |= {"bias0": np.zeros(8), "bias1": np.zeros(4)}
+    size = len(rates.kept)
+    weights = {"weight0": default_rng(0).normal(0, 0.1, (4, size)), "bias0": np.zeros(4)}
     card = {"task": "own", "activation": "tanh", "squash": False, "scale": [1.0] * size}
-    card |= {"largest": 1.0, "flight": flight_of(rates)}
-    policy = TaskPolicy(card, {n: w.astype(np.float32) for n, w in weights.items()})
+    policy = TaskPolicy(card | {"largest": 1.0, "flight": flight_of(rates)}, weights)
     given = {"kind": "flight", "policy": policy}
     exported = export_c(
         rates.declared, "ukf", 200.0, 0.45, None, given, precision="double", controller="lqg"
     )
-    c, apart = CompiledFilter(exported, tmp_path), []
+    c, apart, noise = CompiledFilter(exported, tmp_path), [], np.zeros(3)
 
     def begin_flight(loop):
         if loop.ticks == -SETTLE_TICKS:
             c.reset(loop.sample[4:7], loop.sample[7:])
-            c.begin_flight()
-            assert c.fly(0, np.full(10, np.nan), np.zeros(3))[0] == -6
-            assert c.fly(3, np.zeros(10), np.zeros(3))[0] == -5
+            c.c.ww_flight_init(c.flight)
+            assert c.fly(3, np.zeros(10), None)[0] == -5
 
     def compared(loop):
         c.predict(loop.sample[:4], 0.005)
         c.correct(loop.sample[4:7], loop.sample[7:])
-        plant = loop.record[0]["plant"]
-        felt = plant["rotation"].T @ loop.world.xfrc[:3] / vehicle.mass
-        answer, speeds = c.fly(law if loop.ticks >= 0 else 0, loop.setpoint[:10], felt)
+        record = loop.record[0]
+        felt = record["plant"]["rotation"].T @ loop.world.xfrc[:3] / vehicle.mass
+        felt += record["accelerometer_bias"] + record["accelerometer_sigma"] * noise
+        noise[:] = loop.noise[loop.row, -3:]  # of this tick: the next step tells of it
+        reference = env.many.episodes.references[0, max(loop.ticks, 0)]
+        answer, speeds = c.fly(law if loop.ticks >= 0 else 0, reference, felt)
         assert answer == 0
         apart.append(abs(speeds - loop.command).max())
 
     stages = [Stage("begin", begin_flight, "sense"), Stage("compared", compared, "actuate")]
-    for law, kind, pilot in ((1, Trajectory, LQG(vehicle=vehicle)), (2, Rates, policy)):
+    for law, kind, pilot in ((1, WindTrajectoryEnv, LQG(vehicle=vehicle)), (2, Rates, policy)):
         env = kind(vehicle=vehicle, stages=stages)
-        seen, _ = env.reset(seed=3)
-        for _ in range(75):
-            seen, *_ = env.step(pilot(seen))
+        fly_episode(env, pilot, 3, decisions=20)
         assert max(apart) < 0.01  # rad/s: actions are of single precision there
-        assert np.ptp(env.loop.position) > 0.1
-        assert len(apart) == SETTLE_TICKS + 75 * 8
+        assert len(apart) == SETTLE_TICKS + 20 * 8
         apart.clear()
 
 
 def test_policies_that_no_flight_loop_knows_are_refused():
-    with refused("trained with the action attitude, rates, rotors"):
+    with refused("expected one of FanTracking, or one that"):
         export_c(VEHICLE, policy=exportable_policy("WindHover-gru-0"))
     with refused("unknown controller 'pid'"):
         export_c(VEHICLE, controller="pid")

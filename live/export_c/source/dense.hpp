@@ -1,7 +1,7 @@
 // A trained policy of dense layers on a history of frames: controllers/trained_policy.py.
 #pragma once
-#include "network.hpp"
 #include "windwrench.h"
+#include "windwrench_numbers.hpp"
 
 namespace windwrench {
 

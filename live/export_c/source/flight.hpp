@@ -3,9 +3,6 @@
 #pragma once
 #include "windwrench.h"
 #include "windwrench_numbers.hpp"
-#ifdef WW_LEARNED
-#include "network.hpp"
-#endif
 
 namespace windwrench {
 
@@ -77,19 +74,19 @@ struct Pilot {
 #endif
 #ifdef WW_LEARNED
     if (due && law == WW_LEARNED) act(reference);
-    if (law == WW_LEARNED) return CommandKind(KIND);
+    if (law == WW_LEARNED) return KIND;
 #endif
     return BESIDE;
   }
 
 #ifdef WW_LQG
   void regulate(const ww_number *r) {
-    const ww_number *A = LQG_A, *B = LQG_B, *C = LQG_C, *gains = LQG_GAINS, *regulator = LQG_LAW;
     ww_number *state = states;
     int decision = ticks / DECISION;
     for (int i = 0; i < 3; i++) {
       bool level = i < 2;
-      int n = level ? LQG_LEVEL : LQG_UPWARDS, count = level ? 6 : 4;
+      const ww_number *A = LQG_A[i], *B = LQG_B[i], *C = LQG_C[i];
+      int n = LQG_STATES[i], count = level ? 6 : 4;
       ww_number unit = level ? loop.body.gravity : ww_number(1), now = r[6 + i] / unit;
       ww_number turned = decision > 0 ? now - wanted[i] : ww_number(0);
       // the parts of force and torque that accelerate and tilt along the axis
@@ -99,12 +96,12 @@ struct Pilot {
       const ww_number both[6] = {place, speed, tilt, force, torque, gust};
       const ww_number up[4] = {place, speed, force, gust};
       const ww_number *seen = level ? both : up;
-      ww_number next[LQG_LEVEL] = {};
+      ww_number next[STATES] = {};
       for (int a = 0; decision > 0 && a < n; a++) {
         next[a] = B[a] * command[i] - (a == 2 ? turned : ww_number(0));
         for (int b = 0; b < n; b++) next[a] += A[a * n + b] * state[b];
       }
-      const ww_number *gain = gains + (decision < LQG_ROWS ? decision : LQG_ROWS - 1) * n * count;
+      const ww_number *gain = LQG_GAINS[i] + (decision < LQG_ROWS ? decision : LQG_ROWS - 1) * n * count;
       for (int a = 0; a < n; a++) state[a] = next[a];
       for (int s = 0; s < count; s++) {
         ww_number missed = seen[s];
@@ -112,10 +109,10 @@ struct Pilot {
         for (int a = 0; a < n; a++) state[a] += gain[a * count + s] * missed;
       }
       ww_number wish = -LQG_AHEAD[i] * turned;
-      for (int a = 0; a < n; a++) wish -= regulator[a] * state[a];
+      for (int a = 0; a < n; a++) wish -= LQG_LAW[i][a] * state[a];
       command[i] = within(wish, -MOST, MOST);
       wanted[i] = now;
-      A += n * n, B += n, C += count * n, gains += LQG_ROWS * n * count, regulator += n, state += n;
+      state += n;
     }
   }
 #endif

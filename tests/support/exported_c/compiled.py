@@ -81,7 +81,7 @@ class CompiledFilter:
         self.memory = ctypes.create_string_buffer(int(self.c.size_of_filter()))
         self._now = _estimate_type("gyro_bias" in header, self._number)()
         if "flight" in there:
-            self._flight = ctypes.create_string_buffer(int(self.c.size_of_flight()))
+            self.flight = ctypes.create_string_buffer(int(self.c.size_of_flight()))
         if "policy" in there:
             self.c.ww_policy.restype = self._number
             self.policy_bytes = int(self.c.size_of_policy())
@@ -116,15 +116,11 @@ class CompiledFilter:
         """Call ww_policy."""
         return float(self.c.ww_policy(self._policy, ctypes.byref(estimate)))
 
-    def begin_flight(self):
-        """Call ww_flight_init."""
-        self.c.ww_flight_init(self._flight)
-
     def fly(self, law, reference, accelerometer):
         """Call ww_fly; return its answer and the rotor speeds."""
         out = self._array(np.zeros(4))
         given = self._array(reference), self._array(accelerometer)
-        return self.c.ww_fly(self._flight, self.memory, law, *given, out), np.array(out)
+        return self.c.ww_fly(self.flight, self.memory, law, *given, out), np.array(out)
 
     @property
     def estimate(self):
