@@ -265,7 +265,7 @@ def test_laws_in_c_command_the_rotors_as_in_the_simulator(tmp_path):
 
 
 def test_policies_that_no_flight_loop_knows_are_refused():
-    with refused("expected one of FanTracking, or one that"):
+    with refused("expected one of FanTracking, or one of dense"):
         export_c(VEHICLE, policy=exportable_policy("WindHover-gru-0"))
     with refused("unknown controller 'pid'"):
         export_c(VEHICLE, controller="pid")

@@ -24,10 +24,13 @@ struct Pilot {
            const ww_number *accelerometer) {
     if (started && accelerometer) feel(f, accelerometer);
     if (!started) remember(f);
-    if (now != law) begin(now);
-    for (int i = 0; i < SET_YAW_RATE; i++) loop.setpoint[i] = reference[i];
+    if (now != law) begin(now, reference);
     CommandKind kind = decide(reference);
     remember(f);
+    if (kind == BESIDE)
+      for (int i = 0; i < SET_YAW_RATE; i++) loop.setpoint[i] = reference[i];
+    else
+      move_setpoint(loop, x, WW_NOMINAL_PERIOD);
     foresee(loop, f.vehicle, x);
     steer(loop, x, command, kind, WW_NOMINAL_PERIOD);
     if (kind != ROTOR_SPEEDS) through_the_rotors(loop, f.vehicle);
@@ -35,9 +38,11 @@ struct Pilot {
   }
 
  private:
-  void begin(int now) {
+  void begin(int now, const ww_number *reference) {
     law = now;
     ticks = 0;
+    // a law without the flight loop's own acceleration has a set point at rest
+    for (int i = 0; i < SETPOINT; i++) loop.setpoint[i] = i < 3 || i == SET_YAW ? reference[i] : 0;
     for (int i = 0; i < 4; i++) action[i] = command[i] = 0;
     for (int i = 0; i < STATES; i++) states[i] = 0;
   }
