@@ -125,15 +125,15 @@ def draw_vehicle(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
     def factor(share: float, size: int = 1) -> Array:
         return np.exp(share * rng.standard_normal(size))
 
-    command = factor(known.command if vehicle.omega_source == "commanded" else 0.0)
-    arm = float(factor(known.arm_l)[0])
+    command = factor(known.command * (vehicle.omega_source == "commanded"))
+    arm, mass = factor(known.arm_l), factor(known.mass)
     return replace(
         vehicle,
-        mass=vehicle.mass * float(factor(known.mass)[0]),
+        mass=vehicle.mass * mass.item(),
         k=vehicle.k * command * factor(known.thrust) * factor(known.rotor, 4),
         p=vehicle.p * command * factor(known.torque),
         inertia=vehicle.inertia * factor(known.inertia),
-        arm_l=vehicle.arm_l * arm,
+        arm_l=vehicle.arm_l * arm.item(),
         rotor_positions=vehicle.positions * arm,
     )
 

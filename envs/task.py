@@ -61,7 +61,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         model_in_loop: whether the flight loop counters the effects that ``vehicle`` declares.
         gains: the flight loop's.
         randomise: ``"vehicle"``: the true vehicle is drawn anew each episode, by the section
-            ``uncertainty`` of its file; filter, flight loop and designed laws keep the declared one.
+            ``uncertainty`` of its file; filter, flight loop and laws keep the declared one.
 
     Raises:
         InputError: an argument names nothing known.

@@ -113,10 +113,15 @@ def main(
     task, best = f"{__file__}:Rates", "results/rates/best.npz"
     walk = (
         ["identify", *words, "--mass", "0.027", "--geometry", "0.028", "--out", "cf.yaml"],
-        ["train", "ppo", "--task", task, "--set", "estimator=ukf-lanes", "--steps", str(steps)]
-        + ["--set", "validation={every: 100000, episodes: 10}", "--out", "results/rates"],
-        ["export-c", "--vehicle", "cf.yaml", "--controller", "lqg", "--policy", best]
-        + ["--rise-time", "0.45", "--out", "aboard", "--overwrite"],
+        [
+            *("train", "ppo", "--task", task, "--set", "estimator=ukf-lanes"),
+            *("--steps", str(steps), "--set", "validation={every: 100000, episodes: 10}"),
+            *("--out", "results/rates"),
+        ],
+        [
+            *("export-c", "--vehicle", "cf.yaml", "--controller", "lqg", "--policy", best),
+            *("--rise-time", "0.45", "--out", "aboard", "--overwrite"),
+        ],
     )
     for command in walk:
         print("$ windwrench", *command)

@@ -28,26 +28,28 @@ def flight_of(
     Raises:
         InputError: a policy of another kind, or a decision is no whole number of periods.
     """
-    task = {"decision_hz": 1.0 / WIND_PERIOD}
-    if policy is not None:
-        task = policy.card.get("flight", {})
-        known = task.get("action") in _ACTIONS and task["observation"]
-        if not known or task["gains"] != vars(FlightGains()) or "memory" in policy.card or cell_of(policy.weights):
-            raise InputError(
-                f"--policy: of {policy.task}; expected one of FanTracking, or one of dense layers "
-                f"with the kit's gains and the action {', '.join(_ACTIONS)}"
-            )
-    seconds = 1.0 / task["decision_hz"]
-    ticks = round(seconds / period)
-    if abs(ticks * period - seconds) > 1e-6 or (controller and seconds != WIND_PERIOD):
+    task = policy.card.get("flight", {}) if policy else {"decision_hz": 1.0 / WIND_PERIOD}
+    if policy and not (
+        task.get("action") in _ACTIONS
+        and task["observation"]
+        and task["gains"] == vars(FlightGains())
+        and "memory" not in policy.card
+        and cell_of(policy.weights) is None
+    ):
         raise InputError(
-            f"export-c: decisions of {seconds:g} s in steps of {period:g} s: expected whole steps "
-            f"(--rate 200), and beside {controller} decisions of {WIND_PERIOD:g} s"
+            f"--policy: of {policy.task}; expected one of FanTracking, or one of dense layers "
+            f"with the kit's gains and the action {', '.join(_ACTIONS)}"
+        )
+    ticks = 1.0 / (task["decision_hz"] * period)
+    if abs(ticks - round(ticks)) > 1e-6 or (controller and task["decision_hz"] * WIND_PERIOD != 1):
+        raise InputError(
+            f"export-c: {task['decision_hz']:g} decisions in {1.0 / period:g} steps a second: "
+            f"expected whole steps (--rate 200), and {1.0 / WIND_PERIOD:g} beside a controller"
         )
     return {
         "loop": flight_record(compile_effects(vehicle).vehicle)[0],
         "law": LQG(vehicle=vehicle) if controller else None,
         "policy": policy,
         "task": task,
-        "ticks": ticks,
+        "ticks": round(ticks),
     }

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from ctypes import create_string_buffer
 from dataclasses import replace
 
 import numpy as np
@@ -227,21 +228,21 @@ def test_laws_in_c_command_the_rotors_as_in_the_simulator(tmp_path):
     """Beside the simulator's own flight loop, by whose commands the vehicle flies."""
     vehicle = declaring(load_vehicle("crazyflie"), "motor_lag", "rotor_drag")
     rates = Rates(vehicle=vehicle)
-    size = len(rates.kept)
-    weights = {"weight0": default_rng(0).normal(0, 0.1, (4, size)), "bias0": np.zeros(4)}
-    card = {"task": "own", "activation": "tanh", "squash": False, "scale": [1.0] * size}
-    policy = TaskPolicy(card | {"largest": 1.0, "flight": flight_of(rates)}, weights)
+    ones = np.ones(len(rates.kept))
+    card = {"task": "", "activation": "tanh", "squash": False, "scale": ones, "largest": 1.0}
+    weights = {"weight0": 0.1 * np.sin(np.arange(4)[:, None] + ones.cumsum()), "bias0": np.zeros(4)}
+    policy = TaskPolicy(card | {"flight": flight_of(rates)}, weights)
     given = {"kind": "flight", "policy": policy}
     exported = export_c(
         rates.declared, "ukf", 200.0, 0.45, None, given, precision="double", controller="lqg"
     )
     c, apart, noise = CompiledFilter(exported, tmp_path), [], np.zeros(3)
+    pilot_memory = create_string_buffer(1 << 14)
 
     def begin_flight(loop):
         if loop.ticks == -SETTLE_TICKS:
             c.reset(loop.sample[4:7], loop.sample[7:])
-            c.c.ww_flight_init(c.flight)
-            assert c.fly(3, np.zeros(10), None)[0] == -5
+            c.c.ww_flight_init(pilot_memory)
 
     def compared(loop):
         c.predict(loop.sample[:4], 0.005)
@@ -251,12 +252,13 @@ def test_laws_in_c_command_the_rotors_as_in_the_simulator(tmp_path):
         felt += record["accelerometer_bias"] + record["accelerometer_sigma"] * noise
         noise[:] = loop.noise[loop.row, -3:]  # of this tick: the next step tells of it
         reference = env.many.episodes.references[0, max(loop.ticks, 0)]
-        answer, speeds = c.fly(law if loop.ticks >= 0 else 0, reference, felt)
-        assert answer == 0
-        apart.append(abs(speeds - loop.command).max())
+        now, out = (loop.ticks >= 0) * (1 + (env.action == "rates")), c._array(np.zeros(4))
+        given = c._array(reference), c._array(felt), out
+        assert c.c.ww_fly(pilot_memory, c.memory, now, *given) == 0
+        apart.append(abs(np.array(out) - loop.command).max())
 
     stages = [Stage("begin", begin_flight, "sense"), Stage("compared", compared, "actuate")]
-    for law, kind, pilot in ((1, WindTrajectoryEnv, LQG(vehicle=vehicle)), (2, Rates, policy)):
+    for kind, pilot in ((WindTrajectoryEnv, LQG(vehicle=vehicle)), (Rates, policy)):
         env = kind(vehicle=vehicle, stages=stages)
         fly_episode(env, pilot, 3, decisions=20)
         assert max(apart) < 0.01  # rad/s: actions are of single precision there
@@ -266,11 +268,9 @@ def test_laws_in_c_command_the_rotors_as_in_the_simulator(tmp_path):
 
 def test_policies_that_no_flight_loop_knows_are_refused():
     with refused("expected one of FanTracking, or one of dense"):
-        export_c(VEHICLE, policy=exportable_policy("WindHover-gru-0"))
-    with refused("unknown controller 'pid'"):
-        export_c(VEHICLE, controller="pid")
-    with refused("expected whole steps"):
-        export_c(VEHICLE, rate=90.0, controller="lqg")
+        export_c(
+            VEHICLE, policy=exportable_policy(str(POLICY.parent / "tasks/WindHover-gru-0.npz"))
+        )
 
 
 def test_the_example_finds_the_force_that_it_is_given(tmp_path):

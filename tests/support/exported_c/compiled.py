@@ -62,9 +62,10 @@ class CompiledFilter:
         write(exported, folder)
         header = exported.files["windwrench.h"]
         lines = ['#include "windwrench.h"']
-        types = {"filter": "ww_filter", "policy": "ww_policy_memory", "flight": "ww_flight"}
-        there = {name: type_ for name, type_ in types.items() if f"}} {type_};" in header}
-        for name, type_ in there.items():
+        with_policy = "ww_policy" in header
+        for name, type_ in (("filter", "ww_filter"), ("policy", "ww_policy_memory"))[
+            : 1 + with_policy
+        ]:
             head = f"unsigned size_of_{name}(void)"
             lines += [f'extern "C" {head};', f"{head} {{ return (unsigned)sizeof({type_}); }}"]
         (folder / "size.cpp").write_text("\n".join([*lines, ""]))
@@ -80,9 +81,7 @@ class CompiledFilter:
         self.c.ww_predict.argtypes = [ctypes.c_void_p, pointer, self._number]
         self.memory = ctypes.create_string_buffer(int(self.c.size_of_filter()))
         self._now = _estimate_type("gyro_bias" in header, self._number)()
-        if "flight" in there:
-            self.flight = ctypes.create_string_buffer(int(self.c.size_of_flight()))
-        if "policy" in there:
+        if with_policy:
             self.c.ww_policy.restype = self._number
             self.policy_bytes = int(self.c.size_of_policy())
             self._policy = ctypes.create_string_buffer(self.policy_bytes)
@@ -115,12 +114,6 @@ class CompiledFilter:
     def policy(self, estimate):
         """Call ww_policy."""
         return float(self.c.ww_policy(self._policy, ctypes.byref(estimate)))
-
-    def fly(self, law, reference, accelerometer):
-        """Call ww_fly; return its answer and the rotor speeds."""
-        out = self._array(np.zeros(4))
-        given = self._array(reference), self._array(accelerometer)
-        return self.c.ww_fly(self.flight, self.memory, law, *given, out), np.array(out)
 
     @property
     def estimate(self):
