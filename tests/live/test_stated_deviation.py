@@ -11,9 +11,9 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c.compiled import CompiledFilter, begin, needs, take
+from tests.support.model_flights import drawn
 from tests.support.vehicles import VEHICLE
 from windwrench.envs.recording import record_flight
-from windwrench.envs.scenarios import draw_vehicle
 from windwrench.estimator import WrenchUKFBatch
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log
@@ -34,7 +34,7 @@ STATED = ("std_torque", "std_force")
 def flights():
     """Circles of drawn vehicles, measured with the declared noise."""
     return [
-        record_flight(draw_vehicle(VEHICLE, default_rng(seed)), (), "circle", 5.0, seed)
+        record_flight(drawn(VEHICLE, default_rng(seed)), (), "circle", 5.0, seed)
         | {"dt": np.full(STEPS + 1, 0.005)}
         for seed in range(COUNT)
     ]
