@@ -189,6 +189,7 @@ class ClosedLoop:
         kind: commands in ``action``, once the filter has settled.
         stages: a user's own, in the pipeline of a tick.
         like: a loop whose MuJoCo model is this one's, too, if the rigid bodies are the same.
+        rotors: (4, 3) m, where winds meet the rotors; default: the true vehicle's.
 
     Attributes:
         state: (20,) estimated state, laid out as in ``estimator.estimate``.
@@ -227,6 +228,7 @@ class ClosedLoop:
         kind: int = BESIDE,
         stages: Sequence[Stage] = (),
         like: ClosedLoop | None = None,
+        rotors: Array | None = None,
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
@@ -242,7 +244,8 @@ class ClosedLoop:
         loop["model_in_loop"], self.kind = model_in_loop, kind
         self.jet_table = _NO_JET
         if fan is not None:
-            loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
+            places = self._body.positions if rotors is None else rotors
+            loop["fan"] = fan_record(fan, places, TICK)[0]
             loop["fan"]["blown"] = 1  # drag, in still air too
             self.jet_table = _jet(fan.radius, fan.hub_radius)
         self.accelerometer = accelerometer

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -25,7 +26,7 @@ from .fan import Fan
 from .observations import FELT, as_numbers, bounds, parts
 from .plant import TICK, PlantSettings
 from .references import along
-from .scenarios import Drawn, find_scenario
+from .scenarios import Drawn, draw_vehicle, find_scenario
 from .state import REFERENCE_SIZE, Episodes, Flags, Frame, Start, State
 from .wind import Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_winds
@@ -53,6 +54,7 @@ class TaskDefinition:
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2)  # commanded, for velocities and accelerations
     follows: ClassVar[bool] = True  # whether accelerations are beside a flight to the reference
     model_in_loop: bool = True
+    randomise: str | None = None  # "vehicle": the true vehicle's numbers are drawn each episode
     accelerometer: ClassVar[tuple[float, float] | None] = ACCELEROMETER
     label: ClassVar[str] = "trajectory"  # entry of ``info`` with the name of the episode's draw
     draws: ClassVar[int] = 20  # at most, until an episode begins with the vehicle not lost
@@ -85,6 +87,7 @@ class TaskDefinition:
         winds: Sequence[Wind] | None = None,
         model_in_loop: bool | None = None,
         gains: FlightGains | None = None,
+        randomise: str | None = None,
     ) -> None:
         name = self.name
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -114,10 +117,17 @@ class TaskDefinition:
             "decision_hz": decision_hz,
             "episode_s": episode_s,
             "model_in_loop": model_in_loop,
+            "randomise": randomise,
         }
         for field, value in fields.items():
             if value is not None:
                 setattr(self, field, value)
+        stated = any(vars(self.truth.uncertainty).values())
+        if self.randomise and not (stated and self.randomise == "vehicle"):
+            raise InputError(
+                f"{name}: randomise: expected 'vehicle', and an uncertainty in the vehicle's file "
+                f"such as {{thrust: 0.03}}; got {self.randomise!r} and {self.truth.name}"
+            )
         sees = self._source("observe")
         if observation is None and type(self).observation != sees.observation:
             observation = type(self).observation
@@ -297,6 +307,7 @@ class TaskDefinition:
             kind=self.flown.kind,
             stages=self.stages,
             like=self._made,
+            rotors=self.truth.positions,  # lanes share one wind's stations
             **{**defaults, **given},
         )
         return self._made
@@ -305,21 +316,22 @@ class TaskDefinition:
         return self.__dict__ | {"_made": None}
 
     def draw_loop(self, rng: np.random.Generator, kept: dict[Any, ClosedLoop]) -> ClosedLoop:
-        """Return the closed loop of a world's episode. A scenario with a varied vehicle draws a new
-        loop; otherwise the world's ``kept`` loop flies again.
+        """Return the closed loop of a world's episode. A scenario with a varied vehicle and
+        ``randomise`` draw a new loop; otherwise the world's ``kept`` loop flies again.
         """
-        if not self.scenario.varied:
+        if not (self.scenario.varied or self.randomise):
             self.drawn = {}
             if self.scenario not in kept:
                 kept[self.scenario] = self.make_loop(self.truth, self.fan)
             return kept[self.scenario]
-        fan, truth, drawn = self.fan, self.truth, self.scenario.variation.draw(rng)
-        self.drawn = drawn
+        truth = draw_vehicle(self.truth, rng) if self.randomise else self.truth
+        self.drawn = self.scenario.variation.draw(rng) if self.scenario.varied else {}
+        drawn = defaultdict(lambda: 1.0, self.drawn)
         fan = replace(
-            fan,
-            speed=fan.speed * drawn.get("fan_speed", 1.0),
-            rotor_drag=fan.rotor_drag * drawn["rotor_drag"],
-            hull_area=fan.hull_area * drawn["hull_area"],
+            self.fan,
+            speed=self.fan.speed * drawn["fan_speed"],
+            rotor_drag=self.fan.rotor_drag * drawn["rotor_drag"],
+            hull_area=self.fan.hull_area * drawn["hull_area"],
         )
         mass, inertia = truth.mass * drawn["mass"], truth.inertia * drawn["inertia"]
         return self.make_loop(replace(truth, mass=mass, inertia=inertia), fan)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar, cast
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from ..controllers.briefing import PLACES
-from ..dynamics.vehicle import NotNegative
+from ..dynamics.vehicle import NotNegative, Vehicle
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.forms import STRICT, Positive, checked, expected
 from ..runtime.python_file import is_file_name, named_in_file
@@ -114,6 +114,28 @@ def kept_scenarios(section: str, form: type[AnyScenario]) -> dict[str, AnyScenar
 
 
 SCENARIOS = kept_scenarios("fan", Scenario)
+
+
+def draw_vehicle(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
+    """Return a vehicle as the true one may be where ``vehicle`` is declared: each number times
+    ``exp(share z)``, with the shares of its ``uncertainty`` and standard normal ``z``.
+    """
+    known = vehicle.uncertainty
+
+    def factor(share: float, size: int = 1) -> Array:
+        return np.exp(share * rng.standard_normal(size))
+
+    command = factor(known.command * (vehicle.omega_source == "commanded"))
+    arm, mass = factor(known.arm_l), factor(known.mass)
+    return replace(
+        vehicle,
+        mass=vehicle.mass * mass.item(),
+        k=vehicle.k * command * factor(known.thrust) * factor(known.rotor, 4),
+        p=vehicle.p * command * factor(known.torque),
+        inertia=vehicle.inertia * factor(known.inertia),
+        arm_l=vehicle.arm_l * arm.item(),
+        rotor_positions=vehicle.positions * arm,
+    )
 
 
 def scenarios_in(path: str, known: Mapping[str, AnyScenario]) -> dict[str, AnyScenario]:

@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..controllers.flight import FlightGains
 from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
+from ..envs.definition import TaskDefinition
 from ..evaluation.episodes import fly_episode
 from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
+from ..runtime.plain_values import plain
 from ..runtime.provenance import package_versions
 from ..runtime.regular_files import read_json
 from .configuration import Config, features_of
@@ -115,6 +118,25 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
     }
 
 
+def flight_of(task: TaskDefinition) -> dict[str, Any]:
+    """Return a task's numbers for a flight of its policy elsewhere: the kind of observation (None:
+    the task's own) with limits and divisors, the action with its commands, decisions a second, and
+    the gains of the flight loop.
+    """
+    own = task.chosen is None and type(task).observe is not TaskDefinition.observe
+    numbers = {
+        **vars(task.flown),
+        "action": task.action,
+        "observation": None if own else task.observation,
+        "decision_hz": task.decision_hz,
+        "gains": task.gains or FlightGains(),
+        "limits": task.kept,
+        "divisors": task.divisors,
+    }
+    entries: dict[str, Any] = plain(numbers)
+    return entries
+
+
 def validate(
     policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int
 ) -> tuple[float, int, bool]:
@@ -209,8 +231,11 @@ class Run:
     def card(self, steps: int) -> dict[str, Any]:
         """Return the card of the policy after ``steps`` decisions."""
         card = card_of(self.config, self.scenario, self.seed, steps) | self.own
-        unseen = ("features", "repeat") if "task" in card else ()
-        return {key: value for key, value in card.items() if key not in unseen}
+        if "task" not in card:
+            return card
+        del card["features"], card["repeat"]
+        world = self.judge.unwrapped
+        return card | ({"flight": flight_of(world)} if isinstance(world, TaskDefinition) else {})
 
     def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
         """Validate a policy, and save the policy as the last, and as the best if no earlier policy

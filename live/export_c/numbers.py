@@ -48,10 +48,11 @@ def shape(values: ArrayLike) -> str:
     return "".join(f"[{n}]" for n in np.shape(values))
 
 
-def filters(precision: str) -> dict[str, Callable[..., str]]:
+def filters(precision: str) -> dict[str, Callable[..., object]]:
     """Return the templates' filters for numbers in a precision."""
     return {
         "literal": lambda value, what="a number": literal(value, precision, what),
         "table": lambda values, what="a number": table(values, precision, what),
         "shape": shape,
+        "ravelled": np.ravel,
     }

@@ -111,7 +111,9 @@ def prepare(page, folder):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             kept = ROOT / "training" / "policies" / f"sac-0{ending}"
             shutil.copy(kept, folder / f"{name}{ending}")
-    for name in re.findall(r"\bB\d\w+\.csv\b", page.read_text(encoding="utf-8")):
+    if page.name == "own-vehicle.md":
+        shutil.copytree(ROOT / "examples", folder, dirs_exist_ok=True)
+    for name in {*re.findall(r"\b(?:B\d\w+\.csv|log1\d)\b", page.read_text(encoding="utf-8"))}:
         found = next(iter(DATA.rglob(name)), None)
         if found is None:
             pytest.skip(f"{page.name} reads the measured flight {name}, which is not here")
