@@ -3,12 +3,12 @@ settings.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from ...dynamics.effects import Role, get, playing
-from ..logs.table import Array, ArrayMap, Pair
+from ..logs.table import Array, ArrayMap, Pair, Values
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
@@ -87,15 +87,15 @@ class RowLikelihood:
         A gust acts like the wind, through each drag and by the flight's airspeed. As a force of its
         own, or as a noise, the gusts of a periodic flight pass for more drag and less wind.
         """
-        setting = {**self.rows.fixed, **setting}
+        whole: Mapping[str, Values] = {**self.rows.fixed, **setting}
         winds = [
             (e, c.name)
-            for e in setting
+            for e in whole
             if get(e).sets_wind
             for c in get(e).coefficients
             if c.unit == "m/s"
         ]
-        std = GUST_STD * math.hypot(*(setting[e].get(name, 0.0) for e, name in winds))
+        std = GUST_STD * math.hypot(*(whole[e].get(name, 0.0) for e, name in winds))
         t = np.concatenate([[0.0], np.cumsum(np.diff(self.rows.t) * ~self.rows.begins[1:])])
         rate = np.arange(1, int(2.0 * GUST_HZ * t[-1]) + 1) * math.pi / t[-1]
         size = std * np.sqrt(4.0 * GUST_TIME / t[-1] / (1.0 + np.square(rate * GUST_TIME)))

@@ -113,12 +113,13 @@ def turning_delay(
     # the slopes' own scatter counts where larger
     slopes = [x for _, x in seen(seconds)]
     count = len(slopes)
-    flights = np.array([x.sum() for x in slopes]) * math.sqrt(count / max(count - 1, 1))
+    sums = np.array([x.sum() for x in slopes]) * math.sqrt(count / max(count - 1, 1))
+    flights = float(sums @ sums)
     # W. K. Newey and K. D. West, Econometrica 55 (1987), 703-708
     x = np.concatenate(slopes)
     lagged = [x[i:] @ x[: len(x) - i] for i in range(MEMORY)]
-    lasting = 2.0 * np.linspace(1.0, 0.0, MEMORY + 1)[:-1] @ lagged - lagged[0]
-    std = math.sqrt(max(2.0 * bend, flights @ flights, lasting)) / max(bend, 1e-6)
+    lasting = float(2.0 * np.linspace(1.0, 0.0, MEMORY + 1)[:-1] @ lagged - lagged[0])
+    std = math.sqrt(max(2.0 * bend, flights, lasting)) / max(bend, 1e-6)
     # a lag delays each frequency differently, and the frequencies shown by the loop are not known
     omega = spectra[0].omega
     spread = float(np.std(behind(omega, 0.0) / omega))
@@ -141,5 +142,6 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> _Spectra:
         for z in (moments, piece.angular_acceleration[:, :2])
     )
     share = len(moments) / length / len(x)
-    power = (np.square(np.abs(z)) + 1e-300 for z in (x, y))
-    return _Spectra(2.0 * np.pi * f[band, None], *power, np.conj(x) * y, share)
+    moment, turning = np.square(np.abs(x)), np.square(np.abs(y)) + 1e-300
+    omega = np.asarray(2.0 * np.pi * f[band, None], dtype=np.float64)
+    return _Spectra(omega, moment, turning, np.conj(x) * y, share)
