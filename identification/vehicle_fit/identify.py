@@ -102,7 +102,7 @@ def identify(
             "only what is slower was used"
         )
     if sources.force == "accelerometer" and sources.velocity:
-        prior = fit.model.prior | dict.fromkeys(BIASES, POSED_BIAS)
+        prior = {**fit.model.prior, **dict.fromkeys(BIASES, POSED_BIAS)}
         fit = solve(pieces, fit.drive, replace(fit.model, prior=prior), fit.theta)
     report(0.5, "asking what else shows")
     fit, kept, hidden = _with_optional(pieces, fit, sources)
