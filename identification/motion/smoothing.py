@@ -157,8 +157,7 @@ def power_spectrum(x: Array, period: float, length: int) -> tuple[Array, Array]:
     parts = window * (parts - parts.mean(axis=1, keepdims=True))
     power = 2.0 * period * mean_square(np.abs(np.fft.rfft(parts, axis=1))) / np.sum(window**2)
     power[[0, -1] if length % 2 == 0 else 0] /= 2.0
-    frequencies: Array = np.fft.rfftfreq(length, period)
-    return frequencies, power
+    return np.arange(length // 2 + 1) / (length * period), power
 
 
 def turning(quaternion: Array, period: float) -> tuple[Array, Array]:
