@@ -16,15 +16,11 @@ from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning, WrenchEstimate
 from ..estimator.estimate import (
     COASTING,
-    FORCE,
     MODEL,
-    NIS,
     POSITION,
     QUATERNION,
-    RATE,
     STATE_SIZE,
     STATUS,
-    TORQUE,
     TRACKING,
     VELOCITY,
     WITHOUT_COVARIANCE,
@@ -57,23 +53,19 @@ def inertial_wrench(
     """
     noise, count = imu_noise(log), len(log.t)
     numbers, std = np.zeros((count, WITHOUT_COVARIANCE)), np.full((count, 18), np.nan)
-    numbers[:, STATUS] = COASTING
-    table = np.zeros((count, STATE_SIZE + 6 + LOAD[0] * LOAD[1]))
-    before = 0
     pieces = inertial_signals(log, vehicle.gravity)
-    for number, s in enumerate(pieces):
-        # rows between two pieces hold the values of the nearer end of the one before
-        end = count if number + 1 == len(pieces) else int(np.searchsorted(log.t, s.t[-1]) + 1)
-        t = log.t[before:end]
-        table[before:end] = resampled(t, s.t, _piece(s, vehicle, tuning, log.period, noise))
+    # rows between two pieces hold the values of the nearer end of the one before
+    cuts = np.searchsorted(log.t, [s.t[-1] for s in pieces[:-1]]) + 1
+    tables = []
+    for s, rows in zip(pieces, np.split(np.arange(count), cuts), strict=True):
+        t = log.t[rows]
+        tables.append(resampled(t, s.t, _piece(s, vehicle, tuning, log.period, noise)))
         inside = (t >= s.t[0]) & (t <= s.t[-1] + log.period)
-        numbers[before:end, STATUS] = np.where(inside, TRACKING, COASTING)
-        before = end
+        numbers[rows, STATUS] = np.where(inside, TRACKING, COASTING)
     numbers[:, :STATE_SIZE], std[:, 12:], loads = np.split(
-        table, [STATE_SIZE, STATE_SIZE + 6], axis=1
+        np.concatenate(tables), [STATE_SIZE, STATE_SIZE + 6], axis=1
     )
     loads = loads.reshape(-1, *LOAD)
-    numbers[:, NIS] = np.nan
     if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from both
         numbers[:, POSITION], numbers[:, VELOCITY] = np.nan, np.nan
     quaternion = numbers[:, QUATERNION]
@@ -120,14 +112,13 @@ def _piece(
     turned = np.square(s.rotation)
     std_force = np.sqrt(spread[:3] ** 2 + turned @ (body.mass * s.bias_std) ** 2)
     std_torque = np.sqrt(turned @ spread[3:] ** 2)
-    state = np.zeros((len(s.t), STATE_SIZE))
-    state[:, POSITION], state[:, VELOCITY] = s.position, s.velocity
-    state[:, RATE] = s.angular_velocity
-    state[:, QUATERNION] = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
+    quaternion = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
     torque = np.einsum("nij,jk,nkc->cni", s.rotation, body.inertia, torque)
-    state[:, TORQUE], state[:, FORCE] = torque[0], force[:, :, 0]
-    loads = *torque[1:3], force[:, :, 1], force[:, :, 2], *torque[3:]
-    return np.column_stack([state, std_torque, std_force, *loads])
+    outer, *pushed = np.moveaxis(force, 2, 0)
+    state = s.position, quaternion, s.velocity, s.angular_velocity, torque[0], outer
+    no_nis = np.full(len(s.t), np.nan)
+    loads = *torque[1:3], *pushed, *torque[3:]
+    return np.column_stack([*state, no_nis, std_torque, std_force, *loads])
 
 
 def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array], list[Array]]:
@@ -176,7 +167,7 @@ def _notes(log: FlightLog, pieces: list[InertialSignals], vehicle: Vehicle) -> N
             "gyro and accelerometer were smoothed together with the "
             + ("poses" if log.valid.any() else "positions"),
         )
-    bias = vehicle.mass * float(np.max([s.bias_std for s in pieces]))
+    bias = vehicle.mass * np.max([s.bias_std for s in pieces])
     return (
         "the log has no pose: the wrench is read from gyro and accelerometer. Its force is "
         "along level axes, horizontal ones as the vehicle pointed at the start, which drift "

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,10 +48,9 @@ class JetShape(NamedTuple):
     peaks: Array  # (2,) m, where they are; beyond, the fan is lost
     edges: Array  # (2,) m; beyond, the torque is below a fifth of the largest
 
-    @property
-    def weaker(self) -> float:
-        """The smaller one of the two largest torques, Nm."""
-        return float(min(-self.torques[0], self.torques[1]))
+    def bounds(self, gains: Array) -> Array:
+        """Return the speeds (g,) m/s that gains (g,) ask for at the weaker peak, at most."""
+        return np.asarray(np.minimum(gains * np.abs(self.torques).min(), MAX_COMMAND))
 
 
 def shape_of(place: Array, torque: Array) -> JetShape | None:
@@ -61,26 +60,25 @@ def shape_of(place: Array, torque: Array) -> JetShape | None:
     low, high = ends = np.array([np.argmin(torque), np.argmax(torque)])
     if low >= high or torque[low] >= 0.0 or torque[high] <= 0.0:
         return None
-    rising = low + np.flatnonzero(torque[low + 1 : high + 1] >= 0.0)[0]
-    axis = np.interp(0.0, torque[[rising, rising + 1]], place[[rising, rising + 1]])
+    rising = low + np.argmax(torque[low + 1 : high + 1] >= 0.0) + [0, 1]
+    axis = np.interp(0.0, torque[rising], place[rising])
     ahead, behind = (np.interp(place[low : high + 1] + d, place, torque) for d in (0.1, -0.1))
-    inside = torque < EDGE_SHARE * torque[low], torque > EDGE_SHARE * torque[high]
-    left = low - np.argmin(np.append(inside[0][low::-1], False)) + 1
-    right = high + np.argmin(np.append(inside[1][high:], False)) - 1
-    slope = float((ahead - behind).max()) / 0.2
+    left = low - np.argmin(np.append(torque[low::-1] < EDGE_SHARE * torque[low], False)) + 1
+    right = high + np.argmin(np.append(torque[high:] > EDGE_SHARE * torque[high], False)) - 1
+    slope = (ahead - behind).max() / 0.2
     edges = place[[left, right]]
     return JetShape(place, torque, float(axis), slope, torque[ends], place[ends], edges)
 
 
 def no_jet(place: Array, torque: Array, std: Array) -> str:
     """Return why a profile (n,) with standard deviations allows no law; empty: it allows one."""
-    sure = float(np.max(-torque / std)), float(np.max(torque / std))
-    if max(sure) < SURE:
+    sure = torque / std
+    if (most := np.abs(sure).max()) < SURE:
         return (
             "the torque about z is not distinguishable from zero: at most "
-            f"{max(sure):.1f} standard deviations, {SURE:g} are needed"
+            f"{most:.1f} standard deviations, {SURE:g} are needed"
         )
-    if min(sure) < SURE:
+    if min(sure.max(), -sure.min()) < SURE:
         return "the torque about z does not change its sign: fly on both sides of a jet"
     shape = shape_of(place, torque)
     if shape is None:
@@ -109,22 +107,24 @@ class FollowingLoop:
         """
         answer = gain * self.response
         phase = np.unwrap(np.angle(answer))
-        crossed = int(np.flatnonzero(np.abs(answer) >= 1.0)[-1])
+        crossed = np.flatnonzero(np.abs(answer) >= 1.0)[-1]
         # an integrator at first: a quarter turn behind
         turns = round(phase[0] / (2.0 * math.pi) + 0.25)
-        margin = math.pi + float(phase[crossed]) - 2.0 * math.pi * turns
+        margin = float(phase[crossed]) - math.pi * (2 * turns - 1)
         return margin, margin / float(_OMEGA[crossed])
 
     @cached_property
     def response(self) -> Any:
         """Answer (n,) of the felt place to a commanded velocity at the frequencies ``_OMEGA``."""
-        z = np.exp(1j * _OMEGA * DECISION_PERIOD)[:, None, None]
-        felt = np.linalg.solve(z * np.eye(3) - self.keep, self.enter[:, None])[:, 2, 0]
-        moved = np.linalg.solve(z * np.eye(len(self.push)) - self.carry, self.push[:, None])
-        return (1.0 - felt * (z[:, 0, 0] - 1.0)) * (moved[..., 0] @ self.show)
+        z = np.exp(1j * _OMEGA * DECISION_PERIOD)
+        felt, moved = (
+            np.linalg.solve(z[:, None, None] * np.eye(len(b)) - A, b[:, None])[..., 0]
+            for A, b in ((self.keep, self.enter), (self.carry, self.push))
+        )
+        return (1.0 - felt[:, 2] * (z - 1.0)) * (moved @ self.show)
 
 
-@lru_cache(maxsize=1)
+@cache
 def _flight_loop() -> tuple[Array, Array, Array]:
     """Return the kit's flight loop along one axis, from decision to decision."""
     from scipy.signal import cont2discrete, tf2ss
@@ -144,9 +144,9 @@ def following_loop(
     """Return the loop of a vehicle with this inertia (kg m2), wrench filter, and measured noise
     (k, 2), under the kit's flight loop.
     """
-    f = filter_noise
-    steps = max(1, round(DECISION_PERIOD / f.period))
-    lag = axis_lag(inertia_z, (f.torque, f.torque_walk, f.attitude), Air(), f.period, steps)
+    period = filter_noise.period
+    assumed = filter_noise.torque, filter_noise.torque_walk, filter_noise.attitude
+    lag = axis_lag(inertia_z, assumed, Air(), period, max(1, round(DECISION_PERIOD / period)))
     return FollowingLoop(lag.keep, lag.enter, *_flight_loop(), noise)
 
 
@@ -193,7 +193,7 @@ def followed(
 
 def fastest_followed(loop: FollowingLoop, jet: JetShape, gains: Array) -> Array:
     """Return the fastest fan (g,) m/s that each gain follows in ``HELD_SHARE`` of its flights."""
-    speeds = np.minimum(gains * jet.weaker, MAX_COMMAND)[:, None] * _SHARES
+    speeds = jet.bounds(gains)[:, None] * _SHARES
     shares = np.minimum.accumulate(followed(loop, jet, gains, speeds)[0], axis=1)
     rows = zip(shares[:, ::-1], speeds[:, ::-1], strict=True)
     return np.array([np.interp(HELD_SHARE, *row) for row in rows])
@@ -222,13 +222,13 @@ def design_admittance(
     wanted = 0.5 * float(fastest.max()) if speed is None else speed
     alike = np.tile(wanted * np.linspace(0.0, 1.0, 5), (len(gains), 1))
     offsets = followed(loop, jet, gains, alike, 1)[1].mean(axis=1)
-    best = int(np.argmin(offsets))
-    gain, crossing = float(gains[best]), crossings[best]
+    best = np.argmin(offsets)
+    crossing = crossings[best]
     margin, delay = loop.margins(crossing)
     slow = [rise for rise in RISE_TIMES if lagging(rise).margins(crossing)[0] >= MARGIN]
     return {
-        "gain": gain,
-        "bound_m_s": min(gain * jet.weaker, MAX_COMMAND),
+        "gain": float(gains[best]),
+        "bound_m_s": float(jet.bounds(gains)[best]),
         "fastest_fan_m_s": float(fastest[best]),
         "designed_up_to_m_s": wanted,
         "offset_rms_m": float(offsets[best]),

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..controllers.briefing import FilterNoise
-from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
+from ..controllers.observation import DECISION_PERIOD
 from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning
 from ..runtime.errors import InputError
@@ -98,7 +98,7 @@ def profile_log(
     def loop(rise: float, *noise: Array) -> FollowingLoop:
         tuning = UKFTuning.for_vehicle(vehicle, log.period, rise)
         noise_of = FilterNoise.of(tuning, log.period)
-        return following_loop(float(vehicle.inertia[2, 2]), noise_of, *noise)
+        return following_loop(vehicle.inertia[2, 2], noise_of, *noise)
 
     own = UKFTuning.for_vehicle(vehicle, log.period, rise_time)
     shown = estimate_log(log, vehicle, own)
@@ -109,14 +109,14 @@ def profile_log(
     law = design_admittance(flying, loop, shape, speed)
     if law is None:
         return found("the torque's noise lets no gain follow a fan", shape, None)
-    drawn = []
-    for torque in profile.torque_draws:
-        if one := shape_of(profile.place, torque):
-            bound = min(law["gain"] * one.weaker, MAX_COMMAND)
-            drawn.append((bound, *fastest_followed(flying, one, np.array([law["gain"]]))))
-    ends = np.quantile(drawn, (0.025, 0.975), axis=0).T.tolist()
-    names = "bound_ci95_m_s", "fastest_fan_ci95_m_s"
-    return found("", shape, law | dict(zip(names, ends, strict=True)))
+    gain = np.array([law["gain"]])
+    drawn = [
+        (jet.bounds(gain), fastest_followed(flying, jet, gain))
+        for torque in profile.torque_draws
+        if (jet := shape_of(profile.place, torque))
+    ]
+    bound, fastest = np.quantile(drawn, (0.025, 0.975), axis=(0, 2)).T.tolist()
+    return found("", shape, law | {"bound_ci95_m_s": bound, "fastest_fan_ci95_m_s": fastest})
 
 
 def _noise(
@@ -129,12 +129,12 @@ def _noise(
     rows = np.searchsorted(series.t, t)
     place = profile.along(series.position)[rows]
     true = np.interp(place, profile.place, profile.torque)
-    error, expected = np.zeros(3), true.copy()
-    for k, change in enumerate(np.diff(true, prepend=true[:1])):
+    error, felt = np.zeros(3), []
+    for change in np.diff(true, prepend=true[:1]):
         error = loop.keep @ error + loop.enter * change
-        expected[k] -= error[2]
+        felt.append(error[2])
     way = uniform_filter1d(place, round(_SLOW / DECISION_PERIOD), mode="nearest")
-    noise = np.column_stack([series.torque[rows, 2] - expected, place - way])
+    noise = np.column_stack([series.torque[rows, 2] - (true - felt), place - way])
     low, high = jet.edges
     inside = noise[(place > low) & (place < high) & finite_rows(noise)]
     return np.asarray(inside - inside.mean(axis=0)) if len(inside) else inside

@@ -42,7 +42,7 @@ from ..runtime.threads import one_thread
 from .inertial_wrench import inertial_wrench
 from .logs.flight_log import MOTOR_RATES, FlightLog, between_samples
 from .logs.screening import screen_log
-from .logs.table import Array, ArrayPair, Names, Rows, finite_rows
+from .logs.table import Array, Names, Rows, finite_rows
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 from .motion.smoothing import mean_square
@@ -210,8 +210,7 @@ def pose_notes(log: FlightLog, vehicle: Vehicle) -> Names:
         return ()
     if log.commanded:
         vehicle = replace(vehicle, omega_source="commanded")
-    estimate, _ = _filtered(log, WrenchUKF(vehicle, None, log.period, GATE))
-    return tuple(_notes(log, estimate, False))
+    return tuple(_notes(log, _filtered(log, WrenchUKF(vehicle, None, log.period, GATE))[0], False))
 
 
 def counts(series: WrenchSeries) -> dict[str, int]:
@@ -221,24 +220,23 @@ def counts(series: WrenchSeries) -> dict[str, int]:
 
 def uncertainty_note(series: WrenchSeries) -> str:
     """Return the accuracy of force and torque in words, with the largest part of it."""
-    force = _largest_part(series, series.std_force, 3, "N")
-    force = f"One standard deviation of the force is {force}"
+    force = f"One standard deviation of the force is {_largest_part(series, slice(3, 6), 'N')}"
     if not np.isfinite(series.std_torque).any():
         return force
-    return f"{force}; of the torque, {_largest_part(series, series.std_torque, 0, 'Nm')}"
+    return f"{force}; of the torque, {_largest_part(series, slice(3), 'Nm')}"
 
 
-def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> str:
-    """Return the deviation (N, 3) of three numbers in words; ``first`` of torque and force."""
+def _largest_part(series: WrenchSeries, axes: slice, unit: str) -> str:
+    """Return the deviation of three ``axes`` of torque and force in words."""
     parts = {
         f"{NAMES[name]}, +-{100.0 * getattr(series.vehicle.uncertainty, name):.3g} %"
         f"{' between days' if name == 'command' else ''},": np.mean(
-            variances_along(factors, series.loads)[:, first : first + 3]
+            variances_along(factors, series.loads)[:, axes]
         )
         for name, factors in factors_alone(series.vehicle).items()
     }
-    parts["noise"] = np.mean(np.square(series.std[:, 12 + first : 15 + first]))
-    total = np.mean(np.square(std))
+    parts["noise"] = np.mean(np.square(series.std[:, 12:][:, axes]))
+    total = np.mean(np.square(series.std_wrench[:, axes]))
     parts["what the rotors do between samples"] = total - sum(parts.values())
     name = max(parts, key=parts.__getitem__)
     return (
@@ -311,13 +309,7 @@ def _of_poses(
     position = np.where(log.valid[:, None], log.position, np.nan)
     try:
         return judge(
-            vehicle,
-            log.t,
-            log.rotor_speeds,
-            position,
-            log.quaternion,
-            log.voltage,
-            tuning=tuning,
+            vehicle, log.t, log.rotor_speeds, position, log.quaternion, log.voltage, tuning
         )
     except InputError as error:
         raise InputError(f"{log.source or log.name}: {error}") from error
@@ -362,19 +354,17 @@ def write_wrench(series: WrenchSeries, path: Path) -> None:
             series.std_force,
             series.std_torque,
             series.nis,
-            series.numbers[:, STATUS],
+            series.status_code,
         ]
     )
     write_csv(dict(zip(COLUMNS, values.T, strict=True)), path)
 
 
-def truth_rmse(series: WrenchSeries, log: FlightLog) -> ArrayPair | None:
-    """Return the RMSE (3,) of force in N and (3,) of torque in Nm against the log's truth, or None
+def truth_rmse(series: WrenchSeries, log: FlightLog) -> Array | None:
+    """Return the RMSE (2, 3) of force in N and of torque in Nm against the log's truth, or None
     without one.
     """
     if log.force is None or log.torque is None:
         return None
-    return (
-        np.sqrt(mean_square(series.force - log.force)),
-        np.sqrt(mean_square(series.torque - log.torque)),
-    )
+    errors = series.force - log.force, series.torque - log.torque
+    return np.sqrt(mean_square(np.stack(errors, axis=1)))

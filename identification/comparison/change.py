@@ -71,8 +71,8 @@ SURE = 0.95  # least probability of a place named without a doubt
 class Change(NamedTuple):
     """The change from the flights ``before`` to the flights ``after``."""
 
-    before: tuple[Trim, ...]
-    after: tuple[Trim, ...]
+    before: Sequence[Trim]
+    after: Sequence[Trim]
     difference: Array  # (4,) left - right, front - rear, diagonals, logarithm of the total
     std: Array  # (4,) deviation of the difference, if nothing changed
     # probabilities of "nowhere", each rotor, each side, "all rotors" and "something else"; sum: 1
@@ -109,7 +109,10 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     ways = difference(after, before)
     moved = ways.mean[:, None]
     unchanged = ways.variance
-    unchanged[:, 3] += (_VOLTAGE_POWER * _voltage_ratio(after, before)) ** 2
+    # a correction of the total by the voltage would hide a change: a heavier vehicle draws more and
+    # pulls its battery down
+    late, early = (np.log([trim.voltage for trim in group]).mean() for group in (after, before))
+    unchanged[:, 3] += (_VOLTAGE_POWER * np.nan_to_num(late - early)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
 
     def logs_of(means: Array, spread: Array) -> Array:
@@ -134,7 +137,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
             spread = np.linalg.norm(means, axis=1)[:, None] * np.array(_BEND)
         every = logs_of(means, spread) + prior
         weights = softmax(every)
-        middle = float(amounts @ weights)
+        middle = amounts @ weights
         std = math.sqrt(np.square(amounts - middle) @ weights)
         each = (1.0 - _UNCHANGED) * share / sum(_CHANGES.values())
         found[place, kind] = logsumexp(every) + math.log(each), middle, std
@@ -144,8 +147,8 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
     likely = np.exp(ways.log)
     return Change(
-        tuple(before),
-        tuple(after),
+        before,
+        after,
         likely @ ways.mean,
         np.sqrt(likely @ unchanged),
         places,
@@ -153,17 +156,6 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         kinds.get("carries more", 0.0),
         *found[likeliest, max(kinds, key=kinds.__getitem__)][1:],
     )
-
-
-def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
-    """Return the logarithm of the mean voltages' ratio; zero where a flight has none.
-
-    The ratio makes the total less certain, and is not taken off the total: a heavier vehicle draws
-    more and pulls its battery down, so a correction would hide the change in question.
-    """
-    volts = ([trim.voltage for trim in group] for group in (after, before))
-    late, early = (np.log(np.array(group, dtype=np.float64)).mean() for group in volts)
-    return float(np.nan_to_num(late - early))
 
 
 def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:

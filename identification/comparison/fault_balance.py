@@ -76,8 +76,7 @@ class FaultBalance:
 
     def steps(self, rows: Index, ramps: list[Array]) -> Array:
         """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
-        each = [[c.steps(rows, ramp) for c in self.channels] for ramp in ramps]
-        return np.asarray(np.sum(each, axis=1))
+        return np.array([sum(c.steps(rows, ramp) for c in self.channels) for ramp in ramps])
 
     def share(self, row: int, ramp: int) -> Array:
         """Return the elapsed share (N,) of a change beginning at a row, by one of the ramps."""

@@ -21,7 +21,7 @@ from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import carrying, usual_thrust
 from ..logs.readers import px4_ulog
 from ..logs.reading import READERS, read_log, reader_by_content
-from ..logs.table import Data, Names, Rows, median_step
+from ..logs.table import Data, Names, median_step
 from ..motion.smoothing import lagged, runs_of
 
 _PX4 = "px4_ulog"  # the reader
@@ -168,7 +168,7 @@ def sample(channels: Channels) -> Samples:
     total = c.command.values.sum(axis=1)
     keep = (np.interp(t, c.command.t, total) > 0.5 * usual_thrust(total)) & (t < stop)
     for at in times[:2]:
-        keep &= np.diff(at)[_step_around(at, t)] < LONGEST_GAP
+        keep &= np.diff(at)[np.searchsorted(at, t) - 1] < LONGEST_GAP
     if keep.any():
         keep &= t > t[np.argmax(keep)] + SETTLED
     for a, b in runs_of(keep):
@@ -190,16 +190,11 @@ def sample(channels: Channels) -> Samples:
     )
 
 
-def _step_around(times: Array, t: Array) -> Rows:
-    """Return the number (N,) of the step of ``times`` around each of ``t`` (N,)."""
-    return np.clip(np.searchsorted(times, t), 1, len(times) - 1) - 1
-
-
 def _between(command: Stream, t: Array) -> Array:
     """Return the command's possible error between its samples (N,); see ``Samples``."""
-    before = _step_around(command.t, t)
+    before = np.searchsorted(command.t, t) - 1
     step = np.diff(command.t)[before]
-    part = np.clip((t - command.t[before]) / step, 0.0, 1.0)
+    part = (t - command.t[before]) / step
     change = np.abs(np.diff(command.values, axis=0)[before]).mean(axis=1)
     usual = np.median(np.interp(t, command.t, command.values.mean(axis=1)))
     return np.where(step > 1.5 * STEP, change / usual * np.sqrt(part * (1.0 - part)), 0.0)
@@ -209,8 +204,7 @@ def _means(times: Array, values: Array, middles: Array) -> Array:
     """Return the means (N, d) over the grid's intervals; values are linear between ``times``."""
     new = np.diff(times, prepend=-np.inf) > 0.0
     integral = make_interp_spline(times[new], values[new], k=1).antiderivative()
-    ends = np.clip([middles - 0.5 * STEP, middles + 0.5 * STEP], times[0], times[-1])
-    return np.asarray(np.diff(integral(ends), axis=0)[0] / STEP)
+    return np.asarray(integral(middles + 0.5 * STEP) - integral(middles - 0.5 * STEP)) / STEP
 
 
 def _end(c: Channels) -> tuple[float, str]:

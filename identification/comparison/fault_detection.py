@@ -93,7 +93,7 @@ def find_fault(channels: Channels) -> RotorFault:
     happened = evidence + math.log(sum(_EVENTS))
     chances = softmax(np.append(whole, happened + log_softmax(logs)))
     rotor = int(np.argmax(logs[:4]))
-    _, least, most = _quantiles(shares, weights[rotor], 0.5 * float(shares[1] - shares[0]))
+    _, least, most = _quantiles(shares, weights[rotor], 0.5 * (shares[1] - shares[0]))
     return RotorFault(
         samples,
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
@@ -126,9 +126,8 @@ def _search(samples: Samples, rows: Index, thrust_known: bool) -> list[_Tried]:
         return max(tried, key=lambda key: tried[key].log)
 
     curves = _CURVES[:1] if thrust_known else _CURVES
-    middle = _LAGS[len(_LAGS) // 2]
-    _, *curve = best_of((middle, *curve) for curve in curves)
-    lag, *_ = best_of((lag, curve[0], curve[1]) for lag in _LAGS)
+    _, bend, dead = best_of((_LAGS[3], *curve) for curve in curves)
+    lag, *_ = best_of((lag, bend, dead) for lag in _LAGS)
     best_of((lag, *curve) for curve in curves)
     return list(tried.values())
 
@@ -137,8 +136,7 @@ def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
     """Return a lag and curve with noise fitted beside the likeliest jump."""
     nothing = balance.nothing()
     for _ in range(_ROUNDS):
-        _, row, ramp = _jump(balance, rows)
-        balance.fit(balance.share(row, ramp))
+        balance.fit(balance.share(*_jump(balance, rows)[1:]))
     return _Tried(balance, max(nothing, balance.nothing()), *_jump(balance, rows))
 
 
@@ -157,7 +155,7 @@ def _onsets(t: Array, every: Index, best: _Tried) -> tuple[float, Array, Array]:
     ramps = best.balance.ramps
     logs, fine = (best.balance.steps(some, ramps) for some in (every, rows))
     starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), t[rows])
-    evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
+    evidence = max(logsumexp(logs), logsumexp(fine))
     return evidence - math.log(len(ramps) * len(t)), starts.ravel(), softmax(fine).ravel()
 
 

@@ -63,6 +63,6 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
         gram = past.T @ past + 1e-6 * (present @ present) * np.eye(ORDER)
         poles = np.linalg.solve(gram, past.T @ present)
         rest = np.square(present - past @ poles).sum()
-        noise = Noise(scale, np.append(1.0, -poles), whole, float(rest / len(present)))
-        tried.append((float(noise.log_likelihood(rest)), noise))
+        noise = Noise(scale, np.append(1.0, -poles), whole, rest / len(present))
+        tried.append((noise.log_likelihood(rest), noise))
     return max(tried, key=itemgetter(0))[1]

@@ -74,7 +74,7 @@ def _cuts(trims: Sequence[Trim], later: Mask, x: Array) -> Iterator[tuple[Index,
     the logarithm of its prior.
     """
     apart = np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
-    volts = np.array([trim.voltage for trim in trims], dtype=np.float64)
+    volts = np.array([trim.voltage for trim in trims])
     rises = np.diff(volts) > _RISE * volts[:-1]  # False where one is not known
     chance = np.where(rises, _ENDS_AT_RISE, _ENDS)
     names = np.array([trim.session for trim in trims])

@@ -193,13 +193,15 @@ def _finding(fault: RotorFault, name: str) -> str:
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
     channels = fault.samples.channels
+    onset, *onset_ci95 = fault.onset
+    remaining, *remaining_ci95 = fault.remaining
     of_rotor = {
         "rotor": fault.rotor,
         "motor": channels.motor_names and channels.motor_names[fault.rotor - 1],
-        "onset_s": fault.onset[0],
-        "onset_ci95_s": list(fault.onset[1:]),
-        "remaining": fault.remaining[0],
-        "remaining_ci95": list(fault.remaining[1:]),
+        "onset_s": onset,
+        "onset_ci95_s": onset_ci95,
+        "remaining": remaining,
+        "remaining_ci95": remaining_ci95,
     }
     return {
         "log": channels.name,
