@@ -83,13 +83,9 @@ def _piece(
     acting, body = acting_wrench(s, vehicle)
     needed = needed_wrench(s, body)
     steps = s.period / period  # a walk of one step of the log, in one of the signals
-    given = tuning.force_walk, tuning.torque_walk, tuning.thrust_noise, tuning.motor_torque_noise
-    walk_force, walk_torque, miss_force, miss_torque = (np.broadcast_to(x, 3) for x in given)
     # an Ornstein-Uhlenbeck process, or a walk: the factor of a step, and its squared walks
-    (keep_force, new_force), (keep_torque, new_torque) = (
-        decay_of(np.broadcast_to(time, 3), s.period, period)
-        for time in (tuning.force_time, tuning.torque_time)
-    )
+    keep_force, new_force = decay_of(tuning.force_time, s.period, period)
+    keep_torque, new_torque = decay_of(tuning.torque_time, s.period, period)
     pushes, turns = _loads(s, body, needed)
     needs = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
     inverse = np.linalg.inv(body.inertia)
@@ -97,18 +93,22 @@ def _piece(
     rates = cumulative_trapezoid(driven, dx=s.period, axis=0, initial=0)
     rates[:, :, 0] = s.angular_velocity - rates[:, :, 0]
     force, torque, spread = np.empty_like(needs), np.empty_like(rates), np.empty(6)
-    for i, own in enumerate(np.diagonal(inverse).tolist()):
-        variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
-        # a walk hidden by white noise of this variance
-        walks = np.diag([walk_force[i] ** 2 * new_force[i]])
-        walked, std = _two_sided(needs[:, i], keep_force[i] * np.eye(1), walks, variance)
+    own = np.diagonal(inverse)
+    # a force's walk is hidden by white noise. The change of a rate is a walk, the rate beside it is
+    # hit by the rotors' errors
+    variances = (
+        (body.mass * noise[1]) ** 2 + np.square(tuning.thrust_noise) / steps,
+        np.square(tuning.force_walk) * new_force,
+        np.square(own * s.period) * np.square(tuning.motor_torque_noise) / steps,
+        np.square(own) * np.square(tuning.torque_walk) * new_torque,
+    )
+    axes = np.transpose(np.broadcast_arrays(keep_force, keep_torque, *variances))
+    for i, (kept, kept_turn, hiding, walk, hit, turn) in enumerate(axes):
+        walked, std = _two_sided(needs[:, i], kept * np.eye(1), np.diag([walk]), hiding)
         force[:, i], spread[i] = walked[:, 0], std[0]
-        # the change of a rate is a walk, the rate beside it is hit by the rotors' errors
-        model = np.array([[1.0, s.period], [0.0, keep_torque[i]]])
-        missed = own * np.array([miss_torque[i] * s.period, walk_torque[i]])
-        walks = np.diag(missed**2 * [1.0 / steps, new_torque[i]])
+        model, walks = np.array([[1.0, s.period], [0.0, kept_turn]]), np.diag([hit, turn])
         walked, std = _two_sided(rates[:, i], model, walks, max(noise[0], 1e-6) ** 2)
-        torque[:, i], spread[3 + i] = walked[:, 1], std[1] / own
+        torque[:, i], spread[3 + i] = walked[:, 1], std[1] / own[i]
     turned = np.square(s.rotation)
     std_force = np.sqrt(spread[:3] ** 2 + turned @ (body.mass * s.bias_std) ** 2)
     std_torque = np.sqrt(turned @ spread[3:] ** 2)
@@ -143,21 +143,19 @@ def _two_sided(y: Array, model: Array, noise: Array, variance: float) -> ArrayPa
     the first, and their standard deviations (m,).
     """
     m = len(model)
-    H = np.eye(1, m)
-    P = solve_discrete_are(model.T, H.T, noise + 1e-18 * np.eye(m), variance * np.eye(1))
-    gain = (P @ H.T / (P[0, 0] + variance))[:, 0]
+    P = solve_discrete_are(model.T, np.eye(m, 1), noise + 1e-18 * np.eye(m), variance * np.eye(1))
+    gain = P[0] / (P[0, 0] + variance)
     after = P - np.outer(gain, P[0])
     back = np.linalg.solve(P, model @ after).T
     smoothed = solve_discrete_lyapunov(back, after - back @ P @ back.T)
-    predicted, states = np.empty((2, len(y), m, y.shape[1]))
+    states = np.empty((len(y), m, y.shape[1]))
     x = np.zeros(states.shape[1:])
     x[0] = np.mean(y[: max(1, len(y) // 200)], axis=0)
     for k, measured in enumerate(y):
-        predicted[k] = x
         states[k] = x + np.outer(gain, measured - x[0])
         x = model @ states[k]
     for k in range(len(y) - 2, -1, -1):
-        states[k] += back @ (states[k + 1] - predicted[k + 1])
+        states[k] += back @ (states[k + 1] - model @ states[k])
     return states, np.sqrt(np.maximum(np.diagonal(smoothed), 0.0))
 
 

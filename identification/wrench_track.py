@@ -48,10 +48,10 @@ def write_mcap(series: WrenchSeries, path: Path) -> None:
     with replaced(path) as partial, TemporaryDirectory(dir=partial.parent) as folder:
         bag = Path(folder) / "track"
         with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-            topics = {
-                topic: writer.add_connection(topic, name, typestore=store)
+            topics = [
+                writer.add_connection(topic, name, typestore=store)
                 for topic, name in _TOPICS.items()
-            }
+            ]
             for t, place, turn, *row in zip(*(x.tolist() for x in columns), strict=True):
                 at = round(1e9 * (t - begin))
                 stamped = header(time(at // 10**9, at % 10**9), _FRAME)
@@ -61,7 +61,7 @@ def write_mcap(series: WrenchSeries, path: Path) -> None:
                     wrench(std_force, std_torque),
                     pose(point(*place), quaternion(*turn)),
                 )
-                for (topic, name), part in zip(_TOPICS.items(), parts, strict=True):
-                    message = store.types[name](stamped, part)
-                    writer.write(topics[topic], at, store.serialize_cdr(message, name))
+                for topic, part in zip(topics, parts, strict=True):
+                    message = store.types[topic.msgtype](stamped, part)
+                    writer.write(topic, at, store.serialize_cdr(message, topic.msgtype))
         (bag / "track.mcap").replace(partial)

@@ -43,11 +43,11 @@ _ROTORS = {
     "rotor 4 (front-right)": (-1.0, 1.0),
 }
 _SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
-# possible changes, by place and kind; with their share of a place's prior: all places are alike
+# prior probabilities of the possible changes, by place and kind: all ten places are alike
 _CHANGES = {
-    **{(rotor, kind): 0.5 for rotor in _ROTORS for kind in ("weaker", "carries more")},
-    **dict.fromkeys([(place, "carries more") for place in (*_SIDES, "all rotors")], 1.0),
-    (SOMETHING_ELSE, ""): 1.0,
+    **{(rotor, kind): 0.03 for rotor in _ROTORS for kind in ("weaker", "carries more")},
+    **{(place, "carries more"): 0.06 for place in (*_SIDES, "all rotors")},
+    (SOMETHING_ELSE, ""): 0.06,
 }
 
 _AMOUNTS = 80  # amounts of a change in the sum of its evidence
@@ -63,7 +63,7 @@ _VOLTAGE_POWER = 0.5
 # cut propeller do not shrink alike, so the diagonals move.
 # Cuts of 2 to 4 mm moved the diagonals 0.9, and the total 1.0 times as much as the sides
 _BEND = (0.1, 0.1, 0.25, 0.25)
-# prior probability of no change: a comparison has a reason
+# prior probability of no change, beside ``_CHANGES``: a comparison has a reason
 _UNCHANGED = 0.4
 SURE = 0.95  # least probability of a place named without a doubt
 
@@ -128,7 +128,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     zero = np.zeros(1)
     # log posterior, and mean and deviation of the amount; keys: place and kind
     found = {(NOWHERE, ""): (logs_of(zero, zero)[0] + math.log(_UNCHANGED), 0.0, 0.0)}
-    for (place, kind), share in _CHANGES.items():
+    for (place, kind), chance in _CHANGES.items():
         if place == SOMETHING_ELSE:
             means = zero
             spread = amounts[:, None]
@@ -139,8 +139,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         weights = softmax(every)
         middle = amounts @ weights
         std = math.sqrt(np.square(amounts - middle) @ weights)
-        each = (1.0 - _UNCHANGED) * share / sum(_CHANGES.values())
-        found[place, kind] = logsumexp(every) + math.log(each), middle, std
+        found[place, kind] = logsumexp(every) + math.log(chance), middle, std
     chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
     likeliest = max(places, key=places.__getitem__)

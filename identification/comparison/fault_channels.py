@@ -18,7 +18,7 @@ from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.channels import Stream, readable
 from ..logs.flight_log import FlightLog
-from ..logs.flight_phases import carrying, usual_thrust
+from ..logs.flight_phases import usual_thrust
 from ..logs.readers import px4_ulog
 from ..logs.reading import READERS, read_log, reader_by_content
 from ..logs.table import Data, Names, median_step
@@ -164,13 +164,13 @@ def sample(channels: Channels) -> Samples:
     t = 0.5 * (edges[1:] + edges[:-1])
     gyro = c.gyro.at(edges)
     force = _means(c.accelerometer.t, c.accelerometer.values, t)
-    stop, why = _end(c)
     total = c.command.values.sum(axis=1)
-    keep = (np.interp(t, c.command.t, total) > 0.5 * usual_thrust(total)) & (t < stop)
+    keep = np.interp(t, c.command.t, total) > 0.5 * usual_thrust(total)
     for at in times[:2]:
         keep &= np.diff(at)[np.searchsorted(at, t) - 1] < LONGEST_GAP
-    if keep.any():
-        keep &= t > t[np.argmax(keep)] + SETTLED
+    begin = t[keep].min(initial=np.inf) + SETTLED
+    stop, why = _end(c, begin)
+    keep &= (t > begin) & (t < stop)
     for a, b in runs_of(keep):
         keep[a:b] = (b - a) * STEP > SHORTEST
     if keep.sum() * STEP < LEAST_SECONDS:
@@ -207,23 +207,22 @@ def _means(times: Array, values: Array, middles: Array) -> Array:
     return np.asarray(integral(middles + 0.5 * STEP) - integral(middles - 0.5 * STEP)) / STEP
 
 
-def _end(c: Channels) -> tuple[float, str]:
-    """Return the end of the model's validity, and its reason: a clipped gyro, or an impact."""
-    ends = [(np.inf, "")]
+def _end(c: Channels, begin: float) -> tuple[float, str]:
+    """Return the end of the model's validity, and its reason: a clipped gyro, or an impact after
+    ``begin`` (s), since take-off may be hard.
+    """
     count = max(3, round(CLIPPED_SECONDS / median_step(c.gyro.t)))
     rate, size = c.gyro.values, np.abs(c.gyro.values)
     at_limit = np.abs(size[..., None] / RANGES - 1.0).min(axis=2) < RANGE_SHARE
     at_limit |= (size > (1.0 - CLIPPED_SHARE) * size.max(axis=0)) & (size > RANGES[0])
     spread = maximum_filter1d(rate, count, axis=0) - minimum_filter1d(rate, count, axis=0)
     clipped = np.any(at_limit & (spread < CLIPPED_SHARE * size), axis=1)
-    if clipped.any():
-        # the filters look half their width to either side
-        first = max(0, int(np.argmax(clipped)) - count // 2)
-        ends.append((float(c.gyro.t[first]), "the gyro was at its limit"))
-    hit = np.linalg.norm(c.accelerometer.values, axis=1) > IMPACT
-    # take-off may be hard: an impact counts once the rotors carry the vehicle
-    aloft = c.command.t[carrying(c.command.values.sum(axis=1))]
-    hit &= c.accelerometer.t > aloft[0] + SETTLED if len(aloft) else False
-    if hit.any():
-        ends.append((float(c.accelerometer.t[np.argmax(hit)]) - STEP, "the vehicle hit something"))
-    return min(ends)
+    # the filters look half their width to either side
+    ends = c.gyro.t[np.maximum(np.flatnonzero(clipped) - count // 2, 0)]
+    times, force = c.accelerometer.t, np.linalg.norm(c.accelerometer.values, axis=1)
+    hits = times[(force > IMPACT) & (times > begin)] - STEP
+    return min(
+        (ends.min(initial=np.inf), "the gyro was at its limit"),
+        (hits.min(initial=np.inf), "the vehicle hit something"),
+        (np.inf, ""),
+    )
