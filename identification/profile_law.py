@@ -89,9 +89,9 @@ def profile_log(
         with suppress(InputError):  # too short a line
             others.append(wind_profile(series, profile.direction, beside))
     found = partial(ProfiledJet, profile, tuple(others), notes=series.notes)
-    std = (profile.high - profile.wrench)[5] / 1.96
-    why = no_jet(profile.place, profile.torque, std)
-    shape = None if why else shape_of(profile.place, profile.torque)
+    torque = profile.wrench[5]
+    why = no_jet(profile.place, torque, (profile.high[5] - torque) / 1.96)
+    shape = None if why else shape_of(profile.place, torque)
     if shape is None:
         return found(why, None, None)
 
@@ -100,22 +100,21 @@ def profile_log(
         noise_of = FilterNoise.of(tuning, log.period)
         return following_loop(vehicle.inertia[2, 2], noise_of, *noise)
 
-    own = UKFTuning.for_vehicle(vehicle, log.period, rise_time)
-    shown = estimate_log(log, vehicle, own)
+    shown = estimate_log(log, vehicle, UKFTuning.for_vehicle(vehicle, log.period, rise_time))
     noise = _noise(shown, 4.0 * rise_time, profile, shape, loop(rise_time))
     if len(noise) < _ROWS:
         return found(f"only {DECISION_PERIOD * len(noise):.0f} s lie in the jet", shape, None)
-    flying = loop(rise_time, noise)
+    flying = loop(rise_time, noise - noise.mean(axis=0))
     law = design_admittance(flying, loop, shape, speed)
     if law is None:
         return found("the torque's noise lets no gain follow a fan", shape, None)
     gain = np.array([law["gain"]])
-    drawn = [
+    limits = [
         (jet.bounds(gain), fastest_followed(flying, jet, gain))
-        for torque in profile.torque_draws
-        if (jet := shape_of(profile.place, torque))
+        for drawn in profile.torque_draws
+        if (jet := shape_of(profile.place, drawn))
     ]
-    bound, fastest = np.quantile(drawn, (0.025, 0.975), axis=(0, 2)).T.tolist()
+    bound, fastest = np.quantile(limits, (0.025, 0.975), axis=(0, 2)).T.tolist()
     return found("", shape, law | {"bound_ci95_m_s": bound, "fastest_fan_ci95_m_s": fastest})
 
 
@@ -127,8 +126,8 @@ def _noise(
     """
     t = np.arange(series.t[0] + settled, series.t[-1], DECISION_PERIOD)
     rows = np.searchsorted(series.t, t)
-    place = profile.along(series.position)[rows]
-    true = np.interp(place, profile.place, profile.torque)
+    place = profile.along(series.position[rows])
+    true = np.interp(place, profile.place, profile.wrench[5])
     error, felt = np.zeros(3), []
     for change in np.diff(true, prepend=true[:1]):
         error = loop.keep @ error + loop.enter * change
@@ -136,5 +135,4 @@ def _noise(
     way = uniform_filter1d(place, round(_SLOW / DECISION_PERIOD), mode="nearest")
     noise = np.column_stack([series.torque[rows, 2] - (true - felt), place - way])
     low, high = jet.edges
-    inside = noise[(place > low) & (place < high) & finite_rows(noise)]
-    return np.asarray(inside - inside.mean(axis=0)) if len(inside) else inside
+    return noise[(place > low) & (place < high) & finite_rows(noise)]

@@ -63,11 +63,6 @@ class WindProfile(NamedTuple):
     means: Array
     samples: float
 
-    @property
-    def torque(self) -> Array:
-        """Torque about z (n,), Nm."""
-        return np.asarray(self.wrench[5])
-
     def along(self, position: Array) -> Array:
         """Return the places (N,) on the line of positions (N, 3)."""
         return np.asarray(position @ _ways(self.direction)[1])
@@ -102,8 +97,7 @@ def wind_profile(
     if len(first) < _LEAST[0]:
         raise InputError(f"a torque is known over {len(first)} s; expected {_LEAST[0]} s or more")
     means = np.add.reduceat(rows, first) / counts[:, None]
-    moved = np.linalg.norm(np.gradient(means[:, :3], axis=0), axis=1)
-    slow = moved < _FASTEST * MEAN
+    slow = np.linalg.norm(np.gradient(means[:, :3], axis=0), axis=1) < _FASTEST * MEAN
     used = means[slow]
     direction = _direction(used) if axis is None else axis
     if np.sum(used[:, 3:6] @ _ways(direction)[0]) < 0.0:
@@ -182,8 +176,8 @@ def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Arra
     beta, covariance = _fit(X * weight[:, None], y * weight)
     B = BSpline.design_matrix(at, knots, 3, True).toarray()
     std = np.sqrt(np.einsum("ni,ij,nj->n", B, covariance, B))
-    rng = np.random.default_rng(0)
-    draws = rng.multivariate_normal(beta, covariance, _DRAWS, method="eigh") @ B.T
+    draw = np.random.default_rng(0).multivariate_normal
+    draws = draw(beta, covariance, _DRAWS, method="eigh") @ B.T
     return B @ beta, std, draws, len(y) / more
 
 

@@ -50,11 +50,10 @@ _CHANGES = {
     (SOMETHING_ELSE, ""): 0.06,
 }
 
-_AMOUNTS = 80  # amounts of a change in the sum of its evidence
-
 # usual amount of a change, as a share of the weight or of one rotor's thrust: the scale of a
 # half-normal prior
 _USUAL_AMOUNT = 0.15
+_AMOUNTS = np.linspace(0.02, 4.0, 80) * _USUAL_AMOUNT  # in the sum of a change's evidence
 # standard deviation of the power of the battery's voltage in the request for one thrust: 0 if the
 # firmware makes up for the battery, up to 2 if rotor speed follows the voltage
 _VOLTAGE_POWER = 0.5
@@ -123,22 +122,21 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
         return np.asarray(logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
 
-    amounts = np.linspace(0.02, 4.0, _AMOUNTS) * _USUAL_AMOUNT
-    prior = log_softmax(-0.5 * np.square(amounts / _USUAL_AMOUNT))
+    prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
     zero = np.zeros(1)
     # log posterior, and mean and deviation of the amount; keys: place and kind
     found = {(NOWHERE, ""): (logs_of(zero, zero)[0] + math.log(_UNCHANGED), 0.0, 0.0)}
     for (place, kind), chance in _CHANGES.items():
         if place == SOMETHING_ELSE:
             means = zero
-            spread = amounts[:, None]
+            spread = _AMOUNTS[:, None]
         else:
-            means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
+            means = np.array([_moved(place, kind, amount, shares) for amount in _AMOUNTS])
             spread = np.linalg.norm(means, axis=1)[:, None] * np.array(_BEND)
         every = logs_of(means, spread) + prior
         weights = softmax(every)
-        middle = amounts @ weights
-        std = math.sqrt(np.square(amounts - middle) @ weights)
+        middle = _AMOUNTS @ weights
+        std = math.sqrt(np.square(_AMOUNTS - middle) @ weights)
         found[place, kind] = logsumexp(every) + math.log(chance), middle, std
     chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}

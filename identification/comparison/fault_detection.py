@@ -20,13 +20,14 @@ from scipy.special import log_softmax, logsumexp, softmax
 from scipy.stats import norm
 
 from ...runtime.arrays import Array, Index
+from ..logs.table import ArrayPair
 from .fault_balance import PARTS, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
 
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
 Interval = tuple[float, float, float]  # middle, low and high; of a trial: lag, bend and dead zone
 
-_LOSSES = (0.05, 1.0)  # share of a rotor's thrust
+_LOSSES = np.linspace(0.05, 1.0, 39)  # tried shares of a rotor's thrust
 _ALL_LOSE = 0.5  # the largest share tried for all rotors together
 _LAGS = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
 # curves of thrust against command: the square's share, and the dead zone in parts of the
@@ -40,7 +41,6 @@ _ERROR = 0.25
 _BEFORE = 25  # least intervals of usual flight before a fault
 _AFTER = 4  # least intervals after a fault
 _PLACES = 2000  # most rows for the start of a fault
-_STEPS = 39  # shares tried within ``_LOSSES``
 # standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
 # usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
@@ -86,20 +86,20 @@ def find_fault(channels: Channels) -> RotorFault:
     tried = _search(samples, rows, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
     evidence, starts, likely = _onsets(samples.t, rows, best)
-    each, shares, weights = _patterns(best)
+    each, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
     whole = math.log(_NOTHING) + max(one.nothing for one in tried)
     happened = evidence + math.log(sum(_EVENTS))
     chances = softmax(np.append(whole, happened + log_softmax(logs)))
     rotor = int(np.argmax(logs[:4]))
-    _, least, most = _quantiles(shares, weights[rotor], 0.5 * (shares[1] - shares[0]))
+    _, least, most = _quantiles(_LOSSES, weights[rotor], 0.5 * (_LOSSES[1] - _LOSSES[0]))
     return RotorFault(
         samples,
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
         1 + rotor,
         _quantiles(starts, likely, STEP),
-        (1.0 - float(weights[rotor] @ shares), max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
+        (1.0 - float(weights[rotor] @ _LOSSES), max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
 
@@ -159,13 +159,12 @@ def _onsets(t: Array, every: Index, best: _Tried) -> tuple[float, Array, Array]:
     return evidence - math.log(len(ramps) * len(t)), starts.ravel(), softmax(fine).ravel()
 
 
-def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
-    """Return the log-evidence (6,) of rotors 1 to 4, all rotors, and another force and torque.
-
-    Beside it stand the shares (E,) of a loss and their probabilities for each rotor (4, E).
+def _patterns(best: _Tried) -> ArrayPair:
+    """Return the log-evidence (6,) of rotors 1 to 4, all rotors, and another force and torque; and
+    the probabilities of ``_LOSSES`` for each rotor (4, E).
     """
-    shares = np.linspace(*_LOSSES, _STEPS)
-    lost = shares[shares <= _ALL_LOSE, None]
+    each = _LOSSES[:, None]
+    lost = each[_LOSSES <= _ALL_LOSE]
     share = best.balance.share(best.row, best.ramp)
 
     def seen(columns: Array) -> Array:
@@ -174,7 +173,6 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
         return np.array([channel.part(column) for channel, column in pairs]).T
 
     # each channel's visible part, its standard deviation, and the hypothesis' means and spread
-    each = shares[:, None]
     tried = [(*seen(best.balance.lost(rotor, share)), each, _ERROR * each) for rotor in range(4)]
     # a jump of each channel, in parts of one rotor's usual torque or force there
     jumps = seen(np.tile(share[:, None], 4))
@@ -187,7 +185,7 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
         for part, std, means, spread in tried
     ]
     evidence = np.array([logsumexp(log) - math.log(len(log)) for log in logs])
-    return evidence, shares, softmax(logs[:4], axis=1)
+    return evidence, softmax(logs[:4], axis=1)
 
 
 def _rows(count: int) -> Index:

@@ -39,8 +39,8 @@ class Noise(NamedTuple):
         """Return the log-likelihood of innovations with ``rest`` as the sum of squares, at the best
         variance.
         """
-        n = int(self.whole.sum())
-        log_scale = float(np.log(self.scale[self.whole]).sum())
+        n = self.whole.sum()
+        log_scale = np.log(self.scale[self.whole]).sum()
         return np.asarray(-0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale)
 
 
