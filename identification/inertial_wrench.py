@@ -86,12 +86,20 @@ def _piece(
     # an Ornstein-Uhlenbeck process, or a walk: the factor of a step, and its squared walks
     keep_force, new_force = decay_of(tuning.force_time, s.period, period)
     keep_torque, new_torque = decay_of(tuning.torque_time, s.period, period)
-    pushes, turns = _loads(s, body, needed)
-    needs = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
+    # the loads are by the logged speeds: a declared lag or efficiency changes a small part of a
+    # deviation
+    thrust, x, y, z = body.rotor_wrench(s.rotor_speeds).T
+    none, omega = np.zeros_like(thrust), s.angular_velocity
+    x, y = x - body.com[1] * thrust, y + body.com[0] * thrust
+    turns = [(thrust, none, none), (none, thrust, none), (x, y, none), (none, none, z)]
+    turning = needed[:, 3:] + np.cross(omega, omega @ body.inertia.T)
+    pushing = thrust[:, None] * s.rotation[:, :, 2]
+    needs = np.stack([needed[:, :3] - acting[:, :3], pushing, needed[:, :3]], axis=2)
     inverse = np.linalg.inv(body.inertia)
-    driven = np.einsum("ij,cnj->nic", inverse, np.stack([acting[:, 3:], *turns]))
+    loads = acting[:, 3:], *map(np.column_stack, turns), turning
+    driven = np.einsum("ij,cnj->nic", inverse, np.stack(loads))
     rates = cumulative_trapezoid(driven, dx=s.period, axis=0, initial=0)
-    rates[:, :, 0] = s.angular_velocity - rates[:, :, 0]
+    rates[:, :, 0] = omega - rates[:, :, 0]
     force, torque, spread = np.empty_like(needs), np.empty_like(rates), np.empty(6)
     own = np.diagonal(inverse)
     # a force's walk is hidden by white noise. The change of a rate is a walk, the rate beside it is
@@ -115,27 +123,10 @@ def _piece(
     quaternion = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
     torque = np.einsum("nij,jk,nkc->cni", s.rotation, body.inertia, torque)
     outer, *pushed = np.moveaxis(force, 2, 0)
-    state = s.position, quaternion, s.velocity, s.angular_velocity, torque[0], outer
+    state = s.position, quaternion, s.velocity, omega, torque[0], outer
     no_nis = np.full(len(s.t), np.nan)
-    loads = *torque[1:3], *pushed, *torque[3:]
-    return np.column_stack([*state, no_nis, std_torque, std_force, *loads])
-
-
-def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array], list[Array]]:
-    """Return the loads (n, 3) of the force, world, and of the torque, body frame, in action.
-
-    The rotors' loads are by the logged speeds: a declared lag or efficiency changes a small part of
-    a deviation.
-    """
-    thrust, x, y, z = body.rotor_wrench(s.rotor_speeds).T
-    none, omega = np.zeros_like(thrust), s.angular_velocity
-    x, y = x - body.com[1] * thrust, y + body.com[0] * thrust
-    turning = needed[:, 3:] + np.cross(omega, omega @ body.inertia.T)
-    turns = [(thrust, none, none), (none, thrust, none), (x, y, none), (none, none, z)]
-    return (
-        [thrust[:, None] * s.rotation[:, :, 2], needed[:, :3]],
-        [*map(np.column_stack, turns), turning],
-    )
+    smooth = *torque[1:3], *pushed, *torque[3:]
+    return np.column_stack([*state, no_nis, std_torque, std_force, *smooth])
 
 
 def _two_sided(y: Array, model: Array, noise: Array, variance: float) -> ArrayPair:

@@ -6,8 +6,6 @@ one: of the torque as the filter shows it, and of the vehicle's place. The loop 
 in one dimension, behind fans of steady speeds.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

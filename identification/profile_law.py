@@ -1,7 +1,5 @@
 """From a flight through a wind to an admittance law: the profile, the jet in it, and the design."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -135,4 +133,4 @@ def _noise(
     way = uniform_filter1d(place, round(_SLOW / DECISION_PERIOD), mode="nearest")
     noise = np.column_stack([series.torque[rows, 2] - (true - felt), place - way])
     low, high = jet.edges
-    return noise[(place > low) & (place < high) & finite_rows(noise)]
+    return np.asarray(noise[(place > low) & (place < high) & finite_rows(noise)])

@@ -6,8 +6,6 @@ weight of the penalty is the one of the greatest restricted likelihood. The inte
 spline's posterior (Wahba, 1983): they hold 95 % of the places of a curve.
 """
 
-from __future__ import annotations
-
 import math
 from operator import itemgetter
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -147,7 +145,7 @@ def _filtered(
     """Return a filter's estimate of a screened log (``screen_log``), smoothed by a recording
     filter, and the loads (N, 7, 3).
     """
-    first, count = int(np.argmax(log.valid)), len(log.t)
+    first, count = np.argmax(log.valid), len(log.t)
     numbers, std = np.empty((count, WITHOUT_COVARIANCE)), np.empty((count, 18))
     loads = np.zeros((count, *LOAD))
     events = np.zeros(count, dtype=np.int64)  # last event of each row, of a recording filter
@@ -251,7 +249,7 @@ def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[s
     restarts = np.repeat(log.t[1:], np.diff(estimate.restarts))  # s
     if refused.size:
         yield (
-            f"{refused.size} of {int(log.valid.sum())} poses jump from those before and were "
+            f"{refused.size} of {log.valid.sum()} poses jump from those before and were "
             f"refused, the first at t = {log.t[refused[0]]:.6g} s"
         )
     if restarts.size:

@@ -42,7 +42,7 @@ def write_mcap(series: WrenchSeries, path: Path) -> None:
 
     store = get_typestore(Stores.ROS2_HUMBLE)
     time, header, vector, point, quaternion, wrench, pose = (store.types[name] for name in _PARTS)
-    begin = min(float(series.t[0]), 0.0)  # a bag's times are not negative
+    begin = min(series.t[0], 0.0)  # a bag's times are not negative
     vectors = series.force, series.torque, series.std_force, series.std_torque
     columns = series.t, series.position, np.roll(series.quaternion, -1, axis=1), *vectors
     with replaced(path) as partial, TemporaryDirectory(dir=partial.parent) as folder:

@@ -42,11 +42,17 @@ _ROTORS = {
     "rotor 3 (rear-right)": (-1.0, -1.0),
     "rotor 4 (front-right)": (-1.0, 1.0),
 }
-_SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
+_SIDES = {
+    "left": (1.0, 0.0),
+    "rear": (0.0, -1.0),
+    "right": (-1.0, 0.0),
+    "front": (0.0, 1.0),
+    "all rotors": (0.0, 0.0),
+}
 # prior probabilities of the possible changes, by place and kind: all ten places are alike
 _CHANGES = {
     **{(rotor, kind): 0.03 for rotor in _ROTORS for kind in ("weaker", "carries more")},
-    **{(place, "carries more"): 0.06 for place in (*_SIDES, "all rotors")},
+    **{(place, "carries more"): 0.06 for place in _SIDES},
     (SOMETHING_ELSE, ""): 0.06,
 }
 
@@ -103,7 +109,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     Raises:
         InputError: a set is empty.
     """
-    if not (len(after) and len(before)):
+    if not (after and before):
         raise InputError("compare: expected at least one flight in each of the two sets")
     ways = difference(after, before)
     moved = ways.mean[:, None]
@@ -132,7 +138,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
             spread = _AMOUNTS[:, None]
         else:
             means = np.array([_moved(place, kind, amount, shares) for amount in _AMOUNTS])
-            spread = np.linalg.norm(means, axis=1)[:, None] * np.array(_BEND)
+            spread = np.linalg.norm(means, axis=1)[:, None] * _BEND
         every = logs_of(means, spread) + prior
         weights = softmax(every)
         middle = _AMOUNTS @ weights
@@ -162,8 +168,6 @@ def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
         thrust = shares.copy()
         thrust[rotor] /= 1.0 - min(amount, 0.9)
         return features_of(thrust) - features_of(shares)
-    if place == "all rotors":
-        return np.array([0.0, 0.0, 0.0, math.log1p(amount)])
     left, front = {**_ROTORS, **_SIDES}[place]
     # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there
     way = amount / (1.0 + amount)

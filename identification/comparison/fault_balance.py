@@ -13,15 +13,15 @@ sums that run backwards.
 import math
 
 import numpy as np
-from scipy.linalg import toeplitz
 from scipy.ndimage import maximum_filter1d
+from scipy.signal import lfilter
 
 from ...runtime.arrays import Array, Index, Mask
 from .fault_channels import STEP, Samples
 from .fault_noise import fit_noise
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
-_SIGNS = np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]], dtype=np.float64)
+_SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
 PARTS = (0.0, 0.25, 0.5, 0.75)  # starts of a fault within an interval
 _AROUND = 5  # intervals around a strong acceleration: the model may be as wrong there
 _TURNING = 0.1  # activity per (rad/s)^2: the model's error while the vehicle turns
@@ -42,7 +42,7 @@ class FaultBalance:
         self.follows = samples.follows
         self.thrust = thrust = samples.thrust(lag, bend, dead)  # (N, 4)
         self.ramps = [_ramp(part, late) for late in (0.0, lag) for part in PARTS]
-        gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, -2, axis=1)
+        gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, 1, axis=1)
         one = np.ones(len(w))
         free = [[one, *own] for own in zip(w.T, gyroscopic.T, strict=True)]
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
@@ -155,8 +155,7 @@ class BalanceChannel:
         at = at[:, :-1]
         begun = 1.0 / scale[at]
         begun[:, : len(ramp)] *= ramp
-        taps = toeplitz(np.append(noise.filter, np.zeros(len(ramp) - 1)), np.zeros(early))
-        values = begun @ taps.T * whole[at]
+        values = lfilter(noise.filter, 1.0, begun) * whole[at]
         sums[:, :-1] += np.einsum("kj,kjq->kq", values, against[at])
         sy, sm, ss = sums[:, [0, 1, -1]].T
         ss = ss + np.square(values).sum(axis=1) - np.square(sums[:, 2:-1]).sum(axis=1)

@@ -202,8 +202,7 @@ def _between(command: Stream, t: Array) -> Array:
 
 def _means(times: Array, values: Array, middles: Array) -> Array:
     """Return the means (N, d) over the grid's intervals; values are linear between ``times``."""
-    new = np.diff(times, prepend=-np.inf) > 0.0
-    integral = make_interp_spline(times[new], values[new], k=1).antiderivative()
+    integral = make_interp_spline(times, values, k=1).antiderivative()
     return np.asarray(integral(middles + 0.5 * STEP) - integral(middles - 0.5 * STEP)) / STEP
 
 

@@ -90,8 +90,7 @@ def find_fault(channels: Channels) -> RotorFault:
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
     whole = math.log(_NOTHING) + max(one.nothing for one in tried)
-    happened = evidence + math.log(sum(_EVENTS))
-    chances = softmax(np.append(whole, happened + log_softmax(logs)))
+    chances = softmax(np.append(whole, evidence + math.log(sum(_EVENTS)) + log_softmax(logs)))
     rotor = int(np.argmax(logs[:4]))
     _, least, most = _quantiles(_LOSSES, weights[rotor], 0.5 * (_LOSSES[1] - _LOSSES[0]))
     return RotorFault(
@@ -192,12 +191,9 @@ def _rows(count: int) -> Index:
     """Return the rows for the start of a fault: all, or in a long flight an even spread and all
     rows near the end, with few samples after them.
     """
-    rows = np.arange(_BEFORE, count - _AFTER)
-    if len(rows) > _PLACES:
-        early = rows[: -_PLACES // 4]
-        step = math.ceil(len(early) / (0.75 * _PLACES))
-        rows = np.concatenate([early[::step], rows[-_PLACES // 4 :]])
-    return rows
+    early, late = np.split(np.arange(_BEFORE, count - _AFTER), [-_PLACES // 4])
+    step = max(1, math.ceil(len(early) / (0.75 * _PLACES)))
+    return np.concatenate([early[::step], late])
 
 
 def _quantiles(values: Array, weight: Array, margin: float) -> Interval:

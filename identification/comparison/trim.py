@@ -69,7 +69,7 @@ def features_of(thrust: Array) -> Array:
     return np.append(_MIX @ thrust / total, math.log(total))
 
 
-def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | None = None) -> Trim:
+def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | None) -> Trim:
     """Return the trim of a flight.
 
     Args:
@@ -127,21 +127,23 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     else:
         thrust = log.command
     total = thrust.sum(axis=1)
-    if not log.has_pose:
-        return trim_of(name, t, thrust, carrying(t, total), log.voltage)
-    at = t[log.valid]
-    place = log.position[log.valid]
-    if len(at) < 3:
-        raise InputError(f"{name}: fewer than three poses; expected a flight")
-    speeds = log.rotor_speeds
-    if not log.has_rotor_speeds:  # then scaled: while the rotors are high, they carry the weight
-        carried = total[flying(total)]
-        scale = vehicle.weight / np.median(carried) if len(carried) else 0.0
-        speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
-    phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
-    flown = [(t >= start) & (t <= end) for name, start, end in phases if name == FLIGHT]
-    speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
-    steady = np.any(flown, axis=0) & (np.interp(t, at, speed) < CALM)
+    steady = carrying(t, total)
+    if log.has_pose:
+        at = t[log.valid]
+        place = log.position[log.valid]
+        if len(at) < 3:
+            raise InputError(f"{name}: fewer than three poses; expected a flight")
+        speeds = log.rotor_speeds
+        if (
+            not log.has_rotor_speeds
+        ):  # then scaled: while the rotors are high, they carry the weight
+            carried = total[flying(total)]
+            scale = vehicle.weight / np.median(carried) if len(carried) else 0.0
+            speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
+        phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
+        flown = [(t >= start) & (t <= end) for phase, start, end in phases if phase == FLIGHT]
+        speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
+        steady = np.any(flown, axis=0) & (np.interp(t, at, speed) < CALM)
     return trim_of(name, t, thrust, steady, log.voltage)
 
 

@@ -55,7 +55,7 @@ def change_headline(change: Change) -> str:
     kind = _kind(change)
     if change.sure:
         return f"Changed: {place}, probability {chance:.2f}; {kind}"
-    return f"{_cannot_tell(change.places)} {kind[:1].upper()}{kind[1:]}"
+    return f"{_cannot_tell(change.places)} {kind.capitalize()}"
 
 
 def _kind(change: Change) -> str:
@@ -221,7 +221,7 @@ def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path
     Raises:
         InputError: a file cannot be written.
     """
-    data = [fault_data(fault) for fault in faults]
+    data = list(map(fault_data, faults))
     return _written(folder / "rotor_faults.json", data, _draw_faults(faults))
 
 
