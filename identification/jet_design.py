@@ -17,7 +17,8 @@ import numpy as np
 from ..controllers.briefing import Air, FilterNoise
 from ..controllers.flight import FlightGains
 from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
-from ..controllers.wrench_lag import axis_lag
+from ..controllers.wrench_lag import lags
+from ..runtime.plain_values import plain
 from .logs.table import Array, ArrayPair, NamedNumbers, Pair
 
 HELD_SHARE = 0.8  # of the flights behind a fan that counts as followed
@@ -60,12 +61,11 @@ def shape_of(place: Array, torque: Array) -> JetShape | None:
         return None
     rising = low + np.argmax(torque[low + 1 : high + 1] >= 0.0) + [0, 1]
     axis = np.interp(0.0, torque[rising], place[rising])
-    ahead, behind = (np.interp(place[low : high + 1] + d, place, torque) for d in (0.1, -0.1))
+    around = [np.interp(place[low : high + 1] + d, place, torque) for d in (-0.1, 0.1)]
     left = low - np.argmin(np.append(torque[low::-1] < EDGE_SHARE * torque[low], False)) + 1
     right = high + np.argmin(np.append(torque[high:] > EDGE_SHARE * torque[high], False)) - 1
-    slope = (ahead - behind).max() / 0.2
-    edges = place[[left, right]]
-    return JetShape(place, torque, float(axis), slope, torque[ends], place[ends], edges)
+    slope = np.diff(around, axis=0).max() / 0.2
+    return JetShape(place, torque, axis, slope, torque[ends], place[ends], place[[left, right]])
 
 
 def no_jet(place: Array, torque: Array, std: Array) -> str:
@@ -108,8 +108,8 @@ class FollowingLoop:
         crossed = np.flatnonzero(np.abs(answer) >= 1.0)[-1]
         # an integrator at first: a quarter turn behind
         turns = round(phase[0] / (2.0 * math.pi) + 0.25)
-        margin = float(phase[crossed]) - math.pi * (2 * turns - 1)
-        return margin, margin / float(_OMEGA[crossed])
+        margin = phase[crossed] - math.pi * (2 * turns - 1)
+        return margin, margin / _OMEGA[crossed]
 
     @cached_property
     def response(self) -> Any:
@@ -132,7 +132,7 @@ def _flight_loop() -> tuple[Array, Array, Array]:
     rotors = np.polymul([_MOTOR_LAG, 1.0], [1.0, gains.rate, gains.attitude])
     closed = np.polyadd(np.append(rotors, [0.0, 0.0, 0.0]), answer)
     system = tf2ss(answer, np.append(closed, 0.0))  # a velocity moves the set point
-    carry, push, show, _, _ = cont2discrete(system, DECISION_PERIOD)
+    carry, push, show, *_ = cont2discrete(system, DECISION_PERIOD)
     return carry, push[:, 0], show[0]
 
 
@@ -142,9 +142,7 @@ def following_loop(
     """Return the loop of a vehicle with this inertia (kg m2), wrench filter, and measured noise
     (k, 2), under the kit's flight loop.
     """
-    period = filter_noise.period
-    assumed = filter_noise.torque, filter_noise.torque_walk, filter_noise.attitude
-    lag = axis_lag(inertia_z, assumed, Air(), period, max(1, round(DECISION_PERIOD / period)))
+    lag, _ = lags(1.0, inertia_z, filter_noise, Air(), DECISION_PERIOD)  # whatever the mass
     return FollowingLoop(lag.keep, lag.enter, *_flight_loop(), noise)
 
 
@@ -193,8 +191,8 @@ def fastest_followed(loop: FollowingLoop, jet: JetShape, gains: Array) -> Array:
     """Return the fastest fan (g,) m/s that each gain follows in ``HELD_SHARE`` of its flights."""
     speeds = jet.bounds(gains)[:, None] * _SHARES
     shares = np.minimum.accumulate(followed(loop, jet, gains, speeds)[0], axis=1)
-    rows = zip(shares[:, ::-1], speeds[:, ::-1], strict=True)
-    return np.array([np.interp(HELD_SHARE, *row) for row in rows])
+    pairs = np.stack([shares, speeds], axis=1)[..., ::-1]
+    return np.array([np.interp(HELD_SHARE, *pair) for pair in pairs])
 
 
 def design_admittance(
@@ -217,20 +215,23 @@ def design_admittance(
     fastest = fastest_followed(loop, jet, gains)
     if not fastest.any():
         return None
-    wanted = 0.5 * float(fastest.max()) if speed is None else speed
+    wanted = 0.5 * fastest.max() if speed is None else speed
     alike = np.tile(wanted * np.linspace(0.0, 1.0, 5), (len(gains), 1))
     offsets = followed(loop, jet, gains, alike, 1)[1].mean(axis=1)
     best = np.argmin(offsets)
     crossing = crossings[best]
     margin, delay = loop.margins(crossing)
     slow = [rise for rise in RISE_TIMES if lagging(rise).margins(crossing)[0] >= MARGIN]
-    return {
-        "gain": float(gains[best]),
-        "bound_m_s": float(jet.bounds(gains)[best]),
-        "fastest_fan_m_s": float(fastest[best]),
-        "designed_up_to_m_s": wanted,
-        "offset_rms_m": float(offsets[best]),
-        "phase_margin_deg": math.degrees(margin),
-        "delay_margin_s": delay,
-        "largest_rise_time_s": float(max(slow, default=0.0)),
-    }
+    law: NamedNumbers = plain(
+        {
+            "gain": gains[best],
+            "bound_m_s": jet.bounds(gains)[best],
+            "fastest_fan_m_s": fastest[best],
+            "designed_up_to_m_s": wanted,
+            "offset_rms_m": offsets[best],
+            "phase_margin_deg": math.degrees(margin),
+            "delay_margin_s": delay,
+            "largest_rise_time_s": max(slow, default=0.0),
+        }
+    )
+    return law

@@ -24,7 +24,7 @@ from .jet_design import (
 )
 from .logs.flight_log import FlightLog
 from .logs.table import Array, Data, Names, finite_rows
-from .wind_profile import WindProfile, wind_profile
+from .wind_profile import WindProfile, ways_of, wind_profile
 from .wrench_series import WrenchSeries, estimate_log
 
 RISE_TIME = 0.45  # s, of the filter in the tasks
@@ -95,8 +95,7 @@ def profile_log(
 
     def loop(rise: float, *noise: Array) -> FollowingLoop:
         tuning = UKFTuning.for_vehicle(vehicle, log.period, rise)
-        noise_of = FilterNoise.of(tuning, log.period)
-        return following_loop(vehicle.inertia[2, 2], noise_of, *noise)
+        return following_loop(vehicle.inertia[2, 2], FilterNoise.of(tuning, log.period), *noise)
 
     shown = estimate_log(log, vehicle, UKFTuning.for_vehicle(vehicle, log.period, rise_time))
     noise = _noise(shown, 4.0 * rise_time, profile, shape, loop(rise_time))
@@ -124,7 +123,7 @@ def _noise(
     """
     t = np.arange(series.t[0] + settled, series.t[-1], DECISION_PERIOD)
     rows = np.searchsorted(series.t, t)
-    place = profile.along(series.position[rows])
+    place = series.position[rows] @ ways_of(profile.direction)[1]
     true = np.interp(place, profile.place, profile.wrench[5])
     error, felt = np.zeros(3), []
     for change in np.diff(true, prepend=true[:1]):

@@ -61,12 +61,8 @@ class WindProfile(NamedTuple):
     means: Array
     samples: float
 
-    def along(self, position: Array) -> Array:
-        """Return the places (N,) on the line of positions (N, 3)."""
-        return np.asarray(position @ _ways(self.direction)[1])
 
-
-def _ways(direction: float) -> Array:
+def ways_of(direction: float) -> Array:
     """Return the three directions (3, 3) of a line's parts."""
     c, s = math.cos(direction), math.sin(direction)
     return np.array([[s, -c, 0.0], [c, s, 0.0], [0.0, 0.0, 1.0]])
@@ -98,9 +94,9 @@ def wind_profile(
     slow = np.linalg.norm(np.gradient(means[:, :3], axis=0), axis=1) < _FASTEST * MEAN
     used = means[slow]
     direction = _direction(used) if axis is None else axis
-    if np.sum(used[:, 3:6] @ _ways(direction)[0]) < 0.0:
+    if np.sum(used[:, 3:6] @ ways_of(direction)[0]) < 0.0:
         direction += math.pi
-    ways = _ways(direction)
+    ways = ways_of(direction)
     beyond = used[:, :3] @ ways[0]
     bins = np.floor((beyond - beyond.min()) / _BAND).astype(int)
     runs, count = label(np.bincount(bins) >= _SHARE * len(beyond))  # of full bins, from 1
@@ -123,7 +119,7 @@ def wind_profile(
     mean, half = np.stack(wrench), 1.96 * np.stack(std)
     return WindProfile(
         math.remainder(direction, 2.0 * math.pi),
-        float(lines[line]),
+        lines[line],
         lines,
         at,
         mean,
@@ -168,7 +164,7 @@ def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Arra
     rough = np.sqrt(np.maximum(variance, 0.05 * np.mean(residual**2) + 1e-300))
     unit = residual / rough
     pairs = np.flatnonzero(np.diff(seconds) == 1)
-    rho = float(np.clip(np.mean(unit[pairs] * unit[pairs + 1]), _TOGETHER, 0.9))
+    rho = np.clip(np.mean(unit[pairs] * unit[pairs + 1]), _TOGETHER, 0.9)
     more = (1.0 + rho) / (1.0 - rho)  # means that are worth one
     weight = 1.0 / (rough * math.sqrt(more))
     beta, covariance = _fit(X * weight[:, None], y * weight)

@@ -299,13 +299,13 @@ def _of_poses(
 ) -> T:
     """Return the judgement of a tuning by the columns of a log."""
     log, _ = screen_log(log, vehicle, None)
-    if reads_imu(log):
-        raise InputError(
-            f"{log.source or log.name}: has no pose, or one that is too slow, to fit a tuning to; "
-            "expected 50 poses a second"
-        )
     position = np.where(log.valid[:, None], log.position, np.nan)
     try:
+        if reads_imu(log):
+            raise InputError(
+                "has no pose, or one that is too slow, to fit a tuning to; expected 50 poses a "
+                "second"
+            )
         return judge(
             vehicle, log.t, log.rotor_speeds, position, log.quaternion, log.voltage, tuning
         )

@@ -112,20 +112,19 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     if not (after and before):
         raise InputError("compare: expected at least one flight in each of the two sets")
     ways = difference(after, before)
-    moved = ways.mean[:, None]
     unchanged = ways.variance
     # a correction of the total by the voltage would hide a change: a heavier vehicle draws more and
     # pulls its battery down
     late, early = (np.log([trim.voltage for trim in group]).mean() for group in (after, before))
     unchanged[:, 3] += (_VOLTAGE_POWER * np.nan_to_num(late - early)) ** 2
-    shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
+    shares = np.mean([trim.thrust / trim.thrust.sum() for trim in before], axis=0)
 
     def logs_of(means: Array, spread: Array) -> Array:
         """Return the log-likelihoods (n,) of the difference for changes of given ``means`` (n, 4)
         and standard deviations beside the scatter, ``spread`` (n, 4); or one for all of the four.
         """
         variance = unchanged[:, None] + spread**2
-        off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
+        off = np.square(ways.mean[:, None] - means) / variance + np.log(2.0 * np.pi * variance)
         return np.asarray(logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
 
     prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))

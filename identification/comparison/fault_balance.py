@@ -161,6 +161,6 @@ class BalanceChannel:
         ss = ss + np.square(values).sum(axis=1) - np.square(sums[:, 2:-1]).sum(axis=1)
         own_share = np.maximum(ss - sm * sm / self.mm, 1e-12 * ss + 1e-300)
         gain = np.square(sy - sm * self.my / self.mm) / own_share
-        width = np.log(np.maximum(gain / noise.variance, 1.0))
-        price = 0.5 * np.maximum(1.0 + width, math.log(noise.whole.sum()))
+        width = 1.0 + np.log(np.maximum(gain / noise.variance, 1.0))
+        price = 0.5 * np.maximum(width, math.log(noise.whole.sum()))
         return np.asarray(noise.log_likelihood(self.rest - gain) - price)

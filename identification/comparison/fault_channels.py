@@ -148,35 +148,38 @@ def sample(channels: Channels) -> Samples:
     Raises:
         InputError: fewer than 3 s of flight, or too few samples a second.
     """
-    c = channels
-    times = c.gyro.t, c.accelerometer.t, c.command.t
+    times = channels.gyro.t, channels.accelerometer.t, channels.command.t
     if min(map(len, times)) < 10:
-        raise InputError(f"{c.name}: fewer than ten samples of gyro, accelerometer or commands")
+        raise InputError(
+            f"{channels.name}: fewer than ten samples of gyro, accelerometer or commands"
+        )
     for what, at in zip(_CHANNELS[:2], times, strict=False):
         if (step := median_step(at)) > LONGEST_GAP:
             raise InputError(
-                f"{c.name}: {what}: {1.0 / step:.3g} samples a second; expected at least "
+                f"{channels.name}: {what}: {1.0 / step:.3g} samples a second; expected at least "
                 f"{1.0 / LONGEST_GAP:g}, to see a rotor fail"
             )
     edges = np.arange(max(at[0] for at in times), min(at[-1] for at in times), STEP)
     if len(edges) < 3:
-        raise InputError(f"{c.name}: gyro, accelerometer and commands do not overlap in time")
+        raise InputError(
+            f"{channels.name}: gyro, accelerometer and commands do not overlap in time"
+        )
     t = 0.5 * (edges[1:] + edges[:-1])
-    gyro = c.gyro.at(edges)
-    force = _means(c.accelerometer.t, c.accelerometer.values, t)
-    total = c.command.values.sum(axis=1)
-    keep = np.interp(t, c.command.t, total) > 0.5 * usual_thrust(total)
+    gyro = channels.gyro.at(edges)
+    force = _means(channels.accelerometer.t, channels.accelerometer.values, t)
+    total = channels.command.values.sum(axis=1)
+    keep = np.interp(t, channels.command.t, total) > 0.5 * usual_thrust(total)
     for at in times[:2]:
         keep &= np.diff(at)[np.searchsorted(at, t) - 1] < LONGEST_GAP
     begin = t[keep].min(initial=np.inf) + SETTLED
-    stop, why = _end(c, begin)
+    stop, why = _end(channels, begin)
     keep &= (t > begin) & (t < stop)
     for a, b in runs_of(keep):
         keep[a:b] = (b - a) * STEP > SHORTEST
     if keep.sum() * STEP < LEAST_SECONDS:
         raise InputError(
-            f"{c.name}: {keep.sum() * STEP:.3g} s in flight; expected at least {LEAST_SECONDS:g} s "
-            "without a gap, to see what is usual"
+            f"{channels.name}: {keep.sum() * STEP:.3g} s in flight; expected at least "
+            f"{LEAST_SECONDS:g} s without a gap, to see what is usual"
         )
     return Samples(
         t[keep],
@@ -184,8 +187,8 @@ def sample(channels: Channels) -> Samples:
         (0.5 * (gyro[1:] + gyro[:-1]))[keep],
         force[keep, 2],
         np.append(False, keep[:-1])[keep],
-        _between(c.command, t[keep]),
-        c,
+        _between(channels.command, t[keep]),
+        channels,
         why,
     )
 

@@ -89,8 +89,8 @@ def find_fault(channels: Channels) -> RotorFault:
     each, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
-    whole = math.log(_NOTHING) + max(one.nothing for one in tried)
-    chances = softmax(np.append(whole, evidence + math.log(sum(_EVENTS)) + log_softmax(logs)))
+    nothing = math.log(_NOTHING) + max(one.nothing for one in tried)
+    chances = softmax(np.append(nothing, evidence + math.log(sum(_EVENTS)) + log_softmax(logs)))
     rotor = int(np.argmax(logs[:4]))
     _, least, most = _quantiles(_LOSSES, weights[rotor], 0.5 * (_LOSSES[1] - _LOSSES[0]))
     return RotorFault(
@@ -98,7 +98,7 @@ def find_fault(channels: Channels) -> RotorFault:
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
         1 + rotor,
         _quantiles(starts, likely, STEP),
-        (1.0 - float(weights[rotor] @ _LOSSES), max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
+        (1.0 - weights[rotor] @ _LOSSES, max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
 
@@ -145,7 +145,7 @@ def _jump(balance: FaultBalance, rows: Index) -> tuple[float, int, int]:
     around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
     logs = balance.steps(around, balance.ramps)
     ramp, k = divmod(int(np.argmax(logs)), len(around))
-    return float(logs[ramp, k]), int(around[k]), ramp
+    return logs[ramp, k], around[k], ramp
 
 
 def _onsets(t: Array, every: Index, best: _Tried) -> tuple[float, Array, Array]:
@@ -183,8 +183,8 @@ def _patterns(best: _Tried) -> ArrayPair:
         norm.logpdf(part, means, np.hypot(std, spread)).sum(axis=1, where=says)
         for part, std, means, spread in tried
     ]
-    evidence = np.array([logsumexp(log) - math.log(len(log)) for log in logs])
-    return evidence, softmax(logs[:4], axis=1)
+    evidence = [logsumexp(log) - math.log(len(log)) for log in logs]
+    return np.array(evidence), softmax(logs[:4], axis=1)
 
 
 def _rows(count: int) -> Index:

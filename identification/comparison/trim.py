@@ -50,11 +50,6 @@ class Trim:
     session: str = ""  # common name of a session's flights; empty: not known
 
     @property
-    def total(self) -> float:
-        """Sum of the four."""
-        return float(self.thrust.sum())
-
-    @property
     def features(self) -> Array:
         """The four numbers, see ``features_of``."""
         return features_of(self.thrust)
@@ -84,7 +79,7 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
     """
     step = np.diff(t, append=t[-1])
     step = np.minimum(step, 5.0 * median_step(t))[steady]  # a gap is no flight
-    seconds = float(step.sum())
+    seconds = step.sum()
     if seconds < LEAST_SECONDS:
         raise InputError(
             f"{name}: {seconds:.3g} s of calm flight; expected at least {LEAST_SECONDS:g} s off "
@@ -99,14 +94,13 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
         )
     known = np.empty(0) if voltage is None else voltage[steady]
     known = known[(known > 0.0) & (known < np.inf)]
-    level = known.mean() if known.size else math.nan
     ends = np.flatnonzero(np.diff(np.floor(np.cumsum(step) / BATCH))) + 1
     batches = zip(np.split(thrust, ends), np.split(step, ends), strict=True)
     # the last batch may be a short one
     means = [batch.mean(axis=0) for batch, steps in batches if steps.sum() > 0.5 * BATCH]
     numbers = [features_of(some) for some in means if some.min() > 0.0]
     noise = np.var(numbers, axis=0, ddof=1) / len(numbers) if len(numbers) > 1 else np.zeros(4)
-    return Trim(name, mean, seconds, noise, level)
+    return Trim(name, mean, seconds, noise, known.mean() if known.size else math.nan)
 
 
 def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
