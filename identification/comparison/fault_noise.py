@@ -40,8 +40,8 @@ class Noise(NamedTuple):
         """Return the log-likelihood of innovations with ``rest`` as the sum of squares, at the best
         variance.
         """
-        n = int(self.whole.sum())
-        log_scale = float(np.log(self.scale[self.whole]).sum())
+        n = self.whole.sum()
+        log_scale = np.log(self.scale[self.whole]).sum()
         return np.asarray(-0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale)
 
 
@@ -64,6 +64,6 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
         gram = past.T @ past + 1e-6 * (present @ present) * np.eye(ORDER)
         poles = np.linalg.solve(gram, past.T @ present)
         rest = np.square(present - past @ poles).sum()
-        noise = Noise(scale, np.append(1.0, -poles), whole, float(rest / len(present)))
-        tried.append((float(noise.log_likelihood(rest)), noise))
+        noise = Noise(scale, np.append(1.0, -poles), whole, rest / len(present))
+        tried.append((noise.log_likelihood(rest), noise))
     return max(tried, key=itemgetter(0))[1]

@@ -26,6 +26,13 @@ from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
 _FOUND = {str(i): f"rotor {i}" for i in range(1, 5)}
+# sentences with a place for the probability
+_NO_ROTOR = {
+    NOTHING: "No rotor lost thrust {}.",
+    OTHER: "No rotor fault explains what happened: a force or torque began that no rotor makes, "
+    "a gust, a load or a collision {}.",
+    ALL: "All rotors lost thrust at once {}: the battery, the air, or the vehicle.",
+}
 _NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
@@ -83,8 +90,8 @@ def change_data(change: Change) -> Data:
         return {
             "log": trim.name,
             "seconds": trim.seconds,
-            "thrust_share": trim.thrust / trim.total,
-            "total": trim.total,
+            "thrust_share": trim.thrust / trim.thrust.sum(),
+            "total": trim.thrust.sum(),
             "std": np.sqrt(trim.noise),
             "voltage": trim.voltage,
         }
@@ -166,15 +173,8 @@ def fault_headline(fault: RotorFault) -> str:
     sure = f"(probability {chance:.2f})" if chance < 0.9995 else "(probability above 0.999)"
     if not fault.sure:
         return _undecided({_finding(fault, k): p for k, p in fault.probabilities.items()})
-    if likeliest == NOTHING:
-        return f"No rotor lost thrust {sure}."
-    if likeliest == OTHER:
-        return (
-            f"No rotor fault explains what happened: a force or torque began that no rotor makes, "
-            f"a gust, a load or a collision {sure}."
-        )
-    if likeliest == ALL:
-        return f"All rotors lost thrust at once {sure}: the battery, the air, or the vehicle."
+    if likeliest in _NO_ROTOR:
+        return _NO_ROTOR[likeliest].format(sure)
     when, low, high = fault.onset
     lost, most, least = (100 - 100 * share for share in fault.remaining)
     return (
@@ -191,13 +191,15 @@ def _finding(fault: RotorFault, name: str) -> str:
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
     channels = fault.samples.channels
+    onset, *onset_ci95 = fault.onset
+    remaining, *remaining_ci95 = fault.remaining
     of_rotor = {
         "rotor": fault.rotor,
         "motor": channels.motor_names and channels.motor_names[fault.rotor - 1],
-        "onset_s": fault.onset[0],
-        "onset_ci95_s": list(fault.onset[1:]),
-        "remaining": fault.remaining[0],
-        "remaining_ci95": list(fault.remaining[1:]),
+        "onset_s": onset,
+        "onset_ci95_s": onset_ci95,
+        "remaining": remaining,
+        "remaining_ci95": remaining_ci95,
     }
     return {
         "log": channels.name,
@@ -217,7 +219,7 @@ def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path
     Raises:
         InputError: a file cannot be written.
     """
-    data = [fault_data(fault) for fault in faults]
+    data = list(map(fault_data, faults))
     return _written(folder / "rotor_faults.json", data, _draw_faults(faults))
 
 
