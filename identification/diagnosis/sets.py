@@ -321,9 +321,9 @@ class Posterior:
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
-    def alone(self) -> NamedNumbers:
+    def alone(self) -> list[tuple[str, float]]:
         """Return the deviance of each effect of the library alone, beside the given effects, over
-        the deviance of all effects together.
+        the deviance of all effects together; the largest first.
         """
         base = next(x for x in self.bases if x.effects == self.given)
         asked = [c for c in base.asked if c[0] not in self.given]
@@ -337,7 +337,7 @@ class Posterior:
             if (effect := columns[0][0]) not in self.given:
                 gained = m.explained([m.place[c] for c in columns])
                 out[effect] = max(out.get(effect, 0.0), gained / whole)
-        return out
+        return sorted(out.items(), key=lambda x: -x[1])
 
     def nuisances(self) -> dict[Column, Pair]:
         """Return the nuisances of any flight at the mode beside the likeliest set: values and
