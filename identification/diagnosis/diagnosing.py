@@ -224,7 +224,7 @@ class _Judged:
         structure = fitted.ranking.structure
         strange = unknown(structure, bool(self.pushes))
         rivals = {e: self._rivals(e) for e in named}
-        for e in (e for e in named if e not in known):  # an effect, or its rivals in these flights
+        for e in {*named}.difference(known):  # an effect, or its rivals in these flights
             alike = [x.probability for x in fitted.ranking.sets if {e, *rivals[e]} & {*x.effects}]
             factor = fitted.posterior.factor_in_set(e)
             known[e] = beside_unknown(min(sum(alike), 1.0), factor, structure, strange)
@@ -258,9 +258,8 @@ class _Judged:
         unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
         self.hidden = {e for e in unseen if by_bias[e] >= LEAST_SHOWN}
         self.unseen = unseen - self.hidden
-        self.candidates = tuple(
-            Candidate(e, gain, e in named) for e, gain in fitted.posterior.alone()
-        )
+        alone = sorted(fitted.posterior.alone().items(), key=lambda x: -x[1])
+        self.candidates = tuple(Candidate(e, gain, e in named) for e, gain in alone)
         self.notes = (
             *inertial_notes(flights, named),
             *(sentence for sentences in self.doubts.values() for sentence in sentences),
@@ -339,6 +338,7 @@ class _Judged:
                 f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like "
                 "it. Log the pose to tell them apart"
                 for effect, hidden in self.fitted.behind.items()
+                if hidden
             ),
             "assumed thrust": tuple(
                 f"{effect}: the log holds motor commands and the vehicle file states no motor "

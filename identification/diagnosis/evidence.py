@@ -126,13 +126,14 @@ def tempering(blocks: Array, chosen: Index) -> float:
         chosen: the fitted columns.
     """
     total = blocks.sum(axis=0)
-    mode = np.linalg.solve(total[np.ix_(chosen, chosen)] + np.eye(len(chosen)), total[chosen, -1])
+    normal = total[np.ix_(chosen, chosen)]
+    mode = np.linalg.solve(normal + np.eye(len(chosen)), total[chosen, -1])
     scores = blocks[:, chosen, -1] - blocks[:, chosen[:, None], chosen] @ mode
-    known = np.diagonal(total)[chosen] > 1.0  # columns better known by the flight than by the prior
+    known = np.diagonal(normal) > 1.0  # columns better known by the flight than by the prior
     if not known.any():
         return 1.0
     # the scores as independent ones: in the eigenvectors of their expected products
-    size, axes = np.linalg.eigh(total[np.ix_(chosen, chosen)][np.ix_(known, known)])
+    size, axes = np.linalg.eigh(normal[np.ix_(known, known)])
     keep = size > 1e-6 * size[-1]
     ratio = np.square(scores[:, known] @ axes[:, keep]).sum(axis=0) / size[keep]
     # a fit brings their sum over all blocks to zero: the cost is one block of all

@@ -7,14 +7,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
-from .evidence import Marginal, SetEvidence, evidence_of_one_more, tempering
+from .evidence import Index, Marginal, SetEvidence, evidence_of_one_more, tempering
 from .left_out import LeftOut
 from .priors import (
     PRIORS,
@@ -178,13 +178,16 @@ class Posterior:
         fitted = np.sort(np.append(base.plain, base.at(best.columns)))
         return tempering(base.blocks, np.searchsorted(base.single, fitted))
 
-    def _negligible(self, base: Base) -> Array:
-        """Return the share (len(base.asked),) of each column in any flight."""
-        little = PRIORS.negligible * base.typical[base.at(base.asked)]
+    def _of_any_flight(self, base: Base) -> tuple[Index, Array]:
+        """Return the columns of everything any flight may have, and of a little of every effect,
+        with standard deviations.
+        """
+        at = base.at(base.asked)
+        little = PRIORS.negligible * base.typical[at]
         # a start of another base is no small effect
         if self.one_noise:
             little[[name.startswith(START_PREFIX) for _, name in base.asked]] = 0.0
-        return little
+        return np.append(base.plain, at), np.append(np.ones(len(base.plain)), little)
 
     def _counts(self, number: int, key: Effects) -> bool:
         """Return whether a set is judged beside a base."""
@@ -205,11 +208,8 @@ class Posterior:
 
     def _search(self, number: int, asked: Sequence[Variants] = ()) -> None:
         base = self.bases[number]
-        # integrated out: everything any flight may have, and a little of every effect
-        little = np.append(np.ones(len(base.plain)), self._negligible(base))
-        m = base.marginal(
-            base.asked, np.append(base.plain, base.at(base.asked)), self.power, little
-        )
+        others, little = self._of_any_flight(base)
+        m = base.marginal(base.asked, others, self.power, little)
         variants = self._variants(base)
         ways = Counter(v[0][0] for v in variants)
         before = {e: self.odds - math.log(count) for e, count in ways.items()}
@@ -217,7 +217,7 @@ class Posterior:
 
         def score(some: Variants) -> float:
             key = frozenset(v[0][0] for v in some)
-            if not self._counts(number, key):
+            if len(key) < len(some) or not self._counts(number, key):
                 return -math.inf
             if some not in tried:
                 tried[some] = None
@@ -244,10 +244,9 @@ class Posterior:
         for size in range(more):
             level.sort(key=score, reverse=True)
             grown: dict[frozenset[Variant], Variants] = {}
-            for some in level[: KEPT_SETS if size else 2 * KEPT_SETS]:
-                for v in variants:
-                    if v[0][0] not in {x[0][0] for x in some}:
-                        grown.setdefault(frozenset((*some, v)), (*some, v))
+            kept = level[: KEPT_SETS if size else 2 * KEPT_SETS]
+            for new in ((*some, v) for some in kept for v in variants):
+                grown.setdefault(frozenset(new), new)
             level = list(grown.values())
 
     def _possible(self, candidate: _Candidate) -> bool:
@@ -321,9 +320,9 @@ class Posterior:
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
-    def alone(self) -> list[tuple[str, float]]:
+    def alone(self) -> NamedNumbers:
         """Return the deviance of each effect of the library alone, beside the given effects, over
-        the deviance of all effects together; the largest first.
+        the deviance of all effects together.
         """
         base = next(x for x in self.bases if x.effects == self.given)
         asked = [c for c in base.asked if c[0] not in self.given]
@@ -333,11 +332,11 @@ class Posterior:
         normal = m.quadratic.normal + np.eye(len(asked))
         whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
         out: NamedNumbers = {}
-        for columns in self._variants(base):
-            if (effect := columns[0][0]) not in self.given:
-                gained = m.explained([m.place[c] for c in columns])
+        for v in self._variants(base):
+            if (effect := v[0][0]) not in self.given:
+                gained = m.explained([m.place[c] for c in v])
                 out[effect] = max(out.get(effect, 0.0), gained / whole)
-        return sorted(out.items(), key=lambda x: -x[1])
+        return out
 
     def nuisances(self) -> dict[Column, Pair]:
         """Return the nuisances of any flight at the mode beside the likeliest set: values and
@@ -372,15 +371,17 @@ class Posterior:
         own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
         # an effect of the set is true to some per cent, whatever makes it change
         changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
-        wrong = np.full(len(changing), EFFECT_ERROR / SHARE_OF_EFFECT)
-        ones = np.ones(len(base.plain) + len(own))
-        chosen = np.concatenate([base.plain, own, base.at(base.asked), changing])
+        others, little = self._of_any_flight(base)
+        wrong = np.repeat([1.0, EFFECT_ERROR / SHARE_OF_EFFECT], [len(own), len(changing)])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
-        power = self.power * (1.0 if varied else ROUNDED)
-        size = np.concatenate([ones, self._negligible(base), wrong])
-        return base.marginal(base.dictionary, chosen, power, size).quadratic
+        return base.marginal(
+            base.dictionary,
+            np.concatenate([others, own, changing]),
+            self.power if varied else ROUNDED * self.power,
+            np.append(little, wrong),
+        ).quadratic
 
-    def best_setting(self, most: int = MOST_EFFECTS) -> Setting:
+    def best_setting(self, most: float = math.inf) -> Setting:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._at_mode(self.known[key])[0]
@@ -389,7 +390,7 @@ class Posterior:
         """Return the coefficients of the likeliest set, or of its needed effects, and their
         standard deviations. These contain the changes by needless effects left out.
         """
-        whole = self.best_setting(len(self.library))
+        whole = self.best_setting()
         setting, std = self._at_mode(self._likeliest()[1])
         wide = {
             e: {n: math.hypot(x, setting[e][n] - whole[e][n]) for n, x in own.items()}
@@ -448,8 +449,7 @@ class Posterior:
 
     def ranking(self, quieter: Base | None = None) -> Ranking:
         """Return probabilities; ``quieter`` as of ``structure``."""
-        total = float(logsumexp(list(self.scores.values())))
-        p = {k: math.exp(v - total) for k, v in self.scores.items()}
+        p = dict(zip(self.scores, softmax([*self.scores.values()]).tolist(), strict=True))
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)
         sets = tuple(
