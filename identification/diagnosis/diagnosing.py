@@ -197,20 +197,20 @@ class _Judged:
         library = [e for e in library if e not in flights.not_identifiable]
         given = self._given = what_commands_show(flights, library)
         report("asking how probable each effect is")
-        fitted = (
+        likeliest = (
             rank(flights, library, report)
             if flights.has_raw_poses
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
-        self._best = fitted.ranking.sets[0]
-        sensors = {name: value for name, (value, _) in fitted.sensors.items()}
+        self._best = likeliest.ranking.sets[0]
+        sensors = {name: value for name, (value, _) in likeliest.sensors.items()}
         known_apart = {**given.fixed, **({"": sensors} if sensors else {})}
-        self.setting = known_apart | fitted.setting
-        self.balance = balance(flights, self.setting)
-        if not self.balance.better:  # no set with a larger error on held-out flight is printed
-            fitted = replace(fitted, setting={}, behind={})
-            self.setting = known_apart
+        # no set with a larger error on held-out flight is printed
+        for fitted in (likeliest, replace(likeliest, setting={}, behind={})):
+            self.setting = known_apart | fitted.setting
             self.balance = balance(flights, self.setting)
+            if self.balance.better:
+                break
         self.fitted = fitted
         self.parts = {
             e: flights.residual(without(self.setting, e)) - self.balance.after
@@ -235,9 +235,13 @@ class _Judged:
         names = {e: known[e] for e in named}
         if late := given.late:
             names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
-            doubted = unsure or names[late.name] < rule.least_sure_probability
-            std = self._of_any_flight(late.name, late.coefficients, late.std)
-            effects.append(replace(late, std=std, tentative=doubted))
+            effects.append(
+                replace(
+                    late,
+                    std=self._of_any_flight(late.name, late.coefficients, late.std),
+                    tentative=unsure or names[late.name] < rule.least_sure_probability,
+                )
+            )
         self.effects = tuple(effects)
         self.not_needed = tuple(
             self._stated(e, self._best.coefficients[e], self._best.std[e])
@@ -308,14 +312,14 @@ class _Judged:
         if effect in self._given.first:
             factors = playing(*THRUST_FACTORS)
             return tuple(x for x in factors if x != effect) if effect in factors else ()
-        rest = {*self._best.effects} - {effect}
+        own = {*self._best.effects}
         least = LEAST_RIVAL * self._best.probability
-        return tuple(
-            e
+        swapped = [
+            own ^ {*x.effects}
             for x in self.fitted.ranking.sets
-            if rest < {*x.effects} and len(x.effects) == len(rest) + 1 and x.probability > least
-            for e in {*x.effects} - rest - {effect}
-        )
+            if x.probability > least and len(x.effects) == len(own)
+        ]
+        return tuple(e for x in swapped if effect in x and len(x) == 2 for e in x - {effect})
 
     def _doubts(self, named: Sequence[str], strange: float) -> dict[str, Names]:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
@@ -369,11 +373,6 @@ class _Judged:
                 name: math.hypot(x, flights.thrust_std * unit_of_change((effect, name), vehicle))
                 for name, x in std.items()
             }
-        sizes = [
-            abs(x) / typical_size((effect, name), vehicle)
-            for name, x in values.items()
-            if name != CENTRAL
-        ]
         # shares of the residual's energy without it, each channel over its sensors' noise
         after = self.balance.after
         over = mean_square(flights.visible_noise) ** 0.5 + 1e-12
@@ -392,7 +391,10 @@ class _Judged:
             evidence={
                 "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
                 "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
-                "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
+                "largest_coefficient_in_typical_sizes": max(
+                    abs(x) / typical_size((effect, name), vehicle) * (name != CENTRAL)
+                    for name, x in values.items()
+                ),
                 "size_over_what_is_left": size,
                 **stated.evidence,
             },

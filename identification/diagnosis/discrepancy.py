@@ -85,6 +85,8 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
     rate = whole.angular_velocity
     body = in_body(whole.velocity, rotation)
+    # from the sample before: later samples hold the poses' noise
+    change = np.diff(rotors, axis=0, prepend=rotors[:1])
     size = weight_and_torque(flights.vehicle) / flights.inertias
     one = np.ones(len(t))
     forces, torques = range(3), range(3, 6)
@@ -98,20 +100,19 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
 
     for i, axis in enumerate("xyz"):
         along = body[:, i]
-        torque = rotors[:, 1 + i]
         add("velocity", f"velocity {axis}", along)
         add("velocity", f"squared velocity {axis}", along * np.abs(along))
         add("rotors", f"angular velocity {axis}", rate[:, i])
-        add("rotors", f"torque {axis}", torque, torques)
-        add("rotors", f"change of torque {axis}", _change(torque), (3 + i,))
+        add("rotors", f"torque {axis}", rotors[:, 1 + i], torques)
+        add("rotors", f"change of torque {axis}", change[:, 1 + i], (3 + i,))
     add("rotors", "thrust", rotors[:, 0])
-    add("rotors", "change of thrust", _change(rotors[:, 0]), (2, *torques))
+    add("rotors", "change of thrust", change[:, 0], (2, *torques))
     for a, b in ((0, 1), (1, 2), (0, 2)):
         axes = f"{'xyz'[a]} and {'xyz'[b]}"
         add("velocity", f"velocities {axes}", body[:, a] * body[:, b])
         add("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], torques)
-    for name, x in zip(("x", "y", "height"), position.T, strict=True):
-        add("place", name, x)
+    for i, name in enumerate(("x", "y", "height")):
+        add("place", name, position[:, i])
     for height in HEIGHTS:
         above = position[:, 2].min() - position[:, 2]
         add("place", f"height below {height:g} m", np.exp(above / height))
@@ -140,11 +141,6 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
 def heading_of(rotation: Array) -> Array:
     """Return the headings (n,), rad, of attitudes (n, 3, 3)."""
     return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-
-
-def _change(x: Array) -> Array:
-    """Return differences from the sample before: later samples hold the poses' noise."""
-    return np.diff(x, prepend=x[:1])
 
 
 def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
