@@ -189,13 +189,6 @@ class Posterior:
             little[[name.startswith(START_PREFIX) for _, name in base.asked]] = 0.0
         return np.append(base.plain, at), np.append(np.ones(len(base.plain)), little)
 
-    def _counts(self, number: int, key: Effects) -> bool:
-        """Return whether a set is judged beside a base."""
-        if not self.one_noise:  # another base has the columns of this set
-            return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
-        most = max(len(x.effects) for x in self.bases if x.effects <= key)
-        return key not in self.idle and len(self.bases[number].effects) == most
-
     def _variants(self, base: Base) -> list[Variant]:
         out = []
         for effect in self.library:
@@ -217,7 +210,14 @@ class Posterior:
 
         def score(some: Variants) -> float:
             key = frozenset(v[0][0] for v in some)
-            if len(key) < len(some) or not self._counts(number, key):
+            if self.one_noise:
+                most = max(len(x.effects) for x in self.bases if x.effects <= key)
+                judged = key not in self.idle and len(base.effects) == most
+            else:  # another base has the columns of this set
+                judged = number > 0 or not any(
+                    x.effects and key >= x.effects for x in self.bases[1:]
+                )
+            if len(key) < len(some) or not judged:
                 return -math.inf
             if some not in tried:
                 tried[some] = None
