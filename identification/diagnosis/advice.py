@@ -78,12 +78,13 @@ def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
         ("the thrust", "weights", thrust / flights.vehicle.weight),
     ):
         most = np.quantile(values[seen], KNOWN)
-        beyond = values[~seen] > most
-        if beyond.mean() > OUTSIDE:
+        others = values[~seen]
+        beyond = np.mean(others > most)
+        if beyond > OUTSIDE:
             yield (
-                f"outside the range of the fit: {name} of {beyond.mean():.0%} of the held-out "
-                f"flight is above {most:.3g} {unit}, up to {values[~seen].max():.3g} {unit}. The "
-                "errors there are those of an extrapolation"
+                f"outside the range of the fit: {name} of {beyond:.0%} of the held-out flight is "
+                f"above {most:.3g} {unit}, up to {others.max():.3g} {unit}. The errors there are "
+                "those of an extrapolation"
             )
 
 

@@ -56,7 +56,7 @@ class _FittedPosterior:
     ranking: Ranking
     setting: Setting  # coefficients of the likeliest set's needed effects
     std: Setting  # their standard deviations
-    gains: Mapping[str, Pair]  # as in ``Posterior.needed``
+    gains: Mapping[str, Pair]  # as of ``Posterior.leave_out_needless``
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
@@ -103,8 +103,8 @@ def rank(
         return starts, Posterior(flights, library, (loud, best.base(library, starts)))
 
     def alone(best: Likelihood) -> float:
-        base = best.base(best.setting, {})
-        scores = Posterior(flights, [*best.setting], (base, base)).scores
+        bases = [best.base(best.setting, {})] * 2
+        scores = Posterior(flights, [*best.setting], bases).scores
         return scores.get(frozenset(best.setting), -math.inf)
 
     def first() -> tuple[Likelihood, Starts, Base]:
@@ -125,10 +125,9 @@ def rank(
         score = alone(best)
         starts, posterior = around(best)
         # a similar effect counts as a disturbance beside it: each is judged beside its own noise
-        rivals = [fitted(x, best) for x in posterior.rivals(setting)]
-        scores = [score, *map(alone, rivals)]
-        if max(scores) > score:
-            best = [best, *rivals][scores.index(max(scores))]
+        rivals = {alone(x): x for x in (fitted(y, best) for y in posterior.rivals(setting))}
+        if max(rivals, default=score) > score:
+            best = rivals[max(rivals)]
             starts, posterior = around(best)
         del rivals  # each holds a tenth of a diagnosis' memory
     for _ in range(ROUNDS):
@@ -150,7 +149,7 @@ def rank(
     by_chance = 2.0 * math.log(len(whole.dictionary))
     quieter = best.quieter({column: size}, starts) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
-    posterior, gains = posterior.needed(ranking.probability)
+    gains = posterior.leave_out_needless(ranking.probability)
     late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
     return _FittedPosterior(
         posterior, ranking, *posterior.likeliest_setting(), gains, best.gusts(), late
@@ -211,9 +210,8 @@ def rank_by_rows(
         if not flights.is_nonlinear(effect) or effect in given:
             continue
         report(f"trying {effect}")
-        own = [{**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect]
-        own.sort(key=likelihood.objective)
-        if own:
+        each = ({**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect)
+        if own := sorted(each, key=likelihood.objective):
             near = map(likelihood.fitted, own[:MOST_STARTS])
             add(min(near, key=likelihood.objective))
 
@@ -225,7 +223,7 @@ def rank_by_rows(
         the sets with one effect less are fitted as well.
         """
         while True:
-            setting = posterior().best_setting(len(library))
+            setting = posterior().best_setting()
             new = [setting]
             if (key := frozenset(setting)) in bases:
                 best = fitted[key]
@@ -244,7 +242,7 @@ def rank_by_rows(
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
     ranking = last.ranking()
-    last, gains = last.needed(ranking.probability)
+    gains = last.leave_out_needless(ranking.probability)
     setting, std = last.likeliest_setting()
     setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
     return _FittedPosterior(
@@ -275,8 +273,7 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
-    behind = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
-    return {e: others for e, others in behind.items() if others}
+    return {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
 
 
 def starts_of(
