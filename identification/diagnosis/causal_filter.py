@@ -32,6 +32,7 @@ class Poses:
     voltage: Array  # (n,) V; 0 where unknown
     velocity: Array  # (3,) m/s, at the start
     angular_velocity: Array  # (3,) rad/s, body, at the start
+    log: int = 0  # index among the flights
 
 
 @dataclass(frozen=True, eq=False)

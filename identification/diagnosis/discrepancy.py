@@ -54,6 +54,15 @@ class Product:
 Columns = dict[Column, Array | Product]
 
 
+def along_axis(axis: int, rotation: Array) -> tuple[Array | None, slice]:
+    """Return the last two fields of a product along an axis of the body, three of force and three
+    of torque.
+    """
+    if axis < 3:
+        return rotation[:, :, axis], slice(3)
+    return None, slice(axis, axis + 1)
+
+
 def weight_and_torque(vehicle: Vehicle) -> Array:
     """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
     quarter of the arm.
@@ -125,10 +134,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     for group, name, x, channels in shapes:
         z = _scaled(x)
         for channel in channels if z.any() else ():
-            if channel < 3:
-                made = Product(size[0], z, rotation[:, :, channel], slice(3))
-            else:
-                made = Product(size[channel], z, None, slice(channel, channel + 1))
+            made = Product(size[channel], z, *along_axis(channel, rotation))
             out["", f"{UNKNOWN}{group}: {name} in {channel}"] = made
     for channel in every:
         made = Product(size[channel], np.ones(len(t)), None, slice(channel, channel + 1))

@@ -71,14 +71,13 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     P = _riccati(F, Q)
     S = P[..., ::3, ::3] + np.eye(2)
     K = P[..., :, ::3] @ np.linalg.inv(S)
-    gain = np.empty((*keep.shape, 3, 2))
-    covariance = np.zeros((*keep.shape, 6))
+    one, other = pose[..., :, None], pose[..., None, :]
     units = np.array([1.0, 1.0 / period, 1.0 / period**2])
-    for i in range(2):
-        for j in range(2):
-            at = K[..., 3 * i : 3 * i + 3, j] * (pose[..., i] / pose[..., j])[..., None] * units
-            gain[..., PAIRS[:, i], :, int(i != j)] = np.moveaxis(at, -2, 0)
-            covariance[..., PAIRS[:, i], PAIRS[:, j]] = S[..., i, j] * pose[..., i] * pose[..., j]
+    gain = K.reshape(*pose.shape, 3, 2) * (one / other)[..., None, :] * units[:, None]
+    gain[..., 1, :, :] = gain[..., 1, :, ::-1].copy()  # its own first
+    gain = gain.reshape(*keep.shape, 3, 2).take(np.argsort(PAIRS.ravel()), axis=-3)
+    covariance = np.zeros((*keep.shape, 6))
+    covariance[..., PAIRS[:, :, None], PAIRS[:, None]] = S * one * other
     return SteadyFilter(gain, keep, covariance)
 
 
