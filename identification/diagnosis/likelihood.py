@@ -358,9 +358,8 @@ class Likelihood:
         bent = []  # away from the straight line, by the second difference
         for s in self.signals:
             # the speeds are of k + 1/2: nothing later than sample k + 1
-            u = s.rotor_speeds.copy()
-            u[2:] += np.diff(s.rotor_speeds, 2, axis=0)
-            bent.append(replace(s, rotor_speeds=u))
+            u = np.pad(np.diff(s.rotor_speeds, 2, axis=0), ((2, 0), (0, 0)))
+            bent.append(replace(s, rotor_speeds=s.rotor_speeds + u))
         self._acting["", BETWEEN] = self._accelerations(self.setting, bent) - self._base
         self._add_model_errors()
         self._add_answers()
@@ -462,7 +461,7 @@ class Likelihood:
         disturbed = np.array([gust.rms for gust in self.gusts()]) / self.flights.inertias
         for axis, rotors, own in zip(DRIVEN, whole.rotors.T, states, strict=True):
             size = max(rotors.std(), 1e-9)
-            answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
+            answer = min((disturbed[axis] / size) ** 2, 1.0) * size
             change = np.diff(rotors, prepend=rotors[:1])
             along = along_axis(axis, whole.rotation)
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
@@ -519,7 +518,7 @@ class Likelihood:
                 driven[:, :3, 0] = jumps[at, :3, :1] * self._units
                 driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1:2] * self._units
                 out = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
-                kept = (out if counts[at].all() else out[counts[at]]).reshape(-1, out.shape[2])
+                kept = out[counts[at]].reshape(-1, out.shape[2])
                 samples += int(counts[at].sum())
                 if len(kept):
                     np.matmul(kept.T, kept, out=products[len(flown)])

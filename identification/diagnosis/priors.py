@@ -50,8 +50,6 @@ class _PriorSettings:
     # error of any model as a share of an axis' force or torque: of thrust along its axis and across
     # it, and of the torques. Propellers and bearings are not stable to less
     model_error: float = 0.003
-    # of a thrust or torque which answers disturbances alone: share along each signal of the loop
-    answer: float = 1.0
     # standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
     # units of one period of such an acceleration. They leave the gains free: a loop that shows the
     # tilt it sees has gains of some 3,000, 100 and 1
@@ -251,8 +249,17 @@ def declared(column: Column, flights: RegressedFlights) -> float:
     """Return a column's coefficient by the vehicle's file, the zero of the likelihood's
     coefficient; 0 if not stated.
     """
-    effect, name = bare(column)
-    return flights.coefficients({}, effect).get(name, 0.0)
+    return flights.value({}, bare(column))
+
+
+def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting: Setting) -> Array:
+    """Return the coefficients (c,) of a setting, in standard deviations of their priors."""
+    return np.array(
+        [
+            (flights.value(setting, c) - declared(c, flights)) / prior_size(c, flights)
+            for c in columns
+        ]
+    )
 
 
 def in_prior_units(
@@ -280,8 +287,7 @@ def in_prior_units(
     size = np.array([prior_size(c, flights) for c in names])
     # about zero: the residual without all effects of the setting
     own = [*map(bare, names)]
-    here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in own]
-    back = np.append(np.subtract(here, [declared(c, flights) for c in own]), 1.0)
+    back = np.append([flights.value(setting, c) - declared(c, flights) for c in own], 1.0)
     whole = blocks @ back
     blocks[:, :, -1] = blocks[:, -1, :] = whole
     blocks[:, -1, -1] = whole @ back

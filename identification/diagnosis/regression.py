@@ -458,6 +458,10 @@ class RegressedFlights:
         """Return an effect's coefficients at a setting; outside the setting, the vehicle's own."""
         return setting[effect] if effect in setting else self._declared.get(effect, {})
 
+    def value(self, setting: Setting, column: Column) -> float:
+        """Return one of these coefficients; 0 if nothing states it."""
+        return self.coefficients(setting, column[0]).get(column[1], 0.0)
+
     def stated(self, effect: str) -> Values:
         """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
         the file states some. All may have changed where it states all.
@@ -532,7 +536,7 @@ class RegressedFlights:
         """Return a coefficient's value at a setting, and the step of a derivative from there: so
         many typical sizes, within the coefficient's limits.
         """
-        value = self.coefficients(setting, column[0]).get(column[1], 0.0)
+        value = self.value(setting, column)
         delta = size * typical_size(column, self.vehicle)
         if column[0]:
             c = coefficient(column)

@@ -82,9 +82,5 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     fitted = np.linalg.solve(past.T @ past + np.diag(np.tile(loading, lags)), past.T @ now)
     left = now.T @ now + np.diag(loading) - fitted.T @ (past.T @ now)
     covariance = left / max(len(at) - lags * channels, 1)
-    parts = [fitted[k * channels : (k + 1) * channels].T for k in range(lags)]
-    return RowNoise(
-        np.array([size[:, None] * a / size for a in parts]),
-        size[:, None] * covariance * size,
-        begins,
-    )
+    each = fitted.reshape(lags, channels, channels).swapaxes(1, 2)
+    return RowNoise(size[:, None] * each / size, size[:, None] * covariance * size, begins)
