@@ -104,11 +104,11 @@ class Likelihood:
         self.finer: list[Array] = []
         if near:
             self.finer = near.finer
-            self.answers = near.answers
-            self.tracks = near.tracks
-            self.pieces = near.pieces
-            self.noise = near.noise
-            self.gains = near.gains  # on the rotors' innovations
+            self.answers: list[Array] = near.answers
+            self.tracks: list[Track] = near.tracks
+            self.pieces: list[Poses] = near.pieces
+            self.noise: PoseNoise = near.noise
+            self.gains: Array = near.gains  # on the rotors' innovations
         if not near or sensing_of(near.vehicle) != sensing_of(self.vehicle):
             finer = iter(self.finer)
             self.pieces = [
@@ -243,7 +243,7 @@ class Likelihood:
         """Return the samples of a piece in the fit, like the rows of their block."""
         rows = np.flatnonzero(self.flights.log == piece.log)
         at = np.searchsorted(self.flights.t[rows], piece.t).clip(max=len(rows) - 1)
-        out = self.flights.fit_rows[rows[at]]
+        out: Mask = self.flights.fit_rows[rows[at]]
         out[: round(SETTLING_TIME / self.period)] = False
         return out
 
@@ -499,7 +499,6 @@ class Likelihood:
         # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
         names = (*asked, *drives)
-        samples = 0
         first = 0
         still = np.zeros_like(self._base)
         most = sum(len([*self._blocks(track)]) for track in self.tracks)
@@ -514,17 +513,18 @@ class Likelihood:
                 here = slice(first + at.start, first + at.stop)
                 x = [self._acting.get(c, still)[here] for c in asked]
                 y = [column[here] for column in moved.values()]
-                driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
-                driven[:, :3, 0] = jumps[at, :3, :1] * self._units
-                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1:2] * self._units
-                out = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
+                driven = np.zeros((rows, 6, len(DRIVEN)))
+                driven[:, :3, 0] = jumps[at, :3, 0]
+                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1]
+                own = (driven[..., None] * self._units).reshape(rows, 6, -1)
+                out = self._changes(track, steady, at, state, x, y, own)
                 kept = out[counts[at]].reshape(-1, out.shape[2])
-                samples += int(counts[at].sum())
                 if len(kept):
                     np.matmul(kept.T, kept, out=products[len(flown)])
                     flown.append(piece.log)
             first += len(track.position)
-        penalty = -2.0 * samples * float(np.log(np.diagonal(steady.whitening)).sum())
+        samples = np.concatenate(self._counts).sum()
+        penalty = float(samples * np.linalg.slogdet(steady.covariance)[1])
         blocks = products[: len(flown)]
         return in_prior_units(
             self.flights, names, blocks, np.array(flown), penalty, self.setting, starts

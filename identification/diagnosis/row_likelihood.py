@@ -9,6 +9,7 @@ import numpy as np
 
 from ...dynamics.effects import Role, get, playing
 from ..logs.table import Array, ArrayMap, Pair
+from ..motion.smoothing import mean_square
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
@@ -23,7 +24,7 @@ from .priors import (
     prior_size,
 )
 from .regression import Column, Effects, RegressedFlights, delivered, without
-from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
+from .row_noise import ROUNDS, RowNoise, fitted_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
@@ -69,11 +70,13 @@ class RowLikelihood:
         own = [x * prior_size(c, self.flights) for c, x in columns.items() if c[0] in traced]
         signals = followers(rows)
         explained = np.zeros_like(y)
+        without_memory = np.zeros((0, rows.channels, rows.channels))
+        size = mean_square(y[rows.fit]) + np.square(rows.least)
+        begun = RowNoise(without_memory, np.diag(size), rows.begins)
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
             X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
-            begun = white_noise(y, rows.begins, rows.fit, rows.least)
             noise, z = self._noise_beside(y, X, X.shape[2] - len(answers), begun)
             explained = X[:, :, : len(own)] @ z[: len(own)]
         self.nuisances |= answers

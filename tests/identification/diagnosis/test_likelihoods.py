@@ -91,8 +91,8 @@ def test_deviations_hold_a_coefficient_that_changes(blocks):
         x[:, :, 1] += 0.5 * rng.standard_normal(40)[flight, None] * x[:, :, 0]
         sums = x.swapaxes(1, 2) @ x
         one, none = np.ones(1), np.arange(0)
-        base = Base([column], one, -inf * one, inf * one, sums.sum(axis=0), sums, np.arange(1),
-                    flight, 0.0, frozenset(), none, one, [], {})  # fmt: skip
+        base = Base([column], one, -inf * one, inf * one, sums.sum(axis=0), sums, flight,
+                    np.arange(1), 0.0, frozenset(), none, one, [], {})  # fmt: skip
         found = base.marginal([column], none).evidence([0])
         wide = base.scatter([column], found.mode, 1.0)
         off.append(found.mode / found.std / np.array([1.0, wide[0]]))
