@@ -155,10 +155,10 @@ class Base:
         each = power * self.blocks[:, np.searchsorted(self.single, free)] @ there[kept] @ inverse
         stated = np.diagonal(inverse)
         largest = stated.copy()
-        for group in (np.arange(len(each)), self.flight):
-            sums = np.array([each[group == i].sum(axis=0) for i in np.unique(group)])
+        by_prior = np.square(inverse).sum(axis=0)
+        by_flight = [each[self.flight == i].sum(axis=0) for i in np.unique(self.flight)]
+        for sums in (each, by_flight):
             if (count := len(sums)) > 1:
-                by_prior = np.square(inverse).sum(axis=0)
                 spread = np.square(sums).sum(axis=0) * count / (count - 1)
                 largest = np.maximum(largest, spread + by_prior)
         out = np.ones(len(own))
@@ -297,9 +297,7 @@ def in_prior_units(
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     typical = np.array([typical_size(c, flights.vehicle) for c in own])
     total = blocks.sum(axis=0)
-    free = np.array([not effect for effect, _ in names], dtype=np.bool_)
-    unknown = np.array([name.startswith(UNKNOWN) for _, name in names], dtype=np.bool_)
-    single = np.flatnonzero(~unknown)
+    single = np.flatnonzero([not name.startswith(UNKNOWN) for _, name in names])
     held = np.append(single, len(names))
     return Base(
         names,
@@ -312,7 +310,7 @@ def in_prior_units(
         single,
         penalty,
         frozenset(k for k in setting if k),
-        np.flatnonzero(free & ~unknown),
+        single[[not names[i][0] for i in single]],
         typical / size,
         [c for c in names if c[1].startswith(UNKNOWN)],
         starts,

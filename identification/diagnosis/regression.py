@@ -139,10 +139,10 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)
-    large, small = (abs(x) for x in c.typical)
-    if large == 0 or small == 0:
+    if not all(c.typical):
         same_unit = (o for o in get(column[0]).coefficients if o.unit == c.unit)
-        return max((abs(o.typical[0]) for o in same_unit if o.typical[0]), default=1.0)
+        return max(abs(o.typical[0]) for o in same_unit) or 1.0
+    large, small = np.abs(c.typical)
     share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
     return float(small * (large / small) ** share)
 
@@ -540,7 +540,7 @@ class RegressedFlights:
         delta = size * typical_size(column, self.vehicle)
         if column[0]:
             c = coefficient(column)
-            delta = -delta if c.typical[0] < 0.0 else delta
+            delta = math.copysign(delta, c.typical[0])
             delta = delta if c.minimum <= value + delta <= c.maximum else -delta
         return value, delta
 
