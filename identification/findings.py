@@ -95,7 +95,7 @@ class Trace:
     before: Array = field(repr=False)
     after: Array = field(repr=False)
     held_out: Mask = field(repr=False)
-    parts: ArrayMap = field(default_factory=dict, repr=False)
+    parts: ArrayMap = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)

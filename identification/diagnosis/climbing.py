@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...runtime.errors import InputError
-from .priors import Base, Setting, declared, from_declared
-from .regression import RegressedFlights, coefficient
+from .priors import Base, Setting, changed, from_declared
+from .regression import RegressedFlights
 
 # minus the logarithm of likelihood and prior at a setting, and a function for the mode of the
 # linearised posterior there
@@ -66,8 +66,7 @@ def linearised(
         out = {e: dict(values) for e, values in setting.items()}
         best = m.evidence(every).mode * size
         for c, x in zip(base.asked, best.tolist(), strict=True):
-            limits = coefficient(c)
-            out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)
+            out[c[0]][c[1]] = changed(c, x, flights)
         return out
 
     return value, target

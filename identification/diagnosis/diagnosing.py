@@ -42,7 +42,7 @@ from .advice import FILTERED, advice, composites, inertial_notes, late_rotors, o
 from .commanded_rotors import THRUST_FACTORS
 from .commands import what_commands_show
 from .log_offsets import delays_at_bound
-from .priors import NUISANCE
+from .priors import NUISANCE, declared
 from .ranking import LEAST_RIVAL, Report, rank, rank_by_rows
 from .regression import (
     CENTRAL,
@@ -148,7 +148,7 @@ def diagnose(
             for e in effects
         ),
         structure=said.structure,
-        gusts=said.gusts,
+        gusts=said.fitted.gusts,
         pushes=said.pushes,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
@@ -160,7 +160,7 @@ def diagnose(
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(hidden)),
         doubts=said.doubts,
-        ranking=said.ranking,
+        ranking=said.fitted.ranking,
         probabilities=said.probabilities,
     )
 
@@ -177,6 +177,7 @@ class _Judged:
     Public attributes are as in ``Diagnosis``, and beside them:
 
     Attributes:
+        fitted: the posterior, and the fit of the likeliest set.
         setting: coefficients of the effects; under no name the sensors' errors.
         balance: the residual with them.
         parts: growth of the residual (rows, 6) with one effect left out.
@@ -196,27 +197,26 @@ class _Judged:
         library = [e for e in library if e not in flights.not_identifiable]
         given = self._given = what_commands_show(flights, library)
         report("asking how probable each effect is")
-        fitted = self._fitted = (
+        fitted = (
             rank(flights, library, report)
             if flights.has_raw_poses
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
-        self.ranking = fitted.ranking
         self._best = fitted.ranking.sets[0]
         sensors = {name: value for name, (value, _) in fitted.sensors.items()}
         known_apart = {**given.fixed, **({"": sensors} if sensors else {})}
         self.setting = known_apart | fitted.setting
         self.balance = balance(flights, self.setting)
         if not self.balance.better:  # no set with a larger error on held-out flight is printed
-            fitted = self._fitted = replace(fitted, setting={}, behind={})
+            fitted = replace(fitted, setting={}, behind={})
             self.setting = known_apart
             self.balance = balance(flights, self.setting)
+        self.fitted = fitted
         self.parts = {
             e: flights.residual(without(self.setting, e)) - self.balance.after
             for e in self.setting
             if e
         }
-        self.gusts = fitted.gusts
         self.pushes = tuple(transient_disturbances(flights, self.setting))
         known = {e: self._differs(e) for e in given.first if e in self._best.effects}
         said = [e for e in self._best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
@@ -252,14 +252,15 @@ class _Judged:
             column, _, channel = what.rpartition(" in ")
             where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
             self.structure = (Structure(group, where, gained / fitted.posterior.left()),)
-        some = self.balance.noisy or is_beyond_calm(self.gusts, flights.vehicle) or self.pushes
+        some = self.balance.noisy or is_beyond_calm(fitted.gusts, flights.vehicle) or self.pushes
         self.remainder = "structured" if structured else "random" if some else "none"
         by_bias = fitted.posterior.shown([("", f"{NUISANCE}{name}") for _, name in flights.biases])
         unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
         self.hidden = {e for e in unseen if by_bias[e] >= LEAST_SHOWN}
         self.unseen = unseen - self.hidden
-        alone = sorted(fitted.posterior.alone().items(), key=lambda x: -x[1])
-        self.candidates = tuple(Candidate(e, gain, e in named) for e, gain in alone)
+        self.candidates = tuple(
+            Candidate(e, gain, e in named) for e, gain in fitted.posterior.alone()
+        )
         self.notes = (
             *inertial_notes(flights, named),
             *(sentence for sentences in self.doubts.values() for sentence in sentences),
@@ -277,7 +278,7 @@ class _Judged:
         """Return the standard deviations of an effect in the likeliest set, with the spread from
         flight to flight.
         """
-        std = {**self._best.std, **self._fitted.std}[effect]
+        std = {**self._best.std, **self.fitted.std}[effect]
         return self._of_any_flight(effect, self._best.coefficients[effect], std)
 
     def _of_any_flight(self, effect: str, values: Values, std: Values) -> NamedNumbers:
@@ -287,24 +288,17 @@ class _Judged:
             for name, x in std.items()
         }
 
-    def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
-        """Return standard deviations of coefficients with a relative one besides."""
-        return {
-            name: math.hypot(x, relative * unit_of_change((effect, name), self._flights.vehicle))
-            for name, x in std.items()
-        }
-
     def _differs(self, effect: str) -> float:
         """Return the probability of a calibration, in every set, to differ from the vehicle's
         statement; 0 where the difference is too small for a name.
         """
-        own = self._flights.coefficients({}, effect)
         apart = [0.0]
         # these flights are late, however late others are
         delays = get(effect).role == Role.DELAY
         for name, std in (self._best.std[effect] if delays else self._std(effect)).items():
-            off = abs(self._best.coefficients[effect][name] - own.get(name, 0.0))
-            if off > LEAST_SIZE * typical_size((effect, name), self._flights.vehicle) and std:
+            c = effect, name
+            off = abs(self._best.coefficients[effect][name] - declared(c, self._flights))
+            if off > LEAST_SIZE * typical_size(c, self._flights.vehicle) and std:
                 apart.append(_apart(off, std))
         return max(apart)
 
@@ -319,7 +313,7 @@ class _Judged:
         least = LEAST_RIVAL * self._best.probability
         return tuple(
             e
-            for x in self.ranking.sets
+            for x in self.fitted.ranking.sets
             if rest < {*x.effects} and len(x.effects) == len(rest) + 1 and x.probability > least
             for e in {*x.effects} - rest - {effect}
         )
@@ -328,39 +322,40 @@ class _Judged:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
         flights = self._flights
         rule = self._rule
-        alike = composites(flights.vehicle, self._fitted.setting, self._fitted.std)
-        doubts = {"composite": tuple(alike)}
-        if strange > rule.most_unknown:
-            doubts["unknown"] = (
-                f"a cause outside the library acts with a probability of {strange:.0%}"
-                f"{': all names are tentative' if named else ''}",
+        unsure = ": all names are tentative" if named else ""
+        doubts = {
+            "composite": tuple(composites(flights.vehicle, self.fitted.setting, self.fitted.std)),
+            "unknown": (
+                f"a cause outside the library acts with a probability of {strange:.0%}{unsure}",
             )
-        if flights.seconds < rule.least_seconds:
-            doubts["short"] = (
+            * (strange > rule.most_unknown),
+            "short": (
                 f"{flights.seconds:.1f} s of flight are too few for a sure name: fly at least "
                 f"{rule.least_seconds:g} s",
             )
-        if flights.filtered and named:
-            doubts["filtered pose"] = (FILTERED,)
-        doubts["hidden cause"] = tuple(
-            f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like it. "
-            "Log the pose to tell them apart"
-            for effect, hidden in self._fitted.behind.items()
-        )
-        if flights.thrust_std > 0.0:
-            doubts["assumed thrust"] = tuple(
+            * (flights.seconds < rule.least_seconds),
+            "filtered pose": (FILTERED,) * (flights.filtered and bool(named)),
+            "hidden cause": tuple(
+                f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like "
+                "it. Log the pose to tell them apart"
+                for effect, hidden in self.fitted.behind.items()
+            ),
+            "assumed thrust": tuple(
                 f"{effect}: the log holds motor commands and the vehicle file states no motor "
                 "curve, so how much thrust a command makes is an assumption, and this effect may "
                 "be its error alone. State motor_curve in the vehicle file, or log rotor speeds"
                 for effect in playing(*THRUST_FACTORS, among=named)
-            )
+                if flights.thrust_std > 0.0
+            ),
+        }
         return {check: sentences for check, sentences in doubts.items() if sentences}
 
     def _named(
         self, effect: str, probability: float, size: float, unsure: bool, others: Names
     ) -> NamedEffect:
         flights = self._flights
-        fitted = self._fitted
+        vehicle = flights.vehicle
+        fitted = self.fitted
         std = self._std(effect)
         # the point of action of an effect at the rotors, as declared, is nothing to report
         values = {
@@ -370,17 +365,20 @@ class _Judged:
         }
         uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
         if uncertain:
-            std = self._widened(effect, std, flights.thrust_std)
+            std = {
+                name: math.hypot(x, flights.thrust_std * unit_of_change((effect, name), vehicle))
+                for name, x in std.items()
+            }
         sizes = [
-            abs(x) / typical_size((effect, name), flights.vehicle)
+            abs(x) / typical_size((effect, name), vehicle)
             for name, x in values.items()
             if name != CENTRAL
         ]
         # shares of the residual's energy without it, each channel over its sensors' noise
         after = self.balance.after
-        over = mean_square(flights.visible_noise) ** 0.5
+        over = mean_square(flights.visible_noise) ** 0.5 + 1e-12
         left, whole = (
-            float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
+            float(mean_square(x[~flights.fit_rows] / over).mean())
             for x in (after, after + self.parts[effect])
         )
         stated = self._stated(effect, values, std)
@@ -403,7 +401,7 @@ class _Judged:
 
     def _stated(self, effect: str, values: Values, std: Values) -> NamedEffect:
         """Return an effect with its gain on flight left out of its fit."""
-        gained, spread = self._fitted.gains[effect]
+        gained, spread = self.fitted.gains[effect]
         return NamedEffect(
             name=effect,
             coefficients=values,

@@ -4,7 +4,7 @@ The columns are of the filter's predicted state: none holds the noise of the pos
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -94,57 +94,55 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
     rate = whole.angular_velocity
     body = in_body(whole.velocity, rotation)
-    above = position[:, 2] - position[:, 2].min()
-    shapes = []  # group, name, variable, channels
-    every = range(6)
+    size = weight_and_torque(flights.vehicle) / flights.inertias
+    one = np.ones(len(t))
+    torques = range(3, 6)
+    out: Columns = {}
+
+    def add(group: str, name: str, x: Array, channels: Iterable[int] = range(6)) -> None:
+        z = _scaled(x)
+        for i in channels if z.any() else ():
+            column = Product(size[i], z, *along_axis(i, rotation))
+            out["", f"{UNKNOWN}{group}: {name} in {i}"] = column
+
     for i, axis in enumerate("xyz"):
         along = body[:, i]
         torque = rotors[:, 1 + i]
-        shapes += [
-            ("velocity", f"velocity {axis}", along, every),
-            ("velocity", f"squared velocity {axis}", along * np.abs(along), every),
-            ("rotors", f"angular velocity {axis}", rate[:, i], every),
-            ("rotors", f"torque {axis}", torque, (3, 4, 5)),
-            ("rotors", f"change of torque {axis}", _change(torque), (3 + i,)),
-        ]
-    shapes += [
-        ("rotors", "thrust", rotors[:, 0], every),
-        ("rotors", "change of thrust", _change(rotors[:, 0]), (2, 3, 4, 5)),
-    ]
+        add("velocity", f"velocity {axis}", along)
+        add("velocity", f"squared velocity {axis}", along * np.abs(along))
+        add("rotors", f"angular velocity {axis}", rate[:, i])
+        add("rotors", f"torque {axis}", torque, torques)
+        add("rotors", f"change of torque {axis}", _change(torque), (3 + i,))
+    add("rotors", "thrust", rotors[:, 0])
+    add("rotors", "change of thrust", _change(rotors[:, 0]), (2, *torques))
     for a, b in ((0, 1), (1, 2), (0, 2)):
         axes = f"{'xyz'[a]} and {'xyz'[b]}"
-        shapes += [
-            ("velocity", f"velocities {axes}", body[:, a] * body[:, b], every),
-            ("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], (3, 4, 5)),
-        ]
+        add("velocity", f"velocities {axes}", body[:, a] * body[:, b])
+        add("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], torques)
+    for name, x in zip(("x", "y", "height"), position.T, strict=True):
+        add("place", name, x)
+    for height in HEIGHTS:
+        above = position[:, 2].min() - position[:, 2]
+        add("place", f"height below {height:g} m", np.exp(above / height))
     heading = heading_of(rotation)
-    places = list(zip(("x", "y", "height"), position.T, strict=True))
-    places += [(f"height below {h:g} m", np.exp(-above / h)) for h in HEIGHTS]
-    places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
-    places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
-    shapes += [("place", name, x, every) for name, x in places]
+    add("place", "heading's sine", np.sin(heading))
+    add("place", "heading's cosine", np.cos(heading))
+    for i, axis in enumerate("xy"):
+        add("place", f"tilt {axis}", rotation[:, 2, i])
     turn = np.pi * (t - t[0]) / max(t[-1] - t[0], 1e-9)
-    shapes += [("time", f"time {i}", np.cos(i * turn), every) for i in (1, 2, 3)]
+    for i in (1, 2, 3):
+        add("time", f"time {i}", np.cos(i * turn))
     period = median_step(t)
     for hertz, i in itertools.product(MOUNT_HZ, range(3)):
-        z = _resonance(rotors[:, 1 + i], hertz, period, ends)
-        shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
-    size = weight_and_torque(flights.vehicle) / flights.inertias
-    out: Columns = {}
-    for group, name, x, channels in shapes:
-        z = _scaled(x)
-        for channel in channels if z.any() else ():
-            made = Product(size[channel], z, *along_axis(channel, rotation))
-            out["", f"{UNKNOWN}{group}: {name} in {channel}"] = made
-    for channel in every:
-        made = Product(size[channel], np.ones(len(t)), None, slice(channel, channel + 1))
-        out["", f"{UNKNOWN}constant: a constant in {channel}"] = made
+        swing = _resonance(rotors[:, 1 + i], hertz, period, ends)
+        add("resonance", f"a part that swings at {hertz:g} Hz", swing, (3 + i,))
+    for i in range(6):
+        made = Product(size[i], one, None, slice(i, i + 1))
+        out["", f"{UNKNOWN}constant: a constant in {i}"] = made
     for hertz in LOAD_HZ:
-        column = np.zeros((len(t), 6))
-        column[:, :2] = _resonance(whole.acceleration[:, :2], hertz, period, ends)
-        column *= size[0] / max(column[:, :2].std(), 1e-9)
-        name = f"a load that swings at {hertz:g} Hz in 0"
-        out["", f"{UNKNOWN}resonance: {name}"] = column
+        swing = _resonance(whole.acceleration[:, :2], hertz, period, ends)
+        made = Product(size[0] / max(swing.std(), 1e-9), one, swing, slice(2))
+        out["", f"{UNKNOWN}resonance: a load that swings at {hertz:g} Hz in 0"] = made
     return out
 
 

@@ -46,7 +46,7 @@ class Marginal:
         return float(2.0 * self.right[index] @ z - z @ self.normal[np.ix_(index, index)] @ z)
 
 
-def marginal(products: Array, asked: Index, others: Index, size: Array) -> Marginal:
+def marginal(products: Array, asked: Index, others: Index, size: Array | float = 1.0) -> Marginal:
     """Return the log-likelihood with ``others`` integrated out over their standard normal prior.
 
     Args:
@@ -56,6 +56,7 @@ def marginal(products: Array, asked: Index, others: Index, size: Array) -> Margi
         others: columns to integrate out; they may be among the kept ones as well.
         size: (len(others),) standard deviations of their prior.
     """
+    size = np.full(len(others), size)
     kept = np.append(asked, len(products) - 1)
     inner = products[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
     factor = np.linalg.cholesky(inner)
@@ -138,7 +139,7 @@ def tempering(blocks: Array, chosen: Index) -> float:
     return 1.0 / max(1.0, float(np.mean(ratio)) * len(blocks) / max(len(blocks) - 1, 1))
 
 
-def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[float]) -> float:
+def evidence_of_one_more(m: Marginal, tried: Index, sizes: Sequence[float]) -> float:
     """Return the logarithm of the Bayes factor of one further column, any of those tried, against
     none.
 
@@ -154,4 +155,4 @@ def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[floa
     left = m.own[tried]
     gained = 0.5 * square * np.square(m.right[tried]) / (1.0 + square * left)
     factors = gained - 0.5 * np.log1p(square * left)
-    return float(logsumexp(factors)) - math.log(factors.size)
+    return float(logsumexp(factors, b=1.0 / factors.size))

@@ -45,12 +45,11 @@ class LeftOut:
         asked, others = (np.searchsorted(base.single, x) for x in (at, base.plain))
 
         def likelihood(products: Array) -> Marginal:
-            return marginal(power * products, asked, others, np.ones(len(others)))
+            return marginal(power * products, asked, others)
 
         count = len(base.blocks)
         self.least = float(stdtrit(count, CONFIDENCE)) if count > 1 else -math.inf
-        several = len(np.unique(base.flight)) > 1
-        part = base.flight if several else np.arange(count)
+        part = base.flight if np.ptp(base.flight) else np.arange(count)
         total = base.blocks.sum(axis=0)
         # the likelihood of the rest of each part, and those of its blocks
         self._parts = [

@@ -84,7 +84,7 @@ class Base:
     dictionary: Sequence[Column]  # columns of the discrepancy
     starts: Starts
     # the evidence of sets, by the likelihood's power and their columns; None for an impossible set
-    tried: dict[tuple[float, Variants], SetEvidence | None] = field(default_factory=dict)
+    tried: dict[float, dict[Variants, SetEvidence | None]] = field(default_factory=dict)
 
     @cached_property
     def columns(self) -> dict[Column, int]:
@@ -105,7 +105,7 @@ class Base:
         asked: Sequence[Column],
         others: Index,
         power: float = 1.0,
-        size: Array | None = None,
+        size: Array | float = 1.0,
     ) -> "_Asked":
         """Return the likelihood, to a power, of the columns asked about, with others integrated
         out; ``size``: standard deviations of their prior, if not their own.
@@ -113,7 +113,6 @@ class Base:
         products = power * self.total
         products[-1, -1] += power * self.penalty
         at = self.at(asked)
-        size = np.ones(len(others)) if size is None else size
         return _Asked(self, asked, at, marginal(products, at, others, size))
 
     def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, Pair]:
@@ -260,6 +259,12 @@ def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting:
             for c in columns
         ]
     )
+
+
+def changed(column: Column, change: float, flights: RegressedFlights) -> float:
+    """Return a column's coefficient by the vehicle's file, changed as far as its limits allow."""
+    limits = coefficient(bare(column))
+    return min(max(declared(column, flights) + change, limits.minimum), limits.maximum)
 
 
 def in_prior_units(

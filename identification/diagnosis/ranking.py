@@ -56,7 +56,7 @@ class _FittedPosterior:
     ranking: Ranking
     setting: Setting  # coefficients of the likeliest set's needed effects
     std: Setting  # their standard deviations
-    gains: Mapping[str, Pair]  # as in ``Posterior.needed``
+    gains: Mapping[str, Pair]  # as of ``Posterior.leave_out_needless``
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
@@ -150,7 +150,7 @@ def rank(
     by_chance = 2.0 * math.log(len(whole.dictionary))
     quieter = best.quieter({column: size}, starts) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
-    posterior, gains = posterior.needed(ranking.probability)
+    gains = posterior.leave_out_needless(ranking.probability)
     late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
     return _FittedPosterior(
         posterior, ranking, *posterior.likeliest_setting(), gains, best.gusts(), late
@@ -244,7 +244,7 @@ def rank_by_rows(
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
     ranking = last.ranking()
-    last, gains = last.needed(ranking.probability)
+    gains = last.leave_out_needless(ranking.probability)
     setting, std = last.likeliest_setting()
     setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
     return _FittedPosterior(
