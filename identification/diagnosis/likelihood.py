@@ -479,11 +479,11 @@ class Likelihood:
         tilt = SIDEWAYS * self.flights.vehicle.gravity
         for answer, track in zip(self.answers, self.tracks, strict=True):
             # the innovation of sample k changes the state after k: the jump is before sample k + 1
-            answer = np.vstack([np.zeros(4), answer[:-1]])
-            x = np.zeros((len(answer), 6, len(JUMP_STATE) // len(STATES)))
+            answer = np.pad(answer[:-1], ((1, 0), (0, 0)))
+            x = np.zeros((len(answer), 6, 3))
             x[:, :3, 0] = answer[:, :1] * track.rotation[:, :, 2]
             x[:, 3:, 1] = level(track.heading, answer[:, 1:])
-            x[:, 0, 2], x[:, 1, 2] = tilt * x[:, 4, 1], tilt * x[:, 3, 1]
+            x[:, :2, 2] = tilt * x[:, 4:2:-1, 1]
             out.append(x)
         return out
 

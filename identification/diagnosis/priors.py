@@ -315,7 +315,7 @@ def in_prior_units(
         single,
         penalty,
         frozenset(k for k in setting if k),
-        single[[not names[i][0] for i in single]],
+        single[[not names[i][0] for i in single.tolist()]],
         typical / size,
         [c for c in names if c[1].startswith(UNKNOWN)],
         starts,

@@ -372,7 +372,7 @@ class RegressedFlights:
     @property
     def inertias(self) -> Array:
         """Mass (kg), three times, and moments of inertia (kg m2), (6,)."""
-        return np.array([self.vehicle.mass] * 3 + np.diagonal(self.vehicle.inertia).tolist())
+        return np.append([self.vehicle.mass] * 3, np.diagonal(self.vehicle.inertia))
 
     @property
     def rotor_speeds_vary(self) -> bool:

@@ -63,8 +63,7 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     white = np.square(noise.white[..., PAIRS] * unit)
     Q = np.repeat(white, 3, axis=-1)[..., None] * np.kron(np.eye(2), np.outer(half, half))
     Q[..., _LAST, _LAST] = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
-    F = np.zeros_like(Q)
-    F += np.kron(np.eye(2), [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    F = np.zeros_like(Q) + np.kron(np.eye(2), [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
     F[..., _LAST, _LAST] = decay
     pull = gravity * PULL * unit[..., 0] * pose[..., 1]
     F[..., :3, 3:6] = pull[..., None, None] * np.outer(half, [1.0, 0.5, 0.0])
