@@ -53,10 +53,10 @@ class Rows:
 
     def __init__(self, flights: RegressedFlights, fixed: Setting) -> None:
         self.with_torques = not flights.commanded
-        cutoff = CUTOFFS.residual_hz
-        self._cutoff = np.inf
-        if flights.commanded or flights.filtered:
-            self._cutoff = cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else FILTERED_CUTOFF_HZ
+        self._cutoff = FILTERED_CUTOFF_HZ if flights.filtered else np.inf
+        if flights.commanded:
+            self._cutoff = COMMANDED_CUTOFF_HZ
+        cutoff = min(self._cutoff, CUTOFFS.residual_hz)
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
         self.flights = flights
         self.fixed = fixed
@@ -68,8 +68,8 @@ class Rows:
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
         force, torque = np.split(LEAST * weight_and_torque(flights.vehicle) / flights.inertias, 2)
-        self.least = np.concatenate(
-            [force] * (1 + self.has_accelerometer) + [torque] * self.with_torques
+        self.least = np.append(
+            np.tile(force, 1 + self.has_accelerometer), np.tile(torque, self.with_torques)
         )
         self.rotation = flights.at_rows("rotation")
 
