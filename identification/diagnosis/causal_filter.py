@@ -32,6 +32,7 @@ class Poses:
     voltage: Array  # (n,) V; 0 where unknown
     velocity: Array  # (3,) m/s, at the start
     angular_velocity: Array  # (3,) rad/s, body, at the start
+    log: int = 0  # index among the flights
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +68,8 @@ def level(heading: Array, x: Array) -> Array:
     heading (n, 2), and body z.
     """
     c, s = heading.T
-    out = x.copy()
-    out[:, 0] = c * x[:, 0] - s * x[:, 1]
-    out[:, 1] = s * x[:, 0] + c * x[:, 1]
-    return out
+    ahead, left, up = x.T
+    return np.column_stack([c * ahead - s * left, s * ahead + c * left, up])
 
 
 def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...runtime.errors import InputError
-from .priors import Base, Setting, changed, declared
+from .priors import Base, Setting, changed, from_declared
 from .regression import RegressedFlights
 
 # minus the logarithm of likelihood and prior at a setting, and a function for the mode of the
@@ -59,7 +59,7 @@ def linearised(
     m = base.marginal(base.asked, base.plain, power)
     every = range(len(m.at))
     size = base.size[m.at]
-    z = np.array([setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]) / size
+    z = from_declared(base.asked, flights, setting)
     value = 0.5 * (float(z @ z) - m.quadratic.explained(every, z)) - m.quadratic.constant
 
     def target() -> Setting:

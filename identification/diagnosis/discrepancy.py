@@ -54,6 +54,15 @@ class Product:
 Columns = dict[Column, Array | Product]
 
 
+def along_axis(axis: int, rotation: Array) -> tuple[Array | None, slice]:
+    """Return the last two fields of a product along an axis of the body, three of force and three
+    of torque.
+    """
+    if axis < 3:
+        return rotation[:, :, axis], slice(3)
+    return None, slice(axis, axis + 1)
+
+
 def weight_and_torque(vehicle: Vehicle) -> Array:
     """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
     quarter of the arm.
@@ -89,14 +98,14 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     change = np.diff(rotors, axis=0, prepend=rotors[:1])
     size = weight_and_torque(flights.vehicle) / flights.inertias
     one = np.ones(len(t))
-    forces, torques = range(3), range(3, 6)
+    torques = range(3, 6)
     out: Columns = {}
 
     def add(group: str, name: str, x: Array, channels: Iterable[int] = range(6)) -> None:
         z = _scaled(x)
         for i in channels if z.any() else ():
-            along = (rotation[:, :, i], slice(3)) if i in forces else (None, slice(i, i + 1))
-            out["", f"{UNKNOWN}{group}: {name} in {i}"] = Product(size[i], z, *along)
+            column = Product(size[i], z, *along_axis(i, rotation))
+            out["", f"{UNKNOWN}{group}: {name} in {i}"] = column
 
     for i, axis in enumerate("xyz"):
         along = body[:, i]

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,14 +20,22 @@ from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import FlightLog, Logs
 from ..logs.table import Array, ArrayPair, Mask
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
 from ..motion.smoothing import continuous, filtered, turn_between
 from .causal_filter import Poses, Track, level, run
-from .discrepancy import Columns, Product, changing_columns, discrepancy_columns, joined, variables
+from .discrepancy import (
+    Columns,
+    Product,
+    along_axis,
+    changing_columns,
+    discrepancy_columns,
+    joined,
+    variables,
+)
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -92,47 +99,31 @@ class Likelihood:
         self.flights = flights
         self.setting = setting
         self.vehicle = flights.amended(setting)
-        self.tracks: list[Track]
-        self.known: list[Array]
-        if near is None or sensing_of(near.vehicle) != sensing_of(self.vehicle):
-            finer = iter(near.finer if near else ())
-            self.pieces: list[Poses] = []
-            self._fit: list[Mask] = []  # (n,) samples open to the fit
-            self._log: list[int] = []  # index of each piece's log
-            for i, log in enumerate(flights.logs):
-                rows = flights.log == i
-                if not flights.fit_rows[rows].any():  # a test log
-                    continue
-                for piece in _read_poses(log, self.vehicle, finer):
-                    at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
-                    self.pieces.append(piece)
-                    self._log.append(i)
-                    self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
-        else:
-            self.pieces = near.pieces
-            self._fit = near._fit
-            self._log = near._log
-        self.period = self.pieces[0].period
-        lengths = [len(piece.t) for piece in self.pieces]
-        if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
-            near = None
-        same = near if same_noise else None
-        self.noise: PoseNoise = near.noise if near else self._first_noise()
-        # on the rotors' innovations
-        self.gains: Array = near.gains if near else np.zeros((len(PAIRS), len(JUMP_STATE)))
         # of each piece: the rounding error of its logged rotor speeds (n, 4), which is added back,
         # and the rotors' innovations, by a filter that follows the pose closely
         self.finer: list[Array] = []
-        self.answers: list[Array] = []
         if near:
             self.finer = near.finer
-            self.answers = near.answers
-            self.known = near.known
-            self.tracks = near.tracks
-        else:
+            self.answers: list[Array] = near.answers
+            self.tracks: list[Track] = near.tracks
+            self.pieces: list[Poses] = near.pieces
+            self.noise: PoseNoise = near.noise
+            self.gains: Array = near.gains  # on the rotors' innovations
+        if not near or sensing_of(near.vehicle) != sensing_of(self.vehicle):
+            finer = iter(self.finer)
+            self.pieces = [
+                piece
+                for log in np.unique(flights.log[flights.fit_rows]).tolist()
+                for piece in _read_poses(flights.logs, log, self.vehicle, finer)
+            ]
+        self.period = self.pieces[0].period
+        self._counts = [self._counted(piece) for piece in self.pieces]  # samples in the fit
+        if not near:
+            self.noise = self._first_noise()
+            self.gains = np.zeros((len(PAIRS), len(JUMP_STATE)))
             self._see_rotors()
-        if same:
-            self._run(self.steady, self._said(self._jumps(), self.gains))
+        if near and same_noise:
+            self._run(self.steady, self._jumps(), self.gains)
         else:
             self._search_noise()
         self.signals = [_signals(piece, track) for piece, track in self._seen]
@@ -142,12 +133,12 @@ class Likelihood:
         # effects
         self._acting: Columns = {}
         self._posed: Columns = {}
-        if same:
+        if near and same_noise:
             self._acting, self._posed = (
                 {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
-                for part in (same._acting, same._posed)
+                for part in (near._acting, near._posed)
             )
-        if not self._acting:
+        else:
             self._add_what_any_flight_may_have()
 
     @property
@@ -156,14 +147,14 @@ class Likelihood:
 
     def _see_rotors(self) -> None:
         nothing = [np.zeros((len(piece.t), 6, 3)) for piece in self.pieces]
-        self._run(self.steady, nothing)
+        self._run(self.steady, nothing, self.gains)
         if self._rounding_std:
             self.finer = unrounded(self._seen, self.vehicle.omega_lsb)
             self.pieces = [
                 replace(piece, rotor_speeds=piece.rotor_speeds + x)
                 for piece, x in zip(self.pieces, self.finer, strict=True)
             ]
-            self._run(self.steady, nothing)
+            self._run(self.steady, nothing, self.gains)
         self.answers = rotor_innovations(self._seen)
 
     @property
@@ -171,16 +162,14 @@ class Likelihood:
         """The filter."""
         return steady_filter(self.noise, self.period, self.vehicle.gravity)
 
-    def _run(self, steady: SteadyFilter, known: list[Array]) -> None:
-        self.known = known
-        self.tracks = [
-            run(piece, self.vehicle, steady, x) for piece, x in zip(self.pieces, known, strict=True)
-        ]
-
-    def _said(self, jumps: Iterable[Array], gains: Array) -> list[Array]:
-        """Return the jumps of each piece's states (n, 6, 3) by the rotors' innovations."""
+    def _run(self, steady: SteadyFilter, jumps: Iterable[Array], gains: Array) -> None:
         each = (OWN @ gains).reshape(6, -1, len(STATES)) * self._units
-        return [(x.swapaxes(0, 1) @ each).swapaxes(0, 1) for x in jumps]
+        # of each piece, the jumps of the states (n, 6, 3) by the rotors' innovations
+        self.known = [(x.swapaxes(0, 1) @ each).swapaxes(0, 1) for x in jumps]
+        self.tracks = [
+            run(piece, self.vehicle, steady, x)
+            for piece, x in zip(self.pieces, self.known, strict=True)
+        ]
 
     # Noise
 
@@ -220,9 +209,8 @@ class Likelihood:
         jumps = self._jumps()
 
         def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
-            self._run(steady, self._said(jumps, gains))
-            for i, track in enumerate(self.tracks):
-                counts = self._counts(i)
+            self._run(steady, jumps, gains)
+            for i, (track, counts) in enumerate(zip(self.tracks, self._counts, strict=True)):
                 if explained is not None:
                     pose, force = explained[i].swapaxes(0, 1)
                     begun = np.zeros((6, 3, 1))
@@ -243,7 +231,7 @@ class Likelihood:
         held = np.array(PRIORS.gains)[JUMP_STATE]
         search = NoiseSearch(see, held, self.period, self.vehicle.gravity)
         self.noise, self.gains = search.likeliest(self.noise, self.gains)
-        self._run(self.steady, self._said(jumps, self.gains))
+        self._run(self.steady, jumps, self.gains)
 
     def _blocks(self, track: Track) -> Iterator[slice]:
         """Return the parts of a piece. One part's columns are in memory at a time."""
@@ -251,9 +239,11 @@ class Likelihood:
         n = len(track.t)
         return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
 
-    def _counts(self, piece: int) -> Mask:
-        """Return the samples of a piece in the fit."""
-        out = self._fit[piece].copy()
+    def _counted(self, piece: Poses) -> Mask:
+        """Return the samples of a piece in the fit, like the rows of their block."""
+        rows = np.flatnonzero(self.flights.log == piece.log)
+        at = np.searchsorted(self.flights.t[rows], piece.t).clip(max=len(rows) - 1)
+        out: Mask = self.flights.fit_rows[rows[at]]
         out[: round(SETTLING_TIME / self.period)] = False
         return out
 
@@ -261,15 +251,15 @@ class Likelihood:
         """Return the disturbance of each channel. The rotors show a part: a flight loop on a gyro
         answers most of a gust's torque before the pose shows any.
         """
-        out = []
-        own = (self.flights.inertias, self.noise.disturbance, self.noise.time)
-        for axis, (inertia, std, time) in enumerate(np.transpose(own).tolist()):
-            keep = math.exp(-self.period / time)
-            shown = [filtered(x[:, axis, 2], (1, 0, 0, 1, -keep, 0)) for x in self.known]
-            size = inertia * std
-            said = inertia * float(np.concatenate(shown).std())
-            out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
-        return tuple(out)
+        keep = self.steady.keep.tolist()
+        shown = [
+            np.concatenate([filtered(x[:, i, 2], (1, 0, 0, 1, -keep[i], 0)) for x in self.known])
+            for i in range(6)
+        ]
+        size = self.flights.inertias * self.noise.disturbance
+        whole = np.hypot(size, self.flights.inertias * np.std(shown, axis=1))
+        each = np.transpose([whole, self.noise.time, size]).tolist()
+        return tuple(Disturbance(c, *x) for c, x in zip(CHANNELS, each, strict=True))
 
     # Columns
 
@@ -368,9 +358,8 @@ class Likelihood:
         bent = []  # away from the straight line, by the second difference
         for s in self.signals:
             # the speeds are of k + 1/2: nothing later than sample k + 1
-            u = s.rotor_speeds.copy()
-            u[2:] += np.diff(s.rotor_speeds, 2, axis=0)
-            bent.append(replace(s, rotor_speeds=u))
+            u = np.pad(np.diff(s.rotor_speeds, 2, axis=0), ((2, 0), (0, 0)))
+            bent.append(replace(s, rotor_speeds=s.rotor_speeds + u))
         self._acting["", BETWEEN] = self._accelerations(self.setting, bent) - self._base
         self._add_model_errors()
         self._add_answers()
@@ -441,15 +430,14 @@ class Likelihood:
         share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
         for i, axis in enumerate("xyz"):
-            own = None, slice(3 + i, 4 + i)
+            own = along_axis(3 + i, whole.rotation)
             errors = {
-                "force": Product(1.0, whole.rotors[:, 0], whole.rotation[:, :, i], slice(3)),
+                "force": Product(1.0, whole.rotors[:, 0], *along_axis(i, whole.rotation)),
                 "torque": Product(1.0, whole.rotors[:, 1 + i], *own),
                 "expected torque": Product(scale[i], expected[:, i], *own),
             }
-            self._acting |= {
-                ("", f"{MODEL_ERROR} of {name} {axis}"): x for name, x in errors.items()
-            }
+            for name, x in errors.items():
+                self._acting["", f"{MODEL_ERROR} of {name} {axis}"] = x
 
     def _add_answers(self) -> None:
         """Add the columns of a flight loop's answers to disturbances: along thrust and torques,
@@ -473,11 +461,9 @@ class Likelihood:
         disturbed = np.array([gust.rms for gust in self.gusts()]) / self.flights.inertias
         for axis, rotors, own in zip(DRIVEN, whole.rotors.T, states, strict=True):
             size = max(rotors.std(), 1e-9)
-            answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
+            answer = min((disturbed[axis] / size) ** 2, 1.0) * size
             change = np.diff(rotors, prepend=rotors[:1])
-            along = (
-                (None, slice(axis, axis + 1)) if axis > 2 else (whole.rotation[:, :, 2], slice(3))
-            )
+            along = along_axis(axis, whole.rotation)
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
                 column = Product(answer / max(x.std(), 1e-9), x, *along)
                 self._acting["", f"answer {i} of axis {axis}"] = column
@@ -493,11 +479,11 @@ class Likelihood:
         tilt = SIDEWAYS * self.flights.vehicle.gravity
         for answer, track in zip(self.answers, self.tracks, strict=True):
             # the innovation of sample k changes the state after k: the jump is before sample k + 1
-            answer = np.vstack([np.zeros(4), answer[:-1]])
-            x = np.zeros((len(answer), 6, len(JUMP_STATE) // len(STATES)))
+            answer = np.pad(answer[:-1], ((1, 0), (0, 0)))
+            x = np.zeros((len(answer), 6, 3))
             x[:, :3, 0] = answer[:, :1] * track.rotation[:, :, 2]
             x[:, 3:, 1] = level(track.heading, answer[:, 1:])
-            x[:, 0, 2], x[:, 1, 2] = tilt * x[:, 4, 1], tilt * x[:, 3, 1]
+            x[:, :2, 2] = tilt * x[:, 4:2:-1, 1]
             out.append(x)
         return out
 
@@ -513,31 +499,32 @@ class Likelihood:
         # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
         names = (*asked, *drives)
-        samples = 0
         first = 0
         still = np.zeros_like(self._base)
         most = sum(len([*self._blocks(track)]) for track in self.tracks)
         products = np.empty((most, len(names) + 1, len(names) + 1))
         flown: list[int] = []
-        for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
+        for piece, track, jumps, counts in zip(
+            self.pieces, self.tracks, self._jumps(), self._counts, strict=True
+        ):
             state = np.zeros((6, 3, len(names)))
-            counts = self._counts(i)
             for at in self._blocks(track):
                 rows = at.stop - at.start
                 here = slice(first + at.start, first + at.stop)
                 x = [self._acting.get(c, still)[here] for c in asked]
                 y = [column[here] for column in moved.values()]
-                driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
-                driven[:, :3, 0] = jumps[at, :3, :1] * self._units
-                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1:2] * self._units
-                out = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
-                kept = (out if counts[at].all() else out[counts[at]]).reshape(-1, out.shape[2])
-                samples += int(counts[at].sum())
+                driven = np.zeros((rows, 6, len(DRIVEN)))
+                driven[:, :3, 0] = jumps[at, :3, 0]
+                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1]
+                own = (driven[..., None] * self._units).reshape(rows, 6, -1)
+                out = self._changes(track, steady, at, state, x, y, own)
+                kept = out[counts[at]].reshape(-1, out.shape[2])
                 if len(kept):
                     np.matmul(kept.T, kept, out=products[len(flown)])
-                    flown.append(self._log[i])
+                    flown.append(piece.log)
             first += len(track.position)
-        penalty = -2.0 * samples * float(np.log(np.diagonal(steady.whitening)).sum())
+        samples = np.concatenate(self._counts).sum()
+        penalty = float(samples * np.linalg.slogdet(steady.covariance)[1])
         blocks = products[: len(flown)]
         return in_prior_units(
             self.flights, names, blocks, np.array(flown), penalty, self.setting, starts
@@ -607,17 +594,13 @@ def _without_zeros(column: Array) -> Array | Product:
 
 def _gyration(vehicle: Vehicle, rate: Array) -> Array:
     """Return the derivative of the angular acceleration (n, 3, 3) by the angular velocity."""
-    return np.asarray((rate @ _twist(vehicle)).reshape(-1, 3, 3))
-
-
-@lru_cache(maxsize=1)  # asked at each block of a flight
-def _twist(vehicle: Vehicle) -> Array:
-    """Return -u x J v over the inertia J, of all pairs of axes u and v, (3, 9)."""
+    # -u x J v over the inertia J, of all pairs of axes u and v
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)
-    return np.asarray((twist + twist.swapaxes(0, 1)).swapaxes(1, 2).reshape(3, 9))
+    both: Array = (twist + twist.swapaxes(0, 1)).swapaxes(1, 2)
+    return (rate @ both.reshape(3, 9)).reshape(-1, 3, 3)
 
 
-def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
+def _read_poses(logs: Logs, at: int, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
     """Return the unbroken pieces of a log as measured, with the vehicle's sensing effects undone;
     ``finer`` is added to the rotor speeds (n, 4) of each.
 
@@ -626,7 +609,7 @@ def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> lis
     late = [e for e in sensing_of(vehicle) if is_delay(e.name)]
     offset = sum(sum(e.coefficients.values()) for e in late)
     undone = undo_log_sensing(
-        log, replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in late))
+        logs[at], replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in late))
     )
     out = []
     for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
@@ -643,6 +626,7 @@ def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> lis
                 np.zeros(len(raw.t)) if raw.voltage is None else raw.voltage,
                 smooth.velocity[0],
                 smooth.angular_velocity[0],
+                at,
             )
         )
     return out

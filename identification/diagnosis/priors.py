@@ -50,8 +50,6 @@ class _PriorSettings:
     # error of any model as a share of an axis' force or torque: of thrust along its axis and across
     # it, and of the torques. Propellers and bearings are not stable to less
     model_error: float = 0.003
-    # of a thrust or torque which answers disturbances alone: share along each signal of the loop
-    answer: float = 1.0
     # standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
     # units of one period of such an acceleration. They leave the gains free: a loop that shows the
     # tilt it sees has gains of some 3,000, 100 and 1
@@ -156,10 +154,10 @@ class Base:
         each = power * self.blocks[:, np.searchsorted(self.single, free)] @ there[kept] @ inverse
         stated = np.diagonal(inverse)
         largest = stated.copy()
-        for group in (np.arange(len(each)), self.flight):
-            sums = np.array([each[group == i].sum(axis=0) for i in np.unique(group)])
+        by_prior = np.square(inverse).sum(axis=0)
+        by_flight = [each[self.flight == i].sum(axis=0) for i in np.unique(self.flight)]
+        for sums in (each, by_flight):
             if (count := len(sums)) > 1:
-                by_prior = np.square(inverse).sum(axis=0)
                 spread = np.square(sums).sum(axis=0) * count / (count - 1)
                 largest = np.maximum(largest, spread + by_prior)
         out = np.ones(len(own))
@@ -250,8 +248,17 @@ def declared(column: Column, flights: RegressedFlights) -> float:
     """Return a column's coefficient by the vehicle's file, the zero of the likelihood's
     coefficient; 0 if not stated.
     """
-    effect, name = bare(column)
-    return flights.coefficients({}, effect).get(name, 0.0)
+    return flights.value({}, bare(column))
+
+
+def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting: Setting) -> Array:
+    """Return the coefficients (c,) of a setting, in standard deviations of their priors."""
+    return np.array(
+        [
+            (flights.value(setting, c) - declared(c, flights)) / prior_size(c, flights)
+            for c in columns
+        ]
+    )
 
 
 def changed(column: Column, change: float, flights: RegressedFlights) -> float:
@@ -285,8 +292,7 @@ def in_prior_units(
     size = np.array([prior_size(c, flights) for c in names])
     # about zero: the residual without all effects of the setting
     own = [*map(bare, names)]
-    here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in own]
-    back = np.append(np.subtract(here, [declared(c, flights) for c in own]), 1.0)
+    back = np.append([flights.value(setting, c) - declared(c, flights) for c in own], 1.0)
     whole = blocks @ back
     blocks[:, :, -1] = blocks[:, -1, :] = whole
     blocks[:, -1, -1] = whole @ back
@@ -296,9 +302,7 @@ def in_prior_units(
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     typical = np.array([typical_size(c, flights.vehicle) for c in own])
     total = blocks.sum(axis=0)
-    free = np.array([not effect for effect, _ in names], dtype=np.bool_)
-    unknown = np.array([name.startswith(UNKNOWN) for _, name in names], dtype=np.bool_)
-    single = np.flatnonzero(~unknown)
+    single = np.flatnonzero([not name.startswith(UNKNOWN) for _, name in names])
     held = np.append(single, len(names))
     return Base(
         names,
@@ -311,7 +315,7 @@ def in_prior_units(
         single,
         penalty,
         frozenset(k for k in setting if k),
-        np.flatnonzero(free & ~unknown),
+        single[[not names[i][0] for i in single.tolist()]],
         typical / size,
         [c for c in names if c[1].startswith(UNKNOWN)],
         starts,

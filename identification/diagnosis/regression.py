@@ -139,10 +139,10 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)
-    large, small = (abs(x) for x in c.typical)
-    if large == 0 or small == 0:
+    if not all(c.typical):
         same_unit = (o for o in get(column[0]).coefficients if o.unit == c.unit)
-        return max((abs(o.typical[0]) for o in same_unit if o.typical[0]), default=1.0)
+        return max(abs(o.typical[0]) for o in same_unit) or 1.0
+    large, small = np.abs(c.typical)
     share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
     return float(small * (large / small) ** share)
 
@@ -372,7 +372,7 @@ class RegressedFlights:
     @property
     def inertias(self) -> Array:
         """Mass (kg), three times, and moments of inertia (kg m2), (6,)."""
-        return np.array([self.vehicle.mass] * 3 + np.diagonal(self.vehicle.inertia).tolist())
+        return np.append([self.vehicle.mass] * 3, np.diagonal(self.vehicle.inertia))
 
     @property
     def rotor_speeds_vary(self) -> bool:
@@ -458,6 +458,10 @@ class RegressedFlights:
         """Return an effect's coefficients at a setting; outside the setting, the vehicle's own."""
         return setting[effect] if effect in setting else self._declared.get(effect, {})
 
+    def value(self, setting: Setting, column: Column) -> float:
+        """Return one of these coefficients; 0 if nothing states it."""
+        return self.coefficients(setting, column[0]).get(column[1], 0.0)
+
     def stated(self, effect: str) -> Values:
         """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
         the file states some. All may have changed where it states all.
@@ -532,11 +536,11 @@ class RegressedFlights:
         """Return a coefficient's value at a setting, and the step of a derivative from there: so
         many typical sizes, within the coefficient's limits.
         """
-        value = self.coefficients(setting, column[0]).get(column[1], 0.0)
+        value = self.value(setting, column)
         delta = size * typical_size(column, self.vehicle)
         if column[0]:
             c = coefficient(column)
-            delta = -delta if c.typical[0] < 0.0 else delta
+            delta = math.copysign(delta, c.typical[0])
             delta = delta if c.minimum <= value + delta <= c.maximum else -delta
         return value, delta
 

@@ -3,12 +3,13 @@ settings.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from ...dynamics.effects import Role, get, playing
-from ..logs.table import Array, ArrayMap, Pair, Values
+from ..logs.table import Array, ArrayMap, Pair
+from ..motion.smoothing import mean_square
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
@@ -18,12 +19,12 @@ from .priors import (
     Base,
     Setting,
     Starts,
-    declared,
+    from_declared,
     in_prior_units,
     prior_size,
 )
 from .regression import Column, Effects, RegressedFlights, delivered, without
-from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
+from .row_noise import ROUNDS, RowNoise, fitted_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
@@ -69,11 +70,13 @@ class RowLikelihood:
         own = [x * prior_size(c, self.flights) for c, x in columns.items() if c[0] in traced]
         signals = followers(rows)
         explained = np.zeros_like(y)
+        without_memory = np.zeros((0, rows.channels, rows.channels))
+        size = mean_square(y[rows.fit]) + np.square(rows.least)
+        begun = RowNoise(without_memory, np.diag(size), rows.begins)
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
             X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
-            begun = white_noise(y, rows.begins, rows.fit, rows.least)
             noise, z = self._noise_beside(y, X, X.shape[2] - len(answers), begun)
             explained = X[:, :, : len(own)] @ z[: len(own)]
         self.nuisances |= answers
@@ -87,7 +90,7 @@ class RowLikelihood:
         A gust acts like the wind, through each drag and by the flight's airspeed. As a force of its
         own, or as a noise, the gusts of a periodic flight pass for more drag and less wind.
         """
-        whole: Mapping[str, Values] = {**self.rows.fixed, **setting}
+        whole = {**self.rows.fixed, **setting}
         winds = [
             (e, c.name)
             for e in whole
@@ -95,7 +98,7 @@ class RowLikelihood:
             for c in get(e).coefficients
             if c.unit == "m/s"
         ]
-        std = GUST_STD * math.hypot(*(whole[e].get(name, 0.0) for e, name in winds))
+        std = GUST_STD * math.hypot(*(self.flights.value(whole, c) for c in winds))
         t = np.concatenate([[0.0], np.cumsum(np.diff(self.rows.t) * ~self.rows.begins[1:])])
         rate = np.arange(1, int(2.0 * GUST_HZ * t[-1]) + 1) * math.pi / t[-1]
         size = std * np.sqrt(4.0 * GUST_TIME / t[-1] / (1.0 + np.square(rate * GUST_TIME)))
@@ -163,7 +166,7 @@ class RowLikelihood:
         """
         rows = self.rows
         flights = self.flights
-        residual = self.rows.residual(setting)
+        residual = rows.residual(setting)
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
         noise = self._gusty.get(frozenset(setting), self.noise)
@@ -224,10 +227,7 @@ class RowLikelihood:
         """
         base = self.base(setting, {}, ())
         m = base.marginal((), base.plain, self.power).quadratic
-        off = [
-            (setting[c[0]].get(c[1], 0.0) - declared(c, self.flights)) / prior_size(c, self.flights)
-            for c in self.flights.columns_of(setting)
-        ]
+        off = from_declared(self.flights.columns_of(setting), self.flights, setting)
 
         def target() -> Setting:
             base = self.base(setting, {}, setting)
@@ -247,16 +247,17 @@ class RowLikelihood:
         """
         key = frozenset(setting)
         self._gusty.pop(key, None)
-        steady = best = mode(setting, self._height)
-        if self._gusts(setting):
-            least = self.objective(steady)
-            for _ in range(GUSTY_ROUNDS):
-                self._gusty[key] = self._noise_beside_gusts(setting)
-                best = setting = mode(setting, self._height)
-            if self.objective(best) > least:
-                del self._gusty[key]
-                best = steady
-        return best
+        steady = mode(setting, self._height)
+        if not any(get(e).sets_wind for e in (*self.rows.fixed, *setting)):
+            return steady
+        least = self.objective(steady)
+        for _ in range(GUSTY_ROUNDS):
+            self._gusty[key] = self._noise_beside_gusts(setting)
+            setting = mode(setting, self._height)
+        if self.objective(setting) <= least:
+            return setting
+        del self._gusty[key]
+        return steady
 
     def sensors(self, setting: Setting) -> dict[str, Pair]:
         """Return the likeliest biases of accelerometers from which the motion was read, and the

@@ -161,8 +161,10 @@ def followers(rows: Rows) -> Followers:
     turned = [p.smooth(p.signals.angular_velocity) for p in flights.pieces({})]
     rates = rows.at_rows(np.concatenate(turned) / STOPPED_WITHIN)
     out |= {"thrust": (wrench[:, 0], forces[2]), "change of thrust": (wrench[:, 4], forces[2])}
-    out |= {f"torque {x}": (wrench[:, 1 + i], [torque + i]) for i, x in enumerate("xyz")}
-    return out | {f"rate {x}": (rates[:, i], [torque + i]) for i, x in enumerate("xyz")}
+    for i, x in enumerate("xyz"):
+        out[f"torque {x}"] = wrench[:, 1 + i], [torque + i]
+        out[f"rate {x}"] = rates[:, i], [torque + i]
+    return out
 
 
 def answered(rows: Rows, signals: Followers, disturbance: Array) -> NamedArrays:

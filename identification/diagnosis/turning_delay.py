@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import fminbound
 from scipy.signal import detrend
 
 from ...dynamics.effects import Role, get
@@ -103,22 +103,20 @@ def turning_delay(
         return sum(x for x, _ in seen(seconds))
 
     step = 0.005
+    near = 0.1 * step
     at = min(np.arange(0.0, LONGEST_DELAY + step, step).tolist(), key=deviance)
-    best = minimize_scalar(
-        deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
-    )
-    seconds, least, near = float(best.x), float(best.fun), 0.1 * step
+    bounds = max(at - step, 0.0), at + step
+    seconds = fminbound(deviance, *bounds, xtol=1e-5).item()
+    least = deviance(seconds)
     bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
     # an answer of the loop lasts longer than a segment, and a delay differs from flight to flight:
     # the slopes' own scatter counts where larger
     slopes = [x for _, x in seen(seconds)]
     count = len(slopes)
-    sums = np.array([x.sum() for x in slopes]) * math.sqrt(count / max(count - 1, 1))
-    flights = float(sums @ sums)
+    flights = np.square([x.sum() for x in slopes]).sum() * count / max(count - 1, 1)
     # W. K. Newey and K. D. West, Econometrica 55 (1987), 703-708
-    x = np.concatenate(slopes)
-    lagged = [x[i:] @ x[: len(x) - i] for i in range(MEMORY)]
-    lasting = float(2.0 * np.linspace(1.0, 0.0, MEMORY + 1)[:-1] @ lagged - lagged[0])
+    sums = np.convolve(np.concatenate(slopes), np.ones(MEMORY))
+    lasting = sums @ sums / MEMORY
     std = math.sqrt(max(2.0 * bend, flights, lasting)) / max(bend, 1e-6)
     # a lag delays each frequency differently, and the frequencies shown by the loop are not known
     omega = spectra[0].omega
