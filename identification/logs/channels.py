@@ -13,7 +13,6 @@ rolls over, or a vehicle was switched on twice. Each group keeps its stamps in t
 import math
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import mode
@@ -24,7 +23,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...runtime.errors import InputError
 from ..motion.smoothing import resampled
 from .log_map import UNITS, Attitude, Battery, Columns, Commands, LogMap, Rotors, Sensor, constant
-from .table import Array, ArrayMap, Mask, NamedArrays, Rows, Table, finite_rows
+from .table import Array, ArrayMap, Lines, Mask, NamedArrays, Noted, Piece, Rows, Table, finite_rows
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
@@ -75,6 +74,9 @@ class ChannelGroup:
         if self.table is None or self.rows is None:
             return f"at {self.t[index]:.6g} s"
         return self.table.row(int(self.rows[index]))
+
+
+Groups = list[ChannelGroup]
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,9 +211,7 @@ _ALONE = 100.0  # median steps, and at least ``jitter``: a lone first or last st
 # this far off all others is wrong
 
 
-def on_one_clock(
-    path: Path, recorded: Sequence[ChannelGroup], piece: int | None = None
-) -> tuple[list[ChannelGroup], list[str]]:
+def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Groups]:
     """Return groups of columns with times that increase strictly, and notes.
 
     Args:
@@ -246,9 +246,7 @@ def on_one_clock(
     return groups, list(dict.fromkeys(notes))
 
 
-def _of_piece(
-    path: Path, groups: list[ChannelGroup], piece: int | None
-) -> tuple[list[ChannelGroup], list[str]]:
+def _of_piece(path: Path, groups: Groups, piece: Piece) -> Noted[Groups]:
     """Return each group's rows of one piece, and a note on the number of pieces.
 
     A group with another number of pieces was not written in each of them. Such a group stays whole,
@@ -274,7 +272,7 @@ def _of_piece(
     return [samples.cut(part[chosen]) if part else samples for samples, part in parts], [note]
 
 
-def check_piece(path: Path, piece: int | None, many: int) -> None:
+def check_piece(path: Path, piece: Piece, many: int) -> None:
     """Check the number of a piece.
 
     Raises:
@@ -351,7 +349,7 @@ _DENSE = 0.5  # share of the rows; a channel with more counts as one of every ro
 _FEWEST = 10  # samples of a channel to decide on its rows
 
 
-def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGroup, list[str]]:
+def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGroup]:
     """Return the map's columns, as written, and notes.
 
     Raises:
@@ -493,7 +491,7 @@ def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
     )
 
 
-def check_rows(samples: ChannelGroup, log_map: LogMap) -> list[str]:
+def check_rows(samples: ChannelGroup, log_map: LogMap) -> Lines:
     """Return notes on the gaps of motors, of a true wrench, and of whole rows' voltage.
 
     Args:

@@ -16,11 +16,11 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import unbroken
-from .flight_log import FlightLog
+from .flight_log import FlightLog, SomeVehicle
 from .flight_phases import flying
 from .log_map import Commands
 from .magnitudes import within
-from .table import Array
+from .table import Array, Noted
 
 # s, the longest dip of thrust in flight: a vehicle falls 5 m meanwhile. Without dips, high thrusts
 # alone would remain, with a mean above the weight
@@ -30,7 +30,7 @@ _FELT = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be ano
 
 
 def with_commanded_speeds(
-    log: FlightLog, vehicle: Vehicle | None, model: Commands | None = None
+    log: FlightLog, vehicle: SomeVehicle, model: Commands | None = None
 ) -> FlightLog:
     """Return a log with rotor speeds from its commands, unless speeds were measured. Speeds that
     another vehicle's thrust model gave are replaced by those of ``vehicle``'s motor curve.
@@ -50,8 +50,8 @@ def with_commanded_speeds(
 
 
 def _speeds(
-    log: FlightLog, command: Array, vehicle: Vehicle | None, model: Commands
-) -> tuple[Array | None, list[str]]:
+    log: FlightLog, command: Array, vehicle: SomeVehicle, model: Commands
+) -> Noted[Array | None]:
     """Return the rotor speeds (N, 4) in rad/s of commands (N, 4), None without a thrust model, and
     notes.
     """
@@ -117,7 +117,7 @@ def _speeds(
     ]
 
 
-def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]:
+def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> Noted[Array]:
     """Return rotor speeds (N, 4) in rad/s of commanded collective thrusts and torques (N, 4), and
     notes.
     """

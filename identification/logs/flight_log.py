@@ -155,9 +155,10 @@ class FlightLog:
 
 
 Logs = Sequence[FlightLog]
+SomeVehicle = Vehicle | None  # None: unknown
 
 
-def flown_vehicle(vehicle: Vehicle | None, name: str) -> Vehicle | None:
+def flown_vehicle(vehicle: SomeVehicle, name: str) -> SomeVehicle:
     """Return the vehicle, or else the preset of a log's vehicle name; None: there is none."""
     return _preset(name) if vehicle is None and name in preset_names() else vehicle
 

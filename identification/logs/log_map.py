@@ -44,7 +44,7 @@ place of one states alternatives: the first is taken with columns in the log, an
 """
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
@@ -65,7 +65,7 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .table import Array, ArrayMap, Data, NamedNumbers, Names, Pair
+from .table import Array, ArrayMap, Data, Lines, NamedNumbers, Names, Pair, Wanted
 from .what_flew import ORDERS, Order, rotor_order
 
 _T = TypeVar("_T")
@@ -86,7 +86,7 @@ QUATERNIONS = ("wxyz", "xyzw")
 EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 
-def _known(value: Any, known: Collection[str], what: str) -> str:
+def _known(value: Any, known: Wanted, what: str) -> str:
     """Return a value as one of the known words, in any case or spelling."""
     text = str(value).lower()
     for name in known:
@@ -95,7 +95,7 @@ def _known(value: Any, known: Collection[str], what: str) -> str:
     raise unknown_name(what, str(value), known)
 
 
-def one_of(known: Collection[str]) -> BeforeValidator:
+def one_of(known: Wanted) -> BeforeValidator:
     """Return a validator for one of some words, as ``_known``."""
     return BeforeValidator(lambda value, info: _known(value, known, info.field_name))
 
@@ -150,7 +150,7 @@ class Columns(_Form):
         return self.topic or self.columns[0] + " ..." * (len(self.columns) > 1)
 
     @property
-    def named(self) -> list[str]:
+    def named(self) -> Lines:
         """The columns of the table, without constants such as ``=0``."""
         return [name for name in self.columns if constant(name) is None]
 
@@ -237,7 +237,7 @@ def _section(given: Any, inner: Callable[[Any], Any], info: ValidationInfo) -> A
     """Check a section: the number of columns, their unit and signs."""
     name = info.field_name or ""
     count = SECTIONS.get(name, 0)
-    units: Collection[str] = COMMAND_UNITS if name == "commands" else UNITS.get(name, ())
+    units: Wanted = COMMAND_UNITS if name == "commands" else UNITS.get(name, ())
     stated = given if isinstance(given, Mapping) else {}
     if stated:
         given = {str(key): value for key, value in stated.items() if value is not None}
@@ -331,7 +331,7 @@ class LogMap(_Form):
         return self.with_ways({n: [replace(w, order=order) for w in x] for n, x in motors.items()})
 
     @property
-    def wanted(self) -> list[str]:
+    def wanted(self) -> Lines:
         """The map's columns, each once."""
         parts = [way for section in self.sections for way in self.ways(section)]
         parts += [*self.extra.values(), self.time]
@@ -356,7 +356,7 @@ def constant(name: str) -> float | None:
         return None
 
 
-def map_names() -> list[str]:
+def map_names() -> Lines:
     """Return the names of the kit's own maps."""
     return sorted(path.stem for path in MAPS.glob("*.yaml"))
 

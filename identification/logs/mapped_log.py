@@ -11,19 +11,19 @@ rows is interpolated to the position's rows.
 """
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
-from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.smoothing import resampled
 from .channels import (
     LONGEST_STEPS,
     ChannelGroup,
+    Groups,
     Stream,
     among,
     check_rows,
@@ -42,6 +42,7 @@ from .flight_log import (
     NORM_TOLERANCE,
     VEHICLE,
     FlightLog,
+    SomeVehicle,
     flown_vehicle,
     source_rate,
     time_notes,
@@ -56,7 +57,7 @@ from .log_map import (
     Rotors,
     check_whole,
 )
-from .table import Array, Mask, Table, finite_rows, median_step
+from .table import Array, Lines, Mask, Noted, Piece, Table, Texts, Wanted, finite_rows, median_step
 from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
 
 _SHOWN = 30  # columns in an error
@@ -71,15 +72,15 @@ _ROTOR_GAP = 0.5  # s without rotor speeds; longer gaps get a note
 # times faster than the pose: an inertial sensor has rows of its own. A pose is put to the nearest
 # row, so the pose moves by a tenth of its step at most, with its own noise
 _OWN_ROWS = 5.0
-Sections = tuple[LogMap, dict[str, Stream], dict[str, Stream], list[str]]
+Sections = tuple[LogMap, dict[str, Stream], dict[str, Stream], Lines]
 
 
 def map_table(
     table: Table,
     log_map: LogMap,
-    vehicle: Vehicle | None = None,
+    vehicle: SomeVehicle = None,
     reader: str = "",
-    piece: int | None = None,
+    piece: Piece = None,
 ) -> FlightLog:
     """Return the flight log of a table by a map.
 
@@ -119,12 +120,12 @@ def map_table(
 
 def log_of(
     path: Path,
-    recorded: Sequence[ChannelGroup],
+    recorded: Groups,
     log_map: LogMap,
     reader: str,
-    notes: Sequence[str],
-    vehicle: Vehicle | None,
-    piece: int | None = None,
+    notes: Texts,
+    vehicle: SomeVehicle,
+    piece: Piece = None,
     flown: WhatFlew = UNSTATED,
 ) -> FlightLog:
     """Return the flight log of groups of columns by a map, as of ``sections_of``."""
@@ -134,11 +135,11 @@ def log_of(
 
 def sections_of(
     path: Path,
-    recorded: Sequence[ChannelGroup],
+    recorded: Groups,
     log_map: LogMap,
     reader: str,
-    notes: Sequence[str],
-    piece: int | None = None,
+    notes: Texts,
+    piece: Piece = None,
     flown: WhatFlew = UNSTATED,
 ) -> Sections:
     """Return the map with the sections that are there; their streams and those of further channels,
@@ -229,7 +230,7 @@ def sections_of(
     return log_map, streams, extra, said
 
 
-def motors_left_out(names: Sequence[str], used: Collection[str]) -> list[str]:
+def motors_left_out(names: Texts, used: Wanted) -> Lines:
     """Return a note on columns named as four motors', none of them used."""
     words = "|".join((WORDS["motor_words"], *WORDS["command_words"]))
     taken_apart = take_apart(names)
@@ -247,7 +248,7 @@ def motors_left_out(names: Sequence[str], used: Collection[str]) -> list[str]:
 
 def _pose(
     path: Path, log_map: LogMap, samples: ChannelGroup, turned: ChannelGroup | None
-) -> tuple[Stream, list[str]]:
+) -> Noted[Stream]:
     """Return positions in m and attitudes (N, 7) in the kit's frames, NaN where there is none, and
     notes.
 
@@ -341,7 +342,7 @@ def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
     return np.asarray(np.any([*there.values()], axis=0))
 
 
-def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream) -> list[str]:
+def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream) -> Lines:
     """Return notes on commands (N, 4).
 
     Raises:
@@ -374,7 +375,7 @@ def _order_note(order: tuple[int, int, int, int]) -> str:
 
 
 def fitted(
-    names: Sequence[str], source: object, log_map: LogMap, vehicle: Vehicle | None, reader: str
+    names: Texts, source: object, log_map: LogMap, vehicle: SomeVehicle, reader: str
 ) -> LogMap:
     """Return a map with the ways to fill a section from a table's columns, and with the range of
     its commands. Optional sections without columns are left out.
@@ -411,7 +412,7 @@ def fitted(
     return with_range(replace(log_map, extra=extra), vehicle, where)
 
 
-def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
+def with_range(log_map: LogMap, vehicle: SomeVehicle, where: str) -> LogMap:
     """Return a map with the range of its commands: its own, or the vehicle's.
 
     Raises:
@@ -429,9 +430,7 @@ def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
     return replace(log_map, commands=replace(commands, range=vehicle.motor_curve.command))
 
 
-def chosen(
-    recorded: Sequence[ChannelGroup], log_map: LogMap
-) -> tuple[LogMap, dict[str, ChannelGroup]]:
+def chosen(recorded: Groups, log_map: LogMap) -> tuple[LogMap, dict[str, ChannelGroup]]:
     """Return a map with one way to fill each section, and the columns' groups. The first way with
     columns and measurements is taken; a position together with its attitude. Optional sections
     without columns are left out.
@@ -480,7 +479,7 @@ def flight_log(
     path: Path,
     reader: str,
     sections: Sections,
-    vehicle: Vehicle | None,
+    vehicle: SomeVehicle,
     flown: WhatFlew = UNSTATED,
 ) -> FlightLog:
     """Return the flight log of streams.
@@ -562,7 +561,7 @@ def flight_log(
     return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
-def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Stream], list[str]]:
+def _cleaned(path: Path, streams: Mapping[str, Stream]) -> Noted[dict[str, Stream]]:
     """Return the streams with values, within a flight's limits, and notes.
 
     Raises:
@@ -609,7 +608,7 @@ def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Strea
 
 def _rows(
     path: Path, pose: Stream | None, motors: Stream, sensor: Stream | None
-) -> tuple[Array, Array, list[str]]:
+) -> tuple[Array, Array, Lines]:
     """Return the rows' times (M,) in s, the poses (M, 7) in them, NaN where there is none, and
     notes.
 

@@ -1,11 +1,11 @@
 """A table of numbers in a file: its columns by name, and where a row stands."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,12 @@ ArrayMap = Mapping[str, Array]
 NamedNumbers = dict[str, float]
 ArrayPair = tuple[Array, Array]
 Data = dict[str, Any]  # plain values by name
+Texts = Sequence[str]
+Lines = list[str]
+Wanted = Collection[str]  # names of columns, or of topics
+Piece = int | None  # of a file, from 1; None: the longest
+_T = TypeVar("_T")
+Noted = tuple[_T, Lines]  # with notes
 
 WHAT = "a flight log"  # for errors
 SUFFIXES = (".csv", ".csv.gz", ".parquet")  # of the kit's own tables
@@ -42,7 +48,7 @@ class Table:
     path: Path
     header: Names
     rows: int
-    load: Callable[["Table", Sequence[str]], Iterable[Array]]  # gives columns (rows,) by names
+    load: Callable[["Table", Texts], Iterable[Array]]  # gives columns (rows,) by names
     first_line: int = 0  # line of the first row in a text; 0: rows have no lines
     blank_before: tuple[int, ...] = ()  # a row for each blank line before it, in their order
     units: Names = ()  # of a line of units behind the header
@@ -57,7 +63,7 @@ class Table:
                 f"{self.path}: no rows; expected a header and at least one row of numbers"
             )
 
-    def read(self, names: Sequence[str]) -> NamedArrays:
+    def read(self, names: Texts) -> NamedArrays:
         """Return columns (rows,) by their names, read-only; empty fields are NaN.
 
         Raises:

@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from subprocess import PIPE
@@ -28,7 +28,7 @@ from ...runtime.page_files import write_text
 from ...runtime.regular_files import check_archive, check_regular, open_regular
 from ...runtime.threads import SINGLE_THREADED
 from ...runtime.whole_files import replaced
-from .table import WHAT, Array, ArrayMap, Data, Table, file_kind, one_line
+from .table import WHAT, Array, ArrayMap, Data, Table, Texts, file_kind, one_line
 
 _MEMORY = 7 * 2**27  # bytes of the process for MATLAB's files
 _SHOWN = 10  # arrays in a note
@@ -109,7 +109,7 @@ def open_arrays(path: Path) -> Table:
             other.append(name)
     note = f"arrays of other lengths than {rows} were left out: {', '.join(other[:_SHOWN])}"
 
-    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+    def load(_: Table, names: Texts) -> Iterator[Array]:
         return map(columns.__getitem__, names)
 
     return Table(path, tuple(columns), rows, load, notes=(note,) if other else ())
@@ -170,7 +170,7 @@ def open_parquet(path: Path) -> Table:
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read as Parquet: {error}") from error
 
-    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+    def load(_: Table, names: Texts) -> Iterator[Array]:
         for name in names:
             values = dict(columns)[name]
             if not _is_numeric(values.type):
@@ -193,9 +193,7 @@ def open_parquet(path: Path) -> Table:
     return Table(path, tuple(name for name, _ in columns), rows, load, numeric=numeric)
 
 
-def _check_claims(
-    path: Path, file: Any, names: Sequence[str], size: int, count: int, what: str
-) -> None:
+def _check_claims(path: Path, file: Any, names: Texts, size: int, count: int, what: str) -> None:
     """Raise InputError where columns unpack to more bytes or numbers, by the file's metadata."""
     groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
     claims = [

@@ -15,7 +15,7 @@ import gzip
 import math
 import re
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
@@ -31,7 +31,7 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.regular_files import open_regular
 from .column_names import is_unit
-from .table import ARRAY_SUFFIXES, SUFFIXES, TEXT_SUFFIXES, WHAT, Array, Rows, Table
+from .table import ARRAY_SUFFIXES, SUFFIXES, TEXT_SUFFIXES, WHAT, Array, Lines, Rows, Table, Texts
 from .tables import open_arrays, open_parquet
 
 # people's words for a missing value
@@ -73,7 +73,7 @@ def _is_missing(field: str) -> bool:
     return not field or field.lower() in MISSING_WORDS
 
 
-def _items(field: str) -> list[str]:
+def _items(field: str) -> Lines:
     """Return the items of a list, between commas, semicolons or spaces."""
     return re.sub(r"[\[\](),;]", " ", field).split()
 
@@ -102,11 +102,11 @@ class _TextLayout:
     decimal: str = "."  # or ","
     lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) of lists, and their lengths
 
-    def fields(self, line: str) -> list[str]:
+    def fields(self, line: str) -> Lines:
         """Return the fields of a line without the space around them, as ``split``."""
         return list(map(str.strip, self.split(line)))
 
-    def split(self, line: str) -> list[str]:
+    def split(self, line: str) -> Lines:
         """Return the fields of a line, an item of a list each; empty for quotation marks against
         CSV.
         """
@@ -127,7 +127,7 @@ class _TextLayout:
                 fields[i : i + 1] = _items(fields[i]) or [""] * count
         return fields
 
-    def names(self, line: str) -> list[str]:
+    def names(self, line: str) -> Lines:
         """Return the columns' names of a header; a separator behind the last name, and the mark of
         a comment before the first, belong to none.
         """
@@ -188,7 +188,7 @@ def open_text(path: Path) -> Table:
     Raises:
         InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
     """
-    written: list[str] = []
+    written: Lines = []
     for line in chain.from_iterable(map(_text_lines, _blocks(path))):
         written.append(line)
         if len(written) == _LINES or sum(map(len, written)) > _LOOKED_AT:
@@ -223,7 +223,7 @@ def open_text(path: Path) -> Table:
     blank: list[int] = []
     last = 0, ""  # rows up to the last line that the core does not read, and the line
 
-    def note(lines: Sequence[str], row: int) -> int:
+    def note(lines: Texts, row: int) -> int:
         nonlocal last
         for line in lines:
             if layout.is_blank(line):
@@ -238,11 +238,11 @@ def open_text(path: Path) -> Table:
         rows -= 1
         notes.append("the last line was cut off, and left out")
 
-    def load(table: Table, wanted: Sequence[str]) -> Array:
+    def load(table: Table, wanted: Texts) -> Array:
         columns = np.empty((len(wanted), rows))
         slots = np.array([wanted.index(name) if name in wanted else -1 for name in names])
 
-        def fill(lines: Sequence[str], row: int) -> int:
+        def fill(lines: Texts, row: int) -> int:
             lines = [line for line in lines if not layout.is_blank(line)][: rows - row]
             if lines:
                 _fill(table, layout, lines, row, wanted, columns[:, row : row + len(lines)])
@@ -264,7 +264,7 @@ def open_text(path: Path) -> Table:
     return Table(path, tuple(names), rows, load, *lines, units, tuple(notes), numeric)
 
 
-def _lists(layout: _TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
+def _lists(layout: _TextLayout, lines: Texts) -> tuple[tuple[int, int], ...]:
     """Return the fields (from 0) of lists, and the length of each field's first list with items."""
     lengths: dict[int, int] = {}
     for line in lines if layout.separator != " " else ():
@@ -343,7 +343,7 @@ def _blocks(path: Path) -> Iterator[bytes]:
         raise InputError(f"{path}: cannot be read as {WHAT}: {why}") from error
 
 
-def _text_lines(block: bytes) -> list[str]:
+def _text_lines(block: bytes) -> Lines:
     """Return the lines of a block, without their ends."""
     return block.decode("utf-8", _LATIN).removesuffix("\n").split("\n") if block else []
 
@@ -354,7 +354,7 @@ def _walk(
     first: int,
     slots: Rows,
     columns: Array,
-    other: Callable[[Sequence[str], int], int],
+    other: Callable[[Texts, int], int],
 ) -> int:
     """Read the rows of a text from line ``first``, counted from 0, on; return their number.
 
@@ -384,7 +384,7 @@ def _walk(
     return row
 
 
-def _layout(path: Path, head: list[str]) -> tuple[_TextLayout, int]:
+def _layout(path: Path, head: Lines) -> tuple[_TextLayout, int]:
     """Return the layout with the most numbers in the first lines, and the line (from 0) of the
     first row full of numbers.
 
@@ -408,7 +408,7 @@ def _layout(path: Path, head: list[str]) -> tuple[_TextLayout, int]:
     )
 
 
-def _score(head: list[str], layout: _TextLayout) -> tuple[float, int]:
+def _score(head: Lines, layout: _TextLayout) -> tuple[float, int]:
     """Return how many numbers a line has in a layout, and the line of the first row of them."""
     rows = []
     for i, line in enumerate(head):
@@ -427,14 +427,14 @@ def _score(head: list[str], layout: _TextLayout) -> tuple[float, int]:
     return sum(counts) / whole, start
 
 
-def _counts(layout: _TextLayout, fields: Sequence[str]) -> tuple[int, int]:
+def _counts(layout: _TextLayout, fields: Texts) -> tuple[int, int]:
     """Return how many fields are empty, and how many hold a number (``nan`` among them)."""
     empty = sum(map(_is_missing, fields))
     others = sum(number is None for number in map(layout.number, fields))
     return empty, len(fields) - others - empty
 
 
-def _header(path: Path, head: list[str], layout: _TextLayout, full: int) -> tuple[int | None, int]:
+def _header(path: Path, head: Lines, layout: _TextLayout, full: int) -> tuple[int | None, int]:
     """Return the lines (from 0) of the header, if any, and of the first row.
 
     The header is the nearest line before the first row with a name for nearly every column. Rows
@@ -470,9 +470,9 @@ def _header(path: Path, head: list[str], layout: _TextLayout, full: int) -> tupl
 def _fill(
     table: Table,
     layout: _TextLayout,
-    lines: Sequence[str],
+    lines: Texts,
     first: int,
-    wanted: Sequence[str],
+    wanted: Texts,
     out: Array,
 ) -> None:
     """Put the numbers in the columns ``wanted`` of rows into ``out`` (len(wanted), n).
@@ -494,7 +494,7 @@ def _fill(
     is_plain = "_" not in "".join(lines)  # Python's numbers may hold underscores
     columns = dict(zip(table.header, zip(*rows, strict=True), strict=True))
     for column, values in zip(wanted, out, strict=True):
-        texts: Sequence[str] = columns[column]
+        texts: Texts = columns[column]
         if layout.decimal == ",":
             texts = "\n".join(texts).translate(_POINTS).split("\n")
         with suppress(ValueError):

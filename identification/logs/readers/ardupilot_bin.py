@@ -21,7 +21,7 @@ message a line, its type's name first, FMT among them, and numbers in whole unit
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -32,15 +32,14 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from .... import _core
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import ChannelGroup, in_order
-from ..flight_log import FlightLog
+from ..channels import ChannelGroup, Groups, in_order
+from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import LogMap, shipped_map, stated
 from ..mapped_log import MOST_VOLTS, log_of
-from ..table import Array, NamedNumbers, Values
+from ..table import Array, Lines, NamedNumbers, Noted, Piece, Values, Wanted
 from ..what_flew import (
     ORDERS,
     PLUS,
@@ -80,7 +79,7 @@ _TYPES |= {"c": "<h", "C": "<H", "e": "<i", "E": "<I", "L": "<i"}
 _UNITS = dict.fromkeys("cCeE", 0.01) | {"L": 1e-7}
 
 
-def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
+def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> FlightLog:
     """Read a DataFlash log.
 
     Raises:
@@ -147,7 +146,7 @@ def _samples(name: str, messages: Messages, columns: set[str]) -> ChannelGroup:
     return ChannelGroup(_times(messages), kept, name)
 
 
-def _texts(messages: Messages, column: str) -> list[str]:
+def _texts(messages: Messages, column: str) -> Lines:
     return [x.decode("ascii", "replace").strip("\0 ") for x in messages.get(column, ())]
 
 
@@ -175,7 +174,7 @@ def _functions(parameters: Values) -> list[int]:
     return [int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)]
 
 
-def _order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Order, str]:
+def _order(path: Path, parameters: Values, vehicle: SomeVehicle) -> tuple[Order, str]:
     """Return the motor of each of the vehicle's rotors, and a note on the source.
 
     Raises:
@@ -203,8 +202,8 @@ def _order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Ord
 
 
 def _with_parameters(
-    path: Path, log_map: LogMap, parameters: Values, vehicle: Vehicle | None
-) -> tuple[LogMap, list[str]]:
+    path: Path, log_map: LogMap, parameters: Values, vehicle: SomeVehicle
+) -> Noted[LogMap]:
     """Return the map with the order of the motors, and with their outputs, range and thrust curve;
     and notes.
 
@@ -241,7 +240,7 @@ def _with_parameters(
     return replace(log_map, commands=commands).with_order(order), [*log_map.notes, note]
 
 
-def _telemetry(messages: Messages, parameters: Values) -> tuple[list[ChannelGroup], list[str]]:
+def _telemetry(messages: Messages, parameters: Values) -> Noted[Groups]:
     """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC, and notes."""
     if not {"Instance", "RPM", "TimeUS"} <= set(messages):
         return [], []
@@ -262,7 +261,7 @@ def _telemetry(messages: Messages, parameters: Values) -> tuple[list[ChannelGrou
     return [ChannelGroup(t, columns, "ESC")], [f"rotor speeds: {told}"]
 
 
-def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messages], int]:
+def read_dataflash(path: Path, wanted: Wanted) -> tuple[dict[str, Messages], int]:
     """Return the messages of the wanted types, by type, and the number of bytes outside messages.
 
     Raises:
@@ -295,12 +294,12 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
     return by_type, len(data) - int(used)
 
 
-def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, Messages]:
+def _of_text(path: Path, content: bytes, wanted: Wanted) -> dict[str, Messages]:
     """Return the messages of the wanted types, of a log as text. The lines before the first FMT
     count as MSG: old logs name the vehicle there. Cut lines are left out.
     """
     before, _, lines = content.partition(b"FMT,")
-    names: dict[str, list[str]] = {}
+    names: dict[str, Lines] = {}
     rows: dict[str, list[list[bytes]]] = {}
     for line in (b"FMT," + lines).splitlines():
         kind, _, rest = line.partition(b",")
@@ -339,7 +338,7 @@ def _rows(data: Bytes, places: NDArray[np.int32], layout: Layout) -> Rows:
     return sliding_window_view(data[_HEAD:], layout.itemsize)[places].view(layout)[:, 0]
 
 
-def _layouts(formats: Rows, wanted: Collection[str]) -> dict[int, tuple[str, Layout, NamedNumbers]]:
+def _layouts(formats: Rows, wanted: Wanted) -> dict[int, tuple[str, Layout, NamedNumbers]]:
     """Return name, layout and units of the wanted types, by number; types with a wrong length are
     left out.
     """

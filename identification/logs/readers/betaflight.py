@@ -31,15 +31,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .... import _core
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup, check_piece
-from ..flight_log import FlightLog
+from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import shipped_map
 from ..mapped_log import MOST_VOLTS, log_of, motors_left_out
-from ..table import Array, NamedArrays, Table
+from ..table import Array, Lines, NamedArrays, Piece, Table
 
 Ints = NDArray[np.int64]
 
@@ -66,7 +65,7 @@ _FRAMES = "IPSGH"
 
 
 def read(
-    path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+    path: Path, vehicle: SomeVehicle = None, option: str = "", piece: Piece = None
 ) -> FlightLog:
     """Read a blackbox: the longest log in the file, or number ``piece``, from 1; ``option``: number
     of the motors' magnet poles, for eRPM.
@@ -121,7 +120,7 @@ def read(
 
 
 def read_table(
-    table: Table, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+    table: Table, vehicle: SomeVehicle = None, option: str = "", piece: Piece = None
 ) -> FlightLog:
     """Read a table of blackbox_decode; ``option``: number of the motors' magnet poles, for eRPM.
 
@@ -151,9 +150,9 @@ def _log(
     stated: set[str],
     headers: Headers,
     option: str,
-    vehicle: Vehicle | None,
-    notes: list[str],
-    piece: int | None = None,
+    vehicle: SomeVehicle,
+    notes: Lines,
+    piece: Piece = None,
 ) -> FlightLog:
     """Return the log of a blackbox's fields (N,); the ``stated`` ones are in the map's units.
 
@@ -273,7 +272,7 @@ def _whole_number(text: str, least: int, most: int, default: int = 0) -> int:
     return int(text) if is_whole and least <= int(text) <= most else default
 
 
-def _layout(path: Path, headers: Headers, names: list[str]) -> list[Ints]:
+def _layout(path: Path, headers: Headers, names: Lines) -> list[Ints]:
     """Return the frames' layout from the headers, as the core takes it: the encodings (6, F) of I,
     P, S, G and H frames and none; their predictors (6, F); the number of fields (5,) of each; the
     intervals (3,) of I frames, and numerator and denominator of P frames, in loops; the constants

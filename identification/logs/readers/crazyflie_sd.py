@@ -25,14 +25,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup
-from ..flight_log import FlightLog
+from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import load_map
 from ..mapped_log import chosen, log_of
+from ..table import Piece
 
 _FIRST = b"tick(I),"  # first column of a log before 2021
 BEGINS = rb"\xbc[\x01\x02]\0|[\x02-\xff]tick\(I\),"
@@ -50,7 +50,7 @@ _RUN = 4096  # events looked at together
 _TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
 
 
-def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
+def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> FlightLog:
     """Read an SD-card log; ``vehicle`` turns motor set points into rotor speeds.
 
     Raises:

@@ -27,16 +27,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ..channels import ChannelGroup
-from ..flight_log import FlightLog
+from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import shipped_map, stated
 from ..mapped_log import Sections, flight_log, sections_of
-from ..table import Array, ArrayMap, NamedArrays, NamedNumbers, Values, one_line
+from ..table import Array, ArrayMap, NamedArrays, NamedNumbers, Piece, Values, one_line
 from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
 BEGINS = rb"ULog\x01\x12\x35"
@@ -75,7 +74,7 @@ class Outputs(NamedTuple):
     words: str  # protocol and range
 
 
-def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
+def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> FlightLog:
     """Read a ULog.
 
     Raises:
@@ -88,9 +87,9 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
 
 def channels(
     path: Path,
-    vehicle: Vehicle | None = None,
+    vehicle: SomeVehicle = None,
     has_ranges: bool = True,
-    piece: int | None = None,
+    piece: Piece = None,
 ) -> tuple[Sections, WhatFlew]:
     """Return a ULog's channels, each at its own rate, and its statements on its vehicle.
 
@@ -330,7 +329,7 @@ def what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
     return WhatFlew(airframe, "parameter CA_ROTOR_COUNT" if count else by, count or None)
 
 
-def _motor_order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Order, str]:
+def _motor_order(path: Path, parameters: Values, vehicle: SomeVehicle) -> tuple[Order, str]:
     """Return PX4's motor of each of the vehicle's rotors, and a note on the source: the positions
     CA_ROTORn_PX and PY, the airframe's, else PX4's quad x.
 

@@ -5,7 +5,7 @@ columns: numbers by the paths of their fields, such as ``pose.position.x``, ``da
 
 import re
 from array import array
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from itertools import islice
 from operator import attrgetter, itemgetter
@@ -17,7 +17,7 @@ from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
 from ..column_names import WORDS
 from ..log_map import LogMap, parse_map, stated
-from ..table import Array, Data, NamedArrays
+from ..table import Array, Data, Lines, NamedArrays, Noted, Wanted
 from .px4_ulog import unified
 
 Types = Mapping[str, str]  # of messages, by topic
@@ -34,7 +34,7 @@ _MOTORS = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])), 
 _PX4 = "px4_msgs/msg/"
 
 
-def map_of(types: Types, given: Stated, source: str, where: str) -> tuple[LogMap, list[str]]:
+def map_of(types: Types, given: Stated, source: str, where: str) -> Noted[LogMap]:
     """Return the log map of topics, and notes.
 
     Args:
@@ -49,7 +49,7 @@ def map_of(types: Types, given: Stated, source: str, where: str) -> tuple[LogMap
     """
     sections: Data = {}
     refused: dict[str, str] = {}
-    notes: list[str] = []
+    notes: Lines = []
     for section in SECTIONS:
         said = given.get(section) or {}
         said = {"topic": said} if isinstance(said, str) else said
@@ -102,7 +102,7 @@ def _topic_of(section: object) -> str:
     return str(section.get("topic") or "") if isinstance(section, Mapping) else ""
 
 
-def _of_types(types: Types, wanted: Collection[str]) -> list[str]:
+def _of_types(types: Types, wanted: Wanted) -> Lines:
     """Return the topics of some types of messages."""
     return sorted(topic for topic, kind in types.items() if kind in wanted)
 
@@ -140,7 +140,7 @@ def _chosen(types: Types, section: str, said: Stated, where: str) -> tuple[str, 
         InputError: several topics are possible.
     """
 
-    def named_by(words: str) -> list[str]:
+    def named_by(words: str) -> Lines:
         return [x for x in several if any(word in x.lower() for word in stated("ros")[words])]
 
     fitting = {*stated("ros")[section], *(stated("ros")["arrays"] if "unit" in said else ())}
@@ -214,7 +214,7 @@ class MessageFields:
         wanted: columns of the map.
     """
 
-    def __init__(self, where: str, kind: str, wanted: Collection[str]) -> None:
+    def __init__(self, where: str, kind: str, wanted: Wanted) -> None:
         self.where, self._kind, self._wanted = where, kind, dict.fromkeys(wanted)
         self._is_px4 = kind.startswith(_PX4)
         self._getters: dict[str, Callable[[Any], Any]] = {}
@@ -255,7 +255,7 @@ class MessageFields:
         name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._kind.removeprefix(_PX4)).lower()
         return unified(name, columns_by_name)
 
-    def lack(self, columns: Collection[str]) -> InputError:
+    def lack(self, columns: Wanted) -> InputError:
         """Return the error for columns without some of the wanted ones."""
         missing = [name for name in self._wanted if name not in columns]
         return InputError(

@@ -43,16 +43,15 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ....runtime.yaml_file import read_yaml
 from ..channels import ChannelGroup
-from ..flight_log import FlightLog
+from ..flight_log import FlightLog, SomeVehicle
 from ..mapped_log import log_of
-from ..table import NamedArrays, one_line
+from ..table import NamedArrays, Piece, one_line
 from .ros_topics import MessageFields, definitions, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
@@ -75,7 +74,7 @@ _WHOLE = re.compile(r"compression_mode:\s*['\"]?(file|message)", re.IGNORECASE)
 
 
 def read(
-    path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+    path: Path, vehicle: SomeVehicle = None, option: str = "", piece: Piece = None
 ) -> FlightLog:
     """Read a bag; ``option`` is the path of a map, by default ``NAME.topics.yaml`` beside the bag,
     if any.
