@@ -11,9 +11,9 @@ rows is interpolated to the position's rows.
 """
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
+from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,6 @@ from .channels import (
     ChannelGroup,
     Groups,
     Stream,
-    among,
     check_rows,
     in_kit_axes,
     in_kit_units,
@@ -57,7 +56,19 @@ from .log_map import (
     Rotors,
     check_whole,
 )
-from .table import Array, Lines, Mask, Noted, Piece, Table, Texts, Wanted, finite_rows, median_step
+from .table import (
+    Array,
+    Lines,
+    Mask,
+    Noted,
+    Piece,
+    Table,
+    Texts,
+    Wanted,
+    finite_rows,
+    median_step,
+    stem,
+)
 from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
 
 _SHOWN = 30  # columns in an error
@@ -72,7 +83,8 @@ _ROTOR_GAP = 0.5  # s without rotor speeds; longer gaps get a note
 # times faster than the pose: an inertial sensor has rows of its own. A pose is put to the nearest
 # row, so the pose moves by a tenth of its step at most, with its own noise
 _OWN_ROWS = 5.0
-Sections = tuple[LogMap, dict[str, Stream], dict[str, Stream], Lines]
+Streams = dict[str, Stream]
+Sections = tuple[LogMap, Streams, Streams, Lines]
 
 
 def map_table(
@@ -125,7 +137,7 @@ def log_of(
     reader: str,
     notes: Texts,
     vehicle: SomeVehicle,
-    piece: Piece = None,
+    piece: Piece,
     flown: WhatFlew = UNSTATED,
 ) -> FlightLog:
     """Return the flight log of groups of columns by a map, as of ``sections_of``."""
@@ -169,7 +181,7 @@ def sections_of(
     poses = log_map.ways("position")
     log_map, sources = chosen(recorded, log_map)
     of_clock += [note for s in recorded if s.table for note in check_rows(s, log_map)]
-    if not (log_map.rotors or log_map.commands or log_map.wrench):
+    if _MOTORS.keys().isdisjoint(log_map.sections):
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
         wanted = " or ".join(
             f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors
@@ -220,7 +232,7 @@ def sections_of(
             said.append(f"no pose{what if poses else ' in the log'}")
         if log_map.rows == "whole":  # all rows are the log's
             t = recorded[0].t
-            streams["position"] = Stream("pose", t, np.full((len(t), 7), np.nan))
+            streams["position"] = Stream("pose", t, np.full((len(t), 7), nan))
     extra = {
         name: Stream(name, samples.t, samples.values(part))
         for name, part in log_map.extra.items()
@@ -275,14 +287,14 @@ def _pose(
     if len(t) < len(keep):
         notes.append(f"{len(t)} of {len(keep)} rows kept: those with a pose or an IMU's sample")
     if isinstance(place, Position) and place.held:
-        new = np.append(True, np.any(np.diff(position, axis=0) != 0.0, axis=1))
+        new = np.append(True, (np.diff(position, axis=0) != 0.0).any(axis=1))
         placed &= new
         if not new.all():
             notes.append(
-                f"position: sampled and held; {np.count_nonzero(~new)} of {len(t)} rows repeat the "
+                f"position: sampled and held; {(~new).sum()} of {len(t)} rows repeat the "
                 "one before and are not valid"
             )
-    pose = np.full((len(t), 7), np.nan)
+    pose = np.full((len(t), 7), nan)
     if turn is None or turned is None:
         pose[:, :3] = position
         return Stream(place.label, t, pose), notes
@@ -309,7 +321,7 @@ def _pose(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
         )
-    alone = np.count_nonzero(~among(t[placed], attitude.t))
+    alone = (~np.isin(t[placed], attitude.t)).sum()
     if turned is samples and alone:
         notes.append(
             f"{alone} of {placed.sum()} positions stand in rows without an attitude, which "
@@ -350,7 +362,7 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
     """
     low, high = part.range or (0.0, 1.0)
     u = commands.values[np.isfinite(commands.values)]
-    if np.count_nonzero((u < -0.01) | (u > 1.01)) > _OUTSIDE * len(u):
+    if ((u < -0.01) | (u > 1.01)).sum() > _OUTSIDE * len(u):
         raw = low + (high - low) * u
         what, hint = ("", ": state the range in the map")
         if u.max() < 0.0 and part.topic:  # an autopilot knows its range
@@ -364,7 +376,7 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
         is_said = part.note or (low, high) == (0.0, 1.0)
         taken = "" if is_said else f"{low:g} to {high:g} taken as 0 to 1, "
         notes.append(f"commands: {commands.name}, {part.unit}, {taken}{_order_note(part.order)}")
-    if outside := np.count_nonzero((u < -1e-9) | (u > 1.0 + 1e-9)):
+    if outside := ((u < -1e-9) | (u > 1.0 + 1e-9)).sum():
         notes.append(f"{outside} motor command(s) beyond that range were set to its end")
     return notes
 
@@ -518,7 +530,7 @@ def flight_log(
         )
     valid = finite_rows(pose)
     if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
-        pose[~valid] = np.nan
+        pose[~valid] = nan
     pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
     there = {
         name: stream.between(t) if name in _IMU else stream.at(t)
@@ -526,17 +538,17 @@ def flight_log(
         if name != "position"
     }
     measured = {name: x for name, x in there.items() if name in _IMU and np.isfinite(x).any()}
-    speeds = there.get("rotors", np.full((len(t), 4), np.nan))
+    speeds = there.get("rotors", np.full((len(t), 4), nan))
     if kind == "wrench" and vehicle is not None:
         speeds, words = speeds_of_wrench(there["wrench"], vehicle)
         notes += words
     times = t - t[0] if log_map.time.offset is None else t
     notes += time_notes(times)
-    without = np.count_nonzero(~valid) if valid.any() else 0
+    without = (~valid).sum() if valid.any() else 0
     if without and measured:  # the sensor may be faster than the pose
         notes += [f"of the pose: {text}" for text in time_notes(times[valid])]
     elif without:
-        first = times[np.argmin(valid)]
+        first = times[valid.argmin()]
         notes.append(f"{without} of {len(t)} rows without a pose, the first at t = {first:.6g} s")
     log = FlightLog(
         times,
@@ -546,7 +558,7 @@ def flight_log(
         voltage=there["battery"][:, 0] if "battery" in there else None,
         force=there.get("force"),
         torque=there.get("torque"),
-        name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
+        name=stem(path) if path.is_file() else path.name,
         source=f"{path} (reader {reader})" if reader else str(path),
         notes=tuple(notes),
         valid=valid,
@@ -561,7 +573,7 @@ def flight_log(
     return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
-def _cleaned(path: Path, streams: Mapping[str, Stream]) -> Noted[dict[str, Stream]]:
+def _cleaned(path: Path, streams: Streams) -> Noted[Streams]:
     """Return the streams with values, within a flight's limits, and notes.
 
     Raises:
@@ -583,11 +595,11 @@ def _cleaned(path: Path, streams: Mapping[str, Stream]) -> Noted[dict[str, Strea
                 f"{path}: {name}: no two samples have four finite {_MOTORS[section]}; expected some"
             )
         if section == "rotors":
-            if np.any(values < 0.0):
+            if (values < 0.0).any():
                 notes.append(f"{name}: negative rotor speeds were taken as positive")
             values = np.abs(values)
         elif section == "commands":
-            values = np.clip(values, 0.0, 1.0)
+            values = values.clip(0.0, 1.0)
         elif section == "battery":
             plausible = (values >= LEAST_VOLTS) & (values <= MOST_VOLTS)
             wrong = values[~plausible & (values > 0.0)]
@@ -596,12 +608,12 @@ def _cleaned(path: Path, streams: Mapping[str, Stream]) -> Noted[dict[str, Strea
                     f"{name}: {len(wrong)} of {count} voltages, {wrong.min():.3g} to "
                     f"{wrong.max():.3g} V, are none of a vehicle's battery; left out"
                 )
-            values = np.where(plausible, values, np.nan)
+            values = np.where(plausible, values, nan)
         elif section in _IMU:
-            values = np.where(finite_rows(values)[:, None], values, np.nan)
+            values = np.where(finite_rows(values)[:, None], values, nan)
         if section == "position" or (np.isfinite(values).any() and count > 1):
             made[section] = Stream(name, stream.t, values)
-        elif section == "battery" and not np.any(values > 0.0):
+        elif section == "battery" and not (values > 0.0).any():
             notes.append(f"{name}: no positive voltage; left out")
     return made, notes
 
@@ -615,13 +627,10 @@ def _rows(
     Raises:
         InputError: fewer than two rows lie within the span of the motors' stream.
     """
-    of_sensor = sensor is not None and (
-        pose is None or median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0
-    )
+    if pose and sensor and not median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0:
+        sensor = None
     begin, end = motors.t[0], motors.t[-1]
-    for stream in (pose, sensor if of_sensor else None):  # both must meet the motors
-        if stream is None:
-            continue
+    for stream in filter(None, (pose, sensor)):  # both must meet the motors
         inside = (stream.t >= begin) & (stream.t <= end)
         if inside.sum() < 2:
             raise InputError(
@@ -630,16 +639,16 @@ def _rows(
                 "over the same flight"
             )
         t = stream.t[inside]
-    if sensor is None or not of_sensor:
+    if sensor is None:
         assert pose is not None
         return t, pose.values[inside], []
     rows = f"rows are those of {sensor.name}, {1.0 / median_step(sensor.t):.4g} Hz"
-    placed = np.full((len(t), 7), np.nan)
+    placed = np.full((len(t), 7), nan)
     if pose is None:
         return t, placed, [rows]
     if (seen := readable(pose)) is not None:
         own, values = seen.t, seen.values
-        near = np.clip(np.searchsorted(t, own), 1, len(t) - 1)
+        near = np.searchsorted(t, own).clip(1, len(t) - 1)
         near -= own - t[near - 1] < t[near] - own
         reach = max(0.6 * median_step(t), 0.5 * median_step(own) / _OWN_ROWS)
         near = np.unique(near[np.abs(t[near] - own) <= reach])

@@ -1,7 +1,5 @@
 """Reading a flight log from a file, by a reader or by a map of a table's columns."""
 
-from __future__ import annotations
-
 import os
 import re
 import warnings

@@ -14,6 +14,7 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
 
 Array = NDArray[np.float64]
+SomeArray = Array | None
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 Names = tuple[str, ...]  # of columns, logs or effects; sentences
@@ -138,9 +139,5 @@ def file_kind(path: Path) -> str:
 
 
 def stem(path: Path) -> str:
-    """Return a table's name without its ending."""
-    name = path.name
-    for ending in (".gz", ".parquet", *ARRAY_SUFFIXES, *TEXT_SUFFIXES):
-        if name.lower().endswith(ending):
-            name = name[: -len(ending)]
-    return name
+    """Return a file's name without its ending, and without ``.gz`` behind the ending."""
+    return Path(path.name.removesuffix(".gz")).stem

@@ -94,13 +94,16 @@ def _seconds(field: str) -> float | None:
     return days.total_seconds() + 3600.0 * hours + 60.0 * minutes + seconds
 
 
+_Lists = tuple[tuple[int, int], ...]  # fields (from 0) of lists, and their lengths
+
+
 @dataclass(frozen=True)
 class _TextLayout:
     """How the lines of a text table are written."""
 
     separator: str = ","  # " ": any white space
     decimal: str = "."  # or ","
-    lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) of lists, and their lengths
+    lists: _Lists = ()
 
     def fields(self, line: str) -> Lines:
         """Return the fields of a line without the space around them, as ``split``."""
@@ -260,11 +263,12 @@ def open_text(path: Path) -> Table:
         for name, fields in zip(names, columns_seen, strict=False)
         if None not in map(layout.number, fields)
     )
-    lines = first + 1, tuple(blank)
-    return Table(path, tuple(names), rows, load, *lines, units, tuple(notes), numeric)
+    return Table(
+        path, tuple(names), rows, load, first + 1, tuple(blank), units, tuple(notes), numeric
+    )
 
 
-def _lists(layout: _TextLayout, lines: Texts) -> tuple[tuple[int, int], ...]:
+def _lists(layout: _TextLayout, lines: Texts) -> _Lists:
     """Return the fields (from 0) of lists, and the length of each field's first list with items."""
     lengths: dict[int, int] = {}
     for line in lines if layout.separator != " " else ():
@@ -283,14 +287,16 @@ def _latin(error: UnicodeError) -> tuple[str, int]:
 codecs.register_error(_LATIN, _latin)
 
 
+@dataclass
 class _Packed:
     """The bytes of a gzip file; no more are read than characters were unpacked: a million empty
     parts would take as long as a table.
     """
 
-    def __init__(self, file: BinaryIO, path: Path) -> None:
-        self._file, self._path, self._size = file, path, 0
-        self.unpacked = 0  # characters so far
+    file: BinaryIO
+    path: Path
+    size: int = 0
+    unpacked: int = 0  # characters so far
 
     def read(self, size: int) -> bytes:
         """Return the next bytes.
@@ -298,11 +304,11 @@ class _Packed:
         Raises:
             InputError: they are more than they unpack to.
         """
-        piece = self._file.read(size)
-        self._size += len(piece)
-        if self._size > self.unpacked + _UNUSED:
+        piece = self.file.read(size)
+        self.size += len(piece)
+        if self.size > self.unpacked + _UNUSED:
             raise InputError(
-                f"{self._path}: {self._size} packed bytes unpack to {self.unpacked}; expected a "
+                f"{self.path}: {self.size} packed bytes unpack to {self.unpacked}; expected a "
                 "packed table"
             )
         return piece

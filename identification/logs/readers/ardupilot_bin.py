@@ -250,7 +250,7 @@ def _telemetry(messages: Messages, parameters: Values) -> Noted[Groups]:
     each, known = [], np.isfinite(messages["RPM"])
     for slot in slots:
         times, rpm = (x[known & (which == slot)] for x in (_times(messages), messages["RPM"]))
-        if len(rpm) < 2 or not np.any(rpm > 0.0):
+        if len(rpm) < 2 or not (rpm > 0.0).any():
             return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
         rows, _ = in_order(times)
         each.append((times[rows], rpm[rows]))

@@ -83,7 +83,7 @@ def read(
     edges = [*(match.start() for match in re.finditer(BEGINS, data)), len(data)]
     logs = len(edges) - 1
     check_piece(path, piece, logs)
-    chosen = int(np.argmax(np.diff(edges))) if piece is None else piece - 1
+    chosen = int(np.diff(edges).argmax()) if piece is None else piece - 1
     start, end = edges[chosen : chosen + 2]
     begin = next(_HEADERS.finditer(data, start, end)).end()
     if data[begin : begin + 2] == b"H ":
@@ -110,8 +110,10 @@ def read(
         raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
     notes = [f"blackbox of {headers.get('Firmware revision', 'an unknown firmware')[:60]}"]
     if logs > 1:
-        longest = "" if piece else ", the longest; --piece reads another"
-        notes.append(f"the file holds {logs} logs; number {chosen + 1} was read{longest}")
+        notes.append(
+            f"the file holds {logs} logs; number {chosen + 1} was read (default: the longest; "
+            "--piece reads another)"
+        )
     if lost:
         notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
     notes += motors_left_out(names, wanted)
@@ -167,13 +169,14 @@ def _log(
     }
     said = [*notes, *log_map.notes]
     scales = {"gyro": _gyro_scale(headers), "vbat": 0.01}
-    low = 0.0
     if groups["motor"]:
         low, high, whence = _range(path, [fields[name] for name in groups["motor"]], headers)
         scales["motor"] = 1.0 / (high - low)
+        for name in groups["motor"]:
+            fields[name] -= low
         said.append(f"commands: {low:g} to {high:g} ({whence}) taken as 0 to 1")
     poles, whence = _magnet_poles(path, option, headers["motor_poles"])
-    if any(np.any(fields[name] > 0.0) for name in groups["eRPM"]):
+    if any((fields[name] > 0.0).any() for name in groups["eRPM"]):
         scales["eRPM"] = 200.0 / poles
         said.append(f"eRPM: {poles} magnet poles ({whence})")
     if groups["acc"]:
@@ -182,10 +185,10 @@ def _log(
         said.append(words)
     for kind, scale in scales.items():
         for name in groups[kind]:
-            fields[name] = (fields[name] - (low if kind == "motor" else 0.0)) * scale
+            fields[name] *= scale
     for name in ("vbatLatest", "vbat"):
         if name in stated and (volts := np.median(fields[name])) > MOST_VOLTS:
-            fields[name] = 0.1 * fields[name]
+            fields[name] *= 0.1
             said.append(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
                 "blackbox_decode writes logs of Betaflight before 4.3"
@@ -229,7 +232,7 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
     if 0 < least < most:
         return float(least), float(most), "minthrottle and maxthrottle of the header"
     low, high = _PWM
-    if any(np.any((x > high) | ((x < low) & (x > 0.0))) for x in motors):
+    if any(((x > high) | ((x < low) & (x > 0.0))).any() for x in motors):
         return *_DSHOT, "assumed: DShot, no header says it"
     return low, high, "assumed: pulses in us, no header says it"
 

@@ -35,7 +35,7 @@ from ..channels import ChannelGroup
 from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import shipped_map, stated
 from ..mapped_log import Sections, flight_log, sections_of
-from ..table import Array, ArrayMap, NamedArrays, NamedNumbers, Piece, Values, one_line
+from ..table import Array, ArrayMap, NamedArrays, NamedNumbers, Piece, SomeArray, Values, one_line
 from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
 BEGINS = rb"ULog\x01\x12\x35"
@@ -191,7 +191,7 @@ def _samples(topic: str, fields: ArrayMap, outputs: Outputs) -> Iterator[Channel
     """
     published = fields["timestamp"]
     sampled = fields.get("timestamp_sample", published)
-    plausible = np.all((sampled > 0.0) & (np.abs(published - sampled) < 1e6))
+    plausible = ((sampled > 0.0) & (np.abs(published - sampled) < 1e6)).all()
     t = _MICROSECOND * (sampled if plausible else published)
     if topic in ("sensor_combined", "vehicle_imu"):
         yield from (_sensor(topic, t, fields, *names) for names in _SENSORS)
@@ -214,7 +214,7 @@ def unified(topic: str, fields: ArrayMap) -> NamedArrays:
         return {f"esc[{i}].esc_rpm": columns[name] for i, name in enumerate(reported)}
     if topic == "actuator_motors":
         # NaN: a motor is off
-        columns = {n: np.clip(np.nan_to_num(x), 0.0, 1.0) for n, x in columns.items()}
+        columns = {n: np.nan_to_num(x).clip(0.0, 1.0) for n, x in columns.items()}
         is_used = any(np.any(columns.get(f"control[{i}]", 0.0) > 0.0) for i in range(4))
         return columns if is_used else {}
     for name, flag in _FLAGS.get(topic, {}).items():
@@ -243,7 +243,7 @@ def _sensor(topic: str, t: Array, fields: ArrayMap, field: str, gained: str) -> 
         axes = {n: column / np.where(span > 0.0, span, np.nan) for n, column in axes.items()}
         t = t - 0.5 * span
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
-    if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
+    if field == "accelerometer_m_s2" and (np.abs(late) < 1e6).all():
         t = t + _MICROSECOND * late
     return ChannelGroup(t, axes, topic)
 
@@ -392,7 +392,7 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
     positive = {name: x for name, x in parameters.items() if x > 0.0}
     lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
     # with a bus for sensors alone the motors have pulses, long ones at rest, too
-    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and np.any(motors < _LEAST_PULSE)
+    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and (motors < _LEAST_PULSE).any()
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
     is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
     if 0.0 < most <= _LARGEST_SHARE:
@@ -403,7 +403,7 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
     elif is_dshot or usual < _LEAST_PULSE:
         protocol, high, stated = "DShot", _DSHOT, is_dshot
     else:
-        if not np.all(highs > lows):
+        if not (highs > lows).all():
             raise InputError(
                 f"{path}: the PWM_{bank}_MIN and MAX parameters of the motors' outputs are "
                 f"{lows.tolist()} and {highs.tolist()}; expected MIN below MAX"
@@ -420,21 +420,14 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
 
 
 def _shares_of_outputs(columns: ArrayMap, outputs: Outputs) -> NamedArrays:
-    """Return each output's values (N,) as 0 to 1, other outputs' in the motors' range; nothing if a
-    motor's output never changes.
-    """
-    if _of_motors(columns, outputs.slots) is None:
+    """Return the motors' outputs (N,) as 0 to 1; nothing if one never changes."""
+    if (motors := _of_motors(columns, outputs.slots)) is None:
         return {}
-    low, high = (np.full(_OUTPUTS, end) for end in (outputs.low.min(), outputs.high.max()))
-    low[outputs.slots], high[outputs.slots] = outputs.low, outputs.high
-    return {
-        name: np.clip((np.nan_to_num(columns[name]) - low[i]) / (high[i] - low[i]), 0.0, 1.0)
-        for i in range(_OUTPUTS)
-        if (name := f"output[{i}]") in columns
-    }
+    shares = ((motors - outputs.low) / (outputs.high - outputs.low)).clip(0.0, 1.0)
+    return {f"output[{slot}]": x for slot, x in zip(outputs.slots, shares.T, strict=True)}
 
 
-def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> Array | None:
+def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> SomeArray:
     """Return the values of the motors' outputs (N, 4). None: one is missing or never changes, as of
     a servo, or of an unused bank.
     """

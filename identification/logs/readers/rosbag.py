@@ -52,7 +52,7 @@ from ..channels import ChannelGroup
 from ..flight_log import FlightLog, SomeVehicle
 from ..mapped_log import log_of
 from ..table import NamedArrays, Piece, one_line
-from .ros_topics import MessageFields, definitions, map_of, stamp
+from .ros_topics import MessageFields, Stated, Types, definitions, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -141,7 +141,7 @@ def _bag_in(path: Path) -> Path:
     return files[0]
 
 
-def given_map(file: Path) -> Mapping[str, Any]:
+def given_map(file: Path) -> Stated:
     """Return the content of a map file of topics.
 
     Raises:
@@ -157,7 +157,7 @@ def given_map(file: Path) -> Mapping[str, Any]:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
+def _opened(path: Path) -> Iterator[tuple[Types, _Messages]]:
     """Open a bag of either kind; give the types of its topics, and how to read the messages of one.
 
     Raises:
@@ -249,9 +249,9 @@ def _decoded_topic(fields: MessageFields, messages: Iterator[tuple[int, Any]]) -
     if not recorded:
         raise InputError(f"{fields.where} has no messages; expected at least two")
     received_at, sampled_at, doubt = np.array(recorded), np.array(stamped), ""
-    if not np.any(sampled_at):
+    if not sampled_at.any():
         doubt = "no time stamps"
-    elif np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
+    elif np.abs(sampled_at - received_at).max() > _SAME_CLOCK:
         doubt = "its time stamps are of another clock than the bag's"
     return received_at if doubt else sampled_at, fields.columns(), doubt
 
