@@ -43,8 +43,6 @@ _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 BODY_TURNS: NamedArrays = {"flu": np.eye(3), "frd": _HALF_TURN, "y_up": _Y_UP}
 WORLD_TURNS = {"enu": BODY_TURNS["flu"], "ned": _HALF_TURN, "y_up": _Y_UP}
 
-_SENSOR_GAP = 3.5  # median steps, the longest gap for interpolating an inertial sensor
-
 
 @dataclass(frozen=True, eq=False)
 class ChannelGroup:
@@ -125,15 +123,15 @@ class Stream:
         out = resampled(t, times, self.values)
         step = np.diff(times)
         after = np.searchsorted(times, t).clip(1, len(step))
-        there = (step[after - 1] <= _SENSOR_GAP * np.median(step)) | np.isin(t, times)
+        there = (step[after - 1] <= LONGEST_STEPS * np.median(step)) | np.isin(t, times)
         out[~there | (t < times[0]) | (t > times[-1])] = nan
         return out
 
 
 def readable(stream: Stream | None) -> Stream | None:
     """Return the finite samples (N, K); None: fewer than two."""
-    finite = None if stream is None else stream.whole()
-    return None if finite is None or len(finite.t) < 2 else finite
+    finite = stream and stream.whole()
+    return finite if finite and len(finite.t) > 1 else None
 
 
 def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
@@ -297,7 +295,7 @@ def _resets(t: Array) -> Rows:
         enough = min(len(before), len(after)) >= _LEAST_WINDOW
         if enough and np.median(after) < np.median(before) - _RESET:
             resets.append(i)
-    return np.array(resets, dtype=np.intp)
+    return np.array(resets, np.intp)
 
 
 def in_order(t: Array) -> tuple[Rows, int]:
@@ -338,7 +336,7 @@ def _longest_increase(t: Array) -> Rows:
     rows = at[-1:] or [-1]
     while rows[-1] >= 0:
         rows.append(before[rows[-1]])
-    return np.array(rows[-2::-1], dtype=np.intp)
+    return np.array(rows[-2::-1], np.intp)
 
 
 # A table's rows: their times, empty fields, and gaps of the motors.

@@ -109,7 +109,7 @@ class FlightLog:
     name: str = ""
     source: str = ""
     notes: Names = ()
-    valid: Mask = field(default_factory=lambda: np.empty(0, dtype=bool))
+    valid: Mask = field(default_factory=lambda: np.empty(0, bool))
     extra: ArrayMap = field(default_factory=dict)
     commanded: bool = False
     command: SomeArray = None
@@ -244,7 +244,7 @@ def _corners(t: Array, values: Array) -> Rows:
     both.
     """
     if len(t) < 3:
-        return np.empty(0, dtype=np.intp)
+        return np.empty(0, np.intp)
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
     steps = np.abs(np.diff(values, axis=0))
     rounding = steps.min(axis=0, where=steps > 0.0, initial=inf)
@@ -253,7 +253,7 @@ def _corners(t: Array, values: Array) -> Rows:
     least = np.maximum(_ON_LINE * np.sqrt(mean_square(off)), _ROUNDED * rounding)
     is_corner = (off > least).any(axis=1)
     if is_corner.mean() > _MOST_CORNERS:
-        return np.empty(0, dtype=np.intp)
+        return np.empty(0, np.intp)
     return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))
 
 

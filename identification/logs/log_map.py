@@ -44,7 +44,7 @@ place of one states alternatives: the first is taken with columns in the log, an
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
@@ -58,6 +58,7 @@ from pydantic import (
     Strict,
     StringConstraints,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
     WrapValidator,
 )
 
@@ -82,8 +83,6 @@ COMMAND_UNITS: dict[str, Pair | None] = {
 }
 SECTIONS: dict[str, int] = WORDS["sections"]  # columns of each
 SENSES = ("body_to_world", "world_to_body")
-QUATERNIONS = ("wxyz", "xyzw")
-EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 
 def _known(value: Any, known: Wanted, what: str) -> str:
@@ -125,6 +124,7 @@ _Range = Annotated[
     AfterValidator(_two_levels),
     expected("two numbers, what stands for no and for full command, such as [1000, 2000]"),
 ]
+_Body = Annotated[str, one_of(BODIES)]
 _Order = Annotated[Order, BeforeValidator(rotor_order)]
 
 
@@ -190,8 +190,10 @@ class Position(Columns):
 class Attitude(Columns):
     """A quaternion, or Euler angles about x, y and z."""
 
-    order: Annotated[str, one_of(QUATERNIONS)] = "wxyz"  # order of a quaternion's columns
-    euler: Annotated[str, one_of(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
+    order: Annotated[str, one_of(("wxyz", "xyzw"))] = "wxyz"  # order of a quaternion's columns
+    euler: Annotated[str, one_of(("xyz", "xzy", "yxz", "yzx", "zxy", "zyx"))] = (
+        ""  # of turns; empty: a quaternion
+    )
     sense: Annotated[str, one_of(SENSES)] = "body_to_world"
     of: Names = ()  # topics of positions; empty: of all
 
@@ -230,10 +232,10 @@ class Battery(Columns):
 class Sensor(Columns):
     """An inertial sensor of three axes."""
 
-    body: Annotated[str, one_of(BODIES)] = ""  # empty: the map's
+    body: _Body = ""  # empty: the map's
 
 
-def _section(given: Any, inner: Callable[[Any], Any], info: ValidationInfo) -> Any:
+def _section(given: Any, inner: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
     """Check a section: the number of columns, their unit and signs."""
     name = info.field_name or ""
     count = SECTIONS.get(name, 0)
@@ -282,7 +284,7 @@ class LogMap(_Form):
 
     time: Annotated[TimeColumn, AfterValidator(_clock)]
     world: Annotated[str, one_of(WORLDS), AfterValidator(WORLDS.__getitem__)] = "enu"
-    body: Annotated[str, one_of(BODIES)] = "flu"
+    body: _Body = "flu"
     position: _Part[Position] = None
     attitude: _Part[Attitude] = None
     rotors: _Part[Rotors] = None

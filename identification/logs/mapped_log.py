@@ -74,6 +74,7 @@ from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
 _SHOWN = 30  # columns in an error
 _MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commanded wrenches"}
 NO_QUATERNION = 0.5  # length; shorter stands for a missing quaternion
+MOTOR_NAMES = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])), re.IGNORECASE)
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, the longest gap for interpolating an attitude
 _OUTSIDE = 0.5  # share of commands beyond a wrong range
@@ -128,21 +129,6 @@ def map_table(
     del columns, samples
     table.forget()  # the streams are copies
     return flight_log(table.path, reader, sections, vehicle)
-
-
-def log_of(
-    path: Path,
-    recorded: Groups,
-    log_map: LogMap,
-    reader: str,
-    notes: Texts,
-    vehicle: SomeVehicle,
-    piece: Piece,
-    flown: WhatFlew = UNSTATED,
-) -> FlightLog:
-    """Return the flight log of groups of columns by a map, as of ``sections_of``."""
-    sections = sections_of(path, recorded, log_map, reader, notes, piece, flown)
-    return flight_log(path, reader, sections, vehicle, flown)
 
 
 def sections_of(
@@ -244,14 +230,13 @@ def sections_of(
 
 def motors_left_out(names: Texts, used: Wanted) -> Lines:
     """Return a note on columns named as four motors', none of them used."""
-    words = "|".join((WORDS["motor_words"], *WORDS["command_words"]))
     taken_apart = take_apart(names)
     left = {
         f"{group.columns[0]} ...": None
         for way in WORDS["parts"]["motors"]
         for endings in way["endings"]
         for group in groups_of(taken_apart, endings)
-        if re.search(words, group.key) and not re.search(WORDS["sticks"], group.key)
+        if MOTOR_NAMES.search(group.key) and not re.search(WORDS["sticks"], group.key)
         if not {*group.columns} & {*used}
     }
     listed = ", ".join([*left][:_SHOWN])
@@ -295,9 +280,10 @@ def _pose(
                 "one before and are not valid"
             )
     pose = np.full((len(t), 7), nan)
+    poses = Stream(place.label, t, pose)
     if turn is None or turned is None:
         pose[:, :3] = position
-        return Stream(place.label, t, pose), notes
+        return poses, notes
     measured = turned.cut(turned.there(turn))
     turns = quaternions(turn, measured.values(turn))
     with np.errstate(over="ignore"):
@@ -333,7 +319,7 @@ def _pose(
         for name in turn.columns
         if name not in turn.named
     ]
-    return Stream(place.label, t, pose), notes
+    return poses, notes
 
 
 def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
@@ -562,7 +548,7 @@ def flight_log(
         source=f"{path} (reader {reader})" if reader else str(path),
         notes=tuple(notes),
         valid=valid,
-        extra={n: x if (x := s.between(t)).shape[1] > 1 else x[:, 0] for n, s in extra.items()},
+        extra={name: stream.between(t).squeeze() for name, stream in extra.items()},
         commanded=kind == "wrench",
         command=there.get("commands"),
         vehicle=log_map.vehicle,
@@ -652,7 +638,6 @@ def _rows(
         near -= own - t[near - 1] < t[near] - own
         reach = max(0.6 * median_step(t), 0.5 * median_step(own) / _OWN_ROWS)
         near = np.unique(near[np.abs(t[near] - own) <= reach])
-        near = near[(t[near] >= own[0]) & (t[near] <= own[-1])]
         placed[near, :3] = resampled(t[near], own, values[:, :3])
         placed[near, 3:] = slerp(t[near], replace(seen, values=values[:, 3:]))
     rate = 1.0 / median_step(pose.t)

@@ -30,7 +30,7 @@ from .log_map import OWN_MAP, load_map
 from .magnitudes import unit_doubts, without_broken_speeds
 from .mapped_log import map_table
 from .readers import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
-from .table import SUFFIXES, Names, Piece, Table, Texts
+from .table import SUFFIXES, Names, Piece, Table, Texts, one_line
 from .text_table import is_table, open_table
 
 _SHOWN = 20  # columns in an error
@@ -221,10 +221,8 @@ def reader_by_content(path: Path) -> Reader | None:
                 if reader.begins and re.match(reader.begins, head):
                     return reader
         return None
-    try:
+    with one_line(f"{path}: cannot be read as a folder"):
         names = sorted(os.listdir(path))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read as a folder: {error.strerror}") from error
     if any(name.lower().endswith(_BAG_FOLDER) for name in names):
         return READERS["rosbag"]
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""

@@ -81,7 +81,7 @@ class Table:
         numbers = self.rows * (len(columns) + len(new))
         check_count(self.path, numbers, LIMITS.table_numbers, "numbers")
         for name, column in zip(new, self.load(self, new) if new else (), strict=True):
-            columns[name] = np.asarray(column, dtype=np.float64).view()
+            columns[name] = np.asarray(column, float).view()
             columns[name].flags.writeable = False
         return {name: columns[name] for name in names}
 

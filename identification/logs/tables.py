@@ -148,14 +148,14 @@ def open_parquet(path: Path) -> Table:
     from pyarrow import parquet
 
     check_regular(path, WHAT, LIMITS.table_text)
-    try:
+    with one_line(f"{path}: cannot be read as Parquet"):
         file = parquet.ParquetFile(
             path,
             buffer_size=_BUFFER,
             thrift_string_size_limit=LIMITS.parquet_footer,
             thrift_container_size_limit=LIMITS.parquet_footer,
         )
-        rows = int(file.metadata.num_rows)
+        rows = file.metadata.num_rows
         nested = [field.name for field in file.schema_arrow if pyarrow.types.is_nested(field.type)]
         _check_claims(path, file, nested, 8 * LIMITS.list_numbers, LIMITS.list_numbers, "of lists")
         columns = []  # names, and arrays of their own or the file's fields
@@ -167,8 +167,6 @@ def open_parquet(path: Path) -> Table:
                 held += rows * len(parts)
                 check_count(path, held, LIMITS.list_numbers, "numbers of lists")
             columns += parts
-    except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{path}: cannot be read as Parquet: {error}") from error
 
     def load(_: Table, names: Texts) -> Iterator[Array]:
         for name in names:
@@ -213,14 +211,8 @@ def _column(path: Path, file: Any, name: str) -> Any:
     Raises:
         InputError: the column is unreadable.
     """
-    import pyarrow
-
-    try:
+    with one_line(f"{path}: column {name} cannot be read", "numbers"):
         return file.read(columns=[name]).column(0).combine_chunks()
-    except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(
-            f"{path}: column {name} cannot be read: {error}; expected numbers"
-        ) from error
 
 
 def _within(path: Path, name: str, array: Any) -> Iterator[tuple[str, Any]]:
@@ -244,7 +236,7 @@ def _within(path: Path, name: str, array: Any) -> Iterator[tuple[str, Any]]:
                 f"{path}: column {name}: lists of {', '.join(map(str, sizes[:5]))} numbers; "
                 "expected one length"
             )
-        count = int(sizes[0]) if len(sizes) else 0
+        count = sizes.max(initial=0)
         check_count(path, len(array) * count, LIMITS.list_numbers, f"numbers in column {name}")
         values = np.full((count, len(array)), np.nan)
         if count:

@@ -12,14 +12,13 @@ numbers, else a block of lines at a time.
 import codecs
 import csv
 import gzip
-import math
 import re
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from itertools import chain, product, starmap
+from math import nan
 from pathlib import Path
 from statistics import mode
 from typing import Any, BinaryIO
@@ -31,7 +30,18 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.regular_files import open_regular
 from .column_names import is_unit
-from .table import ARRAY_SUFFIXES, SUFFIXES, TEXT_SUFFIXES, WHAT, Array, Lines, Rows, Table, Texts
+from .table import (
+    ARRAY_SUFFIXES,
+    SUFFIXES,
+    TEXT_SUFFIXES,
+    WHAT,
+    Array,
+    Lines,
+    Rows,
+    Table,
+    Texts,
+    one_line,
+)
 from .tables import open_arrays, open_parquet
 
 # people's words for a missing value
@@ -144,7 +154,7 @@ class _TextLayout:
         None: something else.
         """
         if _is_missing(field):
-            return math.nan
+            return nan
         if self.decimal == ",":
             field = field.translate(_POINTS)
         try:
@@ -322,31 +332,26 @@ def _blocks(path: Path) -> Iterator[bytes]:
             as it comes.
     """
     size, number, rest = 0, 0, b""
-    try:
-        with open_regular(path, WHAT) as file:
-            packed: Any = _Packed(file, path)
-            source = gzip.GzipFile(fileobj=packed) if path.name.lower().endswith(".gz") else file
-            while piece := source.read(_BUFFER):
-                piece += source.read(1) if piece.endswith(b"\r") else b""
-                piece = piece.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-                if b"\0" in piece:
-                    raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
-                block = rest + (piece if size else piece.removeprefix(codecs.BOM_UTF8))
-                size += len(piece)
-                packed.unpacked = size
-                check_count(path, size, LIMITS.table_text, "characters of text")
-                length = block.find(b"\n") if b"\n" in piece else len(block)
-                check_count(path, length, LIMITS.table_line, f"in line {number + 1}")
-                number += piece.count(b"\n")
-                check_count(path, number - _LINES, LIMITS.table_rows, "rows")
-                end = block.rfind(b"\n") + 1
-                rest = block[end:]
-                yield block[:end]
-            yield rest
-    except (OSError, EOFError, zlib.error) as error:
-        cut = "the packed data ends before its end is marked"
-        why = cut if isinstance(error, EOFError) else error
-        raise InputError(f"{path}: cannot be read as {WHAT}: {why}") from error
+    with one_line(f"{path}: cannot be read as {WHAT}"), open_regular(path, WHAT) as file:
+        packed: Any = _Packed(file, path)
+        source = gzip.GzipFile(fileobj=packed) if path.name.lower().endswith(".gz") else file
+        while piece := source.read(_BUFFER):
+            piece += source.read(1) if piece.endswith(b"\r") else b""
+            piece = piece.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+            if b"\0" in piece:
+                raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
+            block = rest + (piece if size else piece.removeprefix(codecs.BOM_UTF8))
+            size += len(piece)
+            packed.unpacked = size
+            check_count(path, size, LIMITS.table_text, "characters of text")
+            length = block.find(b"\n") if b"\n" in piece else len(block)
+            check_count(path, length, LIMITS.table_line, f"in line {number + 1}")
+            number += piece.count(b"\n")
+            check_count(path, number - _LINES, LIMITS.table_rows, "rows")
+            end = block.rfind(b"\n") + 1
+            rest = block[end:]
+            yield block[:end]
+        yield rest
 
 
 def _text_lines(block: bytes) -> Lines:

@@ -19,11 +19,11 @@ at once: any file costs a bounded time. Ground stations turn such a log into tex
 message a line, its type's name first, FMT among them, and numbers in whole units.
 """
 
-import math
 import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup, Groups, in_order
 from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import LogMap, shipped_map, stated
-from ..mapped_log import MOST_VOLTS, log_of
+from ..mapped_log import MOST_VOLTS, flight_log, sections_of
 from ..table import Array, Lines, NamedNumbers, Noted, Piece, Values, Wanted
 from ..what_flew import (
     ORDERS,
@@ -96,7 +96,7 @@ def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> Flight
     stated = messages.pop("PARM", {})
     pairs = zip(_texts(stated, "Name"), stated.get("Value", np.empty(0)).tolist(), strict=False)
     # as the log first states them
-    parameters = {name: x for name, x in reversed(list(pairs)) if math.isfinite(x)}
+    parameters = {name: x for name, x in reversed(list(pairs)) if isfinite(x)}
     flown = _what_flew(parameters, messages.pop("MSG", {}))
     flown.check(path)
     pulses = messages.get("RCOU", {})
@@ -119,7 +119,8 @@ def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> Flight
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
     recorded = [_samples(name, rows, columns) for name, rows in messages.items()]
     groups = [samples for samples in (*recorded, *telemetry) if len(samples.t) > 1]
-    return log_of(path, groups, log_map, "ardupilot_bin", notes, vehicle, piece, flown)
+    sections = sections_of(path, groups, log_map, "ardupilot_bin", notes, piece, flown)
+    return flight_log(path, "ardupilot_bin", sections, vehicle, flown)
 
 
 def _times(messages: Messages) -> Array:
@@ -211,17 +212,18 @@ def _with_parameters(
         InputError: the frame is no quad x, or the pulses' range is none.
     """
     order, note = _order(path, parameters, vehicle)
-    low, high = parameters.get("MOT_PWM_MIN", 0.0), parameters.get("MOT_PWM_MAX", 0.0)
+    given = parameters.get
+    low, high = given("MOT_PWM_MIN", 0.0), given("MOT_PWM_MAX", 0.0)
     whence = "MOT_PWM_MIN and MAX"
     if low <= 0.0 or high <= 0.0:
-        low, high = parameters.get("RC3_MIN", 1000.0), parameters.get("RC3_MAX", 2000.0)
+        low, high = given("RC3_MIN", 1000.0), given("RC3_MAX", 2000.0)
         whence = "RC3_MIN and MAX" if "RC3_MIN" in parameters else "an assumption"
     if not low < high:
         raise InputError(
             f"{path}: parameters {whence} are {low:g} and {high:g} us; expected MIN below MAX"
         )
-    expo = float(np.clip(parameters.get("MOT_THST_EXPO", 0.65), 0.0, 1.0))
-    least, most = parameters.get("MOT_SPIN_MIN", 0.15), parameters.get("MOT_SPIN_MAX", 0.95)
+    expo = min(max(given("MOT_THST_EXPO", 0.65), 0.0), 1.0)
+    least, most = given("MOT_SPIN_MIN", 0.15), given("MOT_SPIN_MAX", 0.95)
     if not 0.0 <= least < most:
         least, most = 0.0, 1.0
     slots = slots_of_motors(_functions(parameters), _MOTOR1) or list(range(4))
@@ -287,7 +289,7 @@ def read_dataflash(path: Path, wanted: Wanted) -> tuple[dict[str, Messages], int
             rows = _rows(data, of_kind, layout)
             with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
                 by_type[name] = {
-                    column: x if x.dtype.kind == "S" else x.astype(np.float64) * unit
+                    column: x if x.dtype.kind == "S" else x.astype(float) * unit
                     for column, unit in units.items()
                     if (x := rows[column]).ndim == 1  # no list of numbers
                 }

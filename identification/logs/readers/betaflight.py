@@ -37,7 +37,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup, check_piece
 from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import shipped_map
-from ..mapped_log import MOST_VOLTS, log_of, motors_left_out
+from ..mapped_log import MOST_VOLTS, flight_log, motors_left_out, sections_of
 from ..table import Array, Lines, NamedArrays, Piece, Table
 
 Ints = NDArray[np.int64]
@@ -193,7 +193,8 @@ def _log(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
-    return log_of(path, [ChannelGroup(t, fields)], log_map, reader, said, vehicle, piece)
+    sections = sections_of(path, [ChannelGroup(t, fields)], log_map, reader, said, piece)
+    return flight_log(path, reader, sections, vehicle)
 
 
 def _gyro_scale(headers: Headers) -> float:
@@ -230,7 +231,7 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
     names = ("minthrottle", "maxthrottle")
     least, most = (_whole_number(headers[name], 1, 10**9) for name in names)
     if 0 < least < most:
-        return float(least), float(most), "minthrottle and maxthrottle of the header"
+        return least, most, "minthrottle and maxthrottle of the header"
     low, high = _PWM
     if any(((x > high) | ((x < low) & (x > 0.0))).any() for x in motors):
         return *_DSHOT, "assumed: DShot, no header says it"
@@ -259,7 +260,7 @@ def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
 def _one_g(t: Array, force: list[Array], headers: Headers) -> tuple[float, str]:
     """Return the accelerometer's counts of 1 g, and words on whence they are known."""
     if stated := _whole_number(headers["acc_1G"], 1, 10**6):
-        return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
+        return stated, f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
     length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
     middle = np.nanmedian(length) if np.isfinite(length).any() else 0.0
     counts = 2.0 ** float(np.clip(np.rint(np.log2(max(middle, 1.0))), *_ONE_G))

@@ -31,7 +31,7 @@ from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup
 from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import load_map
-from ..mapped_log import chosen, log_of
+from ..mapped_log import chosen, flight_log, sections_of
 from ..table import Piece
 
 _FIRST = b"tick(I),"  # first column of a log before 2021
@@ -90,7 +90,8 @@ def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> Flight
             "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
             "work, and nothing else"
         )
-    return log_of(path, events, log_map, "crazyflie_sd", notes, vehicle, piece)
+    sections = sections_of(path, events, log_map, "crazyflie_sd", notes, piece)
+    return flight_log(path, "crazyflie_sd", sections, vehicle)
 
 
 def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:

@@ -65,6 +65,9 @@ _LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed 
 _ABOVE_PULSES = 1.1  # times the longest pulse: no pulse is longer
 
 
+_Topics = dict[str, list[ArrayMap]]  # columns of each instance
+
+
 class Outputs(NamedTuple):
     """The outputs of motors 1 to 4, and their values for commands 0 and 1."""
 
@@ -117,7 +120,7 @@ def channels(
         note = f"{rotors.note}, in rad/s, as PX4 in Gazebo (SIM_GZ_EN = 1) writes them"
         log_map = log_map.with_ways({"rotors": [replace(rotors, unit="rad/s", note=note)]})
     motors, sent = log_map.ways("commands")
-    factor = float(np.clip(parameters.get("THR_MDL_FAC", 0.0), 0.0, 1.0))
+    factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
     note = (
         f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
         f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
@@ -148,7 +151,7 @@ def channels(
     return sections, flown
 
 
-def _read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, bool]:
+def _read_ulog(path: Path) -> tuple[_Topics, NamedNumbers, bool]:
     """Return the topics of the map, the parameters at the log's start, and whether the file is
     damaged. A topic's instances are mappings from field to column.
 
@@ -170,7 +173,7 @@ def _read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, boo
                 file.seek(place)
                 place += _MESSAGE + int.from_bytes(file.read(2), "little")
         is_damaged = bool(parsed.file_corruption) or place != size
-    topics: dict[str, list[ArrayMap]] = {}
+    topics: _Topics = {}
     for data in (one for one in parsed.data_list if "timestamp" in one.data):
         count = len(data.data["timestamp"])
         check_count(f"{path}: topic {data.name}", count, LIMITS.table_rows, "messages")
@@ -420,11 +423,18 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
 
 
 def _shares_of_outputs(columns: ArrayMap, outputs: Outputs) -> NamedArrays:
-    """Return the motors' outputs (N,) as 0 to 1; nothing if one never changes."""
-    if (motors := _of_motors(columns, outputs.slots)) is None:
+    """Return each output's values (N,) as 0 to 1, other outputs' in the motors' range; nothing if a
+    motor's output never changes.
+    """
+    if _of_motors(columns, outputs.slots) is None:
         return {}
-    shares = ((motors - outputs.low) / (outputs.high - outputs.low)).clip(0.0, 1.0)
-    return {f"output[{slot}]": x for slot, x in zip(outputs.slots, shares.T, strict=True)}
+    low, high = (np.full(_OUTPUTS, end) for end in (outputs.low.min(), outputs.high.max()))
+    low[outputs.slots], high[outputs.slots] = outputs.low, outputs.high
+    return {
+        name: ((np.nan_to_num(columns[name]) - low[i]) / (high[i] - low[i])).clip(0.0, 1.0)
+        for i in range(_OUTPUTS)
+        if (name := f"output[{i}]") in columns
+    }
 
 
 def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> SomeArray:

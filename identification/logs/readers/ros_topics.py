@@ -15,8 +15,8 @@ import numpy as np
 
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
-from ..column_names import WORDS
 from ..log_map import LogMap, parse_map, stated
+from ..mapped_log import MOTOR_NAMES
 from ..table import Array, Data, Lines, NamedArrays, Noted, Wanted
 from .px4_ulog import unified
 
@@ -30,7 +30,6 @@ _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
 _SHOWN = 30  # fields in an error
-_MOTORS = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])), re.IGNORECASE)
 _PX4 = "px4_msgs/msg/"
 
 
@@ -85,7 +84,9 @@ def map_of(types: Types, given: Stated, source: str, where: str) -> Noted[LogMap
     is_ned = types.get(_topic_of(sections.get("position"))) in stated("ros")["ned"]
     used = {_topic_of(section) for section in sections.values()}
     motors = {kind for name in MOTORS for kind in stated("ros")[name]}
-    named = {topic for topic in _of_types(types, stated("ros")["arrays"]) if _MOTORS.search(topic)}
+    named = {
+        topic for topic in _of_types(types, stated("ros")["arrays"]) if MOTOR_NAMES.search(topic)
+    }
     if left := sorted({*_of_types(types, motors), *named} - used):
         notes.append(f"topics that may hold motors were left out: {', '.join(left)}")
     clock: Data = {"time": {"column": "stamp", "unit": "ns"}}
@@ -204,6 +205,9 @@ def stamp(message: Any) -> int:
     return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
 
 
+_Getter = Callable[[Any], Any]  # of a number from a message
+
+
 class MessageFields:
     """The numbers of a map in a topic's messages; whole arrays. A field that a message lacks, such
     as a number of a shorter array, is NaN there.
@@ -217,7 +221,7 @@ class MessageFields:
     def __init__(self, where: str, kind: str, wanted: Wanted) -> None:
         self.where, self._kind, self._wanted = where, kind, dict.fromkeys(wanted)
         self._is_px4 = kind.startswith(_PX4)
-        self._getters: dict[str, Callable[[Any], Any]] = {}
+        self._getters: dict[str, _Getter] = {}
         self._numbers, self._count = array("d"), 0
 
     def take(self, message: Any) -> None:
@@ -283,7 +287,7 @@ def _paths(value: Any, path: str = "") -> Iterator[str]:
             yield from _paths(getattr(value, name), f"{path}.{name}" if path else name)
 
 
-def _getter(path: str) -> Callable[[Any], Any]:
+def _getter(path: str) -> _Getter:
     """Return a function that returns a field of a message."""
     if "[" not in path:
         return attrgetter(path)

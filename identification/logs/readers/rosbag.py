@@ -50,7 +50,7 @@ from ....runtime.regular_files import check_regular, open_regular
 from ....runtime.yaml_file import read_yaml
 from ..channels import ChannelGroup
 from ..flight_log import FlightLog, SomeVehicle
-from ..mapped_log import log_of
+from ..mapped_log import flight_log, sections_of
 from ..table import NamedArrays, Piece, one_line
 from .ros_topics import MessageFields, Stated, Types, definitions, map_of, stamp
 
@@ -120,7 +120,8 @@ def read(
         ChannelGroup(_NANOSECOND * (times - origin), columns, name)
         for times, columns, name in decoded
     ]
-    return log_of(path, recorded, log_map, "rosbag", notes, vehicle, piece)
+    sections = sections_of(path, recorded, log_map, "rosbag", notes, piece)
+    return flight_log(path, "rosbag", sections, vehicle)
 
 
 def _bag_in(path: Path) -> Path:
