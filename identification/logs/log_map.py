@@ -71,6 +71,7 @@ from .what_flew import ORDERS, Order, rotor_order
 
 _T = TypeVar("_T")
 
+Ways = tuple[Any, ...]  # to fill a section
 MAPS = Path(__file__).parent / "maps"  # the kit's own maps
 OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # a field that a person must choose
@@ -304,7 +305,7 @@ class LogMap(_Form):
     stray_rows: Annotated[int, Field(ge=0)] = 0
     extra: Mapping[str, _Section[Columns]] = field(default_factory=dict)
     # further ways to fill a section (``time`` among them), in their order
-    alternatives: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+    alternatives: Mapping[str, Ways] = field(default_factory=dict)
 
     @property
     def sections(self) -> dict[str, Columns]:
@@ -316,7 +317,7 @@ class LogMap(_Form):
         """Are the columns this kit's own?"""
         return self.name == OWN_MAP
 
-    def ways(self, section: str) -> tuple[Any, ...]:
+    def ways(self, section: str) -> Ways:
         """Return the ways to fill a section, in their order."""
         first = getattr(self, section)
         return () if first is None else (first, *self.alternatives.get(section, ()))

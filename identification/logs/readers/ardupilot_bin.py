@@ -63,6 +63,8 @@ Rows = NDArray[Any]
 Layout = np.dtype[Any]
 Messages = dict[str, Rows]  # (N,) of one type: columns by name, numbers or bytes of texts
 
+ByType = dict[str, Messages]
+
 _AS_TEXT = b"FMT, 128, 89, FMT,"  # stands in a log as text
 BEGINS = b"\xa3\x95|(?s:.*)" + _AS_TEXT
 WHAT = "an ArduPilot log (DataFlash .BIN)"
@@ -263,7 +265,7 @@ def _telemetry(messages: Messages, parameters: Values) -> Noted[Groups]:
     return [ChannelGroup(t, columns, "ESC")], [f"rotor speeds: {told}"]
 
 
-def read_dataflash(path: Path, wanted: Wanted) -> tuple[dict[str, Messages], int]:
+def read_dataflash(path: Path, wanted: Wanted) -> tuple[ByType, int]:
     """Return the messages of the wanted types, by type, and the number of bytes outside messages.
 
     Raises:
@@ -296,7 +298,7 @@ def read_dataflash(path: Path, wanted: Wanted) -> tuple[dict[str, Messages], int
     return by_type, len(data) - int(used)
 
 
-def _of_text(path: Path, content: bytes, wanted: Wanted) -> dict[str, Messages]:
+def _of_text(path: Path, content: bytes, wanted: Wanted) -> ByType:
     """Return the messages of the wanted types, of a log as text. The lines before the first FMT
     count as MSG: old logs name the vehicle there. Cut lines are left out.
     """

@@ -19,7 +19,7 @@ import io
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,17 @@ from ..channels import ChannelGroup
 from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import shipped_map, stated
 from ..mapped_log import Sections, flight_log, sections_of
-from ..table import Array, ArrayMap, NamedArrays, NamedNumbers, Piece, SomeArray, Values, one_line
+from ..table import (
+    Array,
+    ArrayMap,
+    Data,
+    NamedArrays,
+    NamedNumbers,
+    Piece,
+    SomeArray,
+    Values,
+    one_line,
+)
 from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
 BEGINS = rb"ULog\x01\x12\x35"
@@ -265,7 +275,7 @@ def counting(parser: Any) -> Any:
             raise _TooMuchError(f"more than {most} {what}")
 
     class AddLogged(parser._MessageAddLogged):  # type: ignore[misc]
-        def _parse_format(self, message_formats: Mapping[str, Any]) -> None:
+        def _parse_format(self, message_formats: Data) -> None:
             # an empty one takes its place, too
             more = 1 + _fields(self.message_name, message_formats, {}, 0)
             count("fields of its topics", LIMITS.ulog_fields, more)
@@ -295,7 +305,7 @@ def counting(parser: Any) -> Any:
     return Counting
 
 
-def _fields(name: str, formats: Mapping[str, Any], known: dict[str, int], depth: int) -> int:
+def _fields(name: str, formats: Data, known: dict[str, int], depth: int) -> int:
     """Return the number of a topic's fields, with its arrays and inner topics written out."""
     if depth > _DEEPEST:
         raise _TooMuchError(f"topic {name[:100]!r} lies more than {_DEEPEST} deep in others")

@@ -59,7 +59,8 @@ SUFFIXES = (".bag", ".db3", ".mcap")
 _ROS1 = b"#ROSBAG V2.0"
 BEGINS = _ROS1 + rb"|\x89MCAP0\r\n|SQLite format 3\0"
 
-_Messages = Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at ns, message)
+_Received = Iterator[tuple[int, Any]]  # recorded at ns, and message
+_Messages = Callable[[str], _Received]  # by topic
 
 # times (N,) in ns, columns by name, and a topic, or a doubt on its time stamps
 _Decoded = tuple[NDArray[np.int64], NamedArrays, str]
@@ -186,7 +187,7 @@ def _opened(path: Path) -> Iterator[tuple[Types, _Messages]]:
     if not is_ros1:
         _check_bag_files(path)
 
-    def messages(topic: str) -> Iterator[tuple[int, Any]]:
+    def messages(topic: str) -> _Received:
         kind = types[topic]
         where = f"{path}: topic {topic}"
         with one_line(f"{where}: a message cannot be read", kind):
@@ -235,7 +236,7 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
             del stores[0]
 
 
-def _decoded_topic(fields: MessageFields, messages: Iterator[tuple[int, Any]]) -> _Decoded:
+def _decoded_topic(fields: MessageFields, messages: _Received) -> _Decoded:
     """Return times (N,) in ns and columns (N,) of a topic by name, and a doubt on its time stamps.
 
     Raises:
