@@ -21,12 +21,11 @@ a row with an inertial sensor's three fields empty, the sensor was not read: a s
 Other columns are ignored. The vehicle's name stands in a header, so the table holds numbers alone.
 """  # noqa: E501
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from math import inf, nan
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +41,7 @@ from .table import (
     NamedArrays,
     Names,
     Rows,
+    SomeArray,
     Values,
     finite_rows,
     median_step,
@@ -101,18 +101,18 @@ class FlightLog:
     position: Array
     quaternion: Array
     rotor_speeds: Array
-    voltage: Array | None = None
-    force: Array | None = None
-    torque: Array | None = None
-    accelerometer: Array | None = None
-    gyro: Array | None = None
+    voltage: SomeArray = None
+    force: SomeArray = None
+    torque: SomeArray = None
+    accelerometer: SomeArray = None
+    gyro: SomeArray = None
     name: str = ""
     source: str = ""
     notes: Names = ()
-    valid: Mask = field(default_factory=lambda: np.empty(0, dtype=bool))
+    valid: Mask = field(default_factory=lambda: np.empty(0, bool))
     extra: ArrayMap = field(default_factory=dict)
     commanded: bool = False
-    command: Array | None = None
+    command: SomeArray = None
     vehicle: str = ""
     rates: Values = field(default_factory=dict)
     flown: WhatFlew = UNSTATED
@@ -124,7 +124,7 @@ class FlightLog:
         for name in ("accelerometer", "gyro"):
             x = getattr(self, name)
             if x is not None and not (read := finite_rows(x)).all():
-                object.__setattr__(self, name, np.where(read[:, None], x, np.nan))
+                object.__setattr__(self, name, np.where(read[:, None], x, nan))
 
     def __repr__(self) -> str:
         t = self.t
@@ -146,7 +146,7 @@ class FlightLog:
     def motor_rate(self) -> float:
         """Rate of measured rotor speeds, else of commands, Hz."""
         names = ("rotors", "commands", "wrench")[self.commanded :]
-        return next((self.rates[name] for name in names if name in self.rates), np.inf)
+        return next((self.rates[name] for name in names if name in self.rates), inf)
 
     @property
     def period(self) -> float:
@@ -155,9 +155,10 @@ class FlightLog:
 
 
 Logs = Sequence[FlightLog]
+SomeVehicle = Vehicle | None  # None: unknown
 
 
-def flown_vehicle(vehicle: Vehicle | None, name: str) -> Vehicle | None:
+def flown_vehicle(vehicle: SomeVehicle, name: str) -> SomeVehicle:
     """Return the vehicle, or else the preset of a log's vehicle name; None: there is none."""
     return _preset(name) if vehicle is None and name in preset_names() else vehicle
 
@@ -168,11 +169,11 @@ _preset = cache(load_vehicle)  # asked three times a log
 def time_notes(t: Array) -> Names:
     """Return a note on the gaps in times (N,) in s: steps of more than 3 median ones."""
     step = np.diff(t)
-    usual = np.median(step) if step.size else np.inf
-    gaps = np.count_nonzero(step > _GAP * usual)
+    usual = np.median(step) if step.size else inf
+    gaps = (step > _GAP * usual).sum()
     if not gaps:
         return ()
-    longest = np.argmax(step)
+    longest = step.argmax()
     return (
         f"{gaps} gap(s) in time; the longest is {step[longest]:.3g} s, at t = {t[longest]:.6g} s "
         f"(median step {usual:.4g} s)",
@@ -243,16 +244,16 @@ def _corners(t: Array, values: Array) -> Rows:
     both.
     """
     if len(t) < 3:
-        return np.empty(0, dtype=np.intp)
+        return np.empty(0, np.intp)
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
     steps = np.abs(np.diff(values, axis=0))
-    rounding = np.min(steps, axis=0, where=steps > 0.0, initial=np.inf)
+    rounding = steps.min(axis=0, where=steps > 0.0, initial=inf)
     line = values[:-2] + share * (values[2:] - values[:-2])
     off = np.abs(values[1:-1] - line)
     least = np.maximum(_ON_LINE * np.sqrt(mean_square(off)), _ROUNDED * rounding)
     is_corner = (off > least).any(axis=1)
-    if np.mean(is_corner) > _MOST_CORNERS:
-        return np.empty(0, dtype=np.intp)
+    if is_corner.mean() > _MOST_CORNERS:
+        return np.empty(0, np.intp)
     return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))
 
 
@@ -264,7 +265,7 @@ def _spacing(events: Rows) -> float:
     median = np.median(spacing)
     beat = np.quantile(spacing, _EARLY) >= _LEAST_SPACING * median
     usual = spacing[spacing < median / _LEAST_SPACING]  # no gap
-    return float(np.mean(usual)) if beat and median >= _LEAST_ROWS else 1.0
+    return float(usual.mean()) if beat and median >= _LEAST_ROWS else 1.0
 
 
 def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
@@ -309,8 +310,8 @@ def parts_of(log: FlightLog) -> list[tuple[Names, Array]]:
     is_whole = log.has_pose or accelerometer is None or gyro is None
     if is_whole:
         pose = np.column_stack([pose, log.quaternion])
-        pose[~log.valid] = np.nan
-    parts: list[tuple[Names, Array | None]] = [
+        pose[~log.valid] = nan
+    parts: list[tuple[Names, SomeArray]] = [
         (("t",), log.t),
         (POSE[: pose.shape[1]], pose if is_whole or np.isfinite(pose).any() else None),
         (ROTORS, speeds if log.has_rotor_speeds or command is None else None),

@@ -2,6 +2,7 @@
 ground, take-off, flight and landing.
 """
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,7 @@ def usual_thrust(total: Array) -> float:
     turns.
     """
     turning = total[total > 0.3 * np.quantile(total, 0.95)]
-    return float(np.median(turning)) if turning.size else np.inf
+    return float(np.median(turning)) if turning.size else inf
 
 
 def carrying(total: Array) -> Mask:
@@ -68,7 +69,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
         total = np.nan_to_num(log.command).sum(axis=1)
     else:
         return "unknown", "neither rotor speeds nor motor commands"
-    if not np.any(total > 0.0):
+    if not (total > 0.0).any():
         return "no", "the motors never turn"
     aloft = carrying(total)
     told = f"yes, {np.diff(log.t)[aloft[:-1]].sum():.3g} s"
@@ -121,8 +122,8 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
     on = _run(at_rest)
     off = last - _run(at_rest[::-1])
     starts, lands = on > 0, off < last  # whether the log shows take-off and landing
-    before = float(np.median(height[:on])) if starts else -np.inf
-    after = float(np.median(height[off + 1 :])) if lands else -np.inf
+    before = float(np.median(height[:on])) if starts else -inf
+    after = float(np.median(height[off + 1 :])) if lands else -inf
     clear = height > max(before, after) + _CLEARANCE
     clear[:on] = clear[off + 1 :] = False
     if not clear.any():  # the vehicle never left the ground
@@ -151,10 +152,10 @@ def _first_climb(
     clear: Mask, height: Array, ground: float, typical: float, climb: Array
 ) -> tuple[int, int]:
     """Return the first sample off the ground, and the first behind the climb (N,) from there."""
-    up = int(np.argmax(clear & (height >= ground + _WELL_ABOVE * (typical - ground))))
+    up = int((clear & (height >= ground + _WELL_ABOVE * (typical - ground))).argmax())
     return up - _run(clear[up::-1]) + 1, up + _run(climb[up:] > _CLIMB)
 
 
 def _run(true: Mask) -> int:
     """Return how many elements from the first on are True."""
-    return int(np.argmin(np.append(true, False)))
+    return int(np.append(true, False).argmin())

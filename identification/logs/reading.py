@@ -1,11 +1,9 @@
 """Reading a flight log from a file, by a reader or by a map of a table's columns."""
 
-from __future__ import annotations
-
 import os
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.regular_files import open_regular
 from .clocks import on_one_clock
@@ -25,6 +22,7 @@ from .flight_log import (
     REQUIRED,
     ROTORS,
     FlightLog,
+    SomeVehicle,
     flown_vehicle,
 )
 from .inertial import check_inertial
@@ -32,7 +30,7 @@ from .log_map import OWN_MAP, load_map
 from .magnitudes import unit_doubts, without_broken_speeds
 from .mapped_log import map_table
 from .readers import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
-from .table import SUFFIXES, Names, Table
+from .table import SUFFIXES, Names, Piece, Table, Texts, one_line
 from .text_table import is_table, open_table
 
 _SHOWN = 20  # columns in an error
@@ -78,9 +76,9 @@ READERS["betaflight_csv"] = Reader(
 def read_log(
     path: str | Path | Table,
     reader: str | None = None,
-    vehicle: Vehicle | None = None,
+    vehicle: SomeVehicle = None,
     map: str | Path | None = None,
-    piece: int | None = None,
+    piece: Piece = None,
 ) -> FlightLog:
     """Read a flight log.
 
@@ -110,7 +108,7 @@ def read_log(
     return finished(log, vehicle)
 
 
-def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
+def finished(log: FlightLog, vehicle: SomeVehicle) -> FlightLog:
     """Return a reader's log as from ``read_log``: with doubts about its units, and without the
     inertial sensors contradicting its pose.
 
@@ -140,9 +138,9 @@ def opened(path: Path) -> Table | None:
 def _read(
     source: Path | Table,
     reader: str | None,
-    vehicle: Vehicle | None,
+    vehicle: SomeVehicle,
     map: str | Path | None,
-    piece: int | None,
+    piece: Piece,
 ) -> FlightLog:
     """Read a log by the given map or reader, else by its content."""
     path = source.path if isinstance(source, Table) else source
@@ -223,10 +221,8 @@ def reader_by_content(path: Path) -> Reader | None:
                 if reader.begins and re.match(reader.begins, head):
                     return reader
         return None
-    try:
+    with one_line(f"{path}: cannot be read as a folder"):
         names = sorted(os.listdir(path))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read as a folder: {error.strerror}") from error
     if any(name.lower().endswith(_BAG_FOLDER) for name in names):
         return READERS["rosbag"]
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
@@ -268,7 +264,7 @@ def _unknown_content(path: Path) -> InputError:
     )
 
 
-def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
+def reader_by_columns(path: Path, header: Texts) -> Reader | None:
     """Return the reader by a table's columns; None: no reader's. This kit's own are a time; a pose,
     or an inertial sensor; and rotor speeds or motor commands; further rules are in the map.
 
