@@ -22,8 +22,16 @@ from .page import report_page
 SCHEMA_VERSION = "1.3"
 # attributes of a diagnosis under their own names in ``report.json``
 _AS_FOUND = (
-    *("advice", "notes", "needs_pose", "candidates", "structure", "rotor_faults"),
-    *("logs", "test_logs", "seconds", "cutoff_hz"),
+    "advice",
+    "notes",
+    "needs_pose",
+    "candidates",
+    "structure",
+    "rotor_faults",
+    "logs",
+    "test_logs",
+    "seconds",
+    "cutoff_hz",
 )
 _STATED = ("name", "coefficients", "std", "units", "evidence")  # of an effect not needed
 
@@ -47,7 +55,9 @@ def write_report(
         InputError: a file cannot be written.
     """
     folder = Path(folder)
-    command = command or _command(diagnosis, folder)
+    tests = [word for log in diagnosis.test_logs for word in ("--test", log)]
+    given = [*diagnosis.logs, *tests, "--vehicle", diagnosis.declared.name, "--out", str(folder)]
+    command = command or shlex.join(["windwrench", "diagnose", *given])
     data = json.dumps(report_data(diagnosis), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     page = as_text(report_page(diagnosis, command))
     numbers, html, vehicle = folder / "report.json", folder / "report.html", folder / "vehicle.yaml"
@@ -113,9 +123,3 @@ def _errors(errors: Errors) -> NamedNumbers:
         "nis_without_wrench_state": errors.nis_without_wrench_state,
         "rollout_1s_position_rms_m": errors.rollout_1s_position_rms,
     }
-
-
-def _command(diagnosis: Diagnosis, folder: Path) -> str:
-    tests = [word for log in diagnosis.test_logs for word in ("--test", log)]
-    given = [*diagnosis.logs, *tests, "--vehicle", diagnosis.declared.name, "--out", str(folder)]
-    return shlex.join(["windwrench", "diagnose", *given])

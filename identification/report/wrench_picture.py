@@ -121,7 +121,7 @@ def _draw_vectors(
         panel.fill_between(t, least, most, color=colour, alpha=0.18, lw=0)
         (line,) = panel.plot(t, x, color=colour, lw=1.1, label=name)
         if real is not None:
-            rmse = np.sqrt(np.mean(np.square(x - real)))
+            rmse = np.sqrt(np.square(x - real).mean())
             line.set_label(f"{name} (RMSE {rmse:.3g} {unit})")
             panel.plot(t, real, color=colour, lw=1.0, ls="--", label=f"true {name}")
     # the wide band of the filter's first moments must not set the scale

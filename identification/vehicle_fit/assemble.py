@@ -1,7 +1,6 @@
 """The vehicle made of estimates, and the flights to add for missing ones."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,15 +31,14 @@ def vehicle_of(
     have the lag behind them already: then no effect of the model has one.
     """
     arm, reach = estimates["arm_l"].value, estimates["p/k"].value
-    effects = list(_effects(estimates))
+    effects = _effects(estimates)
     curve = None
     if fit.drive.commands:
         thrust = np.zeros(max(fit.drive.exponents) + 1)
-        thrust[list(fit.drive.exponents)] = [
-            fit.values[f"a{j}"] for j in range(len(fit.drive.exponents))
-        ]
-        exponent = estimates["voltage_exponent"]
-        known = exponent.value if exponent.status == IDENTIFIED else 0.0
+        for j, exponent in enumerate(fit.drive.exponents):
+            thrust[exponent] = fit.values[f"a{j}"]
+        voltage = estimates["voltage_exponent"]
+        known = voltage.value if voltage.status == IDENTIFIED else 0.0
         curve = MotorCurve(tuple(thrust.tolist()), known)
         k = fit.model.weight / (4.0 * USUAL.hover_speed**2)
     else:
@@ -113,7 +111,7 @@ def _shown(estimate: Estimate | None) -> float:
     return estimate.value
 
 
-def _effects(estimates: Estimated) -> Sequence[EffectSetting]:
+def _effects(estimates: Estimated) -> list[EffectSetting]:
     out = []
     for role in dict.fromkeys(further.role for further in FURTHER.values() if further.role):
         effect = effect_of(role)

@@ -102,7 +102,9 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
         return _compared(thin, lambda part: part.flown(model)) / sizes
 
     begin = np.array(astuple(_BEGIN))
-    begin[list(UNITS).index("unmeasured")] = _turning(thin, vehicle)
+    speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
+    turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
+    begin[list(UNITS).index("unmeasured")] = np.sqrt(np.square(turning).mean())
     theta, e, damping = begin, off(begin), 1e-3
     for _ in range(_ROUNDS):
         norms = np.linalg.norm(e, axis=-1)
@@ -112,7 +114,7 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
         changes = [(root * (off(theta + move) - e)).reshape(len(e), -1) for move in moves]
         slopes = np.stack(changes, axis=1) / (_STEP * _SIZES)[:, None]  # (n, 9, ..)
         residual = (root * e).reshape(len(e), -1, 1)
-        strength = _PRIOR * np.sum(np.square(residual)) / np.square(3.0 * _SIZES)
+        strength = _PRIOR * np.square(residual).sum() / np.square(3.0 * _SIZES)
         grams = np.concatenate([slopes @ np.swapaxes(slopes, 1, 2), np.diag(strength)[None]])
         gradients = np.vstack([(slopes @ residual)[..., 0], strength * (theta - begin)])
         before = loss = _loss(e, theta - begin)
@@ -133,7 +135,7 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
 
 def _loss(e: Array, away: Array) -> float:
     """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (9,)."""
-    prior = 1.0 + _PRIOR * np.sum(np.square(away / (3.0 * _SIZES)))
+    prior = 1.0 + _PRIOR * np.square(away / (3.0 * _SIZES)).sum()
     return float(prior * np.linalg.norm(e, axis=-1).mean())
 
 
@@ -144,13 +146,6 @@ def _unchanged(part: LoggedStarts) -> Array:
     off = _compared([part], lambda part: part.unchanged)[:, -1]
     sizes = np.maximum(np.linalg.norm(off, axis=-1).mean(axis=0), _LEAST)
     return np.broadcast_to(sizes[:, None], (len(off), 1, len(sizes), 1))
-
-
-def _turning(starts: Sequence[LoggedStarts], vehicle: Vehicle) -> float:
-    """Return the model's angular acceleration (rad/s2) about x and y, RMS at the starts."""
-    speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in starts])
-    torque = vehicle.rotor_wrench(speeds)[:, 1:3]
-    return float(np.sqrt(np.mean(np.square(torque / np.diag(vehicle.inertia)[:2]))))
 
 
 def _compared(starts: Sequence[LoggedStarts], path_of: Callable[[LoggedStarts], Array]) -> Array:

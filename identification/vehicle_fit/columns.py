@@ -86,7 +86,13 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
             for s in segments_of(stacked, piece.period, piece.log, drive.band)
         ]
     seconds = np.array([len(p.t) * p.period for p in pieces])
-    noise = _rotor_noise(pieces, drive, names, seconds)
+    # white noise of each rotor's speed in a column: standard deviation times the root of the period
+    noise = np.zeros((4, len(names)))
+    if drive.speed_noise > 0.0 and drive.lag <= 0.0:
+        squares = [p.period * (4.0 * np.square(p.rotors)).mean(axis=0) for p in pieces]
+        size = drive.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
+        for letter, share in drive.shares.items():
+            noise[:, names.index(f"{letter}0")] = size * share
     return BalanceSpectra(drive, names, nonlinear, tuple(segments), float(seconds.sum()), noise)
 
 
@@ -135,7 +141,7 @@ def air_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
             out[f"linear drag {a}"] = -v
             out[f"quadratic drag {a}"] = -speed * v
         across = _local(piece, piece.velocity, drive)[:, :, :2]
-        lift = 0.25 * np.sum(across**2, axis=2)
+        lift = 0.25 * np.square(across).sum(axis=2)
         out["lift"] = lift.sum(axis=1)
         for a in "xy":
             out[f"moment {a} of lift"] = lift @ drive.shares[a.upper()]
@@ -162,16 +168,3 @@ def _with_delay(
     share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[:, None]
     every = [x for block in (first, *ordered) for x in (block, share * block[:, :, torques])]
     return replace(s, columns=np.concatenate([measured, *every], axis=2))
-
-
-def _rotor_noise(pieces: Pieces, drive: Drive, names: Names, seconds: Array) -> Array:
-    """Return the white noise of each rotor's speed in each column (4, c), as the root of a
-    spectrum: standard deviation of the column times the root of the period.
-    """
-    out = np.zeros((4, len(names)))
-    if drive.speed_noise > 0.0 and drive.lag <= 0.0:
-        squares = [p.period * np.mean(4.0 * np.square(p.rotors), axis=0) for p in pieces]
-        size = drive.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
-        for letter, share in drive.shares.items():
-            out[:, names.index(f"{letter}0")] = size * share
-    return out

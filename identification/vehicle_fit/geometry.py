@@ -49,7 +49,7 @@ class Geometry:
     @property
     def arm(self) -> float:
         """Mean distance of the rotors from the body x and y axes, m."""
-        return float(np.mean(np.abs(self.positions[:, :2])))
+        return float(np.abs(self.positions[:, :2]).mean())
 
 
 def parse_geometry(text: str | None) -> Geometry:
@@ -73,7 +73,8 @@ def parse_geometry(text: str | None) -> Geometry:
     if len(rows) != 4 or any(len(row) not in (2, 3) for row in rows):
         raise InputError(f"--geometry {text}: {expected}")
     positions = np.array([[*row, 0.0][:3] for row in rows])
-    if not np.all(np.isfinite(positions)) or np.any(positions[:, :2] * QUADRANT[:, :2] <= 0.0):
+    inside = positions[:, :2] * QUADRANT[:, :2] > 0.0
+    if not (np.isfinite(positions).all() and inside.all()):
         raise InputError(
             f"--geometry {text}: the rotors do not stand one in each quadrant, front-left, "
             f"rear-left, rear-right, front-right; {expected}"

@@ -2,6 +2,7 @@
 behind a first-order lag.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
 from ...runtime.arrays import Array
+from ..logs.table import ArrayPair
 from ..motion.smoothing import lagged
 from .channels import Pieces
 from .geometry import Interval
@@ -33,7 +35,7 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
         return None
     speeds = np.concatenate([p.rotors for p in pieces])
     commands = np.concatenate([p.command for p in pieces if p.command is not None])
-    if np.std(commands) < 1e-3 or np.std(speeds) == 0.0:
+    if commands.std() < 1e-3 or speeds.std() == 0.0:
         return None
 
     def columns(lag: float) -> Array:
@@ -42,18 +44,18 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
 
     target = speeds.ravel()
 
-    def fitted(lag: float) -> tuple[Array, Array]:
+    def fitted(lag: float) -> ArrayPair:
         x = columns(lag)
         best = np.linalg.lstsq(x, target, rcond=None)[0]
         return best, target - x @ best
 
     likeliest = minimize_scalar(
-        lambda log_lag: np.sum(np.square(fitted(float(np.exp(log_lag)))[1])),
+        lambda log_lag: np.square(fitted(math.exp(log_lag))[1]).sum(),
         bounds=tuple(np.log(_LAGS)),
         method="bounded",
         options={"xatol": 1e-3},
     )
-    lag = float(np.exp(likeliest.x))
+    lag = math.exp(likeliest.x)
     best, residual = fitted(lag)
     step = 0.01 * lag
     slope = (columns(lag + step) - columns(lag - step)) @ best / (2.0 * step)
@@ -65,7 +67,7 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     # errors go on within a segment: a sandwich over segments
     scores = np.array([moves[block == b].T @ residual[block == b] for b in range(count)])
     meat = scores.T @ scores * (count / max(count - 1, 1))
-    size = float(np.sqrt((inverse @ meat @ inverse)[-1, -1]))
+    size = math.sqrt((inverse @ meat @ inverse)[-1, -1])
     width = float(student.ppf(0.975, max(count - 1, 3))) * size
     known = (lag, max(lag - width, 0.0), lag + width)
-    return MotorResponse(best, known, float(np.std(residual) / np.std(target)))
+    return MotorResponse(best, known, float(residual.std() / target.std()))

@@ -35,8 +35,21 @@ _OPPOSED = 0.15
 _SWING_HZ = (0.5, 8.0)
 
 BASE = (
-    *("Jx", "Jy", "Jz", "reach", "cx", "cy", "Jr", "tilt x", "tilt y", "rx", "ry", "rz"),
-    *("turn bias x", "turn bias y", "turn bias z"),
+    "Jx",
+    "Jy",
+    "Jz",
+    "reach",
+    "cx",
+    "cy",
+    "Jr",
+    "tilt x",
+    "tilt y",
+    "rx",
+    "ry",
+    "rz",
+    "turn bias x",
+    "turn bias y",
+    "turn bias z",
 )
 BIASES = ("force bias x", "force bias y", "force bias z")
 
@@ -89,7 +102,7 @@ def first_model(
     columns = [rotor_columns(piece, drive) for piece in pieces]
     # each basis function's coefficient if it alone carried the weight
     totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(len(drive.exponents))]
-    each = [mass * GRAVITY / max(float(np.mean(total)), 1e-12) for total in totals]
+    each = [mass * GRAVITY / max(total.mean(), 1e-12) for total in totals]
     share = 1.0 / len(each)
     shares = [share * a for a in each]
     gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
@@ -106,7 +119,17 @@ def first_model(
     usual = USUAL.gyration[0] * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
     flat = USUAL.flat[0] * inertia.sum()
-    speed = max(float(np.mean(np.concatenate([p.rotors for p in pieces]))), 1e-6)
+    speed = max(np.concatenate([p.rotors for p in pieces]).mean(), 1e-6)
+    along = {
+        "tilt": 0.01,
+        "turn bias": 0.1,
+        "force bias": 0.1,
+        "rotor drag": 0.05 * mass / speed,
+        "linear drag": 0.1 * mass,
+        "quadratic drag": 0.03 * mass,
+        "damping": inertia[0],
+        "answered": 0.3,
+    }
     size = {
         **{f"a{j}": a for j, a in enumerate(each)},
         "Jx": inertia[0],
@@ -116,15 +139,10 @@ def first_model(
         "reach": float(np.clip(abs(gains[2]) * flat, 1e-3 * arm, 10.0 * arm)),
         **dict.fromkeys(("cx", "cy"), 0.01 * arm),
         "Jr": 0.01 * inertia[0] / speed * np.sqrt(GRAVITY / arm),
-        **dict.fromkeys(("tilt x", "tilt y", "rx", "ry", "rz"), 0.01),
-        **dict.fromkeys(("turn bias x", "turn bias y", "turn bias z", *BIASES), 0.1),
-        **{f"rotor drag {a}": 0.05 * mass / speed for a in "xyz"},
-        **{f"linear drag {a}": 0.1 * mass for a in "xyz"},
-        **{f"quadratic drag {a}": 0.03 * mass for a in "xyz"},
+        **dict.fromkeys(("rx", "ry", "rz"), 0.01),
         "lift": 0.03 * mass,
-        **{f"damping {a}": inertia[0] for a in "xyz"},
         "flapping": 0.05 * mass / speed * 0.03 * arm,
-        **{f"answered {a}": 0.3 for a in "xyz"},
+        **{f"{name} {a}": x for name, x in along.items() for a in "xyz"},
     }
     free = (*(f"a{j}" for j in range(len(each))), *BASE)
     prior = {"delay": DELAY}

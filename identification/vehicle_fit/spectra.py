@@ -25,6 +25,8 @@ BAND = 15.0
 _SMOOTHING = 0.35  # spectrum's smoothing: width as a share of the frequency,
 _NARROWEST = 0.4  # and at least so many Hz
 
+Spectra = list[Array]  # of each segment
+
 
 @dataclass(frozen=True, eq=False)
 class Segment:
@@ -61,7 +63,7 @@ def segments_of(columns: Array, period: float, log: int, band: float) -> list[Se
     return out
 
 
-def residual_spectra(segments: Sequence[Segment], powers: Sequence[Array]) -> list[Array]:
+def residual_spectra(segments: Sequence[Segment], powers: Spectra) -> Spectra:
     """Return, for each segment, the spectrum (m, 6) of residuals with given powers (m, 6): smoothed
     over the segments of a log and over frequency, infinite at no power. Segments of a log stand
     together.
