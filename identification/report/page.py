@@ -33,7 +33,11 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     """
     plots, bars = page_plots(diagnosis), candidate_bars(diagnosis)
     data = plots.data
-    library, script = _library(), _page_file("page.js")
+    licence, code = (
+        _page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
+    )
+    # the library with its mandatory licence
+    library, script = f"/*\n{licence}\n*/\n{code}", _page_file("page.js")
     shown = {bar.name for bar in bars}
     return page_template(__package__, "page.html.j2").render(
         found=diagnosis,
@@ -61,15 +65,6 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
 def _page_file(name: str) -> str:
     """Return a text beside this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
-@cache
-def _library() -> str:
-    """Return the plotting library with its mandatory licence."""
-    licence, code = (
-        _page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
-    )
-    return f"/*\n{licence}\n*/\n{code}"
 
 
 def _policy(scripts: Iterable[str]) -> str:

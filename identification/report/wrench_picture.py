@@ -55,8 +55,8 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: Path) -> Path:
     scale, unit = scale_of([np.percentile(np.abs(series.torque), 99)], "Nm")
     truth = None if log.torque is None else scale * log.torque
     mean, std = scale * series.torque, scale * series.std_torque
-    _draw_vectors(force, series.t, series.force, series.std_force, log.force, ("f", "N"))
-    _draw_vectors(torque, series.t, mean, std, truth, ("τ", unit))
+    _draw_vectors(force, series.t, series.force, series.std_force, log.force, "f", "N")
+    _draw_vectors(torque, series.t, mean, std, truth, "τ", unit)
     force.set_ylabel("external force (N)")
     torque.set(ylabel=f"external torque ({unit})", xlabel="time (s)")
     if GROUND in {phase.name for phase in phases}:
@@ -96,7 +96,7 @@ def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "
 
 
 def _draw_vectors(
-    panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, what: tuple[str, str]
+    panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, symbol: str, unit: str
 ) -> None:
     """Draw three components (N, 3) of a symbol and unit with their 2-sigma bands, or say there are
     none. The truth is dashed, with its RMSE in the legend.
@@ -111,7 +111,6 @@ def _draw_vectors(
         )
         panel.set_yticks([])
         return
-    symbol, unit = what
     low, high = mean - 2 * std, mean + 2 * std
     true: Iterable[Array | None] = [None] * 3 if truth is None else truth.T
     for axis, colour, x, least, most, real in zip(

@@ -6,7 +6,8 @@ minimises the mean norm, with norms weighted by their inverse in turn.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +40,7 @@ _LEAST = 1e-6  # of the errors where nothing changes: smaller ones count as this
 _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 
-@dataclass(frozen=True, eq=False)
-class LoopFit:
+class LoopFit(NamedTuple):
     """The likeliest coefficients, and the normal equations of g groups of starts and the prior.
 
     Attributes:

@@ -9,6 +9,7 @@ gyroscopic one behind ``Jz``.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,8 +50,7 @@ class Drive:
         return {"T": np.ones(4), "X": y, "Y": -x, "Z": -self.spin}
 
 
-@dataclass(frozen=True, eq=False)
-class BalanceSpectra:
+class BalanceSpectra(NamedTuple):
     """All pieces' transforms: the measured six first, then the columns, then their derivatives by
     the nonlinear parameters.
     """
@@ -167,4 +167,4 @@ def _with_delay(
     ordered = [turn * first if name == "delay" else next(rest) for name in nonlinear]
     share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[:, None]
     every = [x for block in (first, *ordered) for x in (block, share * block[:, :, torques])]
-    return replace(s, columns=np.concatenate([measured, *every], axis=2))
+    return s._replace(columns=np.concatenate([measured, *every], axis=2))

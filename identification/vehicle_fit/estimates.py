@@ -93,9 +93,9 @@ class Estimates:
         return value, min(corners), max(corners)
 
     def _say_curve(self, pieces: Pieces, how: str) -> None:
-        exponents = self.fit.drive.exponents
+        fit, exponents = self.fit, self.fit.drive.exponents
         for j, e in enumerate(exponents):
-            self._say(f"thrust u^{e}", self.fit.interval(f"a{j}", False), "N", how)
+            self._say(f"thrust u^{e}", fit.interval(f"a{j}", False), "N", how)
         flown = np.concatenate([p.rotors for p in pieces])
         low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
         beyond = f"continues the curve beyond the commands flown, {low:.2f} to {high:.2f}"
@@ -108,7 +108,7 @@ class Estimates:
             )
 
         def hover(values: Values, share: float = 1.0) -> float:
-            weight = self.fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
+            weight = fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
 
             def excess(u: float) -> float:
                 return 4.0 * thrust_of(values, exponents, u) - weight
@@ -118,21 +118,20 @@ class Estimates:
             return float(brentq(excess, 0.0, 2.0)) if low < 0.0 < high else 2.0 * (low < 0.0)
 
         self._say_positive("hover command", hover, "1", how)
-        if "gamma" not in self.fit.model.free:
+        if "gamma" not in fit.model.free:
             logged = all(p.voltage is not None for p in pieces)
             why = "the voltage hardly changes" if logged else "no voltage is logged"
             why += ": the curve holds for the voltage of these flights"
             self._say("voltage_exponent", UNKNOWN, "1", how, doubt=why)
             return
-        known, how = self.fit.interval("gamma", False), f"{how} and voltage"
+        known, how = fit.interval("gamma", False), f"{how} and voltage"
         why = "command and voltage change together: what the voltage does, the curve may do"
         wide = known[2] - known[1] > USUAL.voltage_exponents
         self._say("voltage_exponent", known, "1", how, doubt=why if wide else "")
         flown = np.concatenate([p.voltage for p in pieces if p.voltage is not None])
         for volts in () if wide else np.quantile(flown, [0.05, 0.95]).tolist():
-            share = volts / self.fit.drive.voltage_ref
-            name = f"hover command at {volts:.2f} V"
-            self._say_positive(name, partial(hover, share=share), "1", how)
+            at_voltage = partial(hover, share=volts / fit.drive.voltage_ref)
+            self._say_positive(f"hover command at {volts:.2f} V", at_voltage, "1", how)
 
     def _say_arm_and_inertia(self) -> None:
         fit, values = self.fit, self.fit.values

@@ -1,6 +1,7 @@
 """The rotors' positions as a user gives them, and usual ratios of quadrotors."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +14,7 @@ SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
 GRAVITY = 9.81  # m/s2
 
 
-@dataclass(frozen=True)
-class _Usual:
+class _Usual(NamedTuple):
     """Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Behind
     the value stands a range, low and high, claimed in place of an interval.
     """

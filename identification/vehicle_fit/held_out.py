@@ -13,8 +13,9 @@ a racer the body rate was off by 3 times the error of no change.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,8 +51,7 @@ Errors = dict[str, dict[str, list[PredictionErrors]]]
 Models = dict[str, Vehicle]  # by name
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOut:
+class HeldOut(NamedTuple):
     """What predictions of held-out data say.
 
     Attributes:
@@ -69,8 +69,7 @@ class HeldOut:
     why: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class _HeldParts:
+class _HeldParts(NamedTuple):
     """Starts in the segments of a fit, and the parts held out in turn."""
 
     starts: list[LoggedStarts]  # of each log

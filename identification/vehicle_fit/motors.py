@@ -3,7 +3,7 @@ behind a first-order lag.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -20,8 +20,7 @@ _SEGMENT = 5.0  # s: errors further apart are taken as independent
 _POWERS = 3  # speed against u^0, u^1, u^2
 
 
-@dataclass(frozen=True, eq=False)
-class MotorResponse:
+class MotorResponse(NamedTuple):
     """Rotor speed in rad/s against command, and its lag."""
 
     speed: Array  # (3,) coefficients of u^0, u^1, u^2
@@ -31,15 +30,17 @@ class MotorResponse:
 
 def motor_response(pieces: Pieces) -> MotorResponse | None:
     """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
-    if any(p.command is None or p.rotor_speeds is None for p in pieces):
+    both = [p for p in pieces if p.rotor_speeds is not None]
+    known = [(p.command, p.period) for p in both if p.command is not None]
+    if len(known) < len(pieces):
         return None
     speeds = np.concatenate([p.rotors for p in pieces])
-    commands = np.concatenate([p.command for p in pieces if p.command is not None])
+    commands = np.concatenate([command for command, _ in known])
     if commands.std() < 1e-3 or speeds.std() == 0.0:
         return None
 
     def columns(lag: float) -> Array:
-        u = [lagged(p.command, lag, p.period).ravel() for p in pieces if p.command is not None]
+        u = [lagged(command, lag, period).ravel() for command, period in known]
         return np.vander(np.concatenate(u), _POWERS, increasing=True)
 
     target = speeds.ravel()
@@ -69,5 +70,5 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     meat = scores.T @ scores * (count / max(count - 1, 1))
     size = math.sqrt((inverse @ meat @ inverse)[-1, -1])
     width = float(student.ppf(0.975, max(count - 1, 3))) * size
-    known = (lag, max(lag - width, 0.0), lag + width)
-    return MotorResponse(best, known, float(residual.std() / target.std()))
+    interval = (lag, max(lag - width, 0.0), lag + width)
+    return MotorResponse(best, interval, float(residual.std() / target.std()))

@@ -3,7 +3,8 @@ by axis, with every coefficient linear.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -54,8 +55,7 @@ BASE = (
 BIASES = ("force bias x", "force bias y", "force bias z")
 
 
-@dataclass(frozen=True)
-class Further:
+class Further(NamedTuple):
     """An effect for logs that get much likelier by it."""
 
     parameters: Names

@@ -223,17 +223,17 @@ def _grams(made: BalanceSpectra, spectra: Spectra) -> Spectra:
     noise, c = made.noise.T @ made.noise, len(made.names)
     grams = []
     for s, spectrum in zip(made.segments, spectra, strict=True):
-        columns = s.columns[:, :, 6:]
-        gram = np.empty((6, 1 + columns.shape[2], 1 + columns.shape[2]))
+        columns, gram = s.columns[:, :, 6:], []
         gain = 1.0 / (1.0 + (s.frequency / made.drive.band) ** 4) ** 2
         for axis in range(6):
             weight = s.weight / spectrum[:, axis]
             both = np.concatenate([s.columns[:, :, axis : axis + 1], columns], axis=2)
-            scaled = (both * np.sqrt(weight)[None, :, None]).reshape(-1, both.shape[2])
+            scaled = (both * np.sqrt(weight)[:, None]).reshape(-1, both.shape[2])
             parts = np.concatenate([scaled.real, scaled.imag])
-            gram[axis] = parts.T @ parts
-            gram[axis, 1 : 1 + c, 1 : 1 + c] -= noise * (weight * gain).sum() * TAPERS
-        grams.append(gram)
+            products = parts.T @ parts
+            products[1 : 1 + c, 1 : 1 + c] -= noise * (weight * gain).sum() * TAPERS
+            gram.append(products)
+        grams.append(np.array(gram))
     return grams
 
 

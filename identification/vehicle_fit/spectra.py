@@ -9,7 +9,7 @@ section 13.4).
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,7 @@ _NARROWEST = 0.4  # and at least so many Hz
 Spectra = list[Array]  # of each segment
 
 
-@dataclass(frozen=True, eq=False)
-class Segment:
+class Segment(NamedTuple):
     """One segment's transforms."""
 
     log: int
