@@ -116,9 +116,8 @@ def predict(
     )
     starts = starts[finite_rows(states[starts])]
     x = _flown(log, vehicle, states, starts, ahead)
-    return Prediction(
-        starts, log.period, x[..., POSITION], x[..., VELOCITY], x[..., QUATERNION], x[..., RATE]
-    )
+    parts = (x[..., part] for part in (POSITION, VELOCITY, QUATERNION, RATE))
+    return Prediction(starts, log.period, *parts)
 
 
 def _checked(log: FlightLog, state: ArrayLike) -> Array:

@@ -5,7 +5,6 @@
 import json
 import shlex
 from dataclasses import asdict
-from importlib import resources
 from pathlib import Path
 
 from ... import __version__
@@ -15,7 +14,7 @@ from ...runtime.plain_values import as_text, plain
 from ..findings import Diagnosis, Errors
 from ..logs.table import Data, NamedNumbers
 from .headline import headline
-from .page import report_page
+from .page import page_file, report_page
 
 # MAJOR.MINOR of ``report.json`` (see ``report.schema.json`` beside this file): a new key is a new
 # minor version, a removed key or a new meaning a new major one
@@ -111,8 +110,7 @@ def report_data(diagnosis: Diagnosis) -> Data:
 
 def report_schema() -> Data:
     """Return the JSON Schema (draft 2020-12) of ``report.json``."""
-    text = resources.files(__package__).joinpath("report.schema.json").read_text(encoding="utf-8")
-    schema: Data = json.loads(text)
+    schema: Data = json.loads(page_file("report.schema.json"))
     return schema
 
 

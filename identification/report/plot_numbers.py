@@ -146,9 +146,9 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
     ``products`` are mean products of ``after`` and the effects' parts: the mean square of
     ``after`` with any choice of parts added is a sum of them.
     """
-    group = slice(0, 3) if i < 3 else slice(3, 6)  # with the same axis
+    _, group, unit = _GROUPS[i // 3]  # with the same axis
     largest = np.abs([joined.before[:, group], joined.after[:, group]]).max()
-    factor, unit = scale_of([largest], "N" if i < 3 else "Nm")
+    factor, unit = scale_of([largest], unit)
     before, after, *parts = (
         factor * x[:, i] for x in (joined.before, joined.after, *joined.parts.values())
     )

@@ -112,7 +112,7 @@ def _shown(estimate: Estimate | None) -> float:
 
 
 def _effects(estimates: Estimated) -> list[EffectSetting]:
-    out = []
+    out = {}
     for role in dict.fromkeys(further.role for further in FURTHER.values() if further.role):
         effect = effect_of(role)
         coefficients = {}
@@ -121,11 +121,11 @@ def _effects(estimates: Estimated) -> list[EffectSetting]:
             if known is not None and ((value := _shown(known)) > 0.0 or c.minimum < 0.0):
                 coefficients[c.name] = value
         if any(coefficients.values()):
-            out.append(EffectSetting(effect, coefficients))
+            out[role] = EffectSetting(effect, coefficients)
     # a drag at the rotors damps by itself
-    if any(get(e.name).role == Role.ROTOR_DRAG for e in out):
-        out = [e for e in out if get(e.name).role != Role.RATE_DAMPING]
-    return out
+    if Role.ROTOR_DRAG in out:
+        out.pop(Role.RATE_DAMPING, None)
+    return list(out.values())
 
 
 def advice_of(estimates: Estimated) -> list[str]:
@@ -159,5 +159,5 @@ def advice_of(estimates: Estimated) -> list[str]:
     if estimates["arm_l"].status == ASSUMED:  # and inertia with it
         for name in ("Jxx", "Jyy", "Jzz"):
             del advice[name]
-    open_ones = [n for n in advice if n in estimates and estimates[n].status in (ASSUMED, NOTHING)]
-    return list(dict.fromkeys(advice[n] for n in open_ones))
+    open_ones = {e.name for e in estimates.values() if e.status in (ASSUMED, NOTHING)}
+    return list(dict.fromkeys(text for name, text in advice.items() if name in open_ones))

@@ -139,9 +139,7 @@ def rounding_step(logs: Logs) -> float:
     """
     values = np.concatenate([log.rotor_speeds.ravel() for log in logs])
     kept = np.unique(values.round(6))
-    if len(kept) < 3 or len(kept) > _FEW_VALUES * len(values):
-        return 0.0
-    return median_step(kept)
+    return median_step(kept) if 3 <= len(kept) <= _FEW_VALUES * len(values) else 0.0
 
 
 def speed_noise(pieces: Pieces) -> float:

@@ -5,7 +5,7 @@ own distance where nothing changes: a brisk flight counts as much as a calm one.
 minimises the mean norm, with norms weighted by their inverse in turn.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, replace
 from typing import NamedTuple
 
@@ -99,7 +99,7 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
-        return _compared(thin, lambda part: part.flown(model)) / sizes
+        return _compared(thin, [part.flown(model) for part in thin]) / sizes
 
     begin = np.array(astuple(_BEGIN))
     speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
@@ -143,16 +143,15 @@ def _unchanged(part: LoggedStarts) -> Array:
     """Return the mean distances (n, 1, 4, 1) of a flight at the horizon's end if nothing changes,
     once for each start.
     """
-    off = _compared([part], lambda part: part.unchanged)[:, -1]
+    off = _compared([part], [part.unchanged])[:, -1]
     sizes = np.maximum(np.linalg.norm(off, axis=-1).mean(axis=0), _LEAST)
     return np.broadcast_to(sizes[:, None], (len(off), 1, len(sizes), 1))
 
 
-def _compared(starts: Sequence[LoggedStarts], path_of: Callable[[LoggedStarts], Array]) -> Array:
-    """Return the differences (n, _TIMES, 4, 3) of paths (.., m, STATE) from the flight."""
+def _compared(starts: Sequence[LoggedStarts], paths: Sequence[Array]) -> Array:
+    """Return the differences (n, _TIMES, 4, 3) of paths (.., m, STATE) from the flights."""
     parts = []
-    for part in starts:
-        path = path_of(part)
+    for part, path in zip(starts, paths, strict=True):
         at = np.rint(np.arange(1, _TIMES + 1) / _TIMES * path.shape[1]).astype(int) - 1
         parts.append(offsets(path[:, at], part.seen[:, at]))
     return np.concatenate(parts)

@@ -45,18 +45,18 @@ def _autopilot(name: str, parameters: Names, most_ballistic: float, identified: 
     momentum, *ballistic, hover, bend = parameters
     values: NamedNumbers = {}
     if max(*linear, *quadratic) > 0.0:
-        values[momentum] = max(float(np.mean(linear)), 0.0)
+        values[momentum] = max(0.5 * sum(linear), 0.0)
         for p, c in zip(ballistic, quadratic, strict=True):
             # both autopilots leave the part of 0 out
             values[p] = 0.5 * AIR_DENSITY * vehicle.mass / c if c > 0.0 else 0.0
     if vehicle.motor_curve is not None:
         u = np.linspace(0.0, 1.0, 41)
         thrust = np.polynomial.polynomial.polyval(u, vehicle.motor_curve.thrust)
-        values[hover] = float(vehicle.weight / (4.0 * thrust[-1]))
+        values[hover] = vehicle.weight / (4.0 * thrust[-1])
         # least squares of T - u = f (u^2 - u)
         bent = u**2 - u
         share = bent @ (thrust / thrust[-1] - u) / (bent @ bent)
-        values[bend] = float(np.clip(share, 0.0, 1.0))
+        values[bend] = np.clip(share, 0.0, 1.0)
     missing = [p for p in parameters if p not in values]
     doubts = [f"# not known from these logs: {', '.join(missing)}"] if missing else []
     limits = {momentum: 1.0, **dict.fromkeys(ballistic, most_ballistic)}  # as both state
