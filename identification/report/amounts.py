@@ -15,7 +15,7 @@ from ...dynamics import effects as library
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, NamedEffect
 from ..logs.table import Array
-from .words import SPACE, coefficient_meaning, effect_summary, in_unit, in_words, scale_of, with_std
+from .words import coefficient_meaning, effect_summary, in_unit, in_words, scale_of, with_std
 
 _ROTORS = 4.0
 _SMALL = 0.5
@@ -61,7 +61,9 @@ class _Amount(NamedTuple):
 
     def __str__(self) -> str:
         """Return ``0.31 ± 0.01 N along x``."""
-        number = f"{with_std(self.value, self.std)}{SPACE}{self.unit}".removesuffix(SPACE)
+        number = f"{with_std(self.value, self.std)}\N{NO-BREAK SPACE}{self.unit}".removesuffix(
+            "\N{NO-BREAK SPACE}"
+        )
         return f"{number} {self.where}".rstrip()
 
 

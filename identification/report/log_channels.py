@@ -67,9 +67,23 @@ def log_channels(log: FlightLog) -> list[Channel]:
         steps, step = np.diff(t), median_step(t)
         rate = min(log.rates.get(section) or np.inf, 1.0 / step)
         gaps, longest = int((steps > _GAP * step).sum()), max(float(steps.max()), 1.0 / rate)
-        numbers = (len(rows), rate, gaps, longest, low, high)
         shown = telling_samples(drawn, _BINS)
-        out.append(Channel(name, unit, *numbers, t[shown], drawn[shown], title, series))
+        out.append(
+            Channel(
+                name,
+                unit,
+                len(rows),
+                rate,
+                gaps,
+                longest,
+                low,
+                high,
+                t[shown],
+                drawn[shown],
+                title,
+                series,
+            )
+        )
     return out
 
 

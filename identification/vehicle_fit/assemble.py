@@ -50,15 +50,14 @@ def vehicle_of(
     if late:
         value = estimates[of_lag].value
         effects.append(EffectSetting(of_lag, {get(of_lag).coefficients[0].name: value}))
-    moments = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
-    products = {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
-    com = np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"])
+    inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
+    inertia |= {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
     size = np.abs(geometry.positions[:, :2])
     uneven = geometry.known and (np.ptp(size) > 1e-9 or np.any(geometry.positions[:, 2] != 0.0))
     vehicle = Vehicle(
         name=name,
         mass=fit.model.mass,
-        inertia=inertia_of({**moments, **products}),
+        inertia=inertia_of(inertia),
         arm_l=arm,
         k=np.full(4, k),
         p=np.full(4, reach * k),
@@ -68,7 +67,7 @@ def vehicle_of(
         voltage_ref=fit.drive.voltage_ref,
         spin=fit.drive.spin.copy(),
         rotor_positions=geometry.positions if uneven else None,
-        com=com,
+        com=np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"]),
         effects=tuple(effects),
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),

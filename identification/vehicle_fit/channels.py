@@ -100,9 +100,16 @@ def _sources_of(logs: Logs) -> Sources:
                 f"{log.source or log.name}: has neither a pose nor a gyro (gx, gy, gz); expected "
                 "one of them"
             )
-    commands = [log.command is not None and _is_fast(log, "commands") for log in logs]
+    # each channel of the rotors must be quick enough to tell their torque
+    commands = [
+        log.command is not None and serves(log.rates.get("commands", np.inf), TORQUE_HZ)
+        for log in logs
+    ]
     speeds = [
-        log.has_rotor_speeds and not log.commanded and _is_fast(log, "rotors") for log in logs
+        log.has_rotor_speeds
+        and not log.commanded
+        and serves(log.rates.get("rotors", np.inf), TORQUE_HZ)
+        for log in logs
     ]
     if not all(speeds) and not all(commands):
         log = logs[speeds.index(False)]
@@ -126,11 +133,6 @@ def _sources_of(logs: Logs) -> Sources:
         "rotor speeds" if all(speeds) else "commands",
         pose,
     )
-
-
-def _is_fast(log: FlightLog, channel: str) -> bool:
-    """Return whether a channel of the rotors was measured often enough to tell their torque."""
-    return serves(log.rates.get(channel, np.inf), TORQUE_HZ)
 
 
 def rounding_step(logs: Logs) -> float:

@@ -95,7 +95,12 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
     group = np.concatenate([*(numbers[::every] for numbers in groups), [-1]])
-    sizes: Array = np.concatenate([_unchanged(part) for part in thin])
+    # mean distances (n, 1, 4, 1) of a flight at the horizon's end if nothing changes
+    scales = []
+    for part in thin:
+        far = np.linalg.norm(_compared([part], [part.unchanged])[:, -1], axis=-1)
+        scales.append(np.repeat([np.maximum(far.mean(axis=0), _LEAST)], len(far), axis=0))
+    sizes: Array = np.concatenate(scales)[:, None, :, None]
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
@@ -137,15 +142,6 @@ def _loss(e: Array, away: Array) -> float:
     """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (9,)."""
     prior = 1.0 + _PRIOR * np.square(away / (3.0 * _SIZES)).sum()
     return float(prior * np.linalg.norm(e, axis=-1).mean())
-
-
-def _unchanged(part: LoggedStarts) -> Array:
-    """Return the mean distances (n, 1, 4, 1) of a flight at the horizon's end if nothing changes,
-    once for each start.
-    """
-    off = _compared([part], [part.unchanged])[:, -1]
-    sizes = np.maximum(np.linalg.norm(off, axis=-1).mean(axis=0), _LEAST)
-    return np.broadcast_to(sizes[:, None], (len(off), 1, len(sizes), 1))
 
 
 def _compared(starts: Sequence[LoggedStarts], paths: Sequence[Array]) -> Array:

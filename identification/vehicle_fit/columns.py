@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.arrays import Array, Mask
+from ...runtime.arrays import Array
 from ..logs.table import NamedArrays, Names
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece, Pieces
@@ -81,10 +81,18 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
                 parts.append((np.column_stack([*moved.values()]) - base) / _STEP[name])
         stacked = low_pass(np.column_stack(parts), drive.band, piece.period)
         late = np.array([name in here for name in every])
-        segments += [
-            _with_delay(s, drive, nonlinear, late, slow)
-            for s in segments_of(stacked, piece.period, piece.log, drive.band)
-        ]
+        for s in segments_of(stacked, piece.period, piece.log, drive.band):
+            # late columns are delayed; blocks are in the order of ``nonlinear``, each with the
+            # slow part of its torques behind it
+            turn = -2j * np.pi * s.frequency[:, None] * late
+            measured, *blocks = np.split(s.columns, range(6, s.columns.shape[2], len(late)), axis=2)
+            first, *others = (block * np.exp(turn * drive.delay) for block in blocks)
+            rest = iter(others)
+            ordered = [turn * first if name == "delay" else next(rest) for name in nonlinear]
+            share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[:, None]
+            every_block = (x for b in (first, *ordered) for x in (b, share * b[:, :, slow]))
+            joined = np.concatenate([measured, *every_block], axis=2)
+            segments.append(s._replace(columns=joined))
     seconds = np.array([len(p.t) * p.period for p in pieces])
     # white noise of each rotor's speed in a column: standard deviation times the root of the period
     noise = np.zeros((4, len(names)))
@@ -146,25 +154,3 @@ def air_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
         for a in "xy":
             out[f"moment {a} of lift"] = lift @ drive.shares[a.upper()]
     return out
-
-
-def _with_delay(
-    s: Segment,
-    drive: Drive,
-    nonlinear: Names,
-    late: Mask,
-    torques: list[int],
-) -> Segment:
-    """Return a segment with its ``late`` columns delayed and their derivative by the delay.
-
-    Blocks are in the order of ``nonlinear``, each with the slow part of ``torques`` behind it.
-    """
-    turn = -2j * np.pi * s.frequency[:, None] * late
-    ends = range(6, s.columns.shape[2], len(late))
-    measured, *blocks = np.split(s.columns, ends, axis=2)
-    first, *others = (block * np.exp(turn * drive.delay) for block in blocks)
-    rest = iter(others)
-    ordered = [turn * first if name == "delay" else next(rest) for name in nonlinear]
-    share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[:, None]
-    every = [x for block in (first, *ordered) for x in (block, share * block[:, :, torques])]
-    return s._replace(columns=np.concatenate([measured, *every], axis=2))

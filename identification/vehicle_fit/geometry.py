@@ -63,7 +63,7 @@ def parse_geometry(text: str | None) -> Geometry:
         "x,y in m with semicolons between them, front-left, rear-left, rear-right, front-right"
     )
     if text is None:
-        return Geometry(QUADRANT.copy(), known=False)
+        return Geometry(QUADRANT, known=False)
     try:
         rows = [[float(x) for x in row.split(",")] for row in text.split(";")]
     except ValueError as error:

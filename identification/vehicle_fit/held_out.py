@@ -222,8 +222,10 @@ def _reason(errors: Errors) -> str:
         least = np.minimum(whole.still, simple.model)
         ends = whole.model[:, -1], least[:, -1]
         for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True):
-            figures = f"{what} of {where.replace('_', ' ')} worse than the simplest guess "
-            figures += f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
+            figures = (
+                f"{what} of {where.replace('_', ' ')} worse than the simplest guess "
+                f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
+            )
             said.append((end / best, figures))
     return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"
 

@@ -74,7 +74,7 @@ def identify(
     Raises:
         InputError: the logs lack a channel, or contradict the rotors' order.
     """
-    if not (math.isfinite(mass) and mass > 0.0):
+    if not 0.0 < mass < math.inf:
         raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
@@ -147,8 +147,10 @@ def identify(
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:
-        lag, left = effect_of(Role.LAG), f"{100 * motors.left:.0f} % of their variation left over"
-        how = f"rotor speeds against commands, {left}"
+        lag = effect_of(Role.LAG)
+        how = (
+            f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
+        )
         named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
     return Identified(
         vehicle,
@@ -174,8 +176,8 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
         for size, (c, unit), value in zip(
             tested.loop.deviations, UNITS.items(), tested.loop.theta, strict=True
         ):
-            known = value, value - 1.96 * size, value + 1.96 * size
-            named[f"closed_loop {c}"] = Estimate(f"closed_loop {c}", *known, unit, stands, LOOP)
+            name, wide = f"closed_loop {c}", 1.96 * size
+            named[name] = Estimate(name, value, value - wide, value + wide, unit, stands, LOOP)
     if not tested.stands:
         for name, e in named.items():
             if e.status == IDENTIFIED:

@@ -52,7 +52,7 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
 
     likeliest = minimize_scalar(
         lambda log_lag: np.square(fitted(math.exp(log_lag))[1]).sum(),
-        bounds=tuple(np.log(_LAGS)),
+        bounds=np.log(_LAGS),
         method="bounded",
         options={"xatol": 1e-3},
     )

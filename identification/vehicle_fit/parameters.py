@@ -2,7 +2,6 @@
 by axis, with every coefficient linear.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -91,7 +90,7 @@ def first_model(
     sources: Sources,
     drive: Drive,
     mass: float,
-    nonlinear: Sequence[str],
+    nonlinear: Names,
 ) -> tuple[Model, Array, Drive]:
     """Return the model, its start, and the drive with the turning senses that yaw shows;
     ``nonlinear`` parameters start at the drive's values.
@@ -103,7 +102,7 @@ def first_model(
     # each basis function's coefficient if it alone carried the weight
     totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(len(drive.exponents))]
     each = [mass * GRAVITY / max(total.mean(), 1e-12) for total in totals]
-    share = 1.0 / len(each)
+    share, thrust = 1.0 / len(each), [f"a{j}" for j in range(len(each))]
     shares = [share * a for a in each]
     gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
     # a loop that answers a swinging load opposes its own slow torque, and no quick one
@@ -131,7 +130,7 @@ def first_model(
         "answered": 0.3,
     }
     size = {
-        **{f"a{j}": a for j, a in enumerate(each)},
+        **dict(zip(thrust, each, strict=True)),
         "Jx": inertia[0],
         "Jy": inertia[1],
         "Jz": flat,
@@ -144,12 +143,12 @@ def first_model(
         "flapping": 0.05 * mass / speed * 0.03 * arm,
         **{f"{name} {a}": x for name, x in along.items() for a in "xyz"},
     }
-    free = (*(f"a{j}" for j in range(len(each))), *BASE)
+    free = (*thrust, *BASE)
     prior = {"delay": DELAY}
     if sources.force == "accelerometer":
         free = (*free, *BIASES)
         prior |= {**dict.fromkeys(BIASES, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
-    known = {**{f"a{j}": share for j in range(len(each))}, "reach": 1.0}
+    known = dict.fromkeys(thrust, share) | {"reach": 1.0}
     known |= {name: getattr(drive, name) for name in nonlinear}
     model = Model(mass, len(each), (*free, *nonlinear), size, prior)
     if gains[2] < 0.0:
