@@ -76,9 +76,7 @@ def chance(probability: float) -> str:
     """Return a probability in per cent; close to 0 or 1, a bound."""
     if not _CERTAIN < probability < 1.0 - _CERTAIN:
         return (
-            "above 99.9\N{NO-BREAK SPACE}%"
-            if probability > 0.5
-            else "below 0.1\N{NO-BREAK SPACE}%"
+            "above 99.9\N{NO-BREAK SPACE}%" if probability > 0.5 else "below 0.1\N{NO-BREAK SPACE}%"
         )
     return percent(probability)
 
@@ -135,8 +133,8 @@ def doubts(diagnosis: Diagnosis) -> list[str]:
     """Return the reasons to doubt the logs, and then the names; a likely cause outside the library
     stands in the headline.
     """
-    checks = {**diagnosis.doubts, "unknown": ()}
-    of_names = [text for some in checks.values() for text in some]
+    checks = diagnosis.doubts
+    of_names = [text for name in checks if name != "unknown" for text in checks[name]]
     said = [text for text in diagnosis.notes if _WARNING in text or text in of_names]
     return sorted(said, key=lambda text: _WARNING not in text)
 

@@ -48,9 +48,9 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: Path) -> Path:
     figure.suptitle(f"External wrench: {log.name}, {vehicle.name}", parse_math=False)
 
     height.plot(series.t, series.position[:, 2], color=BLACK, lw=1.2)
-    height.set_ylabel("height (m)")
+    height.set_ylabel("height (m)" if known else "height (not known)")
     if not known:
-        height.set(ylabel="height (not known)", yticks=[])
+        height.set_yticks([])
     backdrop = _draw_thrust(height, series.t, log, vehicle)
     scale, unit = scale_of([np.percentile(np.abs(series.torque), 99)], "Nm")
     truth = None if log.torque is None else scale * log.torque

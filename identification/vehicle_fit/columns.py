@@ -122,9 +122,9 @@ def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
         along = np.moveaxis(drag, 2, 0)
         for axis, force in zip("xyz", along, strict=True):
             out[f"rotor drag {axis}"] = force.sum(axis=1)
-        for axis, force in zip("xy", along[:2], strict=True):
-            out[f"moment of rotor drag {axis}"] = -force @ shares[axis.upper()]
-            out[f"moment {axis} of rotor drag z"] = along[2] @ shares[axis.upper()]
+        for axis, force, arm in zip("xy", along[:2], (shares["X"], shares["Y"]), strict=True):
+            out[f"moment of rotor drag {axis}"] = -force @ arm
+            out[f"moment {axis} of rotor drag z"] = along[2] @ arm
     return out
 
 
@@ -136,8 +136,8 @@ def _local(piece: MotionPiece, velocity: Array, drive: Drive) -> Array:
 
 def air_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     """Return the columns (n,) without rotor speeds."""
-    w, period = piece.angular_velocity, piece.period
-    dw = derivative(w, period)
+    w = piece.angular_velocity
+    dw = derivative(w, piece.period)
     out = {"1": np.ones(len(piece.t))}
     for i, a in enumerate("xyz"):
         out[f"w{a}"], out[f"dw{a}"] = w[:, i], dw[:, i]

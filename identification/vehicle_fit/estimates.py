@@ -53,8 +53,8 @@ class Estimates:
         Raises:
             InputError: neither turning nor an arm says how large the vehicle is.
         """
-        force, rotors = self.sources.force, self.sources.rotors
-        vertical = f"{force} along body z against {rotors}, with the mass given"
+        of = self.sources
+        vertical = f"{of.force} along body z against {of.rotors}, with the mass given"
         if self.fit.drive.commands:
             self._say_curve(pieces, vertical)
         else:
@@ -218,7 +218,7 @@ class Estimates:
             self._say("p", known, "Nm/(rad/s)^2", how, status)
 
     def _say_lag(self) -> None:
-        name, doubt, known = effect_of(Role.LAG), "", UNKNOWN
+        doubt, known = "", UNKNOWN
         how = f"force and turning against {self.sources.rotors}"
         if "lag" in self.fit.model.free:
             if not self.fit.drive.commands:
@@ -231,7 +231,7 @@ class Estimates:
                 "force follows the logged rotor speeds at once: they are measured, and no command "
                 "is logged beside them"
             )
-        self._say(name, known, "s", how, doubt=doubt)
+        self._say(effect_of(Role.LAG), known, "s", how, doubt=doubt)
         offset = self.fit.interval("delay", False)
         self._say("time_offset", offset, "s", "of the motion behind the rotors")
 

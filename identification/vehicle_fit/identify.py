@@ -219,8 +219,8 @@ def _voltage(pieces: Pieces) -> float:
     voltages = [p.voltage for p in pieces if p.voltage is not None]
     if len(voltages) < len(pieces):
         return 0.0
-    low, middle, high = np.quantile(np.concatenate(voltages), [0.05, 0.5, 0.95]).tolist()
-    return float(middle) if high - low > _LEAST_VOLTAGE_RANGE * middle > 0.0 else 0.0
+    low, middle, high = np.quantile(np.concatenate(voltages), [0.05, 0.5, 0.95])
+    return middle if high - low > _LEAST_VOLTAGE_RANGE * middle > 0.0 else 0.0
 
 
 def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> VehicleFit:
