@@ -13,9 +13,9 @@ import numpy as np
 
 from ...dynamics import effects as library
 from ...dynamics.vehicle import Vehicle
-from ..findings import CHANNELS, Diagnosis, NamedEffect
-from ..logs.table import Array, Pair
-from .words import SPACE, coefficient_meaning, effect_summary, in_unit, in_words, scale_of, with_std
+from ..findings import CHANNELS, NamedEffect
+from ..logs.table import Array
+from .words import coefficient_meaning, effect_summary, in_unit, in_words, scale_of, with_std
 
 _ROTORS = 4.0
 _SMALL = 0.5
@@ -61,7 +61,9 @@ class _Amount(NamedTuple):
 
     def __str__(self) -> str:
         """Return ``0.31 ± 0.01 N along x``."""
-        number = f"{with_std(self.value, self.std)}{SPACE}{self.unit}".removesuffix(SPACE)
+        number = f"{with_std(self.value, self.std)}\N{NO-BREAK SPACE}{self.unit}".removesuffix(
+            "\N{NO-BREAK SPACE}"
+        )
         return f"{number} {self.where}".rstrip()
 
 
@@ -136,23 +138,26 @@ def _wind(effect: NamedEffect) -> _Amount:
     return _Amount(speed, spread, "m/s", f"from {' '.join(sides)}", "")
 
 
-def steady_wrench(pieces: Sequence[Array], periods: Sequence[float], floors: Pair) -> str:
+def steady_wrench(pieces: Sequence[tuple[Array, float]], force: float, torque: float) -> str:
     """Return the mean force and torque, each if beyond chance and its floor; else nothing.
 
     The mean of a block of 3 s is one number; all blocks together say how sure their mean is.
 
     Args:
-        pieces: (n, 6) N and Nm, NaN where not known.
-        periods: s, of each piece.
-        floors: least mean force, N, and torque, Nm.
+        pieces: (n, 6) N and Nm, NaN where not known, and the period, s, of each.
+        force: least mean, N.
+        torque: least mean, Nm.
     """
-    counts = (max(1, round(len(x) * dt / _BLOCK)) for x, dt in zip(pieces, periods, strict=True))
-    blocks = [part.mean(axis=0) for parts in map(np.array_split, pieces, counts) for part in parts]
+    blocks = [
+        part.mean(axis=0)
+        for x, period in pieces
+        for part in np.array_split(x, max(1, round(len(x) * period / _BLOCK)))
+    ]
     if len(blocks) < _LEAST_BLOCKS:
         return ""
     mean = np.mean(blocks, axis=0)
     error = np.std(blocks, axis=0, ddof=1) / math.sqrt(len(blocks))
-    sure = np.abs(mean) > np.maximum(_STEADY * error, np.nan_to_num(np.repeat(floors, 3)))
+    sure = np.abs(mean) > np.maximum(_STEADY * error, np.nan_to_num(np.repeat([force, torque], 3)))
     told = []
     for kind, unit, first in (("force", "N", 0), ("torque", "Nm", 3)):
         i = first + int(np.argmax(np.abs(mean[first : first + 3])))
@@ -160,13 +165,3 @@ def steady_wrench(pieces: Sequence[Array], periods: Sequence[float], floors: Pai
             way = "about" if first else "along"
             told.append(f"{kind} {in_unit(float(mean[i]), unit, 3)} {way} {CHANNELS[i][-1]}")
     return in_words(told)
-
-
-def steady_residual(diagnosis: Diagnosis) -> str:
-    """Return the mean force and torque that the named effects leave, in words, or nothing."""
-    traces = diagnosis.traces
-    return steady_wrench(
-        [x.after for x in traces],
-        [x.period for x in traces],
-        (diagnosis.floor_force_rms, diagnosis.floor_torque_rms),
-    )

@@ -9,7 +9,7 @@ import numpy as np
 from ..findings import Diagnosis, NamedEffect
 from ..logs.table import finite_rows, median_step
 from ..wrench_series import WrenchSeries
-from .amounts import known, steady_residual, steady_wrench, title, with_amounts
+from .amounts import known, steady_wrench, title, with_amounts
 from .words import (
     by_energy,
     chance,
@@ -54,7 +54,8 @@ def _verdict(diagnosis: Diagnosis) -> str:
         sure = [e for e in diagnosis.effects if not e.tentative or energy(e) > _MOST_OF_IT]
         rest = "" if sure or not gusts else f"he residual looks random{gusts}; t"
         return f"T{rest}he model {_lacks(diagnosis)}."
-    if steady := steady_residual(diagnosis):
+    pieces = [(trace.after, trace.period) for trace in diagnosis.traces]
+    if steady := steady_wrench(pieces, diagnosis.floor_force_rms, diagnosis.floor_torque_rms):
         return f"Unmodelled {steady} on average; n{library} explains it."
     if diagnosis.pushes:
         clearest = disturbance_at(diagnosis)
@@ -93,12 +94,12 @@ def wrench_headline(series: WrenchSeries) -> str:
     """
     rows = finite_rows(series.force)
     wrench = np.nan_to_num(np.hstack([series.force, series.torque])[rows])
-    floors = [
+    force, torque = (
         float(np.median(np.nan_to_num(std[rows]), axis=0).max())
         for std in (series.std_force, series.std_torque)
-    ]
-    told = steady_wrench([wrench], [median_step(series.t)], (floors[0], floors[1]))
-    mean = f"Unmodelled {told}" if told else f"No unmodelled force above {in_unit(floors[0], 'N')}"
+    )
+    told = steady_wrench([(wrench, median_step(series.t))], force, torque)
+    mean = f"Unmodelled {told}" if told else f"No unmodelled force above {in_unit(force, 'N')}"
     spread = in_unit(math.sqrt(wrench[:, :3].var(axis=0).sum()), "N")
     doubt = first_doubt(warnings_in(series.notes))
     return " ".join([*doubt, f"{mean} on average; the force varies by {spread} rms."])

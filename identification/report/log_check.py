@@ -50,7 +50,7 @@ class _LogCheck:
             told.append(f"Nothing shows a flight: {by}.")
         return " ".join(told)
 
-    def what_flew(self) -> list[tuple[str, str, str]]:
+    def what_flew(self) -> list[Names]:
         """Return facts of the vehicle and its flight: name, value, source."""
         return [*self.log.flown.rows(), ("flew", *flew(self.log))]
 

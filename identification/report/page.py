@@ -8,7 +8,6 @@ nothing from elsewhere.
 import base64
 import hashlib
 import json
-from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 
@@ -19,6 +18,7 @@ from . import amounts, words
 from .headline import headline
 from .plot_numbers import candidate_bars, page_plots
 
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 _TONES = {
     "explained": "good",
     "nothing to explain": "good",
@@ -33,8 +33,18 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     """
     plots, bars = page_plots(diagnosis), candidate_bars(diagnosis)
     data = plots.data
-    library, script = _library(), _page_file("page.js")
+    licence, code = (
+        page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
+    )
+    # the library with its mandatory licence
+    library, script = f"/*\n{licence}\n*/\n{code}", page_file("page.js")
     shown = {bar.name for bar in bars}
+    # the page's content security policy: these scripts, and nothing from outside
+    hashes = (
+        f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+        for text in (library, script)
+    )
+    allowed = " ".join(hashes) if data else "'none'"
     return page_template(__package__, "page.html.j2").render(
         found=diagnosis,
         words=words,
@@ -45,12 +55,12 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         plots=plots,
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
-        policy=_policy((library, script) if data else ()),
+        policy=f"{_POLICY}; script-src {allowed}",
         # escaped for a page's script element: no tag can begin inside
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c") if data else "",
         library=library,
-        shared_style=_page_file("page.css"),
-        library_style=_page_file("uplot/uPlot.min.css"),
+        shared_style=page_file("page.css"),
+        library_style=page_file("uplot/uPlot.min.css"),
         script=script,
         command=command,
         version=__version__,
@@ -58,25 +68,6 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
 
 
 @cache
-def _page_file(name: str) -> str:
+def page_file(name: str) -> str:
     """Return a text beside this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
-@cache
-def _library() -> str:
-    """Return the plotting library with its mandatory licence."""
-    licence, code = (
-        _page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
-    )
-    return f"/*\n{licence}\n*/\n{code}"
-
-
-def _policy(scripts: Iterable[str]) -> str:
-    """Return the page's content security policy: these scripts, and nothing from outside."""
-    hashes = (
-        f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'"
-        for s in scripts
-    )
-    allowed = " ".join(hashes) or "'none'"
-    return f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}"

@@ -8,7 +8,6 @@ from ..findings import Diagnosis, NamedEffect
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
-SPACE = "\N{NO-BREAK SPACE}"
 _CERTAIN = 0.001  # probability; closer to 0 or 1 no digit is meant
 _LIKELIER = 0.5  # probability of a cause outside the library, from which this comes first
 _MILLI = 0.8  # N or Nm, below which an error is in thousandths
@@ -61,7 +60,7 @@ def in_words(names: Sequence[str], last: str = "and") -> str:
 def in_unit(value: float, unit: str, digits: int = 2) -> str:
     """Return a number with its unit, plain or milli."""
     factor, unit = scale_of([value], unit)
-    return f"{rounded(factor * value, digits)}{SPACE}{unit}"
+    return f"{rounded(factor * value, digits)}\N{NO-BREAK SPACE}{unit}"
 
 
 def percent(share: float) -> str:
@@ -70,13 +69,15 @@ def percent(share: float) -> str:
         return MISSING
     near = min(abs(share), 10.0 * abs(1.0 - abs(share)))
     decimals = 1 if 0.0005 <= near < 0.0995 else 0
-    return f"{100.0 * share:z.{decimals}f}{SPACE}%".replace("-", "−")
+    return f"{100.0 * share:z.{decimals}f}\N{NO-BREAK SPACE}%".replace("-", "−")
 
 
 def chance(probability: float) -> str:
     """Return a probability in per cent; close to 0 or 1, a bound."""
     if not _CERTAIN < probability < 1.0 - _CERTAIN:
-        return f"above 99.9{SPACE}%" if probability > 0.5 else f"below 0.1{SPACE}%"
+        return (
+            "above 99.9\N{NO-BREAK SPACE}%" if probability > 0.5 else "below 0.1\N{NO-BREAK SPACE}%"
+        )
     return percent(probability)
 
 
@@ -132,8 +133,8 @@ def doubts(diagnosis: Diagnosis) -> list[str]:
     """Return the reasons to doubt the logs, and then the names; a likely cause outside the library
     stands in the headline.
     """
-    checks = {**diagnosis.doubts, "unknown": ()}
-    of_names = [text for some in checks.values() for text in some]
+    checks = diagnosis.doubts
+    of_names = [text for name in checks if name != "unknown" for text in checks[name]]
     said = [text for text in diagnosis.notes if _WARNING in text or text in of_names]
     return sorted(said, key=lambda text: _WARNING not in text)
 
@@ -168,7 +169,7 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
     said = []
     for row in error_table(diagnosis)[:2]:
         before, after, floor = (
-            f"{row[x]}{SPACE}{row['unit']}" for x in ("before", "after", "floor")
+            f"{row[x]}\N{NO-BREAK SPACE}{row['unit']}" for x in ("before", "after", "floor")
         )
         if MISSING not in before + after:
             change = f"{before} before, {after} after" if diagnosis.effects else after
@@ -197,7 +198,8 @@ def disturbances(diagnosis: Diagnosis) -> str:
     """Return the strongest random disturbances, of a force and of a torque, as an insertion."""
     by_size = sorted(diagnosis.gusts, key=lambda gusts: -gusts.rms)
     stated = [
-        f"{in_unit(gusts.rms, unit)} rms (correlation time {rounded(gusts.time, 2)}{SPACE}s)"
+        f"{in_unit(gusts.rms, unit)} rms "
+        f"(correlation time {rounded(gusts.time, 2)}\N{NO-BREAK SPACE}s)"
         for unit in ("N", "Nm")
         for gusts in [x for x in by_size if _unit_of(x.channel) == unit][:1]
     ]
@@ -213,7 +215,7 @@ def disturbance_at(diagnosis: Diagnosis) -> str:
     largest = diagnosis.pushes[0]
     size = in_unit(largest.peak, _unit_of(largest.channel))
     where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
-    return f"{size} in {largest.channel} at {rounded(largest.t)}{SPACE}s{where}"
+    return f"{size} in {largest.channel} at {rounded(largest.t)}\N{NO-BREAK SPACE}s{where}"
 
 
 def next_step(diagnosis: Diagnosis) -> str:

@@ -7,7 +7,8 @@ Rotors come as measured speeds, or as motor commands.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -69,9 +70,8 @@ class MotionPiece:
 
     def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
         """Return the piece with each of its series changed."""
-        series = {f.name: getattr(self, f.name) for f in fields(self)}
-        changed: Data = {name: change(x) for name, x in series.items() if isinstance(x, np.ndarray)}
-        return replace(self, **changed)
+        series: Data = {n: change(x) for n, x in vars(self).items() if isinstance(x, np.ndarray)}
+        return replace(self, **series)
 
 
 Pieces = list[MotionPiece]
@@ -100,9 +100,16 @@ def _sources_of(logs: Logs) -> Sources:
                 f"{log.source or log.name}: has neither a pose nor a gyro (gx, gy, gz); expected "
                 "one of them"
             )
-    commands = [log.command is not None and _is_fast(log, "commands") for log in logs]
+    # each channel of the rotors must be quick enough to tell their torque
+    commands = [
+        log.command is not None and serves(log.rates.get("commands", np.inf), TORQUE_HZ)
+        for log in logs
+    ]
     speeds = [
-        log.has_rotor_speeds and not log.commanded and _is_fast(log, "rotors") for log in logs
+        log.has_rotor_speeds
+        and not log.commanded
+        and serves(log.rates.get("rotors", np.inf), TORQUE_HZ)
+        for log in logs
     ]
     if not all(speeds) and not all(commands):
         log = logs[speeds.index(False)]
@@ -128,23 +135,16 @@ def _sources_of(logs: Logs) -> Sources:
     )
 
 
-def _is_fast(log: FlightLog, channel: str) -> bool:
-    """Return whether a channel of the rotors was measured often enough to tell their torque."""
-    return serves(log.rates.get(channel, np.inf), TORQUE_HZ)
-
-
 def rounding_step(logs: Logs) -> float:
     """Return the step (rad/s) of rounded rotor speeds, from the numbers themselves; 0 where
     rounding does not matter.
     """
     values = np.concatenate([log.rotor_speeds.ravel() for log in logs])
-    kept = np.unique(np.round(values, 6))
-    if len(kept) < 3 or len(kept) > _FEW_VALUES * len(values):
-        return 0.0
-    return median_step(kept)
+    kept = np.unique(values.round(6))
+    return median_step(kept) if 3 <= len(kept) <= _FEW_VALUES * len(values) else 0.0
 
 
-def speed_noise(pieces: Sequence[MotionPiece]) -> float:
+def speed_noise(pieces: Pieces) -> float:
     """Return the standard deviation (rad/s) of the white noise of rotor speeds with their rounding,
     from the highest quarter of their spectrum: no rotor follows its command there.
     """
@@ -236,7 +236,11 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
         piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
         moving = []
         if sources.velocity:
-            velocity = _velocity(log, t)
+            velocity = np.full((len(t), 3), np.nan)  # in gaps of the pose
+            for s in _posed_pieces(log):
+                inside = (t >= s.t[0]) & (t <= s.t[-1])
+                body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
+                velocity[inside] = resampled(t[inside], s.t, body)
             moving = _cut(replace(piece, velocity=velocity), np.isfinite(velocity[:, 0]))
         yield from moving or [piece]
 
@@ -262,11 +266,10 @@ def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
 
         piece = replace(piece.mapped(thinned), t=thin, period=period)
 
-    def smooth(x: Array) -> Array:
-        return low_pass(x, _PRODUCT_HZ, period)
-
-    moving = None if piece.velocity is None else smooth(piece.velocity)
-    return replace(piece, angular_velocity=smooth(piece.angular_velocity), velocity=moving)
+    rate, velocity = low_pass(piece.angular_velocity, _PRODUCT_HZ, period), piece.velocity
+    if velocity is not None:
+        velocity = low_pass(velocity, _PRODUCT_HZ, period)
+    return replace(piece, angular_velocity=rate, velocity=velocity)
 
 
 def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
@@ -274,22 +277,10 @@ def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
     return resampled(t, log.t[read], values[read])
 
 
-def _velocity(log: FlightLog, t: Array) -> Array:
-    """Return the velocity (n, 3) in body axes at times, NaN in gaps of the pose."""
-    out = np.full((len(t), 3), np.nan)
-    for s in _posed_pieces(log):
-        inside = (t >= s.t[0]) & (t <= s.t[-1])
-        body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
-        out[inside] = resampled(t[inside], s.t, body)
-    return out
-
-
 def _cut(piece: MotionPiece, keep: Mask) -> Pieces:
     """Return the kept runs of samples that are long enough."""
-    if keep.all():
-        return [piece]
     return [
-        piece.mapped(lambda x, a=a, b=b: x[a:b])  # type: ignore[misc]
+        piece.mapped(itemgetter(slice(a, b)))
         for a, b in runs_of(keep)
         if (b - a) * piece.period >= _SHORTEST_PIECE
     ]
