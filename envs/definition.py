@@ -1,7 +1,5 @@
 """A task's definition: arguments and spaces, and the functions of the state of n worlds."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -240,8 +238,7 @@ class TaskDefinition:
 
         Here: 2.5 m from the reference, on the floor, tilted by 70 degrees, or not finite.
         """
-        lost: Flags = ~(s.flying & (s.position[:, 2] > 0.0) & (s.distance <= LOST_OFFSET))
-        return lost
+        return ~(s.flying & (s.position[:, 2] > 0.0) & (s.distance <= LOST_OFFSET))
 
     def info(self, s: State) -> dict[str, Any]:
         """Return entries of ``info``, arrays (n, ...): the truth behind the observation.
@@ -269,8 +266,7 @@ class TaskDefinition:
     def declared(self) -> Any:
         """The declared vehicle, with the scenario's measurement of the pose."""
         mocap = Mocap(1.0 / TICK, self.scenario.sigma_position, self.scenario.sigma_attitude)
-        declared: Vehicle = replace(self.vehicle, mocap=mocap)
-        return declared
+        return replace(self.vehicle, mocap=mocap)
 
     @property
     def tuning(self) -> UKFTuning:

@@ -1,7 +1,5 @@
 """The fan-tracking environment."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
@@ -184,8 +182,7 @@ class FanTrackingEnv(FanTask):
         """Return whether each vehicle is lost (n,)."""
         away = np.abs(s.position - s.reference[:, :3])
         near = (away[:, 0] <= AWAY) & (away[:, 2] <= AWAY)
-        lost: Flags = ~(s.flying & near & (np.abs(self.off_axis(s)[:, 0]) <= LOST_OFFSET))
-        return lost
+        return ~(s.flying & near & (np.abs(self.off_axis(s)[:, 0]) <= LOST_OFFSET))
 
     def info(self, s: State) -> dict[str, Any]:
         """Return the fan's motion and the true offset, force and torque."""

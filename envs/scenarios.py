@@ -1,7 +1,5 @@
 """The scenarios of the fan-tracking tasks, and those of a user's own, as YAML files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

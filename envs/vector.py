@@ -212,8 +212,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     @property
     def truncated(self) -> Flags:
         """Whether each episode (n,) has had its last decision."""
-        over: Flags = self.episodes.decisions >= self.max_episode_steps
-        return over
+        return self.episodes.decisions >= self.max_episode_steps
 
     def fly(self, actions: Any, which: Flags) -> None:
         """Fly a decision in some environments with actions (num_envs, n).

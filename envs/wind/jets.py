@@ -5,8 +5,6 @@ Each rotor blows the mean jet of ``dynamics.mean_jet``. The momentum fluxes of o
 as velocity.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -11,8 +11,6 @@ from a field of its own with the stated spectrum along the mean wind. The field 
 hypothesis): a point sees ``u(x - U t)``.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -155,7 +153,6 @@ class Turbulence(CompiledWind):
         c, s = math.cos(heading), math.sin(heading)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         table[:, :3], table[:, 4:] = table[:, :3] @ turn.T, table[:, 4:] @ turn.T
-        table = np.ascontiguousarray(table)
         parameters = np.array([(0, len(table), carried)], dtype=TURBULENCE)
         super().__init__("waves", parameters, {"waves": table})
 
