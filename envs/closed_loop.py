@@ -386,9 +386,10 @@ class ClosedLoop:
             ticks: even: the winds blow from the first.
             fan_path: the fan's place meanwhile, as in ``run``.
         """
-        self.record[0]["ticks"], self._settled, self.record[0]["kind"] = -ticks, ticks, BESIDE
+        loop = self.record[0]
+        loop["ticks"], self._settled, loop["kind"] = -ticks, ticks, BESIDE
         self.run(rng.standard_normal((ticks, self.noise_size)), fan_path)
-        self.record[0]["kind"] = self.kind
+        loop["kind"] = self.kind
 
     def run(self, noise: Array, fan_path: Array | None = None) -> None:
         """Run one tick for each row of ``noise``.

@@ -279,18 +279,13 @@ class TaskDefinition:
         """
         return Briefing(self.vehicle)
 
-    def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
+    def make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
         """Return the closed loop of a true vehicle and the undeclared effects, with a filter of the
         declared vehicle.
         """
         declared = self.declared
         drawn: dict[str, Any] = {
             n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__
-        }
-        defaults = {
-            "accelerometer": ACCELEROMETER if self.observation in FELT else self.accelerometer,
-            "gains": self.gains,
-            "model_in_loop": bool(self.model_in_loop),
         }
         self._made = ClosedLoop(
             declared,
@@ -304,7 +299,9 @@ class TaskDefinition:
             stages=self.stages,
             like=self._made,
             rotors=self.truth.positions,  # lanes share one wind's stations
-            **{**defaults, **given},
+            accelerometer=ACCELEROMETER if self.observation in FELT else self.accelerometer,
+            gains=self.gains,
+            model_in_loop=bool(self.model_in_loop),
         )
         return self._made
 
@@ -373,8 +370,8 @@ class TaskDefinition:
 
 def _ticks(task: str, decision_hz: float) -> int:
     """Return the ticks of a decision."""
-    hz = decision_hz if isinstance(decision_hz, int | float) and decision_hz > 0 else 0.0
-    ticks = 1.0 / (TICK * hz) if hz else 0.0
+    is_rate = isinstance(decision_hz, int | float) and decision_hz > 0
+    ticks = 1.0 / (TICK * decision_hz) if is_rate else 0.0
     if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
         raise InputError(
             f"{task}: decision_hz must be 200 Hz over a whole number (200, 100, 50, 40, 25, 12.5), "

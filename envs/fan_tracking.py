@@ -9,9 +9,9 @@ import numpy as np
 from ..controllers.observation import MAX_COMMAND
 from ..dynamics.motion import Array
 from ..runtime.errors import InputError, unknown_name
-from .definition import EPISODE_SECONDS, LOST_OFFSET
+from .definition import LOST_OFFSET
 from .fan import Fan
-from .fan_task import AWAY, DISTANCE, LIMITS, SCALES, FanTask
+from .fan_task import AWAY, LIMITS, SCALES, FanTask
 from .scenarios import draw_fan_path
 from .state import Flags, State
 
@@ -200,4 +200,3 @@ class FanTrackingEnv(FanTask):
 
 
 fan_tracking_vector = FanTrackingEnv.vector
-__all__ = ["DISTANCE", "EPISODE_SECONDS", "LOST_OFFSET", "SCALES", "FanTrackingEnv"]
