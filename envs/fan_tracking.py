@@ -149,7 +149,7 @@ class FanTrackingEnv(FanTask):
                 raise InputError(
                     f"FanTracking: fan_path must return {n} finite numbers for {n} times"
                 )
-        offset = float(rng.uniform(*self.scenario.offset) * rng.choice([-1.0, 1.0]))
+        offset = rng.uniform(*self.scenario.offset) * rng.choice([-1.0, 1.0])
         path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
         return label, path, np.array([offset, 0.0])
 

@@ -184,6 +184,6 @@ def draw_fan_path(scenario: Scenario, rng: np.random.Generator, t: Array) -> tup
     0.8-1.6 m.
     """
     motion = scenario.motions[rng.integers(len(scenario.motions))]
-    speed, sign = rng.uniform(*scenario.speed), float(rng.choice([-1.0, 1.0]))
+    speed, sign = rng.uniform(*scenario.speed), rng.choice([-1.0, 1.0])
     travel = rng.uniform(0.5, 1.2)
     return motion, sign * PLACES[motion](speed, travel, t)
