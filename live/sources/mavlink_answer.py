@@ -67,6 +67,6 @@ def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
         return None
     inverse = np.linalg.inv(drag)
     force = output.estimate.covariance[15:17, 15:17].copy()
-    np.fill_diagonal(force, output.std[:2] ** 2)  # of noise and of the vehicle's uncertainty
+    np.fill_diagonal(force, output.std[:2] ** 2)  # noise and the vehicle's uncertainty
     covariance = inverse @ force @ inverse.T
     return inverse @ output.estimate.force[:2], np.sqrt(np.diagonal(covariance))
