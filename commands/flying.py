@@ -39,7 +39,7 @@ def fly(
 
     from ..dynamics.effects import parse_setting
     from ..envs.captions import captioned
-    from ..envs.fan_tracking import EPISODE_SECONDS
+    from ..envs.definition import EPISODE_SECONDS
     from ..envs.gif import write_gif
     from ..evaluation.benchmark import Request
     from ..evaluation.episodes import fly_episode, time_series

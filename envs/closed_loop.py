@@ -104,8 +104,7 @@ _NO_JET: Array = np.zeros((2, COUNT_X, COUNT_R))
 @lru_cache(maxsize=8)
 def _jet(radius: float, hub_radius: float) -> Array:
     """Return the tables (2, COUNT_X, COUNT_R) of axial and radial speed, one for all loops."""
-    tables: Array = np.stack(jet_table(radius, hub_radius))
-    return tables
+    return np.stack(jet_table(radius, hub_radius))
 
 
 class World(NamedTuple):
@@ -152,21 +151,13 @@ class Stage:
             raise unknown_name("stage", self.before, STAGES, f"stage {self.name!r}: before")
 
 
-def _core_stages(*numbers: int) -> Callable[[ClosedLoop], None]:
-    def run(loop: ClosedLoop) -> None:
-        for number in numbers:
-            loop.run_stage(number)
-
-    return run
-
-
 # the kit's own stages, in their order
 STAGES: dict[str, Callable[[ClosedLoop], object]] = {
     "wind": lambda loop: loop.blow(),
-    "sense": _core_stages(SENSE),
-    "estimate": _core_stages(ESTIMATE),
-    "steer": _core_stages(STEER),
-    "actuate": _core_stages(ACTUATE, FEEL),
+    "sense": lambda loop: loop.run_stage(SENSE),
+    "estimate": lambda loop: loop.run_stage(ESTIMATE),
+    "steer": lambda loop: loop.run_stage(STEER),
+    "actuate": lambda loop: loop.run_stage(ACTUATE, FEEL),
     "move": lambda loop: loop.move(),
 }
 
@@ -234,7 +225,10 @@ class ClosedLoop:
             raise unknown_name("estimator", estimator, ESTIMATORS)
         self.true = declared if true is None else true
         plant, self._body = plant_record(self.true, settings or PlantSettings())
-        self.model, self.data = self._make_world(drawn, like)
+        if like is None or not is_same_body(like._body, self._body):
+            self.model, self.data = load_world(self._body, drawn)
+        else:
+            self.model, self.data = like.model, mujoco.MjData(like.model)
         self.own_stages = tuple(stages)
         self.record = np.zeros(1, dtype=LOOP)
         loop = self.record[0]
@@ -260,13 +254,6 @@ class ClosedLoop:
         self._settled = 0  # ticks before the episode
         self._carried = tuple(self.__dict__)  # to a copy, where ``_bind`` adds the rest
         self._bind()
-
-    def _make_world(
-        self, drawn: bool, like: ClosedLoop | None
-    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        if like is not None and is_same_body(like._body, self._body):
-            return like.model, mujoco.MjData(like.model)
-        return load_world(self._body, drawn)
 
     def _bind(self) -> None:
         """Lay Python's arrays over the record and MuJoCo's data, and find the core's functions."""
@@ -399,9 +386,10 @@ class ClosedLoop:
             ticks: even: the winds blow from the first.
             fan_path: the fan's place meanwhile, as in ``run``.
         """
-        self.record[0]["ticks"], self._settled, self.record[0]["kind"] = -ticks, ticks, BESIDE
+        loop = self.record[0]
+        loop["ticks"], self._settled, loop["kind"] = -ticks, ticks, BESIDE
         self.run(rng.standard_normal((ticks, self.noise_size)), fan_path)
-        self.record[0]["kind"] = self.kind
+        loop["kind"] = self.kind
 
     def run(self, noise: Array, fan_path: Array | None = None) -> None:
         """Run one tick for each row of ``noise``.
@@ -437,9 +425,10 @@ class ClosedLoop:
                     stage(self)
                 raise_errors()
 
-    def run_stage(self, number: int) -> None:
-        """Run a stage of the core in the present tick."""
-        _core.run_stage(self.address, number, self.fan_path, self.noise, self.row)
+    def run_stage(self, *numbers: int) -> None:
+        """Run stages of the core in the present tick."""
+        for number in numbers:
+            _core.run_stage(self.address, number, self.fan_path, self.noise, self.row)
 
     def blow(self) -> None:
         """Write the winds at the vehicle's stations into ``air``, every second tick."""

@@ -1,7 +1,5 @@
 """A task's definition: arguments and spaces, and the functions of the state of n worlds."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -240,8 +238,7 @@ class TaskDefinition:
 
         Here: 2.5 m from the reference, on the floor, tilted by 70 degrees, or not finite.
         """
-        lost: Flags = ~(s.flying & (s.position[:, 2] > 0.0) & (s.distance <= LOST_OFFSET))
-        return lost
+        return ~(s.flying & (s.position[:, 2] > 0.0) & (s.distance <= LOST_OFFSET))
 
     def info(self, s: State) -> dict[str, Any]:
         """Return entries of ``info``, arrays (n, ...): the truth behind the observation.
@@ -269,8 +266,7 @@ class TaskDefinition:
     def declared(self) -> Any:
         """The declared vehicle, with the scenario's measurement of the pose."""
         mocap = Mocap(1.0 / TICK, self.scenario.sigma_position, self.scenario.sigma_attitude)
-        declared: Vehicle = replace(self.vehicle, mocap=mocap)
-        return declared
+        return replace(self.vehicle, mocap=mocap)
 
     @property
     def tuning(self) -> UKFTuning:
@@ -283,18 +279,13 @@ class TaskDefinition:
         """
         return Briefing(self.vehicle)
 
-    def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
+    def make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
         """Return the closed loop of a true vehicle and the undeclared effects, with a filter of the
         declared vehicle.
         """
         declared = self.declared
         drawn: dict[str, Any] = {
             n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__
-        }
-        defaults = {
-            "accelerometer": ACCELEROMETER if self.observation in FELT else self.accelerometer,
-            "gains": self.gains,
-            "model_in_loop": bool(self.model_in_loop),
         }
         self._made = ClosedLoop(
             declared,
@@ -308,7 +299,9 @@ class TaskDefinition:
             stages=self.stages,
             like=self._made,
             rotors=self.truth.positions,  # lanes share one wind's stations
-            **{**defaults, **given},
+            accelerometer=ACCELEROMETER if self.observation in FELT else self.accelerometer,
+            gains=self.gains,
+            model_in_loop=bool(self.model_in_loop),
         )
         return self._made
 
@@ -377,8 +370,8 @@ class TaskDefinition:
 
 def _ticks(task: str, decision_hz: float) -> int:
     """Return the ticks of a decision."""
-    hz = decision_hz if isinstance(decision_hz, int | float) and decision_hz > 0 else 0.0
-    ticks = 1.0 / (TICK * hz) if hz else 0.0
+    is_rate = isinstance(decision_hz, int | float) and decision_hz > 0
+    ticks = 1.0 / (TICK * decision_hz) if is_rate else 0.0
     if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
         raise InputError(
             f"{task}: decision_hz must be 200 Hz over a whole number (200, 100, 50, 40, 25, 12.5), "

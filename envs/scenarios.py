@@ -1,11 +1,9 @@
 """The scenarios of the fan-tracking tasks, and those of a user's own, as YAML files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,18 +120,18 @@ def draw_vehicle(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
     """
     known = vehicle.uncertainty
 
-    def factor(share: float, size: int = 1) -> Array:
+    def factor(share: float, size: int | None = None) -> Any:
         return np.exp(share * rng.standard_normal(size))
 
     command = factor(known.command * (vehicle.omega_source == "commanded"))
-    arm, mass = factor(known.arm_l), factor(known.mass)
+    arm = factor(known.arm_l)
     return replace(
         vehicle,
-        mass=vehicle.mass * mass.item(),
+        mass=vehicle.mass * factor(known.mass),
         k=vehicle.k * command * factor(known.thrust) * factor(known.rotor, 4),
         p=vehicle.p * command * factor(known.torque),
         inertia=vehicle.inertia * factor(known.inertia),
-        arm_l=vehicle.arm_l * arm.item(),
+        arm_l=vehicle.arm_l * arm,
         rotor_positions=vehicle.positions * arm,
     )
 
@@ -186,6 +184,6 @@ def draw_fan_path(scenario: Scenario, rng: np.random.Generator, t: Array) -> tup
     0.8-1.6 m.
     """
     motion = scenario.motions[rng.integers(len(scenario.motions))]
-    speed, sign = rng.uniform(*scenario.speed), float(rng.choice([-1.0, 1.0]))
+    speed, sign = rng.uniform(*scenario.speed), rng.choice([-1.0, 1.0])
     travel = rng.uniform(0.5, 1.2)
     return motion, sign * PLACES[motion](speed, travel, t)

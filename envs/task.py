@@ -1,7 +1,5 @@
 """The base of all tasks: array functions over n worlds, for one environment or a vector."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

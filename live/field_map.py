@@ -70,8 +70,14 @@ class FieldMap:
         poses = self._sections.get("position", ())
         named = any(name in fields for part in poses for name in part.columns)  # a lost pose
         sample.whole = sample.has_motors and (sample.has_pose or named)
+        there = {
+            "pose": sample.has_pose,
+            "motors": sample.has_motors,
+            "imu": sample.has_imu,
+            "battery": sample.voltage is not None,
+        }
         if not sample.whole:
-            sample.kind = _kind(sample)
+            sample.kind = "+".join(name for name, is_there in there.items() if is_there)
         if not sample.kind:
             raise Malformed(
                 f"none of the fields that are looked for; found {', '.join(fields)[:200]}; "
@@ -117,24 +123,13 @@ class FieldMap:
     def _attitude(self, part: Attitude, values: Array) -> Array:
         quaternion = quaternions(part, values[None])
         if not part.euler:
-            length = float(np.linalg.norm(quaternion))
+            length = np.linalg.norm(quaternion)
             if not abs(length - 1.0) <= NORM_TOLERANCE:
                 raise Malformed(
                     f"a quaternion of length {length:.4g}; expected 1 within {NORM_TOLERANCE:g}"
                 )
             quaternion = quaternion / length
         return np.asarray(in_kit_axes(self.map, part, quaternion)[0])
-
-
-def _kind(sample: Measurement) -> str:
-    """Return the names of the parts of a row; empty: there is none."""
-    parts = {
-        "pose": sample.has_pose,
-        "motors": sample.has_motors,
-        "imu": sample.has_imu,
-        "battery": sample.voltage is not None,
-    }
-    return "+".join(name for name, there in parts.items() if there)
 
 
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:

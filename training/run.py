@@ -3,6 +3,7 @@
 import platform
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -60,17 +61,15 @@ def progress_from(data: Any, path: Path) -> Progress:
     Raises:
         InputError: the file holds something else.
     """
-    try:
+    with suppress(InputError):
         progress = checked(Progress, data, str(path))
-    except InputError:
-        progress = None
-    counts = {len(progress.steps), len(progress.rmse_m), len(progress.lost)} if progress else ()
-    if progress is None or len(counts) > 1 or not -1 <= progress.best < len(progress.steps):
-        raise InputError(
-            f"{path}: does not hold the progress of a training "
-            f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
-        )
-    return progress
+        count = len(progress.steps)
+        if count == len(progress.rmse_m) == len(progress.lost) and -1 <= progress.best < count:
+            return progress
+    raise InputError(
+        f"{path}: does not hold the progress of a training "
+        f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
+    )
 
 
 def read_progress(folder: Path) -> Progress | None:
@@ -80,12 +79,11 @@ def read_progress(folder: Path) -> Progress | None:
         InputError: the file cannot be read, or holds something else.
     """
     path = folder / "progress.json"
-    if not path.exists():
-        return None
-    return progress_from(read_json(path, "the progress of a training"), path)
+    told = "the progress of a training"
+    return progress_from(read_json(path, told), path) if path.exists() else None
 
 
-def versions() -> dict[str, str]:
+def _versions() -> dict[str, str]:
     """Return the versions behind a trained policy."""
     return {"windwrench": __version__, "python": platform.python_version(), **package_versions()}
 
@@ -99,7 +97,7 @@ def origin(algorithm: str, scenario: str, seed: int, steps: int, activation: str
         "steps": steps,
         "activation": activation,
         "squash": algorithm in _SQUASHED,
-        "versions": versions(),
+        "versions": _versions(),
     }
 
 
@@ -118,7 +116,7 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
     }
 
 
-def flight_of(task: TaskDefinition) -> dict[str, Any]:
+def flight_of(task: TaskDefinition) -> Any:
     """Return a task's numbers for a flight of its policy elsewhere: the kind of observation (None:
     the task's own) with limits and divisors, the action with its commands, decisions a second, and
     the gains of the flight loop.
@@ -133,8 +131,7 @@ def flight_of(task: TaskDefinition) -> dict[str, Any]:
         "limits": task.kept,
         "divisors": task.divisors,
     }
-    entries: dict[str, Any] = plain(numbers)
-    return entries
+    return plain(numbers)
 
 
 def validate(
@@ -215,7 +212,7 @@ class Run:
                     f"{self.folder}: holds a run with another configuration, scenario or seed; "
                     "give another --out, or delete it"
                 )
-        write_json({**run, "versions": versions()}, path)
+        write_json({**run, "versions": _versions()}, path)
 
     def resume(self, progress: Progress) -> None:
         """Continue from the progress of an earlier part of the run."""
@@ -231,11 +228,12 @@ class Run:
     def card(self, steps: int) -> dict[str, Any]:
         """Return the card of the policy after ``steps`` decisions."""
         card = card_of(self.config, self.scenario, self.seed, steps) | self.own
-        if "task" not in card:
-            return card
-        del card["features"], card["repeat"]
-        world = self.judge.unwrapped
-        return card | ({"flight": flight_of(world)} if isinstance(world, TaskDefinition) else {})
+        if "task" in card:
+            del card["features"], card["repeat"]
+            world = self.judge.unwrapped
+            if isinstance(world, TaskDefinition):
+                card["flight"] = flight_of(world)
+        return card
 
     def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
         """Validate a policy, and save the policy as the last, and as the best if no earlier policy

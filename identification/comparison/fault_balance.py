@@ -67,7 +67,7 @@ class FaultBalance:
     def fit(self, *step: Array) -> None:
         """Fit the channels' noise to the residual of no change, or beside a ``step`` (N,)."""
         self.channels = [
-            BalanceChannel(columns, self.activity, self.follows, *step) for columns in self.columns
+            _BalanceChannel(columns, self.activity, self.follows, *step) for columns in self.columns
         ]
 
     def nothing(self) -> float:
@@ -96,7 +96,7 @@ def _ramp(part: float, lag: float) -> Array:
     return np.asarray(np.diff(area) / STEP)
 
 
-class BalanceChannel:
+class _BalanceChannel:
     """Innovations of a channel's measurement and moment, the free columns projected out."""
 
     def __init__(self, columns: Array, activity: Array, follows: Mask, *step: Array) -> None:

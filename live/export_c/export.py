@@ -104,12 +104,12 @@ def export_c(
     f = made.record[0]
     names = sorted({str(effect.model) for kind in effects.values() for effect in kind})
     headers = [f"core/{header}.hpp", *(f"core/effects/{name}.hpp" for name in names)]
-    if names:
-        headers.append("core/effects/called.hpp")
-    if flown is not None and flown["kind"] == "tracker":
-        headers.append("core/tracker.hpp")
-    if flight is not None:
-        headers.append("core/flight_loop.hpp")
+    needed = {
+        "effects/called": names,
+        "tracker": flown and flown["kind"] == "tracker",
+        "flight_loop": flight,
+    }
+    headers += [f"core/{name}.hpp" for name, whether in needed.items() if whether]
     room = _room(effects)
     context: dict[str, Any] = {
         "version": __version__,
@@ -121,10 +121,8 @@ def export_c(
         "rate": rate,
         "f": f,
         "filter": made,
-        "body": f["body"],
         "settings": f[list(fields_between("gated", "period"))],
         "first_variances": np.diag(default_covariance(vehicle, tuning)),
-        "hover_speed": f["last_speeds"][0],
         "full_battery": vehicle.voltage_ref,
         "headers": headers,
         "effects": effects,

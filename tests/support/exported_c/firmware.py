@@ -47,7 +47,7 @@ def fly(exported, flight, folder):
     columns = [np.atleast_2d(flight[name].T).T for name in _COLUMNS if name in flight]
     rows = np.concatenate(columns, axis=1)
     unmeasured = "12345.678"  # a number that no flight has, where nothing was measured
-    values = table(np.where(np.isfinite(rows), rows, float(unmeasured)), "single", "flight")
+    values = table(np.where(np.isfinite(rows), rows, float(unmeasured)), "flight")
     values = values.replace(f"{unmeasured}f", "NAN")
     (folder / "flight.h").write_text(
         f"#include <math.h>\n#define FLIGHT_STEPS {len(rows)}\n"
