@@ -91,8 +91,8 @@ def test_deviations_hold_a_coefficient_that_changes(blocks):
         x[:, :, 1] += 0.5 * rng.standard_normal(40)[flight, None] * x[:, :, 0]
         sums = x.swapaxes(1, 2) @ x
         one, none = np.ones(1), np.arange(0)
-        base = Base([column], one, -inf * one, inf * one, sums.sum(axis=0), sums, np.arange(1),
-                    flight, 0.0, frozenset(), none, one, [], {})  # fmt: skip
+        base = Base([column], one, -inf * one, inf * one, sums.sum(axis=0), sums, flight,
+                    np.arange(1), 0.0, frozenset(), none, one, [], {})  # fmt: skip
         found = base.marginal([column], none).evidence([0])
         wide = base.scatter([column], found.mode, 1.0)
         off.append(found.mode / found.std / np.array([1.0, wide[0]]))
@@ -172,12 +172,10 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     """A flight in which thrust and attitude are what the forces ask for; rotors by commands."""
     rng = default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)
-    rate = (0.9, 1.4, 0.5)
-    size = (1.2, 0.7, 0.4)
-    phase = (0.0, 0.6, 1.1)
-    angle = [np.outer(t, [w, 1.7 * w]) + p for w, p in zip(rate, phase, strict=True)]
-    place = [s * np.sin(a) @ [1.0, 0.5] for s, a in zip(size, angle, strict=True)]
-    place = np.column_stack(place) + np.array([0.0, 0.0, 2.0])
+    angle = np.outer(t, [0.9, 1.4, 0.5])
+    phase = [0.0, 0.6, 1.1]
+    place = [1.2, 0.7, 0.4] * (np.sin(angle + phase) + 0.5 * np.sin(1.7 * angle + phase))
+    place[:, 2] += 2.0
     speed = np.gradient(place, t, axis=0)
     gust = 3e-4 * VEHICLE.weight * np.cumsum(rng.standard_normal(place.shape), axis=0)
     gust -= np.linspace(0.0, 1.0, len(t))[:, None] * gust[-1]
