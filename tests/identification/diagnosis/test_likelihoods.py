@@ -172,12 +172,10 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     """A flight in which thrust and attitude are what the forces ask for; rotors by commands."""
     rng = default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)
-    rate = (0.9, 1.4, 0.5)
-    size = (1.2, 0.7, 0.4)
-    phase = (0.0, 0.6, 1.1)
-    angle = [np.outer(t, [w, 1.7 * w]) + p for w, p in zip(rate, phase, strict=True)]
-    place = [s * np.sin(a) @ [1.0, 0.5] for s, a in zip(size, angle, strict=True)]
-    place = np.column_stack(place) + np.array([0.0, 0.0, 2.0])
+    angle = np.outer(t, [0.9, 1.4, 0.5])
+    phase = [0.0, 0.6, 1.1]
+    place = [1.2, 0.7, 0.4] * (np.sin(angle + phase) + 0.5 * np.sin(1.7 * angle + phase))
+    place[:, 2] += 2.0
     speed = np.gradient(place, t, axis=0)
     gust = 3e-4 * VEHICLE.weight * np.cumsum(rng.standard_normal(place.shape), axis=0)
     gust -= np.linspace(0.0, 1.0, len(t))[:, None] * gust[-1]

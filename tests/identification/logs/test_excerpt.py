@@ -4,16 +4,14 @@ found in a short one."""
 import numpy as np
 import pytest
 
-from windwrench.identification.logs.flight_log import LONGEST, FlightLog, excerpt
+from tests.support.flown import resting
+from windwrench.identification.logs.flight_log import LONGEST, excerpt
 from windwrench.identification.motion.signals import log_signals
 
 
 def long_log(seconds, period=0.02):
     t = 5.0 + period * np.arange(round(seconds / period))
-    ones = np.ones((len(t), 4))
-    return FlightLog(
-        t, np.zeros((len(t), 3)), ones * [1.0, 0, 0, 0], 300.0 * ones, voltage=t, name="long"
-    )
+    return resting(t, voltage=t, name="long")
 
 
 def test_what_is_short_stays_whole():

@@ -12,10 +12,9 @@ import pytest
 from numpy.linalg import norm
 from numpy.random import default_rng
 from numpy.testing import assert_array_equal
-from scipy.spatial.transform import Rotation
 
 from tests.support.data_paths import crazyswarm2_file
-from tests.support.flown import VEHICLE, recorded, without_pose
+from tests.support.flown import VEHICLE, noisy, recorded, resting, without_pose
 from tests.support.hostile_conventions import permuted
 from tests.support.outcomes import refused
 from tests.support.parameters import mostly_slow
@@ -24,7 +23,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.evidence.trials.practice_flights import practise
 from windwrench.identification.logs.evidence import Evidence, log_ranking
-from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
+from windwrench.identification.logs.flight_log import with_rows, write_log
 from windwrench.identification.logs.magnitudes import without_broken_speeds
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
@@ -104,13 +103,9 @@ def test_a_quiet_hover_decides_nothing():
     """Without excitation no order of rotors explains more than another."""
     rng = default_rng(0)
     t = np.arange(0.0, 15.0, 0.005)
-    attitude = Rotation.from_rotvec(0.005 * rng.standard_normal((len(t), 3))).as_quat(
-        scalar_first=True
-    )
-    rotors = VEHICLE.hover_rate + rng.standard_normal((len(t), 4))
-    log = FlightLog(
-        t, np.array([0.0, 0.0, 1.0]) + 0.001 * rng.standard_normal((len(t), 3)), attitude, rotors
-    )
+    log = resting(t, rotor_speeds=VEHICLE.hover_rate + rng.standard_normal((len(t), 4)))
+    position, quaternion = noisy(VEHICLE.mocap, rng, log.position, log.quaternion)
+    log = replace(log, position=position, quaternion=quaternion)
     assert screen_log(log, VEHICLE)[1] == ()
     assert Evidence.of_log(log, VEHICLE).fit(DECLARED).torque > 0.5  # there is nothing to tell
 
