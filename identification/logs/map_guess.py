@@ -48,7 +48,7 @@ from .log_map import (
     Sensor,
     TimeColumn,
 )
-from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
+from .magnitudes import DOUBTFUL, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
 from .table import Array, ArrayMap, Data, NamedArrays, Names, Table
 from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
@@ -172,7 +172,7 @@ class _Guessing:
         names = take_apart(table.header, table.units)
         self.data = _numbers_of(table, names)
         self.clock = _time_column(names, self.data)
-        self.t: Array = 0.01 * np.arange(table.rows, dtype=np.float64)
+        self.t: Array = 0.01 * np.arange(0.0, table.rows)
         if self.clock is not None:
             # a column of nanoseconds may stand beside a clock of whole seconds
             key = re.sub("(^|_)secs?$", "", self.clock.base)
@@ -300,8 +300,8 @@ class _Guessing:
         steps = np.diff(known)
         step = max(float(np.median(steps[steps > 0.0])), 1e-300)
         guessed, sure = likely_unit("time", step)
-        if clock.unit in units:  # an unusual rate is no reason to doubt a name
-            sure &= not within(1.0 / (step * units[clock.unit]), MAGNITUDES.named_rates)
+        if clock.unit in units:  # an unusual rate (Hz) is no reason to doubt a name
+            sure &= not within(1.0 / (step * units[clock.unit]), (0.5, 20000.0))
         choice = guessed, sure, f"{1.0 / (step * units[guessed]):.4g} rows a second"
         unit = self.unit("time", "s" if nanoseconds else clock.unit, choice)
         t = (raw - known[0]) * units[unit]
@@ -379,7 +379,7 @@ class _Guessing:
         if group.unit in units or is_gravity:
             guessed = guessed if is_gravity else group.unit
             unit = self.unit("accelerometer", group.unit, (guessed, True, why))
-            if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
+            if unit == group.unit and not within(size * units[unit] / _G, DOUBTFUL):
                 self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:
             scale = float(f"{_G / size:.6g}")
@@ -432,8 +432,10 @@ class _Guessing:
             sure = self.ranking is None and ("accelerometer", "body") in told
             self.say("gyro", "body", sure, "as the accelerometer's")
             high = float(np.nanquantile(np.abs(self.values(group.columns)), 0.995))
-            unit = "deg/s" if high > MAGNITUDES.slow_gyro else "rad/s"
-            guessed = unit, high > MAGNITUDES.fast_gyro, f"its fast values are {high:.3g}"
+            # 99.5 % of a flight's angular velocities are less than 6 rad/s; 35 rad/s
+            # (2000 deg/s) is the range of usual gyros
+            unit = "deg/s" if high > 6.0 else "rad/s"
+            guessed = unit, high > 35.0, f"its fast values are {high:.3g}"
         unit = self.unit("gyro", group.unit, guessed)
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
 
@@ -484,7 +486,7 @@ class _Guessing:
         evidence = Evidence(self.t, np.square(values), **motion)
         if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
-        ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
+        ways = [replace(best, rotors=order) for order in permutations(ROTORS)]
         ranking = RankedFits(map(evidence.fit, ways))
         left, lead, order = ranking.fit.torque, ranking.other("rotors")[1], ranking.best.motors
         names = order_names(order)

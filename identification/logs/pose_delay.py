@@ -45,24 +45,13 @@ AHEAD = 0.03
 # s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
 _LAGS = 0.01 * np.arange(11)
 _STEP = 0.001  # s, of the search
-_DELAYS = _STEP * np.arange(-300, 301, dtype=np.float64)
+_DELAYS = _STEP * np.arange(-300.0, 301.0)
 _BAND_HZ = (0.8, 10.0)
-_SHARE_OF_RATE = 0.4  # of the poses' rate, the highest frequency
 _SEGMENT = 2.0  # s, of a spectrum
-_PERIOD = 0.01  # s, the shortest of the spectra's clock
-_INDEPENDENT = 0.55  # of half overlapping segments
-_GAP = 0.1  # s (or 3.5 periods) without a pose end a piece
-_ROUNDS = 10  # of the search, each around the delay of the last
 _PARTS = 5  # of the flight; the scatter of their delays is the uncertainty
 _FEWEST = 10  # segments
-_VISIBLE = 40.0  # deviance explained by the moments, at least
-_BEYOND = 9.0  # deviance against an honest delay and any lag
-_NOISE_SHARE = 0.25  # of the poses' rate: above is noise alone
 # correlation of second differences with the next ones: -2/3 of white noise, above 0 of motion
 _WHITE = -0.5
-_APART = 0.01  # s, of the differences, at least
-_FINEST = 0.005  # s, between two delays of an answer
-_FEWEST_POSES = 100
 _ANSWERED = 6.0  # standard deviations of a chance correlation
 
 Spectra = NDArray[np.complex128]
@@ -107,7 +96,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     """
     log = excerpt(log)
     late = 0.0
-    for _ in range(_ROUNDS):  # a window over delayed signals cuts the two of them differently
+    for _ in range(10):  # a window over delayed signals cuts the two of them differently
         segments = _segments(log, vehicle, late)
         if segments is None:
             return None
@@ -121,7 +110,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     whole = response.weight * np.square(np.abs(response.gain))
     left = np.sum(whole) - best
     scale = max(1.0, left / (2.0 * whole.size - 3.0))  # beyond what noise leaves
-    if best < _VISIBLE * scale:
+    if best < 40.0 * scale:
         return None
     # gusts answered by the loop leave a response of another shape, and turn its phase by as much
     misfit = np.sqrt(left / np.sum(np.square(response.omega) * whole))
@@ -132,7 +121,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     as_good = max(
         np.max(response.explained(honest[honest <= _LAGS[-1] - lag] - late, lag)) for lag in _LAGS
     )
-    return _PoseDelay(late, std, bool(best - as_good > _BEYOND * scale))
+    return _PoseDelay(late, std, bool(best - as_good > 9.0 * scale))
 
 
 def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> _Response:
@@ -140,7 +129,8 @@ def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> 
     xx, yy = (np.mean(np.square(np.abs(z)), axis=0) + 1e-300 for z in (moment, turning))
     xy = np.mean(np.conj(moment) * turning, axis=0)
     left = np.maximum(yy - np.square(np.abs(xy)) / xx, 1e-12 * yy)
-    variance = left / (2.0 * _INDEPENDENT * len(moment)) + noise
+    # a half overlapping segment counts for 0.55 independent ones
+    variance = left / (1.1 * len(moment)) + noise
     return _Response(omega, xy / xx, xx / variance)
 
 
@@ -155,15 +145,16 @@ def _segments(
     if len(rows) < _FEWEST:
         return None
     step = median_step(log.t[rows])
-    period = max(_PERIOD, log.period)
+    period = max(0.01, log.period)
     count = round(_SEGMENT / period)
     inertia = np.eye(3) if vehicle is None else vehicle.inertia
     window = np.hanning(count)[:, None]
     moments = _moments(log, vehicle)
     transforms, noises = [], []
-    for piece in unbroken(log.t, rows, max(_GAP, 3.5 * step), 60, _SEGMENT):
+    for piece in unbroken(log.t, rows, max(0.1, 3.5 * step), 60, _SEGMENT):
         t, angles = log.t[piece], _angles(log, piece)
-        noises.append(robust_std(high_pass(angles, _NOISE_SHARE)))
+        # above a quarter of the poses' rate is noise alone
+        noises.append(robust_std(high_pass(angles, 0.25)))
         first = max(t[0], log.t[0] + late) + period
         last = min(t[-1], log.t[-1] + late) - period
         at = np.arange(first, last, period)
@@ -178,8 +169,8 @@ def _segments(
             transforms.append(np.fft.rfft(part, axis=1))
     if len(transforms) < _FEWEST:
         return None
-    frequency = np.asarray(np.fft.rfftfreq(count, period), dtype=np.float64)
-    highest = min(_BAND_HZ[1], _SHARE_OF_RATE / step)
+    frequency = np.fft.rfftfreq(count, period).astype(float)
+    highest = min(_BAND_HZ[1], 0.4 / step)
     band = (frequency >= _BAND_HZ[0]) & (frequency <= highest)
     frequency = frequency[band, None]
     # white noise of the angles, through the mean over a period and two differences
@@ -224,8 +215,8 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
     """
     log = excerpt(log)
     rows = np.flatnonzero(log.valid)
-    step, fine = median_step(log.t[rows]), max(log.period, _FINEST)
-    apart = max(1, round(_APART / step))  # rows
+    step, fine = median_step(log.t[rows]), max(log.period, 0.005)
+    apart = max(1, round(0.01 / step))  # rows
     width = apart * step
     most = round(FARTHEST / fine)
     lags = fine * np.arange(-most, most + 1)
@@ -234,7 +225,7 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
     turns = moments - moments.mean(axis=0)
     for _ in range(2):
         turns = running_integral(turns, log.t)
-    for piece in unbroken(log.t, rows, 1.5 * step, _FEWEST_POSES):
+    for piece in unbroken(log.t, rows, 1.5 * step, 100):
         t, angles = log.t[piece], _angles(log, piece)[:, :2]
         at = t[apart:-apart]
         noise = angles[2 * apart :] - 2.0 * angles[apart:-apart] + angles[: -2 * apart]

@@ -35,8 +35,6 @@ BIAS_STD = 0.03, 0.2
 BIAS_WALK = 3e-4, 3e-3
 LEAST_NOISE = 0.001, 0.01  # least credible noise of one sample: rad/s and m/s2
 LEVELLING = 5.0  # s, time constant of the first guess, which takes gravity for up
-ITERATIONS = 6
-SETTLED = 1e-4  # rad, largest change of attitude in the last iteration
 # attitude (body), velocity, position (world), gyro bias, accelerometer bias: three each
 N = 15
 ATTITUDE, VELOCITY, POSITION = 0, 3, 6  # the first of their three
@@ -120,7 +118,7 @@ def fuse(
         positions: measured beside it, world.
         attitudes: likewise. Without positions and attitudes the heading is zero at the start.
     """
-    dt = float((imu.t[-1] - imu.t[0]) / (len(imu.t) - 1))
+    dt = (imu.t[-1] - imu.t[0]) / (len(imu.t) - 1)
     stride = max(1, round(KNOT / dt))
     count = (len(imu.t) - 1) // stride
     T, end = stride * dt, count * stride + 1
@@ -149,7 +147,7 @@ def fuse(
     prior_std = np.append(angles + 1e-4, priors)
     begun = linear[0].copy()
     change, std = np.zeros((2, count + 1, N))
-    for _ in range(ITERATIONS):
+    for _ in range(6):
         change[0, :3] = (rotation[0].inv() * started).as_rotvec()
         change[0, 3:], std[0] = begun - linear[0], prior_std
         measured = _measured(times, rates, rotation, linear, readings)
@@ -159,7 +157,7 @@ def fuse(
         turn = Rotation.from_rotvec(change[:, :3])
         rotation = rotation * turn
         linear += change[:, 3:]
-        if turn.magnitude().max() < SETTLED:
+        if turn.magnitude().max() < 1e-4:
             break
     if positions is None:
         std[:, 3:6] = np.hypot(std[:, 3:6], STEADY_VELOCITY_STD)
@@ -172,12 +170,12 @@ def _first_guess(
     """Return an attitude (m) to linearise about, and the standard deviation (rad) of its
     heading at the start.
     """
-    dt = float(imu.t[1] - imu.t[0])
+    dt = imu.t[1] - imu.t[0]
     quaternions = np.empty((len(imu.t), 4))
     # roll and pitch return to their start: their mean rate is the bias
     rates = imu.gyro - np.append(imu.gyro.mean(axis=0)[:2], 0.0)
     first = imu.force[: max(1, round(LEVELLING / dt))].mean(axis=0)
-    size = float(np.linalg.norm(first))
+    size = np.linalg.norm(first)
     up = first / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
     ahead = np.eye(3)[0 if abs(up[0]) < 1.0 - 1e-9 else 1]
     level, _ = Rotation.align_vectors(np.eye(3)[[2, 0]], [up, ahead], weights=[np.inf, 1.0])

@@ -20,6 +20,7 @@ from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body
 from .smoothing import (
     CUTOFFS,
     derivative,
+    even_times,
     high_pass,
     low_pass,
     mean_square,
@@ -37,9 +38,6 @@ FIRST_POSITION_STD = 0.02
 LEAST_POSITION_STD = 0.0005
 FIRST_ATTITUDE_STD = 0.01
 LEAST_ATTITUDE_STD = 0.001
-# standard deviations from which a position or an attitude is a leap and is left out
-OUTLIER = 10.0
-DRIFT_TIME = 3.0  # s, over which the fusion's errors drift, in a sample of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +68,21 @@ def imu_noise(log: FlightLog) -> Pair:
 
 
 def _level(x: Array | None) -> float:
-    read = np.empty((0, 3)) if x is None else x[finite_rows(x)]
-    if len(read) < 50:
+    if x is None or len(read := x[finite_rows(x)]) < 50:
         return 0.0
     return robust_std(high_pass(read, CUTOFFS.noise_share_of_rate))
 
 
+def imu_rows(log: FlightLog) -> Rows:
+    """Return the rows with readings of both gyro and accelerometer."""
+    if log.gyro is None or log.accelerometer is None:
+        return np.flatnonzero([])
+    return np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
+
+
 def inertial_pieces(log: FlightLog) -> list[Rows]:
     """Return the rows of each unbroken run of IMU readings of sufficient length."""
-    if log.gyro is None or log.accelerometer is None:
-        return []
-    read = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
-    return unbroken(log.t, read, LONGEST_GAP, 50, SHORTEST_PIECE)
+    return unbroken(log.t, imu_rows(log), LONGEST_GAP, 50, SHORTEST_PIECE)
 
 
 def inertial_signals(log: FlightLog, gravity: float) -> list[InertialSignals]:
@@ -112,8 +113,7 @@ def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Array) -> Inertial
     fine = median_step(imu_times)
     thin = max(1, int(np.ceil(1.0 / (MOST_HZ * fine) - 1e-6)))
     period = thin * fine
-    even = np.arange(imu_times[0], imu_times[-1] + 0.5 * fine, fine)
-    even = even[even <= imu_times[-1]]
+    even = even_times(imu_times, fine)
 
     def sampled(times: Array, x: Array) -> Array:
         even_x = resampled(even, times, x)
@@ -161,7 +161,7 @@ def _fused(log: FlightLog, imu: ImuPiece) -> FusedMotion:
     off = positions.values - resampled(positions.t, fused.t, fused.linear[:, 3:6])
     off -= np.median(off, axis=0)
     std = max(1.3 * robust_std(off), LEAST_POSITION_STD)  # a smoother leaves less than noise
-    kept = np.linalg.norm(off, axis=1) < OUTLIER * std
+    kept = np.linalg.norm(off, axis=1) < 10.0 * std  # others are leaps
     positions = Readings(positions.t[kept], positions.values[kept], std)
     if attitudes is not None:
         knot = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)
@@ -203,7 +203,7 @@ def with_drift(s: InertialSignals, rng: np.random.Generator, gravity: float) -> 
     """
     from scipy.ndimage import gaussian_filter1d  # needed without a pose alone
 
-    slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), DRIFT_TIME / s.period, axis=0)
+    slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), 3.0 / s.period, axis=0)
     slow /= np.sqrt(mean_square(slow)) + 1e-30
     slow *= s.std
     turn = Rotation.from_rotvec(slow[:, :3]).as_matrix()

@@ -58,7 +58,6 @@ class _ChannelNoise(NamedTuple):
 
 POSE_CHANNELS = ("position", "attitude")
 ROTORS = "rotor speeds"
-_MEASURED = 0.9  # measurements a row, below which the reader interpolated the channel
 
 
 @lru_cache(maxsize=1)  # a diagnosis asks three times
@@ -88,12 +87,11 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         ("accelerometer", log.accelerometer),
         (ROTORS, None if log.commanded else log.rotor_speeds),
     ):
-        rows = np.flatnonzero([] if x is None else finite_rows(x))
-        if x is None or len(rows) <= SEGMENT:
+        if x is None or len(rows := np.flatnonzero(finite_rows(x))) <= SEGMENT:
             continue
         period = median_step(log.t[rows])
         rate = log.rates.get("rotors" if name == ROTORS else name, np.inf)
-        if name not in POSE_CHANNELS and rate * period < _MEASURED:
+        if name not in POSE_CHANNELS and rate * period < 0.9:
             continue
         pieces = unbroken(log.t, rows, GAP * period, SEGMENT)
         turning = name == "attitude"
@@ -122,8 +120,7 @@ def _amplitudes(pieces: Sequence[Array]) -> Array | None:
 
 def _within(low: float, high: float) -> Mask:
     """Return the frequencies (f,) between two shares of half the sampling rate."""
-    share = _SHARES
-    return (share >= low) & (share <= high)
+    return (low <= _SHARES) & (high >= _SHARES)
 
 
 def _slope(amplitude: Array) -> float:
@@ -139,7 +136,7 @@ def _fall(amplitude: Array, nyquist: float) -> float:
     the lower band.
     """
     if LOWER_BAND[0] * nyquist < LEAST_LOWER_HZ:
-        return float("nan")
+        return np.nan
     lower, top = amplitude[_within(*LOWER_BAND)], amplitude[_within(TOP_FROM, BAND[1])]
     return float(np.exp(np.median(lower.mean(axis=0) - top.mean(axis=0))))
 

@@ -97,6 +97,12 @@ def lagged(x: Array, lag: float, period: float) -> Array:
     return filtered(x, (1.0 - keep, 0.0, 0.0, 1.0, -keep, 0.0), steady=True)
 
 
+def even_times(t: Array, period: float) -> Array:
+    """Return times (n,) from the first of ``t`` (m,) to the last, ``period`` s apart."""
+    times = np.arange(t[0], t[-1] + 0.5 * period, period)
+    return times[times <= t[-1]]
+
+
 def resampled(t: Array, times: Array, x: Array) -> Array:
     """Return ``x`` (m, k), measured at ``times`` (m,), linear between them, at ``t`` (n,)."""
     return np.column_stack([np.interp(t, times, column) for column in x.T])
@@ -157,7 +163,7 @@ def power_spectrum(x: Array, period: float, length: int) -> tuple[Array, Array]:
     parts = window * (parts - parts.mean(axis=1, keepdims=True))
     power = 2.0 * period * mean_square(np.abs(np.fft.rfft(parts, axis=1))) / np.sum(window**2)
     power[[0, -1] if length % 2 == 0 else 0] /= 2.0
-    return np.fft.rfftfreq(length, period), power
+    return np.fft.rfftfreq(length, period).astype(float), power
 
 
 def turning(quaternion: Array, period: float) -> tuple[Array, Array]:
