@@ -38,13 +38,7 @@ from .inertial import (
 from .pose_delay import FARTHEST, LEAST, SURE, answer_to_noise, pose_delay
 from .table import Array, Data, Names, Pair
 
-_COARSE, _FINE = 0.01, 0.001  # s, of the search's steps
-# s: between commands and motion lies a motor's lag of about so much. Smaller offsets of an IMU do
-# not show whose clock is wrong; for rotor speeds from commands three times as much
-_MOTOR_LAG, _TELLING = 0.02, 0.06
-# widths of the differences of a pose's noise (10 ms or more): the uncertainty of a loop's answer
-# with its reaction, and the smear of its time
-_REACTION, _SMEAR = 0.8, 1.5
+_COARSE = 0.01  # s, of the search's first steps
 _PARTS = 4  # of the flight; the scatter of their offsets is the uncertainty
 
 _Felt = Callable[[float, Array], Array]  # s of delay and windows (n,): a sensor's means (n, 3)
@@ -79,7 +73,9 @@ def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog,
     whose, other = "IMU", "pose"
     rotors = ", by less than the rotor speeds tell whose clock is wrong"
     delay = pose_delay(log, vehicle) if log.has_rotor_speeds else None
-    lag, least = (_MOTOR_LAG, _TELLING) if log.commanded else (0.0, _MOTOR_LAG)
+    # s: between commands and motion lies a motor's lag of about 0.02. Smaller offsets of an IMU do
+    # not show whose clock is wrong; for rotor speeds from commands three times as much
+    lag, least = (0.02, 0.06) if log.commanded else (0.0, 0.02)
     if delay is not None and abs(late) > max(least, SURE * delay.std):
         rotors = " and the rotor speeds"
         if abs(delay.seconds - lag) > abs(delay.seconds - lag + late):
@@ -106,11 +102,11 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
     answer = answer_to_noise(log, vehicle, late) if abs(late) > LEAST else None
     if answer is not None:
         ahead, width = answer
-        unsure = _REACTION * width
+        unsure = 0.8 * width  # of a loop's answer with its reaction
         if abs(ahead - late) < SURE * np.hypot(std, unsure):
             share = unsure**2 / (unsure**2 + std**2)
             late, std = share * late + (1.0 - share) * ahead, float(np.sqrt(share)) * std
-            if ahead > _SMEAR * width:
+            if ahead > 1.5 * width:  # beyond the smear of its time
                 why = "and the rotor speeds answer the pose's noise ahead of its rows"
                 is_clock = True
     # rotor speeds that are held from one measurement to the next are late by as long, at most
@@ -177,7 +173,7 @@ def _imu_delay(log: FlightLog) -> tuple[float, float, str]:
 def _likeliest(felt: _Felt, begins: Array, needed: Array) -> Pair:
     """Return the delay in s with the least error in some windows, and its middle squared error."""
     found = left = 0.0
-    for reach, step in ((FARTHEST, _COARSE), (_COARSE, _FINE)):
+    for reach, step in ((FARTHEST, _COARSE), (_COARSE, 0.001)):
         tried = found + np.arange(-round(reach / step), round(reach / step) + 1) * step
         left, found = min(
             (median_square(unbiased(needed - felt(x, begins))), x) for x in tried.tolist()

@@ -10,6 +10,7 @@ telling names are tried by adjacent threes and fours.
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -52,16 +53,14 @@ class Numbers:
         # times (n,) in s of comparisons of motors
         self.clock = self.t[np.linspace(0, rows - 1, min(_MOST_SAMPLES, rows)).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
-        self._rows: dict[Names, ArrayPair] = {}
+        self.rows = cache(self._rows)
         self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
 
-    def rows(self, columns: Names) -> ArrayPair:
+    def _rows(self, columns: Names) -> ArrayPair:
         """Return the times (n,) and values (n, k) of the rows with all columns."""
-        if columns not in self._rows:
-            values = np.column_stack([self.data[name][self.order] for name in columns])
-            there = finite_rows(values)
-            self._rows[columns] = self.t[there], values[there]
-        return self._rows[columns]
+        values = np.column_stack([self.data[name][self.order] for name in columns])
+        there = finite_rows(values)
+        return self.t[there], values[there]
 
     def some(self, columns: Names) -> Array:
         """Return values (n, k) of some rows, spread over all."""
@@ -84,9 +83,8 @@ class Numbers:
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
         off = np.abs(length[length > 0.5] - 1.0)  # zeros stand for a missing quaternion
-        few = len(off) < max(2, 0.5 * len(x))
         # median error of a quaternion's length, and of 98 %
-        if few or np.any(np.quantile(off, [0.5, 0.98]) >= (2e-3, 0.02)):
+        if len(off) < max(2, 0.5 * len(x)) or np.any(np.quantile(off, [0.5, 0.98]) >= (2e-3, 0.02)):
             return -np.inf, ""
         return 1.0, "their length is 1"
 
@@ -103,8 +101,8 @@ class Numbers:
     def moves_together(self, columns: Names) -> Verdict:
         """Return 1 where four columns are of one size and move with the specific force."""
         x = self.some(columns)
-        x = x[np.any(x != 0.0, axis=1)]
-        if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
+        x = x[x.any(axis=1)]
+        if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.ptp(x, axis=0).all():
             return 0.0, ""
         middle, total = np.median(x, axis=0), self.between(self.clock, columns).sum(axis=1)
         together = any(_correlation(total, felt) > 0.5 for felt in self.felt)
@@ -210,8 +208,7 @@ def candidates(
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
     found = []
     for group, score, why in ways:
-        there = len(numbers.rows(group.columns)[0])
-        strength, told = judge(group.columns) if there else (0.0, "")
+        strength, told = judge(group.columns) if len(numbers.rows(group.columns)[0]) else (0.0, "")
         words = "; ".join(filter(None, (why, told if strength else "")))
         if words and strength >= 0.0:
             found.append(ColumnCandidate(group, score + _NUMBERS * strength, words))

@@ -51,29 +51,19 @@ from .readings import (
 from .table import Array, ArrayPair, Rows, finite_rows, median_step
 
 # Filters, and when a reading is certain.
-# Hz, of the angular acceleration: from, to, and to of yaw, where rotors do least. Below, steady
-# moments of the air are larger than the torques of turning; above, the pose's noise is
-_TURN_HZ = (1.0, 4.0, 3.0)
-_RATE_HZ = 20.0  # rate of the samples compared
-_EDGE = 0.3  # s at either end of a run, for the filters' start
-_PAUSE = 2.0  # s, between two runs on the even clock: longer than the filters remember
 _FEWEST = 60  # samples in flight for a decision
 
 # gains and delays (s) by undeclared effects
 _FORCE_GAIN = (0.6, 1.6)
 _TORQUE_GAIN = (0.4, 2.5)  # and of thrust in commands
 # s: the motion comes up to 0.22 s behind the rotors' columns on measured flights, by motors, radio
-# and filters on one clock. Then the longest delay searched, and the search's step
-_DELAYS = tuple(0.02 * k for k in range(-5, 13))
-_FAR = 5.0
+# and filters on one clock
 _STEP = 0.02
+_DELAYS = tuple(_STEP * k for k in range(-5, 13))
 
 _MOST_SHARE = 2.0  # larger shares count the same
 GOOD = 0.5  # share: a reading below is believed
 GOOD_TORQUE = 0.65  # the same of torques without a vehicle
-# share of the vertical force, from which thrust alone shows a delay: the best of some 500 delays
-# leaves .3 by chance where a flight repeats its path
-_BY_THRUST = 0.1
 _CERTAIN_LEAD = 3.4  # log-likelihood ratio over the next best: 30 to 1
 # rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
 # answer disturbances more than they turn the body, and the mirrored order may explain more
@@ -170,7 +160,7 @@ class Evidence:
         return cls(log.t, squares, position, quaternion, vehicle=vehicle)
 
     def _laid_out(self, rows: Rows) -> Rows:
-        """Lay the runs of known motion out on one even clock, ``_PAUSE`` apart. Return the samples
+        """Lay the runs of known motion out on one even clock, 2 s apart. Return the samples
         in flight, far enough from the runs' ends for the filters.
         """
         step = median_step(self._t[rows]) if len(rows) > 1 else 0.0
@@ -181,7 +171,7 @@ class Evidence:
         if not runs:
             return rows[:0]
         ends = np.array([self._t[run[[0, -1]]] for run in runs])
-        before = np.append(0.0, np.cumsum(np.diff(ends)[:-1, 0] + _PAUSE))
+        before = np.append(0.0, np.cumsum(np.diff(ends)[:-1, 0] + 2.0))
         laid = before[:, None] + ends - ends[:, :1]
         # of the rows; NaN outside the runs
         self._times = np.interp(self._t, ends.ravel(), laid.ravel(), left=np.nan, right=np.nan)
@@ -189,9 +179,9 @@ class Evidence:
         self._ends = begin, end = laid[np.searchsorted(before, clock, "right") - 1].T
         total = self._slow(self._even(self._thrusts)) @ self._k
         aloft = total > 0.5 * usual_thrust(total[clock <= end])
-        aloft &= (clock >= begin + _EDGE) & (clock <= end - _EDGE)
-        # at most 2000 samples: of longer flights every second one, or third ...
-        every = np.ceil(len(rows) * step * _RATE_HZ / 2000) / (_RATE_HZ * period)
+        aloft &= (clock >= begin + 0.3) & (clock <= end - 0.3)  # the filters' start
+        # 20 a second, at most 2000: of longer flights every second one, or third ...
+        every = np.ceil(len(rows) * step * 20.0 / 2000) / (20.0 * period)
         return np.flatnonzero(aloft & (np.arange(len(clock)) % max(1, round(every)) == 0))
 
     def _even(self, x: Array) -> Array:
@@ -207,7 +197,9 @@ class Evidence:
 
     def _band(self, x: Array) -> Array:
         """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
-        low, high, yaw = (low_pass(x, hz, self._period) for hz in _TURN_HZ)
+        # Below 1 Hz, steady moments of the air are larger than the torques of turning; above 4 Hz
+        # (of yaw, where rotors do least, 3 Hz), the pose's noise is
+        low, high, yaw = (low_pass(x, hz, self._period) for hz in (1.0, 4.0, 3.0))
         return np.stack([high - low, yaw - low], axis=1)
 
     @cached_property
@@ -216,7 +208,7 @@ class Evidence:
         assert self._position is not None
         place = self._even(self._position)
         second = derivative(low_pass(place, CUTOFFS.pose_hz, self._period), self._period, 2)
-        return self._slow(second)[self._compared], np.asarray(np.median(place, axis=0))
+        return self._slow(second)[self._compared], np.median(place, axis=0)
 
     @cached_property
     def _driving(self) -> Array:
@@ -295,7 +287,7 @@ class Evidence:
         cost = 60.0 * (mean[2] <= GOOD * np.linalg.norm(mean))
         cost += 3.0 * ((frames.position @ middle)[2] < 0.0)
         left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
-        return float(left), float(cost), self._needed(along, reading)
+        return float(left), cost, self._needed(along, reading)
 
     def fit(self, reading: Convention, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone. A flight
@@ -311,7 +303,7 @@ class Evidence:
         """Return the fit of a reading at the likeliest delay of the rotors beyond a flight loop's
         own.
         """
-        far = np.arange(-_FAR, _FAR, _STEP)
+        far = np.arange(-5.0, 5.0, _STEP)
         parts = np.array_split(far[(far < _DELAYS[0]) | (far > _DELAYS[-1] + _STEP)], 20)
         reading = replace(reading, unlikely=reading.unlikely + OFFSET)
         fits = (self._fit(reading, self._mixing, *part.tolist()) for part in parts)
@@ -331,8 +323,8 @@ class Evidence:
         given = rows @ thrusts
         left = shares(  # (d, 1 + torques)
             there @ np.square(needed).T,
-            np.sum(given * given, axis=2),
-            np.sum(given * needed, axis=2),
+            (given * given).sum(axis=2),
+            (given * needed).sum(axis=2),
             np.transpose(self._gains[: len(rows)]),
         )
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
@@ -343,8 +335,7 @@ class Evidence:
 
     def turns(self, reading: Convention) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
-        rates = self._motion(reading.attitude)[1][:, 0, :2]
-        return float(np.sqrt(np.mean(np.square(rates))))
+        return float(np.sqrt(np.mean(np.square(self._motion(reading.attitude)[1][:, 0, :2]))))
 
 
 class RankedFits:
@@ -383,13 +374,17 @@ class RankedFits:
         is_good = self.fit.torque <= GOOD_TORQUE
         if self.best.moves[:3] != DECLARED.moves[:3]:  # another pose: forces tell, not torques
             is_good = self.fit.horizontal <= GOOD
-        if self.best.late and self.fit.vertical < _BY_THRUST:
+        # thrust alone shows a delay: the best of some 500 delays leaves .3 of the vertical force by
+        # chance where a flight repeats its path
+        if self.best.late and self.fit.vertical < 0.1:
             is_good = True
         if self.best is DECLARED or not is_good:
             return []
-        least = self.fit.score - _CERTAIN_LEAD
-        alike = (fit.reading for fit in self.ranked if fit.score >= least)
-        return [reading for reading in alike if reading is not DECLARED]
+        return [
+            fit.reading
+            for fit in self.ranked
+            if fit.score >= self.fit.score - _CERTAIN_LEAD and fit.reading is not DECLARED
+        ]
 
     def says(self, name: str) -> tuple[Any, bool, str]:
         """Return the best value of a property, whether it is certain, and why."""

@@ -76,8 +76,7 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
             shares = gyro_shares(t, measured, *pose, (AS_DECLARED, *GYRO_READINGS))
             doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
             # 70 rad/s (4000 deg/s) is the range of the fastest gyros
-            fast = np.quantile(np.abs(measured), 0.99) > 70.0
-            alone = GYRO_READINGS[0].says if fast else ""
+            alone = GYRO_READINGS[0].says if np.quantile(np.abs(measured), 0.99) > 70.0 else ""
         else:
             shares, up = _force_shares(t, measured, *pose, part.position[seen], gravity)
             if up is not None:
@@ -111,7 +110,7 @@ def _in_body_axes(log: FlightLog, up: Array) -> FlightLog:
 
 def is_stuck(measured: Array) -> bool:
     """Return whether the readings (N, 3) of a sensor are all the same."""
-    return len(measured) >= LEAST_SAMPLES and bool(np.all(np.ptp(measured, axis=0) == 0.0))
+    return len(measured) >= LEAST_SAMPLES and not np.ptp(measured, axis=0).any()
 
 
 def _sensor_doubt(
@@ -157,8 +156,7 @@ def gyro_shares(
     if len(begins) < _FEWEST:
         return None
     motion = unbiased(turn_rates(begins, pose_times, attitude))
-    sum_of = running_integral(gyro, t)
-    seen = unbiased(mean_rate(begins, t, sum_of))
+    seen = unbiased(mean_rate(begins, t, running_integral(gyro, t)))
     size = median_square(motion) + STILL**2
     return [median_square(motion - seen @ reading.turn.T) / size for reading in readings]
 
@@ -217,8 +215,7 @@ def _force_shares(
             / median_square(needed[moves, :2])
             for x in (body.apply(measured), measured)
         )
-        lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
-        if in_world <= GOOD and lead >= OTHER:
+        if in_world <= GOOD and likelihood([in_world] * 2) - likelihood([in_body] * 2) >= OTHER:
             return None, up * (np.median(measured[:, 2]) < 0.5 * gravity)
     needed += up
     readings = AS_DECLARED, *ACCELEROMETER_READINGS
@@ -262,13 +259,13 @@ def gravity_doubt(force: Array, gravity: float, is_flight: bool = True) -> str:
     if length < 0.5 * gravity:
         otherwise += " (an acceleration without gravity is none)"
     up, readings = np.array([0.0, 0.0, gravity]), (AS_DECLARED, *_BY_GRAVITY)
-    shares = [float(np.sum(np.square(up - r.turn @ median))) / gravity**2 for r in readings]
+    shares = [float(np.square(up - r.turn @ median).sum()) / gravity**2 for r in readings]
     return _sensor_doubt(shares, _BY_GRAVITY, otherwise if is_flight else "")
 
 
 def median_square(vectors: Array) -> float:
     """Return the median squared length of vectors (n, 3): robust to single leaps of a pose."""
-    return float(np.median(np.sum(np.square(vectors), axis=1)))
+    return float(np.median(np.square(vectors).sum(axis=1)))
 
 
 def windows(pose_times: Array, sensor_times: Array, before: float) -> Array:

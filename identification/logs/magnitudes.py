@@ -50,8 +50,7 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     unit is certain. The size is a battery's median voltage, the time's median step, or an
     accelerometer's median length.
     """
-    units = UNITS[section].items()
-    sizes = {unit: size * one for unit, one in units if unit not in ("min", "raw")}
+    sizes = {u: size * one for u, one in UNITS[section].items() if u not in ("min", "raw")}
     likely = (unit for unit in sizes if within(sizes[unit], _LIKELY[section]))
     unit = next(likely, next(iter(sizes)))
     return unit, within(sizes[unit], _CERTAIN[section])
@@ -109,7 +108,7 @@ def motor_doubts(log: FlightLog) -> list[str]:
     """
     measured = log.has_rotor_speeds and not log.commanded
     motors = log.rotor_speeds if measured else log.command
-    if motors is None or not np.isfinite(motors).all() or not np.any(motors > 0.0):
+    if motors is None or not np.isfinite(motors).all() or not (motors > 0.0).any():
         return []
     what = "rotor speeds" if measured else "motor commands"
     alike = [
@@ -148,7 +147,7 @@ def motor_unit(
         return "commands", "normalised", False, "all are zero"
     low, middle, high = np.quantile(turning, [0.01, 0.5, 1.0]).tolist()
     named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = bool(re.search("|".join(WORDS["command_words"]), names))
+    commanded = re.search("|".join(WORDS["command_words"]), names)
     speeds = bool(re.search("omega|speed|rotor|rpm", names))
     speeds |= within(power, (1.5, 2.5)) and not commanded  # about 2: squares
     pulses = low >= 850.0 and high <= 2250.0
@@ -263,7 +262,7 @@ def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     broken = fast & ~far[:-6] & ~far[6:]
     if not broken.any():
         return log, []
-    highest = np.max(log.rotor_speeds[broken])
+    highest = log.rotor_speeds[broken].max()
     return interpolated(log, broken), [
         f"{np.count_nonzero(broken)} rotor speeds are broken, up to {highest:.0f} rad/s where "
         f"99 % are below {high.max():.0f}: they were interpolated"

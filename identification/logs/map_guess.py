@@ -56,15 +56,19 @@ from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
 # fields of a body's turns
-_FRAMES = "frames.map_world", "frames.map_body"
-_TURNS = *_FRAMES, "attitude.sense", "attitude.order", "attitude.unit", "pitch_sign"
+_TURNS = (
+    "frames.map_world",
+    "frames.map_body",
+    "attitude.sense",
+    "attitude.order",
+    "attitude.unit",
+    "pitch_sign",
+)
 _MOTORS = ("motors", "commands")
 _GYROS = [
     SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
     for unit, (body, turn) in product(("rad/s", "deg/s"), BODY_TURNS.items())
 ]
-# roll and pitch of a plus, by rotors at the left, rear, right and front
-_PLUS = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
 _EXAMPLES = {
     "position": "x, y, z",
     "attitude": "qw, qx, qy, qz or roll, pitch, yaw",
@@ -153,7 +157,7 @@ def _time_column(names: Sequence[Name], data: ArrayMap) -> Name | None:
         steps = np.diff(values[np.isfinite(values)])
         if np.any(steps > 0.0) and np.mean(steps >= 0.0) > 0.9:
             return name
-    rises = (n for n in there if len(x := data[n.column]) > 2 and np.all(np.diff(x) > 0.0))
+    rises = (n for n in there if len(x := data[n.column]) > 2 and (np.diff(x) > 0.0).all())
     return next(rises, None)
 
 
@@ -418,8 +422,7 @@ class _Guessing:
 
     def gyro(self, group: Group) -> None:
         """Find unit and axes of the gyro: from the pose's turns, or from size and accelerometer."""
-        named = group.unit if group.unit in UNITS["gyro"] else ""
-        ranking = self.gyro_fits(group.columns, named)
+        ranking = self.gyro_fits(group.columns, group.unit if group.unit in UNITS["gyro"] else "")
         if ranking is not None:
             guessed = ranking.says("unit")
             axes, sure, why = ranking.says("body")
@@ -499,7 +502,9 @@ class _Guessing:
             )
             return order, is_sure, why
         why = f"{hint}: no order is much likelier than all others"
-        evidence = Evidence(self.t, np.square(values), sides=_PLUS, **motion)
+        # roll and pitch of a plus, by rotors at the left, rear, right and front
+        sides = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
+        evidence = Evidence(self.t, np.square(values), sides=sides, **motion)
         plus = RankedFits(map(evidence.fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))

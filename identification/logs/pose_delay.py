@@ -38,20 +38,13 @@ FARTHEST = 0.3  # s, of the search
 # s: smaller delays are of filters, and of stamps at a sample's end
 LEAST = 0.01
 SURE = 4.0  # standard deviations
-# s: rotor speeds of flown vehicles act by up to so much later. A flight loop falls over more
-HONEST = 0.04
-# s: rotor speeds that pass a filter of their own act by up to so much earlier
-AHEAD = 0.03
 # s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
 _LAGS = 0.01 * np.arange(11)
 _STEP = 0.001  # s, of the search
 _DELAYS = _STEP * np.arange(-300.0, 301.0)
-_BAND_HZ = (0.8, 10.0)
 _SEGMENT = 2.0  # s, of a spectrum
 _PARTS = 5  # of the flight; the scatter of their delays is the uncertainty
 _FEWEST = 10  # segments
-# correlation of second differences with the next ones: -2/3 of white noise, above 0 of motion
-_WHITE = -0.5
 _ANSWERED = 6.0  # standard deviations of a chance correlation
 
 Spectra = NDArray[np.complex128]
@@ -78,7 +71,7 @@ class _Response(NamedTuple):
         """
         shape = np.exp(-1j * self.omega * delays[:, None, None]) / (1.0 + 1j * self.omega * lag)
         along = np.sum(self.weight * np.real(np.conj(shape) * self.gain), axis=1)
-        power = np.sum(self.weight * np.square(np.abs(shape)), axis=1)
+        power = (self.weight * np.square(np.abs(shape))).sum(axis=1)
         explained: Array = np.sum(np.square(np.maximum(along, 0.0)) / power, axis=1)
         return explained
 
@@ -108,7 +101,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
             break
     best = response.explained(np.zeros(1))[0]
     whole = response.weight * np.square(np.abs(response.gain))
-    left = np.sum(whole) - best
+    left = whole.sum() - best
     scale = max(1.0, left / (2.0 * whole.size - 3.0))  # beyond what noise leaves
     if best < 40.0 * scale:
         return None
@@ -117,9 +110,11 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     parts = zip(*(np.array_split(x, _PARTS) for x in both), strict=True)
     scatter = np.std([_response(omega, noise, *part).likeliest() for part in parts])
     std = float(np.hypot(scatter / np.sqrt(_PARTS), misfit))
-    honest = np.arange(-AHEAD, HONEST + _STEP, _STEP)
+    # s: rotor speeds of flown vehicles act by up to 0.04 later (a flight loop falls over more), and
+    # those that pass a filter of their own by up to 0.03 earlier
+    honest = np.arange(-0.03, 0.04 + _STEP, _STEP)
     as_good = max(
-        np.max(response.explained(honest[honest <= _LAGS[-1] - lag] - late, lag)) for lag in _LAGS
+        np.max(response.explained(honest[honest <= 0.1 - lag] - late, lag)) for lag in _LAGS
     )
     return _PoseDelay(late, std, bool(best - as_good > 9.0 * scale))
 
@@ -170,13 +165,12 @@ def _segments(
     if len(transforms) < _FEWEST:
         return None
     frequency = np.fft.rfftfreq(count, period).astype(float)
-    highest = min(_BAND_HZ[1], 0.4 / step)
-    band = (frequency >= _BAND_HZ[0]) & (frequency <= highest)
+    band = (frequency >= 0.8) & (frequency <= min(10.0, 0.4 / step))
     frequency = frequency[band, None]
     # white noise of the angles, through the mean over a period and two differences
     passed = np.sinc(frequency * period) * np.square(2.0 * np.sin(np.pi * frequency * period))
     noise = np.square(passed / period**2 * np.mean(noises) * np.diag(inertia)[:2])
-    noise *= step / period * np.sum(np.square(window))
+    noise *= step / period * np.square(window).sum()
     moment, turning = np.array(transforms)[:, :, band].swapaxes(0, 1)
     return 2.0 * np.pi * frequency, noise, moment, turning
 
@@ -191,8 +185,7 @@ def _means(at: Array, width: float, t: Array, x: Array) -> Array:
 
 def _moments(log: FlightLog, vehicle: Vehicle | None) -> Array:
     """Return the rotors' roll and pitch moments (N, 2); without a vehicle, in no unit."""
-    mixing = SIDES if vehicle is None else vehicle.mixing[1:3]
-    return np.square(log.rotor_speeds) @ mixing.T
+    return np.square(log.rotor_speeds) @ (SIDES if vehicle is None else vehicle.mixing[1:3]).T
 
 
 def _angles(log: FlightLog, piece: Rows) -> Array:
@@ -231,7 +224,8 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
         noise = angles[2 * apart :] - 2.0 * angles[apart:-apart] + angles[: -2 * apart]
         after = np.sum(noise[apart:] * noise[:-apart]) / np.sum(np.square(noise) + 1e-300)
         inside = (at > t[0] + lags[-1] + width) & (at < t[-1] - lags[-1] - width)
-        if after > _WHITE or not inside.any():
+        # the differences' correlation with the next ones: -2/3 of white noise, above 0 of motion
+        if after > -0.5 or not inside.any():
             continue
         at, noise = at[inside], noise[inside]
         driven = np.hstack(

@@ -276,9 +276,8 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
     angles = [
         Attitude((), unit, euler=e, signs=signs, sense=sense) for e, unit, signs, sense in ways
     ]
-    attitudes = _quaternions(orders) or angles
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    readings = _each(attitude=attitudes, frames=MAP_FRAMES, length=lengths)
+    readings = _each(attitude=_quaternions(orders) or angles, frames=MAP_FRAMES, length=lengths)
     named = [
         replace(r, unlikely=OTHER * (length in lengths and r.length != length)) for r in readings
     ]

@@ -32,10 +32,6 @@ from .table import Array, Mask, Names, median_step
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
 _LEAST_IMU_HZ = 45.0  # without a pose: a quadrotor turns within a tenth of a second
-_UNEVEN = 0.4, 2.5  # of the median step: a step outside is uneven
-_UNEVEN_SHARE, _UNEVEN_NOTE = 0.25, 0.05
-_LEAP = 0.3, 20.0  # m, and m/s over the step: the farthest between two poses
-_TURN = 0.8, 60.0  # rad, and rad/s over the step
 _JUMP = 0.3  # s: a step so long without a move is a jump of the clock
 _STILL = 0.5  # s of a still channel; a busy link repeats a few samples
 
@@ -274,15 +270,15 @@ def _uneven_steps(log: FlightLog) -> _Findings:
     """Check for even steps of the clock."""
     step = np.diff(log.t)
     median = np.median(step)
-    uneven = np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median))
+    uneven = np.mean((step < 0.4 * median) | (step > 2.5 * median))
     words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
-    if uneven > _UNEVEN_SHARE:
+    if uneven > 0.25:
         yield _Refused(
             f"column t: time steps vary wildly, from {step.min():.3g} to {step.max():.3g} s, "
             f"{words}; expected the times at which the poses were taken, not those at which they "
             "arrived"
         )
-    if uneven > _UNEVEN_NOTE:
+    if uneven > 0.05:
         yield _Note(f"time steps are uneven: {words}")
 
 
@@ -293,7 +289,8 @@ def _steps(log: FlightLog) -> _Findings:
     step = np.diff(t)
     way = np.linalg.norm(np.diff(position, axis=0), axis=1)
     angle = np.linalg.norm(turn_between(q[:-1], q[1:]), axis=1)
-    far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
+    # m and rad, and m/s and rad/s over the step
+    far, turned = way > 0.3 + 20.0 * step, angle > 0.8 + 60.0 * step
     leaps = far | turned
     if leaps.any():
         first = np.argmax(leaps)

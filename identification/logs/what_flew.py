@@ -44,7 +44,7 @@ def rotor_order(value: object) -> Order:
             raise unknown_name("rotor order", value, ORDERS)
         return ORDERS[value]
     if isinstance(value, list | tuple) and sorted(map(str, value)) == ["1", "2", "3", "4"]:
-        return tuple(np.array(value, dtype=int).tolist())
+        return tuple(map(int, value))
     raise InputError(
         f"{value!r}; expected one of {', '.join(ORDERS)}, or the numbers of the motors "
         f"at the {', '.join(PLACES)}, such as [3, 2, 4, 1]"
@@ -121,10 +121,10 @@ def more_rotors(columns: Names, source: Table | ArrayMap, are_speeds: bool = Fal
         size = abs(np.median(fifth) / max(np.median(np.abs(four)), 1e-12))
         moves = fifth - fifth.mean()
         left = np.linalg.lstsq(four - four.mean(axis=0), moves)[1]
-        share = left.sum() / np.sum(moves**2)  # no residual: of columns that depend on each other
         is_motor = are_speeds or re.search(WORDS["motor_words"], name.lower())
-        # the four explain half of its variance, and its median is like theirs
-        if (is_motor or share < 0.5) and 0.5 <= size <= 2.0:
+        # the four explain half of its variance, and its median is like theirs. Without a residual,
+        # columns depend on each other
+        if (is_motor or left.sum() / np.sum(moves**2) < 0.5) and 0.5 <= size <= 2.0:
             turning.append(name)
     if len(turning) == len(columns):
         return ""

@@ -30,15 +30,6 @@ from .smoothing import (
     unbroken,
 )
 
-# poses a second, from which the pose alone shows the motion; with fewer the IMU is needed
-LEAST_POSE_HZ = 45.0
-MOST_HZ = 250.0  # of the signals; faster IMUs are low-passed and thinned out
-# m and rad, standard deviations of a measured pose's axis: first guess, and least credible
-FIRST_POSITION_STD = 0.02
-LEAST_POSITION_STD = 0.0005
-FIRST_ATTITUDE_STD = 0.01
-LEAST_ATTITUDE_STD = 0.001
-
 
 @dataclass(frozen=True, eq=False)
 class InertialSignals(Signals):
@@ -50,14 +41,15 @@ class InertialSignals(Signals):
 
 def pose_rate(log: FlightLog) -> float:
     """Return the number of new poses a second in a log; 0 without any."""
-    rows = np.flatnonzero(finite_rows(log.position))
-    times = log.t[_changed(rows, log.position)]
+    times = log.t[_changed(np.flatnonzero(finite_rows(log.position)), log.position)]
     return 1.0 / median_step(times) if len(times) > 1 else 0.0
 
 
 def reads_imu(log: FlightLog) -> bool:
-    """Return whether a log's motion is of its IMU: the log has one, and no pose fast enough."""
-    return log.gyro is not None and log.accelerometer is not None and pose_rate(log) < LEAST_POSE_HZ
+    """Return whether a log's motion is of its IMU: the log has one, and no pose fast enough (45 a
+    second) to show the motion alone.
+    """
+    return log.gyro is not None and log.accelerometer is not None and pose_rate(log) < 45.0
 
 
 def imu_noise(log: FlightLog) -> Pair:
@@ -111,7 +103,8 @@ def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Array) -> Inertial
     assert log.accelerometer is not None
     imu_times = log.t[rows]
     fine = median_step(imu_times)
-    thin = max(1, int(np.ceil(1.0 / (MOST_HZ * fine) - 1e-6)))
+    # readings beyond 250 Hz are low-passed and thinned out
+    thin = max(1, int(np.ceil(1.0 / (250.0 * fine) - 1e-6)))
     period = thin * fine
     even = even_times(imu_times, fine)
 
@@ -150,17 +143,19 @@ def _fused(log: FlightLog, imu: ImuPiece) -> FusedMotion:
     placed = _measured(log, finite_rows(log.position), imu.t)
     turned = _measured(log, finite_rows(log.quaternion) & log.valid, imu.t)
     positions = attitudes = None
+    # first guesses of a measured axis' standard deviation in m and rad
     if len(placed) > 3:
-        positions = Readings(log.t[placed], log.position[placed], FIRST_POSITION_STD)
+        positions = Readings(log.t[placed], log.position[placed], 0.02)
     if len(turned) > 3:
         matrices = Rotation.from_quat(log.quaternion[turned], scalar_first=True).as_matrix()
-        attitudes = Readings(log.t[turned], matrices, FIRST_ATTITUDE_STD)
+        attitudes = Readings(log.t[turned], matrices, 0.01)
     fused = fuse(imu, positions, attitudes)
     if positions is None:
         return fused
     off = positions.values - resampled(positions.t, fused.t, fused.linear[:, 3:6])
     off -= np.median(off, axis=0)
-    std = max(1.3 * robust_std(off), LEAST_POSITION_STD)  # a smoother leaves less than noise
+    # a smoother leaves less than noise; below 0.5 mm and 1 mrad no noise is credible
+    std = max(1.3 * robust_std(off), 0.0005)
     kept = np.linalg.norm(off, axis=1) < 10.0 * std  # others are leaps
     positions = Readings(positions.t[kept], positions.values[kept], std)
     if attitudes is not None:
@@ -169,7 +164,7 @@ def _fused(log: FlightLog, imu: ImuPiece) -> FusedMotion:
         if near.sum() > 20:
             seen = Rotation.from_matrix(attitudes.values[near])
             off = (fused.rotation[knot[near]].inv() * seen).as_rotvec()
-            std = max(1.3 * robust_std(off - np.median(off, axis=0)), LEAST_ATTITUDE_STD)
+            std = max(1.3 * robust_std(off - np.median(off, axis=0)), 0.001)
             attitudes = attitudes._replace(std=std)
     return fuse(imu, positions, attitudes)
 
@@ -184,8 +179,7 @@ def _measured(log: FlightLog, there: Mask, t: Array) -> Rows:
 
 def _changed(rows: Rows, values: Array) -> Rows:
     """Return the rows whose values (N, k) differ from the row before among them."""
-    new = np.any(np.diff(values[rows], axis=0, prepend=np.inf) != 0.0, axis=1)
-    return rows[new]
+    return rows[np.diff(values[rows], axis=0, prepend=np.inf).any(axis=1)]
 
 
 def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:

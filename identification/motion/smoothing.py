@@ -100,7 +100,7 @@ def lagged(x: Array, lag: float, period: float) -> Array:
 def even_times(t: Array, period: float) -> Array:
     """Return times (n,) from the first of ``t`` (m,) to the last, ``period`` s apart."""
     times = np.arange(t[0], t[-1] + 0.5 * period, period)
-    return times[times <= t[-1]]
+    return np.asarray(times[times <= t[-1]])
 
 
 def resampled(t: Array, times: Array, x: Array) -> Array:
