@@ -20,12 +20,11 @@ from ..identification.logs.log_map import (
     constant,
     load_map,
 )
-from ..identification.logs.magnitudes import MAGNITUDES
+from ..identification.logs.magnitudes import LARGEST
 from ..identification.logs.mapped_log import with_range
 from .messages import SECOND, Array, Malformed, Measurement
 
 _OUTSIDE = 0.01  # tolerance, share of a command's range
-_LARGEST = MAGNITUDES.largest
 _FIELDS = {
     "rotors": "rotor_speeds",
     "commands": "command",
@@ -135,7 +134,7 @@ class FieldMap:
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
     """Return a section's numbers, with signs and scale; None: it has none."""
     given: list[Any] = [fields.get(name) for name in part.columns]
-    if all(type(x) is float and abs(x) <= _LARGEST for x in given):  # nearly always, and quick
+    if all(type(x) is float and abs(x) <= LARGEST for x in given):  # nearly always, and quick
         return scaled(part, np.array(given))
     numbers = {name: _number(name, fields) for name in part.columns}
     missing = [name for name in part.named if math.isnan(numbers[name])]
@@ -146,7 +145,7 @@ def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | N
             f"no field {', '.join(missing)}; expected all of {', '.join(part.named)} ({section})"
         )
     values = scaled(part, np.array([numbers[name] for name in part.columns]))
-    if not np.all(np.abs(values) <= _LARGEST):
+    if not np.all(np.abs(values) <= LARGEST):
         raise Malformed(
             f"{section}: {', '.join(f'{x:.3g}' for x in values)}; expected numbers of a flight"
         )

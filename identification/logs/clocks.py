@@ -38,19 +38,8 @@ from .inertial import (
 from .pose_delay import FARTHEST, LEAST, SURE, answer_to_noise, pose_delay
 from .table import Array, Data, Names, Pair
 
-_COARSE, _FINE = 0.01, 0.001  # s, of the search's steps
-# s: between commands and motion lies a motor's lag of about so much. Smaller offsets of an IMU do
-# not show whose clock is wrong; for rotor speeds from commands three times as much
-_MOTOR_LAG, _TELLING = 0.02, 0.06
-# widths of the differences of a pose's noise (10 ms or more): the uncertainty of a loop's answer
-# with its reaction, and the smear of its time
-_REACTION, _SMEAR = 0.8, 1.5
+_COARSE = 0.01  # s, of the search's first steps
 _PARTS = 4  # of the flight; the scatter of their offsets is the uncertainty
-_CHANGE = 0.025  # s between the parts' delays; on 34 measured flights at most 0.018
-_FEWEST_WINDOWS = 40
-_MOVING = 0.3  # m/s2: the acceleration of a hovering vehicle by pose noise
-_WHOLE = 2.0  # standard deviations between an offset and whole rows
-_GAP = 3.5  # median time steps; rotor speeds are not moved across
 
 _Felt = Callable[[float, Array], Array]  # s of delay and windows (n,): a sensor's means (n, 3)
 
@@ -84,14 +73,17 @@ def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog,
     whose, other = "IMU", "pose"
     rotors = ", by less than the rotor speeds tell whose clock is wrong"
     delay = pose_delay(log, vehicle) if log.has_rotor_speeds else None
-    lag, least = (_MOTOR_LAG, _TELLING) if log.commanded else (0.0, _MOTOR_LAG)
+    # s: between commands and motion lies a motor's lag of about 0.02. Smaller offsets of an IMU do
+    # not show whose clock is wrong; for rotor speeds from commands three times as much
+    lag, least = (0.02, 0.06) if log.commanded else (0.0, 0.02)
     if delay is not None and abs(late) > max(least, SURE * delay.std):
         rotors = " and the rotor speeds"
         if abs(delay.seconds - lag) > abs(delay.seconds - lag + late):
             whose, other, late = "pose", "IMU", -late  # rotors and IMU share a clock
     names = ("position", "quaternion") if whose == "pose" else ("gyro", "accelerometer")
-    known = {name: x for name in names if (x := getattr(log, name)) is not None}
-    moved: Data = {name: _moved(log.t, x, late) for name, x in known.items()}
+    moved: Data = {
+        name: _moved(log.t, x, late) for name in names if (x := getattr(log, name)) is not None
+    }
     log = replace(log, **moved, valid=np.empty(0, np.bool_))
     return log, (_note(whose, late, std, f"{other}{rotors}", f"the {whose} was moved"),)
 
@@ -110,11 +102,11 @@ def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightL
     answer = answer_to_noise(log, vehicle, late) if abs(late) > LEAST else None
     if answer is not None:
         ahead, width = answer
-        unsure = _REACTION * width
+        unsure = 0.8 * width  # of a loop's answer with its reaction
         if abs(ahead - late) < SURE * np.hypot(std, unsure):
             share = unsure**2 / (unsure**2 + std**2)
             late, std = share * late + (1.0 - share) * ahead, float(np.sqrt(share)) * std
-            if ahead > _SMEAR * width:
+            if ahead > 1.5 * width:  # beyond the smear of its time
                 why = "and the rotor speeds answer the pose's noise ahead of its rows"
                 is_clock = True
     # rotor speeds that are held from one measurement to the next are late by as long, at most
@@ -147,7 +139,8 @@ def _imu_delay(log: FlightLog) -> tuple[float, float, str]:
     seen = np.flatnonzero(log.valid)
     for measured, before, least in (
         (log.gyro, 0.0, STILL),
-        (log.accelerometer, WINDOW, _MOVING),
+        # m/s2: the acceleration of a hovering vehicle by pose noise
+        (log.accelerometer, WINDOW, 0.3),
     ):
         if measured is None or not seen.size:
             continue
@@ -156,7 +149,7 @@ def _imu_delay(log: FlightLog) -> tuple[float, float, str]:
         begins = windows(pose_times, t, before)
         inside = (begins > t[:1] + FARTHEST + before) & (begins < t[-1:] - FARTHEST - WINDOW)
         begins = begins[inside]
-        if len(begins) < _FEWEST_WINDOWS:
+        if len(begins) < 40:
             continue
         attitude = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
         if measured is log.gyro:
@@ -170,7 +163,8 @@ def _imu_delay(log: FlightLog) -> tuple[float, float, str]:
             parts = [*zip(*(np.array_split(x, _PARTS) for x in (begins, needed)), strict=True)]
             delays, own = zip(*(_likeliest(felt, *part) for part in parts), strict=True)
             common = [median_square(unbiased(y - felt(late, x))) for x, y in parts]
-            changes = np.less(own, GOOD * np.array(common)).any() and np.ptp(delays) > _CHANGE
+            # at most 0.018 s on 34 measured flights
+            changes = np.less(own, GOOD * np.array(common)).any() and np.ptp(delays) > 0.025
             said = ", ".join(f"{x:.3f}" for x in delays) + " s in turn"
             return late, float(np.std(delays) / np.sqrt(_PARTS)), said if changes else ""
     return 0.0, 0.0, ""
@@ -179,7 +173,7 @@ def _imu_delay(log: FlightLog) -> tuple[float, float, str]:
 def _likeliest(felt: _Felt, begins: Array, needed: Array) -> Pair:
     """Return the delay in s with the least error in some windows, and its middle squared error."""
     found = left = 0.0
-    for reach, step in ((FARTHEST, _COARSE), (_COARSE, _FINE)):
+    for reach, step in ((FARTHEST, _COARSE), (_COARSE, 0.001)):
         tried = found + np.arange(-round(reach / step), round(reach / step) + 1) * step
         left, found = min(
             (median_square(unbiased(needed - felt(x, begins))), x) for x in tried.tolist()
@@ -210,10 +204,11 @@ def _rotors_later(log: FlightLog, late: float, std: float) -> FlightLog:
     from scipy.interpolate import Akima1DInterpolator  # few logs need one
 
     whole = round(late / log.period) * log.period
-    late = whole if abs(whole - late) < _WHOLE * std else late
+    late = whole if abs(whole - late) < 2.0 * std else late
     source = log.t - late
     steps = np.diff(log.t, prepend=-np.inf, append=np.inf)
-    inside = steps[np.searchsorted(log.t, source, side="right")] <= _GAP * log.period
+    # speeds are not moved across a gap
+    inside = steps[np.searchsorted(log.t, source, side="right")] <= 3.5 * log.period
     moved: Data = {}
     for name in ("rotor_speeds", "command", "voltage", "force", "torque"):
         x = getattr(log, name)

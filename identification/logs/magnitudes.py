@@ -6,22 +6,38 @@ The guess of a map, the reading of a log and its screening decide here, with the
 import re
 from dataclasses import replace
 from itertools import combinations
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, Group
 from .flight_log import FlightLog, parts_of
 from .flight_phases import carrying, usual_thrust
 from .log_map import UNITS
 from .table import Array, Mask, Pair, finite_rows
 
-# limits, with their reasons
-MAGNITUDES = SimpleNamespace(**read_yaml(Path(__file__).with_name("magnitudes.yaml"), "limits"))
+# sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
+_LIKELY = {"time": (0.0002, 0.2), "battery": (2.7, 100.0), "accelerometer": (8.335, 11.278)}
+_CERTAIN = _LIKELY | {"time": (0.0004, 1.0 / 15.0), "battery": (2.7, 60.0)}
+_TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+# of rotors, in words, and in rad/s
+_SPEEDS = {
+    "rad/s": ("", 1.0),
+    "rpm": ("revolutions per minute", 0.10471975511965977),
+    "Hz": ("revolutions per second", 6.283185307179586),
+    "deg/s": ("degrees per second", 0.017453292519943295),
+}
+_SHORTEST_PERIOD = 1.0e-5  # s, of the median step: 100 kHz, far above any pose's rate
+# s, of any step. A log in nanoseconds has steps of 1e7; a step of a year is no flight
+_LONGEST_STEP = 1.0e12
+LARGEST = 1.0e9  # SI units, all other numbers; millimetres or rpm stay far below
+# median thrust by weight; beyond, another vehicle may have flown
+DOUBTFUL = 0.5, 2.0
+STRONGEST = 300.0  # m/s2 of specific force, above all racers and most sensors' range
+# rad/s: the largest drones' rotors (1.4 m across) hover at 150; slower, the unit is wrong
+_SLOW = 100.0
+_UNEVEN = 2.0  # ratio of two rotors' medians in flight, at most
 
 
 def within(value: float, limits: Pair) -> bool:
@@ -34,18 +50,17 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     unit is certain. The size is a battery's median voltage, the time's median step, or an
     accelerometer's median length.
     """
-    units = UNITS[section].items()
-    sizes = {unit: size * one for unit, one in units if unit not in ("min", "raw")}
-    likely, sure = MAGNITUDES.units[section]
-    unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
-    return unit, within(sizes[unit], sure)
+    sizes = {u: size * one for u, one in UNITS[section].items() if u not in ("min", "raw")}
+    likely = (unit for unit in sizes if within(sizes[unit], _LIKELY[section]))
+    unit = next(likely, next(iter(sizes)))
+    return unit, within(sizes[unit], _CERTAIN[section])
 
 
 def time_doubt(step: float) -> str:
     """Return a doubt on the time's unit by a median step (s), or nothing."""
     unit, is_sure = likely_unit("time", step)
     words = (
-        f"t looks like {MAGNITUDES.times[unit]}: its median step is {step:.4g}; expected seconds: "
+        f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: "
         f"divide t by {1.0 / UNITS['time'][unit]:g}"
     )
     return words if is_sure and unit != "s" else ""
@@ -66,19 +81,16 @@ def _carrying_units(thrust: float) -> list[str]:
     """Return the units of rotor speeds able to carry the vehicle, by the median thrust by weight of
     the numbers as rad/s.
     """
-    return [
-        u
-        for u, (_, factor) in MAGNITUDES.speeds.items()
-        if within(thrust * factor**2, MAGNITUDES.carries)
-    ]
+    # mass and thrust curve may be off
+    return [u for u, (_, one) in _SPEEDS.items() if within(thrust * one**2, (0.55, 1.8))]
 
 
 def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     """Return a doubt on rotor speeds in rad/s by a median thrust by weight, or nothing."""
-    if within(thrust, MAGNITUDES.flies):
+    if within(thrust, (0.2, 5.0)):  # beyond, another vehicle flew
         return ""
     for unit in _carrying_units(thrust):
-        name, factor = MAGNITUDES.speeds[unit]
+        name, factor = _SPEEDS[unit]
         what = f"divide by {1 / factor:.4g}" if factor < 1 else f"multiply by {factor:.4g}"
         return (
             f"omega1..omega4 look like {name}: read as rad/s they make {thrust:.3g} times the "
@@ -96,22 +108,23 @@ def motor_doubts(log: FlightLog) -> list[str]:
     """
     measured = log.has_rotor_speeds and not log.commanded
     motors = log.rotor_speeds if measured else log.command
-    if motors is None or not np.isfinite(motors).all() or not np.any(motors > 0.0):
+    if motors is None or not np.isfinite(motors).all() or not (motors > 0.0).any():
         return []
     what = "rotor speeds" if measured else "motor commands"
     alike = [
         f"{what} of motors {i + 1} and {j + 1} are equal in every row; expected four motors"
         for i, j in combinations(range(4), 2)
         if np.array_equal(motors[:, i], motors[:, j])
-        and np.count_nonzero(np.diff(motors[:, i])) >= MAGNITUDES.changes
+        # a column of fewer changes is no measurement, and equal by chance
+        and np.count_nonzero(np.diff(motors[:, i])) >= 20
     ]
     doubts = [] if len(alike) == 2 else alike[:1]  # two pairs: a flight in one plane without noise
     medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
     expected = ""
-    if medians.max() > MAGNITUDES.uneven * medians.min():
-        expected = f"a ratio of at most {MAGNITUDES.uneven:g}"
-    elif medians.max() < MAGNITUDES.slow:
-        expected = f"at least {MAGNITUDES.slow:g}: no rotor carries a drone at less. Check the unit"
+    if medians.max() > _UNEVEN * medians.min():
+        expected = f"a ratio of at most {_UNEVEN:g}"
+    elif medians.max() < _SLOW:
+        expected = f"at least {_SLOW:g}: no rotor carries a drone at less. Check the unit"
     if measured and expected:
         listed = ", ".join(f"{x:.3g}" for x in medians)
         doubts.append(
@@ -134,9 +147,9 @@ def motor_unit(
         return "commands", "normalised", False, "all are zero"
     low, middle, high = np.quantile(turning, [0.01, 0.5, 1.0]).tolist()
     named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = bool(re.search("|".join(WORDS["command_words"]), names))
+    commanded = re.search("|".join(WORDS["command_words"]), names)
     speeds = bool(re.search("omega|speed|rotor|rpm", names))
-    speeds |= within(power, MAGNITUDES.squares) and not commanded
+    speeds |= within(power, (1.5, 2.5)) and not commanded  # about 2: squares
     pulses = low >= 850.0 and high <= 2250.0
     carrier = ""  # the one unit in which the rotors carry the vehicle
     if vehicle is not None and not commanded:
@@ -162,17 +175,17 @@ def motor_unit(
         (commanded and pulses, "commands", "us", True, between),
         (commanded and high <= 100.0, "commands", "percent", False, up_to),
         (commanded and high <= 65535.0, "commands", "counts", False, up_to),
-        (pulses and power >= MAGNITUDES.offset, "commands", "us", True, between),
+        (pulses and power >= 2.8, "commands", "us", True, between),
         (carrier, "rotors", carrier, not doubt, carries),
         (
-            middle > MAGNITUDES.counts and high <= 65535.0,
+            middle > 20000.0 and high <= 65535.0,
             "commands",
             "counts",
             False,
             f"{up_to}, which may be 16 bits of a command, or rpm",
         ),
         (
-            not commanded and middle > MAGNITUDES.rpm,
+            not commanded and middle > 4500.0,
             "rotors",
             "rpm",
             True,
@@ -180,7 +193,7 @@ def motor_unit(
         ),
         (pulses and not speeds, "commands", "us", False, between),
         (
-            middle > MAGNITUDES.fast,
+            middle > 2600.0,  # in rad/s only palm-sized vehicles hover as fast
             "rotors",
             "rpm",
             False,
@@ -199,26 +212,26 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
     """
     step = np.diff(log.t)
     where, longest = f"{log.source}: column", np.argmax(step)
-    if not log.period >= MAGNITUDES.shortest_period:
+    if not log.period >= _SHORTEST_PERIOD:
         raise InputError(
             f"{where} t: the median time step is {log.period:.3g} s; expected at least "
-            f"{MAGNITUDES.shortest_period:g} s"
+            f"{_SHORTEST_PERIOD:g} s"
         )
-    if not step[longest] <= MAGNITUDES.longest_step:
+    if not step[longest] <= _LONGEST_STEP:
         raise InputError(
             f"{where} t, row {longest + 2}: {step[longest]:.3g} s after the row before; expected "
-            f"at most {MAGNITUDES.longest_step:g} s"
+            f"at most {_LONGEST_STEP:g} s"
         )
     for names, values in parts_of(log)[1:]:
         columns = values.reshape(len(log.t), -1)
-        for row, i in np.argwhere(np.abs(columns) > MAGNITUDES.largest)[:1]:  # False where NaN
+        for row, i in np.argwhere(np.abs(columns) > LARGEST)[:1]:  # False where NaN
             raise InputError(
                 f"{where} {names[i]}, row {row + 1}: {columns[row, i]:.3g}; expected a number "
-                f"within {MAGNITUDES.largest:g}"
+                f"within {LARGEST:g}"
             )
     doubts = [time_doubt(log.period), *motor_doubts(log)]
     spread = np.max(np.ptp(log.position[log.valid], axis=0)) if log.has_pose else 0.0
-    if spread > MAGNITUDES.widest:
+    if spread > 300.0:
         doubts.append(
             f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres"
         )
@@ -242,13 +255,14 @@ def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     if not log.has_rotor_speeds or log.commanded:
         return log, []
     high = np.nanquantile(log.rotor_speeds, 0.99, axis=0)
-    fast = log.rotor_speeds > MAGNITUDES.broken * np.where(high > 0.0, high, np.inf)
+    # 3 times the speed: 9 times the thrust
+    fast = log.rotor_speeds > 3.0 * np.where(high > 0.0, high, np.inf)
     # a sample counts if the third before it and the third behind it are sound
     far = np.pad(fast, ((3, 3), (0, 0)))
     broken = fast & ~far[:-6] & ~far[6:]
     if not broken.any():
         return log, []
-    highest = np.max(log.rotor_speeds[broken])
+    highest = log.rotor_speeds[broken].max()
     return interpolated(log, broken), [
         f"{np.count_nonzero(broken)} rotor speeds are broken, up to {highest:.0f} rad/s where "
         f"99 % are below {high.max():.0f}: they were interpolated"

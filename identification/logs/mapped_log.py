@@ -69,7 +69,7 @@ from .table import (
     median_step,
     stem,
 )
-from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
+from .what_flew import UNSTATED, Order, WhatFlew, more_rotors, order_names, order_words
 
 _SHOWN = 30  # columns in an error
 _MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commanded wrenches"}
@@ -367,7 +367,7 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
     return notes
 
 
-def _order_note(order: tuple[int, int, int, int]) -> str:
+def _order_note(order: Order) -> str:
     names = order_names(order)
     return f"{order_words(order)}{f' ({names[0]})' if names else ''}"
 

@@ -94,7 +94,6 @@ def _sensor(says: str, scale: float = 1.0, axes: str = "x y z", **more: Any) -> 
 GYRO_READINGS = tuple(_sensor(**stated) for stated in _STATED["gyro"])
 ACCELEROMETER_READINGS = tuple(_sensor(**stated) for stated in _STATED["accelerometer"])
 
-
 AS_WRITTEN = Attitude(())  # without columns
 
 
@@ -117,11 +116,6 @@ class Convention:
         return self.attitude, self.frames, self.length, self.gyro
 
     @property
-    def is_delay(self) -> bool:
-        """Whether the rotors' clock alone is another one."""
-        return bool(self.late) and not replace(self, late=0.0).says
-
-    @property
     def pitch_sign(self) -> int:
         """Sign of the angle about y."""
         return -1 if self.attitude.signs else 1
@@ -129,8 +123,7 @@ class Convention:
     @property
     def motors(self) -> Order:
         """Motor, from 1, of each of the kit's rotors."""
-        a, b, c, d = (self.rotors.index(rotor) + 1 for rotor in ROTORS)
-        return a, b, c, d
+        return tuple(self.rotors.index(rotor) + 1 for rotor in ROTORS)
 
     @property
     def says(self) -> str:
@@ -229,19 +222,19 @@ def _each(**aspects: Sequence[Any]) -> list[Convention]:
 
 def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convention]:
     """Return readings with a penalty of 1 for each less usual convention; ``world``: the usual."""
-    weighed = []
-    for reading in readings:
-        attitude, frames = reading.attitude, reading.frames
-        less_usual = (
-            attitude.order != "wxyz",
-            attitude.euler == "xyz",
-            bool(attitude.signs),
-            attitude.sense != SENSES[0],
-            frames.map_world != world,
-            frames.unusual,
+    return [
+        replace(
+            r,
+            unlikely=r.unlikely
+            + (r.attitude.order != "wxyz")
+            + (r.attitude.euler == "xyz")
+            + bool(r.attitude.signs)
+            + (r.attitude.sense != SENSES[0])
+            + (r.frames.map_world != world)
+            + r.frames.unusual,
         )
-        weighed.append(replace(reading, unlikely=reading.unlikely + sum(less_usual)))
-    return weighed
+        for r in readings
+    ]
 
 
 ROTOR_READINGS = [  # two departures at once are as unlikely as both
@@ -283,9 +276,8 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
     angles = [
         Attitude((), unit, euler=e, signs=signs, sense=sense) for e, unit, signs, sense in ways
     ]
-    attitudes = _quaternions(orders) or angles
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    readings = _each(attitude=attitudes, frames=MAP_FRAMES, length=lengths)
+    readings = _each(attitude=_quaternions(orders) or angles, frames=MAP_FRAMES, length=lengths)
     named = [
         replace(r, unlikely=OTHER * (length in lengths and r.length != length)) for r in readings
     ]

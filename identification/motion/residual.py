@@ -15,8 +15,6 @@ from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array
 from .signals import Signals
 
-_MODEL = np.dtype(MODEL_FIELDS)
-
 
 def acting_wrench(
     signals: Signals, vehicle: Vehicle, body: Vehicle | None = None
@@ -53,7 +51,7 @@ def loaded_model(vehicle: Vehicle) -> tuple[np.ndarray, Vehicle]:
     """Return the record (1,) of a vehicle's model, to be copied, and the vehicle with its body
     effects applied.
     """
-    models = np.zeros(1, dtype=_MODEL)
+    models = np.zeros(1, dtype=np.dtype(MODEL_FIELDS))
     return models, load_model(models[0], vehicle)
 
 

@@ -97,6 +97,12 @@ def lagged(x: Array, lag: float, period: float) -> Array:
     return filtered(x, (1.0 - keep, 0.0, 0.0, 1.0, -keep, 0.0), steady=True)
 
 
+def even_times(t: Array, period: float) -> Array:
+    """Return times (n,) from the first of ``t`` (m,) to the last, ``period`` s apart."""
+    times = np.arange(t[0], t[-1] + 0.5 * period, period)
+    return np.asarray(times[times <= t[-1]])
+
+
 def resampled(t: Array, times: Array, x: Array) -> Array:
     """Return ``x`` (m, k), measured at ``times`` (m,), linear between them, at ``t`` (n,)."""
     return np.column_stack([np.interp(t, times, column) for column in x.T])
