@@ -225,10 +225,7 @@ class ClosedLoop:
             raise unknown_name("estimator", estimator, ESTIMATORS)
         self.true = declared if true is None else true
         plant, self._body = plant_record(self.true, settings or PlantSettings())
-        if like is None or not is_same_body(like._body, self._body):
-            self.model, self.data = load_world(self._body, drawn)
-        else:
-            self.model, self.data = like.model, mujoco.MjData(like.model)
+        self.model, self.data = self._make_world(drawn, like)
         self.own_stages = tuple(stages)
         self.record = np.zeros(1, dtype=LOOP)
         loop = self.record[0]
@@ -254,6 +251,13 @@ class ClosedLoop:
         self._settled = 0  # ticks before the episode
         self._carried = tuple(self.__dict__)  # to a copy, where ``_bind`` adds the rest
         self._bind()
+
+    def _make_world(
+        self, drawn: bool, like: ClosedLoop | None
+    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        if like is not None and is_same_body(like._body, self._body):
+            return like.model, mujoco.MjData(like.model)
+        return load_world(self._body, drawn)
 
     def _bind(self) -> None:
         """Lay Python's arrays over the record and MuJoCo's data, and find the core's functions."""

@@ -64,7 +64,7 @@ def features_of(thrust: Array) -> Array:
     return np.append(_MIX @ thrust / total, math.log(total))
 
 
-def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | None) -> Trim:
+def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | None = None) -> Trim:
     """Return the trim of a flight.
 
     Args:
