@@ -10,14 +10,14 @@ constexpr ww_number MOST = 4;  // m/s2, that the regulator adds to the flight lo
 
 struct Pilot {
   int law, started;
-  int ticks;               // since the law began
-  int samples;             // of the accelerometer since the last decision
+  int ticks;    // since the law began
+  int samples;  // of the accelerometer since the last decision
   Flight<ww_number> loop;
-  ww_number x[STATE];      // the estimate of the last step
-  ww_number felt[6];       // sums: specific force of the accelerometer and of the rotors, world
-  ww_number mean[6];       // m/s2, the same, of the last decision
+  ww_number x[STATE];  // the estimate of the last step
+  ww_number felt[6];   // sums: specific force of the accelerometer and of the rotors, world
+  ww_number mean[6];   // m/s2, the same, of the last decision
   ww_number action[4], command[4];
-  ww_number wanted[3];     // acceleration of the reference at the last decision, in tilts and m/s2
+  ww_number wanted[3];  // acceleration of the reference at the last decision, in tilts and m/s2
   ww_number states[STATES];
 
   void fly(Filter<ww_number> &f, int now, const ww_number *reference,
@@ -29,8 +29,7 @@ struct Pilot {
     remember(f);
     if (kind == BESIDE)
       for (int i = 0; i < SET_YAW_RATE; i++) loop.setpoint[i] = reference[i];
-    else
-      move_setpoint(loop, x, WW_NOMINAL_PERIOD);
+    else move_setpoint(loop, x, WW_NOMINAL_PERIOD);
     foresee(loop, f.vehicle, x);
     steer(loop, x, command, kind, WW_NOMINAL_PERIOD);
     if (kind != ROTOR_SPEEDS) through_the_rotors(loop, f.vehicle);
@@ -106,7 +105,8 @@ struct Pilot {
         next[a] = B[a] * command[i] - (a == 2 ? turned : ww_number(0));
         for (int b = 0; b < n; b++) next[a] += A[a * n + b] * state[b];
       }
-      const ww_number *gain = LQG_GAINS[i] + (decision < LQG_ROWS ? decision : LQG_ROWS - 1) * n * count;
+      const ww_number *gain =
+          LQG_GAINS[i] + (decision < LQG_ROWS ? decision : LQG_ROWS - 1) * n * count;
       for (int a = 0; a < n; a++) state[a] = next[a];
       for (int s = 0; s < count; s++) {
         ww_number missed = seen[s];
