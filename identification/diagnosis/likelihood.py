@@ -124,6 +124,8 @@ class Likelihood:
             self._see_rotors()
         if near and same_noise:
             self._run(self.steady, self._jumps(), self.gains)
+            if np.isnan([track.predicted[-1] for track in self.tracks]).any():
+                raise np.linalg.LinAlgError("the filter diverges with these effects")
         else:
             self._search_noise()
         self.signals = [_signals(piece, track) for piece, track in self._seen]

@@ -86,7 +86,11 @@ def rank(
         tried[frozenset(setting)] = setting
         # a slow disturbance does much of what a steady effect does: each is fitted beside the other
         for _ in range(ROUNDS):
-            near = Likelihood(flights, setting, near)
+            try:
+                near = Likelihood(flights, setting, near)
+            except np.linalg.LinAlgError:  # the filter diverges: halfway to the declared vehicle
+                setting = {e: {n: 0.5 * x for n, x in own.items()} for e, own in setting.items()}
+                continue
             begun = setting
             setting = mode(begun, partial(height, near=near))
             moved = (
