@@ -96,6 +96,7 @@ class NoiseSearch:
         square += np.square(self._gains(at) / self.held).sum()
         return float(0.5 * (square + n * np.linalg.slogdet(covariance)[1]))
 
+    @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
     def _slopes(self, at: Array) -> tuple[float, Array, Array]:
         """Return the height, Fisher's information (c, c), and minus the height's gradient (c,)."""
         steady = self._filter(at)
