@@ -67,8 +67,14 @@ types: $(VENV)/built
 	cd installation && MYPYPATH=. $(abspath $(BIN))/mypy --explicit-package-bases --config-file $(CURDIR)/pyproject.toml *.py
 	cd $(VENV)/built && MYPYPATH=. $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml -p windwrench
 
+# from a copy, with the page that the commands make
 docs: $(VENV)/built
-	WINDWRENCH_BUILT=$(VENV)/built NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+	rm -rf $(VENV)/pages site
+	mkdir $(VENV)/pages
+	cp -r docs mkdocs.yml $(VENV)/pages
+	$(BIN)/python .ci/commands_page.py > $(VENV)/pages/docs/commands.md
+	cd $(VENV)/pages && WINDWRENCH_BUILT=$(abspath $(VENV)/built) $(abspath $(BIN))/zensical build
+	mv $(VENV)/pages/site site
 
 check: lint types docs test
 

@@ -73,10 +73,12 @@ def windwrench(
     ] = False,
 ) -> None:
     """Estimate the external force and torque (the wrench) on a quadrotor, in flight or from a log.
-    Find what the model of the vehicle lacks. Simulate flights in wind; compare and train
-    controllers.
+    Find what the vehicle's model lacks. Fly, compare and train controllers in simulated wind.
 
-    windwrench LOG says of a flight log all that it allows, on one page.
+    First step: windwrench demo shows all of this, on one page.
+
+    Your own log: windwrench flight.ulg checks the log, estimates the wrench and names missing
+    effects, on one page.
 
     Example: windwrench fly --scenario base --seed 4
     """
@@ -99,7 +101,7 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     train,
 )
 # earlier names of commands' options: taken, and not shown
-_EARLIER: dict[str, dict[str, str]] = {
+_EARLIER = {
     "live": {"view": "browser"},
 }
 app.command(command_name(look), hidden=True)(as_command(look))

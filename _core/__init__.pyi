@@ -1,5 +1,6 @@
 """The compiled core: what is computed at every step."""
 
+from collections.abc import Sequence
 from typing import Annotated, Final, overload
 
 import numpy
@@ -380,11 +381,15 @@ def sensitivities(
     gyration: Annotated[
         NDArray[numpy.float64], dict(shape=(None, 3, 3), order="C", device="cpu", writable=False)
     ],
-    acting: Annotated[
-        NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu", writable=False)
+    acting: Sequence[
+        Annotated[
+            NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
+        ]
     ],
-    moved: Annotated[
-        NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu", writable=False)
+    moved: Sequence[
+        Annotated[
+            NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
+        ]
     ],
     jumps: Annotated[
         NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu", writable=False)
@@ -401,10 +406,15 @@ def sensitivities(
     disturbance: Annotated[
         NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
     ],
+    whiten: Annotated[
+        NDArray[numpy.float64], dict(shape=(6, 6), order="C", device="cpu", writable=False)
+    ],
     state: Annotated[NDArray[numpy.float64], dict(shape=(6, 3, None), order="C", device="cpu")],
     out: Annotated[NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu")],
 ) -> None:
-    """Write the change of the innovations' predictions (n, 6, c) with a unit of each column."""
+    """Write rows (n, 6, c + 1): the whitened change of the innovations' predictions with a unit of
+    each column, and the innovations, whitened by a lower triangle.
+    """
 
 def evidence(
     normal: Annotated[
@@ -445,18 +455,35 @@ def bounded_mode(
     there is one.
     """
 
-def low_pass(
+def run_sections(
     x: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
-    section: Annotated[
-        NDArray[numpy.float64], dict(shape=(6), order="C", device="cpu", writable=False)
+    sections: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
     ],
-    start: Annotated[
-        NDArray[numpy.float64], dict(shape=(2), order="C", device="cpu", writable=False)
-    ],
+    steady: bool,
+    ways: int,
 ) -> None:
-    """Run a second-order section (6,) over columns (n, k) in place, forwards and backwards;
-    start (2,): the memory of a one.
+    """Run second-order sections (m, 6) over columns (n, k) in place: forwards, and backwards where
+    there are two ways; steady: as if the first row of a way had lasted, else from rest.
     """
+
+def filter_both_ways(
+    x: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+    order: int,
+    share_of_nyquist: float,
+    high: bool,
+) -> None:
+    """Run a Butterworth low-pass or high-pass over columns (n, k) in place, both ways."""
+
+def differentiate(
+    x: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    period: float,
+    order: int,
+    out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu")],
+) -> None:
+    """Write the derivative of columns (n, k) by the polynomial through five samples."""
 
 def level_attitude(
     gyro: Annotated[

@@ -38,7 +38,9 @@ def compare(
 
     if example:
         if logs or against:
-            raise InputError(f"--example: has logs of its own; expected it without {_AGAINST}")
+            raise InputError(
+                f"--example: has logs of its own and takes no other log and no {_AGAINST}"
+            )
         console.print(_EXAMPLE)
         logs, reading = [_FLOWN / "cut.csv.gz"], AS_THEY_ARE
         against = sorted(_FLOWN.glob("normal-*.csv.gz"))
@@ -57,9 +59,9 @@ def compare(
     ]
     change = find_change(trims[: len(logs)], trims[len(logs) :])
     written = write_change(change, folder)
-    log_notes(text for log in every for text in log.notes)
     console.print(change_headline(change))
     console.print(f"vehicle: {model.name}")
+    log_notes(text for log in every for text in log.notes)
     for session in dict.fromkeys(sessions) if by_folder else ():
         after, before = (
             part.count(session) for part in (sessions[: len(logs)], sessions[len(logs) :])

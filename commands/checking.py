@@ -35,15 +35,14 @@ def check(
         with working("reading"):
             checked = check_log(log, reading.reader, model, reading.map, reading.piece)
     except UnreadLogError as error:
+        edit = f"edit {write_map}"
         if write_map is None:
             console.print(error.map_text, soft_wrap=True, highlight=False)
-            where = "stands above; --write-map map.yaml writes it"
+            edit = "edit the map above (--write-map map.yaml writes it)"
         else:
             write_text(error.map_text, write_map)
-            where = f"is {write_map}"
-        name = write_map or "map.yaml"
         raise InputError(
-            f"{error}. The map so far {where}: edit it, then windwrench check {log} --map {name}"
+            f"{error}; {edit}, then: windwrench check {log} --map {write_map or 'map.yaml'}"
         ) from error
     if write_map is not None and not checked.map_text:
         raise InputError(

@@ -33,7 +33,7 @@ def demo(
     parse_setting(effect)  # refused before anything is made
     folder = results_folder(out)
     console.print(
-        "A vehicle flies in a fan's jet, is diagnosed, and flies better.",
+        "A quadrotor flies in a fan's jet, is diagnosed, and flies again with a better model.",
     )
     with working("loading"):
         from ..demo.steps import Step, write_page
@@ -64,8 +64,8 @@ def demo(
     seconds = time.monotonic() - begun
     write_page(
         "A vehicle that feels the wind",
-        "It flies, feels, is diagnosed, and flies better. All of it was computed on this machine "
-        f"in {seconds:.0f} s.",
+        "A quadrotor flies in a fan's jet, is diagnosed, and flies again with a better model. "
+        f"Computed on this machine in {seconds:.0f} s.",
         steps,
         _YOURS,
         command_line(),

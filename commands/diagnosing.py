@@ -44,7 +44,7 @@ def diagnose(
         given = {"LOGS": logs, **{f"--{name}": x for name, x in vars(reading).items()}}
         given |= {"--test": test, "--rotor-faults": rotor_faults}
         if unwanted := [name for name, value in given.items() if value]:
-            raise InputError(f"--example: has a log of its own; expected it without {unwanted[0]}")
+            raise InputError(f"--example: has a log of its own and takes no {unwanted[0]}")
         with example_flight() as flight:
             console.print(f"{flight.what} ({flight.source})\nKnown before the diagnosis:")
             for why in (*(known.why for known in flight.known), flight.unknown):
@@ -59,7 +59,7 @@ def diagnose(
     if rotor_faults:
         if test or reading.piece:
             option = "--test" if test else "--piece"
-            raise InputError(f"--rotor-faults: expected no {option} with it")
+            raise InputError(f"--rotor-faults: takes no {option}")
         return _rotor_faults(logs, reading, out)
     read = read_flights([*logs, *(test or [])], reading)
     return _diagnose(read, logs, without, out)
@@ -102,7 +102,7 @@ def _diagnose(
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
     from ..identification.report.headline import headline
-    from ..identification.report.words import doubts, error_sentences, remainder_sentence
+    from ..identification.report.words import doubts, remainder_sentence
 
     (every, model), count = read, len(paths)
     folder = results_folder(out)
@@ -111,19 +111,15 @@ def _diagnose(
     diagnosis = _with_rotor_faults(diagnosis, paths, every[:count])
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(diagnosis, folder, command_line())
-    log_notes([*(own := doubts(diagnosis)), *(x for x in diagnosis.notes if x not in own)])
+    log_notes(doubted := doubts(diagnosis))
     faults = [data["headline"] for data in diagnosis.rotor_faults if data["rotor"] is not None]
-    sentences = (
-        headline(diagnosis),
-        *error_sentences(diagnosis),
-        remainder_sentence(diagnosis),
-        *faults,
-    )
+    sentences = (headline(diagnosis), remainder_sentence(diagnosis), *faults)
     for sentence in (*sentences, f"vehicle: {model.name}"):
         console.print(sentence)
     _show(diagnosis)
     for line in diagnosis.advice:
         console.print(line)
+    log_notes(text for text in diagnosis.notes if text not in doubted)
     say(*written)
     return report_data(diagnosis)
 
@@ -131,13 +127,14 @@ def _diagnose(
 def _show(diagnosis: "Diagnosis") -> None:
     """Print the tables of effects and of the error before and after."""
     from ..identification.report.amounts import amount
-    from ..identification.report.page import error_table
-    from ..identification.report.words import by_energy, chance, name_in_words
+    from ..identification.report.words import by_energy, chance, error_table
 
     stated = diagnosis.probabilities.names
     rows: list[tuple[str, ...]] = []
     for effect in by_energy(diagnosis):
-        head = [name_in_words(effect), *([chance(stated[effect.name])] if stated else [])]
+        name = " or ".join((effect.name, *effect.indistinguishable_from))
+        head = [f"{name} (tentative)" if effect.tentative else name]
+        head += [chance(stated[effect.name])] if stated else []
         for name in effect.coefficients:
             acts = amount(effect, name, diagnosis.declared)
             rows.append((head[0], name, f"{acts} {acts.when}".rstrip(), *head[1:]))

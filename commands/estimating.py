@@ -59,6 +59,7 @@ def estimate(
     from ..estimator.noise_scale import noise_warning
     from ..identification.motion.inertial_signals import reads_imu
     from ..identification.report.headline import wrench_headline
+    from ..identification.report.words import rounded, scale_of
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
         counts,
@@ -95,11 +96,11 @@ def estimate(
     written = [track, plot_wrench(series, flight, track.with_suffix(".png"))]
     written.append(folder / f"{begin}tuning.yaml")
     save_tuning(series.tuning, flight.period, written[2])
-    log_notes(series.notes)
     seconds = float(flight.t[-1] - flight.t[0])
     headline = wrench_headline(series)
     console.print(headline)
     console.print(f"{flight.name}: {len(flight.t)} samples, {seconds:.1f} s, vehicle {model.name}")
+    log_notes(series.notes)
     result: dict[str, Any] = {
         "headline": headline,
         "log": flight.name,
@@ -133,8 +134,8 @@ def estimate(
             measures["RMSE to truth"] = truth[i]
         # a log may tell no torque
         for measure, value in measures.items() if np.isfinite(values).any() else ():
-            sign = "+" if measure == "mean" else ""
-            table.append((f"{name}, {measure} ({unit})", *(f"{v:{sign}.4g}" for v in value)))
+            factor, small = scale_of(value, unit)
+            table.append((f"{name}, {measure} ({small})", *(rounded(factor * v) for v in value)))
             result[f"{name}_{measure.lower().replace(' ', '_')}_{unit}"] = value
     show_table(("", "x", "y", "z"), table)
     say(*written)

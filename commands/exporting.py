@@ -11,6 +11,7 @@ def export_c(
     vehicle: str,
     estimator: str = "ukf",
     effects: str = "declared",
+    controller: str | None = None,
     policy: str | None = None,
     rate: float | None = None,
     rise_time: float = 1.0,
@@ -36,7 +37,7 @@ def export_c(
     model = load_vehicle(vehicle)
     if effects == "none":
         model = replace(model, effects=())
-    flown = None if policy is None else exportable_policy(policy)
+    flown = exportable_policy(policy) if policy else None
     with working("exporting"):
         found = export(
             model,
@@ -47,19 +48,21 @@ def export_c(
             flown,
             command_line(),
             precision,
+            controller,
         )
-    there = [out / name for name in found.files if (out / name).exists()]
+    paths = {out / name: text for name, text in found.files.items()}
+    there = next(filter(Path.exists, paths), None)
     if there and not overwrite:
-        raise InputError(f"{there[0]}: is there already; expected a new folder, or --overwrite")
+        raise InputError(f"{there}: is there already; expected a new folder, or --overwrite")
     results_folder(out, vehicle=model.name, estimator=estimator, files=list(found.files))
-    for name, text in found.files.items():
-        (out / name).parent.mkdir(parents=True, exist_ok=True)
-        write_text(text, out / name)
+    for path, text in paths.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(text, path)
     console.print(
         f"{estimator} of {model.name} for {1.0 / found.filter.period:g} poses a second, with "
         f"{', '.join(found.effects) or 'no effects'}.",
     )
-    say(*(out / name for name in found.files if "/" not in name))
+    say(*(path for path in paths if path.parent == out))
     return {
         "vehicle": model.name,
         "estimator": estimator,
@@ -67,5 +70,5 @@ def export_c(
         "policy": policy,
         "precision": precision,
         "period_s": found.filter.period,
-        "files": [str(out / name) for name in found.files],
+        "files": [str(path) for path in paths],
     }

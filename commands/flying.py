@@ -39,7 +39,7 @@ def fly(
 
     from ..dynamics.effects import parse_setting
     from ..envs.captions import captioned
-    from ..envs.fan_tracking import EPISODE_SECONDS
+    from ..envs.definition import EPISODE_SECONDS
     from ..envs.gif import write_gif
     from ..evaluation.benchmark import Request
     from ..evaluation.episodes import fly_episode, time_series
@@ -48,7 +48,7 @@ def fly(
     from ..runtime.whole_files import replaced
 
     if view and gif:
-        raise InputError("--view shows the flight in a window; expected it without --gif")
+        raise InputError("--view: shows the flight in a window; expected no --gif")
     effects = [parse_setting(e) for e in effect or []]
     import_files(imports or ())
     known = task_of(task)

@@ -49,7 +49,7 @@ def train(
     values = [*(setting or []), *([f"steps={steps}"] if steps else [])]
     if algorithm == "tune":
         if cluster or reward or observation:
-            raise InputError("train tune: expected no --cluster, --reward and --observation")
+            raise InputError("train tune: takes no --cluster, --reward or --observation")
         values = [*([f"task={task}"] if task else []), *values]
         return _tune(load_config(algorithm, values, config), scenario or "base", seed, out)
     given = load_config(algorithm, values, config, task=task)

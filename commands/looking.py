@@ -56,7 +56,7 @@ def look(
             raise
         write_text(unread.map_text, own_map)
         raise InputError(
-            f"{unread}. The map so far is {own_map}: edit it, then windwrench {log} --map {own_map}"
+            f"{unread}; edit {own_map}, then: windwrench {log} --map {own_map}"
         ) from unread
     if checked["fields"]:  # its map was guessed
         write_text(checked["map"], own_map)
@@ -73,11 +73,11 @@ def look(
     if reading.vehicle is None:
         then = _how_to_make_a_vehicle(log, reading)
     else:
-        ways: tuple[tuple[str, str, Callable[..., Any], Any, Callable[..., Any]], ...] = (
-            ("estimate", "Which force and torque act", estimate, log, lambda x: (x["headline"],)),
-            ("diagnose", "What the model lacks", diagnose, [log], _what_lacks),
+        ways: tuple[tuple[str, str, Callable[..., Any], Any], ...] = (
+            ("estimate", "Which force and torque act", estimate, log),
+            ("diagnose", "What the model lacks", diagnose, [log]),
         )
-        for name, title, work, logs, told in ways:
+        for name, title, work, logs in ways:
             command = _typed(name, log, reading)
             try:
                 with silently():
@@ -85,10 +85,10 @@ def look(
             except InputError as refused:
                 steps.append(Step(title, (f"Not from this log: {refused}",), command))
             else:
-                sentence, *_ = said = told(results[name])
+                sentence = results[name]["headline"]
                 picture = folder / name / "wrench.png" if name == "estimate" else None
                 report = "" if picture else f"{name}/report.html"
-                steps.append(Step(title, said, command, picture, report))
+                steps.append(Step(title, (sentence,), command, picture, report))
             _tell(steps[-1])
     page = folder / "log.html"
     write_page(checked["log"], sentence, steps, then, command_line(), page, checked["doubts"])
@@ -133,11 +133,3 @@ def _what_it_holds(checked: Mapping[str, Any]) -> tuple[str, ...]:
     read = f"{checked['samples']} rows, {checked['seconds']:.1f} s, read by {checked['read_by']}."
     rates = (f"{name} {c['rate_hz']:.3g} Hz" for name, c in checked["channels"].items())
     return (checked["headline"], read, f"Channels: {', '.join(rates)}.")
-
-
-def _what_lacks(result: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the first sentence of a diagnosis, and its error on held-out flight."""
-    error = result["error"]
-    before, after = (1e3 * error[when]["force_rms_N"] for when in ("before", "after"))
-    told = f"Held-out force error: {before:.3g} mN before, {after:.3g} mN after."
-    return (result["headline"], told)

@@ -29,7 +29,7 @@ def reproduce(
         raise InputError(
             "reproduce: an installed wheel holds no figures; expected a checkout of the repository"
         )
-    from ..reproduction import KEPT, NAMES
+    from ..reproduction import NAMES
     from ..reproduction.reproduce import chosen, is_done, numbers_of_seeds, write_page
     from ..reproduction.reproduce import reproduce as run
     from ..runtime.regular_files import read_json
@@ -50,7 +50,7 @@ def reproduce(
 
         fresh = run(names, folder, seeds, jobs, report)
     target = folder / "reproduction.md" if page is None else page
-    write_page((*NAMES, *KEPT), folder, target)
+    write_page(NAMES, folder, target)
     result: dict[str, Any] = {}
     for name in names:
         kept = read_json(folder / f"{name}.json", "a figure's results")

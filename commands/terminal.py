@@ -52,7 +52,7 @@ errors = _Terminal(stderr=True, emoji=False, markup=False)
 
 
 @dataclass
-class CommandRun:
+class _CommandRun:
     """The running command's record so far."""
 
     dry: bool = False
@@ -73,7 +73,7 @@ class CommandRun:
                 folder.rmdir()
 
 
-run = CommandRun()
+run = _CommandRun()
 
 
 class DryRun(Exception):  # noqa: N818 - the way out of a command whose request is good, no error

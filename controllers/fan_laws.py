@@ -19,7 +19,7 @@ from .observation import DECISION_PERIOD, FORCE_X, MAX_COMMAND, TORQUE_Y, TORQUE
 Array = NDArray[np.floating[Any]]
 
 
-class FanLaw:
+class _FanLaw:
     """Base of the laws: limits the command, without a memory."""
 
     def __post_init__(self) -> None:
@@ -45,7 +45,7 @@ class FanLaw:
 
 
 @dataclass(eq=False)
-class Hover(FanLaw):
+class Hover(_FanLaw):
     """Stays in place: the lower bound, score 0."""
 
     axes: int = 1  # that are commanded
@@ -56,7 +56,7 @@ class Hover(FanLaw):
 
 
 @dataclass(eq=False)
-class Admittance(FanLaw):
+class Admittance(_FanLaw):
     """The admittance controller of McKinnon and Schoellig (2016): velocity in proportion to the yaw
     torque and, with a second commanded axis, to the pitch torque.
 
@@ -89,7 +89,7 @@ class Ratio(Admittance):
 
 
 @dataclass(eq=False)
-class Lead(FanLaw):
+class Lead(_FanLaw):
     """Ratio with derivative: ``x = tau_z / max(f_x, least_force)``, ``u = -(gain x + lead dx/dt)``.
 
     The rate is the difference between decisions. It compensates a part of the filter's lag, so the
@@ -107,7 +107,7 @@ class Lead(FanLaw):
 
 
 @dataclass(eq=False)
-class AdmittancePID(FanLaw):
+class AdmittancePID(_FanLaw):
     """The admittance law with integral and lead: ``u = -(gain tau_z + integral S + lead
     dtau_z/dt)``, ``S`` the integral of ``tau_z``.
 

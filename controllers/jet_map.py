@@ -31,7 +31,7 @@ _SIDEWAYS, _TURNING = 0.2, 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class JetMap:
+class _JetMap:
     """Tables (AXES, COUNT) of ``tau_z`` (Nm), ``f_x`` and ``f_y`` (N), world, over the offset from
     the axis. The vehicle faces the fan at the height of the axis.
     """
@@ -43,7 +43,7 @@ class JetMap:
 
 
 @lru_cache(maxsize=16)
-def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> JetMap:
+def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> _JetMap:
     """Return the tables of a vehicle, from the effect model ``fan_jet`` at the vehicle's own
     stations. The gusts' variance follows from the drag at these stations, each in its own gust.
     """
@@ -72,7 +72,7 @@ def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> JetMap:
     slope = (felt(_SIDEWAYS, 0.0) - felt(-_SIDEWAYS, 0.0)) / (2.0 * _SIDEWAYS)
     turning = (felt(0.0, _TURNING) - felt(0.0, -_TURNING)) / (2.0 * _TURNING)
     gust = _gust_variance(bundle.vehicle, jet, air, offsets)
-    return JetMap(felt(0.0, 0.0), slope, turning, gust)
+    return _JetMap(felt(0.0, 0.0), slope, turning, gust)
 
 
 def _gust_variance(vehicle: Vehicle, jet: Jet, air: Air, offsets: Array) -> Array:

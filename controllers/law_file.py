@@ -16,7 +16,7 @@ WHAT = "a law file"
 
 
 @dataclass(frozen=True)
-class LawFile:
+class _LawFile:
     """The fields of such a file."""
 
     __pydantic_config__ = STRICT
@@ -32,7 +32,7 @@ def is_law_file(name: str) -> bool:
     return name.endswith((".yaml", ".yml"))
 
 
-def read_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> LawFile:
+def read_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> _LawFile:
     """Return a file's law and gains.
 
     Args:
@@ -43,7 +43,7 @@ def read_law(name: str, task: str, laws: Mapping[str, Callable[..., Any]]) -> La
     Raises:
         InputError: no such file, another task's law, an unknown law, or an unknown gain.
     """
-    stated = checked(LawFile, read_yaml(Path(name), WHAT), name)
+    stated = checked(_LawFile, read_yaml(Path(name), WHAT), name)
     if stated.task not in ("", task):
         raise InputError(f"{name}: task: a law of {stated.task}; expected one of {task}")
     if stated.law not in laws:

@@ -85,7 +85,7 @@ class LQG:
         for name in _POSITIVE:
             if not getattr(self, name) > 0.0:
                 raise InputError(f"LQG: {name} must be above 0, got {getattr(self, name)!r}")
-        self._laws = [self._law(axis) for axis in axis_models(self.vehicle)]
+        self.laws = [self._law(axis) for axis in axis_models(self.vehicle)]
         self.reset()
 
     def brief(self, briefing: Briefing) -> None:
@@ -95,7 +95,7 @@ class LQG:
 
     def reset(self) -> None:
         """Forget the last episode."""
-        for observer, *_ in self._laws:
+        for observer, *_ in self.laws:
             observer.reset()
         self._action = np.zeros(3)
         self._wanted: Wide | None = None  # acceleration of the reference, in tilts and m/s2
@@ -131,7 +131,7 @@ class LQG:
         tilt = rotors / gravity - wanted
         torque = tilting(o[TORQUE])
         action = np.zeros(3)
-        for i, (observer, gain, ahead) in enumerate(self._laws):
+        for i, (observer, gain, ahead) in enumerate(self.laws):
             seen = [place[i], speed[i], o[FORCE][i], felt[i]]
             if i < 2:
                 seen = [place[i], speed[i], tilt[i], o[FORCE][i], torque[i], felt[i]]

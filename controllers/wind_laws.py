@@ -38,7 +38,7 @@ _ATTITUDE_LAG = FlightGains.rate / FlightGains.attitude * np.array([1.0, 1.0, 0.
 
 
 @dataclass(eq=False)
-class WindLaw:
+class _WindLaw:
     """Base of the laws: proportional, derivative and integral action on the position error.
 
     ``a = kp e + kd de/dt + ki (integral of e)``, beside the flight loop's own; the integral stops
@@ -101,16 +101,16 @@ class WindLaw:
         return np.array([*turn, 0.0]) * self._tilting(o, lead)
 
 
-class FlightLoopAlone(WindLaw):
+class FlightLoopAlone(_WindLaw):
     """Adds nothing to the flight loop: the lower end of the score, 0."""
 
 
-class PID(WindLaw):
+class PID(_WindLaw):
     """A PID position controller: it waits for the error."""
 
 
 @dataclass(eq=False)
-class PIDWithForce(WindLaw):
+class PIDWithForce(_WindLaw):
     """A PID controller with the estimated force fed forward: ``- gain f / m``.
 
     ``f`` is the external force from the unscented Kalman filter (McKinnon and Schoellig, IROS
@@ -143,7 +143,7 @@ class PIDWithWrench(PIDWithForce):
 
 
 @dataclass(eq=False)
-class INDI(WindLaw):
+class INDI(_WindLaw):
     """Incremental nonlinear dynamic inversion of the position loop, and of the torque.
 
     Tal and Karaman, *Accurate tracking of aggressive quadrotor trajectories using incremental
@@ -194,7 +194,7 @@ class INDI(WindLaw):
 
 
 @dataclass(eq=False)
-class L1Adaptive(WindLaw):
+class L1Adaptive(_WindLaw):
     """L1 adaptive augmentation of the position loop, and of the torque.
 
     Wu, Cheng, Ackerman, Gahlawat, Lakshmanan, Zhao and Hovakimyan, *L1 adaptive augmentation for

@@ -23,7 +23,7 @@ ORDER = 3  # the autoregression's
 
 
 @dataclass(frozen=True, eq=False)
-class AxisLag:
+class _AxisLag:
     """One axis of the filter, from decision to decision."""
 
     keep: Array  # (3, 3), remainder of the error after a decision
@@ -41,7 +41,7 @@ class AxisLag:
 @lru_cache(maxsize=64)
 def axis_lag(
     inertia: float, noise: tuple[float, float, float], air: Air, period: float, steps: int
-) -> AxisLag:
+) -> _AxisLag:
     """Return how one axis follows.
 
     Args:
@@ -94,7 +94,7 @@ def axis_lag(
         return np.array(values)
 
     pose = _autocovariance(F, K @ K.T * measured**2, np.array([0.0, 0.0, -1.0]))
-    return AxisLag(over(F), enter, coloured(air.disturbance_time), coloured(air.gust_time), pose)
+    return _AxisLag(over(F), enter, coloured(air.disturbance_time), coloured(air.gust_time), pose)
 
 
 def autoregressions(autocovariance: Array) -> tuple[Array, Array]:
@@ -114,7 +114,7 @@ def autoregressions(autocovariance: Array) -> tuple[Array, Array]:
 
 def lags(
     mass: float, inertia_z: float, noise: FilterNoise, air: Air, decision: float
-) -> tuple[AxisLag, AxisLag]:
+) -> tuple[_AxisLag, _AxisLag]:
     """Return how the estimated torque about z and the estimated force follow."""
     steps = max(1, round(decision / noise.period))
     torque = (noise.torque, noise.torque_walk, noise.attitude)

@@ -116,7 +116,6 @@ template <class T> void point(Flight<T> &c, const T *x, Single<T> dt, T thrust, 
 template <class T> void fly(Flight<T> &c, const T *x, Single<T> dt) {
   using S = Single<T>;
   const auto &R = c.rotation;
-  matrix_of(x + QUATERNION, c.rotation);
   T a0 = wanted_acceleration(c, x, dt, 0), a1 = wanted_acceleration(c, x, dt, 1);
   T a2 = wanted_acceleration(c, x, dt, 2) + c.body.gravity;
   a2 = larger(a2, T{} + S(LEAST_THRUST) * c.body.gravity);
@@ -137,7 +136,6 @@ template <class T> void fly(Flight<T> &c, const T *x, Single<T> dt) {
 // pitch turn about the body's x and y axes at the present yaw, in the order yaw, pitch, roll.
 // `move_setpoint` carries the set point's yaw along at the yaw rate
 template <class T> void fly_attitude(Flight<T> &c, const T *x, const T *wanted, Single<T> dt) {
-  matrix_of(x + QUATERNION, c.rotation);
   c.setpoint[SET_YAW_RATE] = wanted[2];
   T yaw = angle_of(c.rotation[1][0], c.rotation[0][0]);
   T forward = sine(wanted[1]) * cosine(wanted[0]), right = sine(wanted[0]);
@@ -158,6 +156,7 @@ template <class T> void fly_rates(Flight<T> &c, const T *x, const T *wanted) {
 template <class T>
 void steer(Flight<T> &c, const T *x, const T *command, CommandKind kind, Single<T> dt) {
   using S = Single<T>;
+  matrix_of(x + QUATERNION, c.rotation);
   if (kind == ROTOR_SPEEDS) {
     for (int i = 0; i < 4; i++) c.command[i] = command[i];
   } else if (kind == RATES) {
@@ -198,7 +197,7 @@ template <class T> void delivered(Model<T> &m, const T *commands, T *out) {
                       T{} + Single<T>(HORIZON),
                       m.voltage,
                       m.time};
-  T memory[112];
+  T memory[sizeof(m.memory[0]) / sizeof(T)];
   for (int i = 0; i < m.rotor_count; i++) {
     std::memcpy(memory, m.memory[i], sizeof(memory));
     m.rotor_models[i](m.rotor_coefficients[i], numbers_of<T>(m.constants), numbers_of<T>(rotors),

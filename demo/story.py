@@ -89,8 +89,8 @@ class Story:
                 (
                     "The vehicle must stay in the jet. Its controller sees the estimated force and "
                     "torque, never the fan.",
-                    f"It keeps {episode.rmse:.2f} m from the axis (RMSE over 20 s)"
-                    f"{', and is lost' if episode.lost else ''}; a vehicle that hovers on the spot "
+                    f"Distance from the axis: {episode.rmse:.2f} m (RMSE over 20 s)"
+                    f"{', terminated' if episode.lost else ''}; without the controller "
                     f"{still.rmse:.2f} m.",
                 ),
                 command,
@@ -100,8 +100,8 @@ class Story:
                 "Feel the wind",
                 (
                     "A Kalman filter estimates force and torque from rotor speeds and pose alone.",
-                    f"On this flight its error is {force:.2f} N and {1e3 * torque:.1f} mNm (RMSE "
-                    "over the three axes); the jet pushes with up to "
+                    f"Error of the estimate: {force:.2f} N and {1e3 * torque:.1f} mNm (RMSE "
+                    "over three axes); the jet pushes with up to "
                     f"{np.abs(episode.force[:, 0]).max():.1f} N.",
                 ),
                 f"{command} --csv",
@@ -123,8 +123,8 @@ class Story:
                 "Record a flight with a hidden effect",
                 (
                     f"The vehicle now has an effect that its model lacks: {self.effect_words}.",
-                    f"It flies {SECONDS:g} s and writes its log. The log holds times, poses and "
-                    "rotor speeds, and not the answer.",
+                    f"The vehicle flies {SECONDS:g} s. The log holds times, poses and rotor "
+                    "speeds, and no true wrench.",
                 ),
                 f"windwrench record --vehicle {shlex.quote(self.vehicle_name)} "
                 f"--effect {self.effect_words} --trajectory {TRAJECTORY} --seconds {SECONDS:g} "
@@ -168,8 +168,7 @@ class Story:
                     "one. Fan, gusts and noise are the same.",
                     f"Distance from the jet's axis, mean RMSE: {before.mean():.3f} m before, "
                     f"{after.mean():.3f} m after; smaller on {np.sum(after < before)} of {count}.",
-                    "So few flights show the way and not a rate: docs/trust.md has twenty for "
-                    "each of ten effects.",
+                    "So few flights show a direction, no rate.",
                 ),
                 f"windwrench fly --scenario {SCENARIO} --seed {self.seed} --vehicle "
                 f"{self.out / 'diagnose' / 'vehicle.yaml'} --truth "
@@ -186,7 +185,7 @@ class Story:
                 "Compare controllers",
                 (
                     f"{len(LAWS)} controllers fly the same {self.episodes} episodes of each "
-                    "scenario. Score 0 is a vehicle that hovers, 1 one that sees the fan.",
+                    "scenario. Score 0: hovering; 1: a controller that sees the fan.",
                     f"RMSE on {SCENARIO}: {best}.",
                 ),
                 f"windwrench benchmark --controllers {','.join(LAWS)} --episodes {self.episodes} "

@@ -1,7 +1,5 @@
 """Actions of an agent: the five kinds, and their numbers in the flight loop's units."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

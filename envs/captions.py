@@ -58,8 +58,8 @@ def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDAr
     for label, stroke, mark, label_text in (
         ("true force", _WIDE, TRUE, _newtons(loop.external[:3])),
         ("estimated force", _NARROW, ESTIMATED, _newtons(loop.state[16:19])),
-        ("true yaw torque", _WIDE, TURNING_TRUE, _millis(float(loop.external[5]))),
-        ("estimated yaw torque", _NARROW, TURNING, _millis(float(loop.state[15]))),
+        ("true yaw torque", _WIDE, TURNING_TRUE, _millis(loop.external[5])),
+        ("estimated yaw torque", _NARROW, TURNING, _millis(loop.state[15])),
     ):
         colour = tuple(np.round(255 * mark[:3]).astype(int).tolist())
         shown = margin, middle, margin + 34 * size, middle
@@ -104,7 +104,7 @@ def _short(value: float) -> str:
 
 
 def _newtons(force: NDArray[np.float64]) -> str:
-    return f"{float(np.linalg.norm(force)):.2f} N"
+    return f"{np.linalg.norm(force):.2f} N"
 
 
 def _millis(torque: float) -> str:

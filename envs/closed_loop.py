@@ -104,8 +104,7 @@ _NO_JET: Array = np.zeros((2, COUNT_X, COUNT_R))
 @lru_cache(maxsize=8)
 def _jet(radius: float, hub_radius: float) -> Array:
     """Return the tables (2, COUNT_X, COUNT_R) of axial and radial speed, one for all loops."""
-    tables: Array = np.stack(jet_table(radius, hub_radius))
-    return tables
+    return np.stack(jet_table(radius, hub_radius))
 
 
 class World(NamedTuple):
@@ -152,21 +151,13 @@ class Stage:
             raise unknown_name("stage", self.before, STAGES, f"stage {self.name!r}: before")
 
 
-def _core_stages(*numbers: int) -> Callable[[ClosedLoop], None]:
-    def run(loop: ClosedLoop) -> None:
-        for number in numbers:
-            loop.run_stage(number)
-
-    return run
-
-
 # the kit's own stages, in their order
 STAGES: dict[str, Callable[[ClosedLoop], object]] = {
     "wind": lambda loop: loop.blow(),
-    "sense": _core_stages(SENSE),
-    "estimate": _core_stages(ESTIMATE),
-    "steer": _core_stages(STEER),
-    "actuate": _core_stages(ACTUATE, FEEL),
+    "sense": lambda loop: loop.run_stage(SENSE),
+    "estimate": lambda loop: loop.run_stage(ESTIMATE),
+    "steer": lambda loop: loop.run_stage(STEER),
+    "actuate": lambda loop: loop.run_stage(ACTUATE, FEEL),
     "move": lambda loop: loop.move(),
 }
 
@@ -189,6 +180,7 @@ class ClosedLoop:
         kind: commands in ``action``, once the filter has settled.
         stages: a user's own, in the pipeline of a tick.
         like: a loop whose MuJoCo model is this one's, too, if the rigid bodies are the same.
+        rotors: (4, 3) m, where winds meet the rotors; default: the true vehicle's.
 
     Attributes:
         state: (20,) estimated state, laid out as in ``estimator.estimate``.
@@ -227,6 +219,7 @@ class ClosedLoop:
         kind: int = BESIDE,
         stages: Sequence[Stage] = (),
         like: ClosedLoop | None = None,
+        rotors: Array | None = None,
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
@@ -242,7 +235,8 @@ class ClosedLoop:
         loop["model_in_loop"], self.kind = model_in_loop, kind
         self.jet_table = _NO_JET
         if fan is not None:
-            loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
+            places = self._body.positions if rotors is None else rotors
+            loop["fan"] = fan_record(fan, places, TICK)[0]
             loop["fan"]["blown"] = 1  # drag, in still air too
             self.jet_table = _jet(fan.radius, fan.hub_radius)
         self.accelerometer = accelerometer
@@ -396,9 +390,10 @@ class ClosedLoop:
             ticks: even: the winds blow from the first.
             fan_path: the fan's place meanwhile, as in ``run``.
         """
-        self.record[0]["ticks"], self._settled, self.record[0]["kind"] = -ticks, ticks, BESIDE
+        loop = self.record[0]
+        loop["ticks"], self._settled, loop["kind"] = -ticks, ticks, BESIDE
         self.run(rng.standard_normal((ticks, self.noise_size)), fan_path)
-        self.record[0]["kind"] = self.kind
+        loop["kind"] = self.kind
 
     def run(self, noise: Array, fan_path: Array | None = None) -> None:
         """Run one tick for each row of ``noise``.
@@ -434,9 +429,10 @@ class ClosedLoop:
                     stage(self)
                 raise_errors()
 
-    def run_stage(self, number: int) -> None:
-        """Run a stage of the core in the present tick."""
-        _core.run_stage(self.address, number, self.fan_path, self.noise, self.row)
+    def run_stage(self, *numbers: int) -> None:
+        """Run stages of the core in the present tick."""
+        for number in numbers:
+            _core.run_stage(self.address, number, self.fan_path, self.noise, self.row)
 
     def blow(self) -> None:
         """Write the winds at the vehicle's stations into ``air``, every second tick."""

@@ -1,7 +1,6 @@
 """A task's definition: arguments and spaces, and the functions of the state of n worlds."""
 
-from __future__ import annotations
-
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -25,7 +24,7 @@ from .fan import Fan
 from .observations import FELT, as_numbers, bounds, parts
 from .plant import TICK, PlantSettings
 from .references import along
-from .scenarios import Drawn, find_scenario
+from .scenarios import Drawn, draw_vehicle, find_scenario
 from .state import REFERENCE_SIZE, Episodes, Flags, Frame, Start, State
 from .wind import Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_winds
@@ -53,6 +52,7 @@ class TaskDefinition:
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2)  # commanded, for velocities and accelerations
     follows: ClassVar[bool] = True  # whether accelerations are beside a flight to the reference
     model_in_loop: bool = True
+    randomise: str | None = None  # "vehicle": the true vehicle's numbers are drawn each episode
     accelerometer: ClassVar[tuple[float, float] | None] = ACCELEROMETER
     label: ClassVar[str] = "trajectory"  # entry of ``info`` with the name of the episode's draw
     draws: ClassVar[int] = 20  # at most, until an episode begins with the vehicle not lost
@@ -85,6 +85,7 @@ class TaskDefinition:
         winds: Sequence[Wind] | None = None,
         model_in_loop: bool | None = None,
         gains: FlightGains | None = None,
+        randomise: str | None = None,
     ) -> None:
         name = self.name
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -114,10 +115,17 @@ class TaskDefinition:
             "decision_hz": decision_hz,
             "episode_s": episode_s,
             "model_in_loop": model_in_loop,
+            "randomise": randomise,
         }
         for field, value in fields.items():
             if value is not None:
                 setattr(self, field, value)
+        stated = any(vars(self.truth.uncertainty).values())
+        if self.randomise and not (stated and self.randomise == "vehicle"):
+            raise InputError(
+                f"{name}: randomise: expected 'vehicle', and an uncertainty in the vehicle's file "
+                f"such as {{thrust: 0.03}}; got {self.randomise!r} and {self.truth.name}"
+            )
         sees = self._source("observe")
         if observation is None and type(self).observation != sees.observation:
             observation = type(self).observation
@@ -230,8 +238,7 @@ class TaskDefinition:
 
         Here: 2.5 m from the reference, on the floor, tilted by 70 degrees, or not finite.
         """
-        lost: Flags = ~(s.flying & (s.position[:, 2] > 0.0) & (s.distance <= LOST_OFFSET))
-        return lost
+        return ~(s.flying & (s.position[:, 2] > 0.0) & (s.distance <= LOST_OFFSET))
 
     def info(self, s: State) -> dict[str, Any]:
         """Return entries of ``info``, arrays (n, ...): the truth behind the observation.
@@ -259,8 +266,7 @@ class TaskDefinition:
     def declared(self) -> Any:
         """The declared vehicle, with the scenario's measurement of the pose."""
         mocap = Mocap(1.0 / TICK, self.scenario.sigma_position, self.scenario.sigma_attitude)
-        declared: Vehicle = replace(self.vehicle, mocap=mocap)
-        return declared
+        return replace(self.vehicle, mocap=mocap)
 
     @property
     def tuning(self) -> UKFTuning:
@@ -273,18 +279,13 @@ class TaskDefinition:
         """
         return Briefing(self.vehicle)
 
-    def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
+    def make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
         """Return the closed loop of a true vehicle and the undeclared effects, with a filter of the
         declared vehicle.
         """
         declared = self.declared
         drawn: dict[str, Any] = {
             n: v for n, v in self.drawn.items() if n in Drawn.__dataclass_fields__
-        }
-        defaults = {
-            "accelerometer": ACCELEROMETER if self.observation in FELT else self.accelerometer,
-            "gains": self.gains,
-            "model_in_loop": bool(self.model_in_loop),
         }
         self._made = ClosedLoop(
             declared,
@@ -297,7 +298,10 @@ class TaskDefinition:
             kind=self.flown.kind,
             stages=self.stages,
             like=self._made,
-            **{**defaults, **given},
+            rotors=self.truth.positions,  # lanes share one wind's stations
+            accelerometer=ACCELEROMETER if self.observation in FELT else self.accelerometer,
+            gains=self.gains,
+            model_in_loop=bool(self.model_in_loop),
         )
         return self._made
 
@@ -305,21 +309,22 @@ class TaskDefinition:
         return self.__dict__ | {"_made": None}
 
     def draw_loop(self, rng: np.random.Generator, kept: dict[Any, ClosedLoop]) -> ClosedLoop:
-        """Return the closed loop of a world's episode. A scenario with a varied vehicle draws a new
-        loop; otherwise the world's ``kept`` loop flies again.
+        """Return the closed loop of a world's episode. A scenario with a varied vehicle and
+        ``randomise`` draw a new loop; otherwise the world's ``kept`` loop flies again.
         """
-        if not self.scenario.varied:
+        if not (self.scenario.varied or self.randomise):
             self.drawn = {}
             if self.scenario not in kept:
                 kept[self.scenario] = self.make_loop(self.truth, self.fan)
             return kept[self.scenario]
-        fan, truth, drawn = self.fan, self.truth, self.scenario.variation.draw(rng)
-        self.drawn = drawn
+        truth = draw_vehicle(self.truth, rng) if self.randomise else self.truth
+        self.drawn = self.scenario.variation.draw(rng) if self.scenario.varied else {}
+        drawn = defaultdict(lambda: 1.0, self.drawn)
         fan = replace(
-            fan,
-            speed=fan.speed * drawn.get("fan_speed", 1.0),
-            rotor_drag=fan.rotor_drag * drawn["rotor_drag"],
-            hull_area=fan.hull_area * drawn["hull_area"],
+            self.fan,
+            speed=self.fan.speed * drawn["fan_speed"],
+            rotor_drag=self.fan.rotor_drag * drawn["rotor_drag"],
+            hull_area=self.fan.hull_area * drawn["hull_area"],
         )
         mass, inertia = truth.mass * drawn["mass"], truth.inertia * drawn["inertia"]
         return self.make_loop(replace(truth, mass=mass, inertia=inertia), fan)
@@ -365,8 +370,8 @@ class TaskDefinition:
 
 def _ticks(task: str, decision_hz: float) -> int:
     """Return the ticks of a decision."""
-    hz = decision_hz if isinstance(decision_hz, int | float) and decision_hz > 0 else 0.0
-    ticks = 1.0 / (TICK * hz) if hz else 0.0
+    is_rate = isinstance(decision_hz, int | float) and decision_hz > 0
+    ticks = 1.0 / (TICK * decision_hz) if is_rate else 0.0
     if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
         raise InputError(
             f"{task}: decision_hz must be 200 Hz over a whole number (200, 100, 50, 40, 25, 12.5), "

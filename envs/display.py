@@ -7,6 +7,7 @@ import os
 import sys
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 from ..runtime.errors import InputError
@@ -20,34 +21,23 @@ def _choose() -> None:
     if not _LINUX or any(os.environ.get(name) for name in (*_VARIABLES, "MUJOCO_GL")):
         return
     for backend, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8")):
-        try:
+        with suppress(OSError):
             ctypes.CDLL(library)
-        except OSError:
-            continue
-        os.environ["MUJOCO_GL"] = backend
-        return
-
-
-def _import_mujoco() -> None:
-    """Import MuJoCo.
-
-    Raises:
-        InputError: MuJoCo does not know the way to draw, or cannot load it.
-    """
-    try:
-        import mujoco  # noqa: F401
-    except Exception as error:
-        asked = os.environ.get("MUJOCO_GL")
-        if asked is None:
-            raise
-        raise InputError(
-            f"MUJOCO_GL={asked}: MuJoCo cannot draw that way ({error}); expected egl, osmesa, glfw "
-            f"or disable, or the variable not set"
-        ) from error
+            os.environ["MUJOCO_GL"] = backend
+            return
 
 
 _choose()
-_import_mujoco()
+try:
+    import mujoco  # noqa: F401
+except Exception as error:
+    asked = os.environ.get("MUJOCO_GL")
+    if asked is None:
+        raise
+    raise InputError(
+        f"MUJOCO_GL={asked}: MuJoCo cannot draw that way ({error}); expected egl, osmesa, glfw "
+        f"or disable, or the variable not set"
+    ) from error
 
 
 def modes_shown(metadata: Mapping[str, Any]) -> list[str]:

@@ -44,8 +44,8 @@ class Fan:
         with weight and arm.
         """
         standard = standard_vehicle()
-        weight, length = vehicle.weight / standard.weight, vehicle.arm_l / standard.arm_l
-        length = math.sqrt(length)
+        weight = vehicle.weight / standard.weight
+        length = math.sqrt(vehicle.arm_l / standard.arm_l)
         return replace(
             self,
             rotor_drag=weight * self.rotor_drag,
@@ -55,14 +55,11 @@ class Fan:
         )
 
 
+_OF_FAN = ("speed", "height", "turbulence", "rotor_drag", "hull_area")
 FAN = np.dtype(
     [
-        ("speed", "f8"),
-        ("height", "f8"),
-        ("turbulence", "f8"),
-        ("rotor_drag", "f8"),
-        ("hull_area", "f8"),
-        ("keep", "f8"),  # share of a gust left after a tick
+        # ``keep``: share of a gust left after a tick
+        *[(name, "f8") for name in (*_OF_FAN, "keep")],
         ("mixing", "f8", (STATIONS, STATIONS)),  # lower root of the correlation between stations
         ("stations", "f8", (STATIONS, 3)),  # m, body frame, from the geometric centre
         ("gusts", "f8", (STATIONS, 3)),  # unit variance
@@ -80,7 +77,7 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
     """
     record = np.zeros(1, dtype=FAN)
     f = record[0]
-    for name in ("speed", "height", "turbulence", "rotor_drag", "hull_area"):
+    for name in _OF_FAN:
         f[name] = getattr(fan, name)
     f["keep"] = math.exp(-period / fan.gust_time)
     angle = np.arange(8) * math.pi / 4

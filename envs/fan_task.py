@@ -1,7 +1,5 @@
 """The base of the tasks in front of a fan."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -48,8 +46,7 @@ class FanTask(Task):
     @property
     def times(self) -> Array:
         """Times (n,) s of the ticks of an episode."""
-        times: Array = TICK * np.arange(round(self.episode_s / TICK) + 2, dtype=np.float64)
-        return times
+        return TICK * np.arange(round(self.episode_s / TICK) + 2, dtype=np.float64)
 
     def start(self, rng: np.random.Generator, n: int) -> Start:
         """Draw paths of the fan; hover beside their starts, facing the fan."""

@@ -1,7 +1,5 @@
 """The fan-tracking environment."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
@@ -11,9 +9,9 @@ import numpy as np
 from ..controllers.observation import MAX_COMMAND
 from ..dynamics.motion import Array
 from ..runtime.errors import InputError, unknown_name
-from .definition import EPISODE_SECONDS, LOST_OFFSET
+from .definition import LOST_OFFSET
 from .fan import Fan
-from .fan_task import AWAY, DISTANCE, LIMITS, SCALES, FanTask
+from .fan_task import AWAY, LIMITS, SCALES, FanTask
 from .scenarios import draw_fan_path
 from .state import Flags, State
 
@@ -151,7 +149,7 @@ class FanTrackingEnv(FanTask):
                 raise InputError(
                     f"FanTracking: fan_path must return {n} finite numbers for {n} times"
                 )
-        offset = float(rng.uniform(*self.scenario.offset) * rng.choice([-1.0, 1.0]))
+        offset = rng.uniform(*self.scenario.offset) * rng.choice([-1.0, 1.0])
         path = np.column_stack([fan_y, np.full(len(fan_y), self.fan.height)])
         return label, path, np.array([offset, 0.0])
 
@@ -184,8 +182,7 @@ class FanTrackingEnv(FanTask):
         """Return whether each vehicle is lost (n,)."""
         away = np.abs(s.position - s.reference[:, :3])
         near = (away[:, 0] <= AWAY) & (away[:, 2] <= AWAY)
-        lost: Flags = ~(s.flying & near & (np.abs(self.off_axis(s)[:, 0]) <= LOST_OFFSET))
-        return lost
+        return ~(s.flying & near & (np.abs(self.off_axis(s)[:, 0]) <= LOST_OFFSET))
 
     def info(self, s: State) -> dict[str, Any]:
         """Return the fan's motion and the true offset, force and torque."""
@@ -203,4 +200,3 @@ class FanTrackingEnv(FanTask):
 
 
 fan_tracking_vector = FanTrackingEnv.vector
-__all__ = ["DISTANCE", "EPISODE_SECONDS", "LOST_OFFSET", "SCALES", "FanTrackingEnv"]

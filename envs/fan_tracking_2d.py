@@ -82,8 +82,8 @@ class FanTracking2DEnv(FanTask):
         sideways, y = draw_fan_path(self.scenario, rng, self.times)
         upwards, z = draw_fan_path(self.scenario, rng, self.times)
         path = np.column_stack([y, self.fan.height + _VERTICAL * z])
-        offset = float(rng.uniform(*self.scenario.offset))
-        side = float(rng.uniform(-math.pi, math.pi))
+        offset = rng.uniform(*self.scenario.offset)
+        side = rng.uniform(-math.pi, math.pi)
         beside = offset * np.array([math.cos(side), 0.5 * math.sin(side)])
         return f"{sideways} and {upwards}", path, beside
 

@@ -13,7 +13,7 @@ FELT = ("imu", "all")  # need an accelerometer
 # largest size and scale of three numbers each
 _POSE = [(5.0, 0.5), (10.0, 1.0), (2.0, 0.3), (40.0, 2.0)]  # m, m/s, rad, rad/s
 _IMU = [(40.0, 10.0)] * 2  # m/s2
-_WRENCH = [(2.0, 0.2), (2.0, 0.05)]  # weights, and weights times the arm
+_WRENCH = [(2.0, 0.2, 0), (2.0, 0.05, 1)]  # weights, times so many arms
 
 
 def parts(name: str, s: State) -> list[Array]:
@@ -43,15 +43,14 @@ def bounds(name: str, vehicle: Vehicle, actions: int) -> tuple[list[float], list
     """
     if name not in OBSERVATIONS:
         raise unknown_name("observation", str(name), OBSERVATIONS, "observation")
-    rows = list(_POSE)
+    rows = [*_POSE]
     if name in ("wrench", "all"):
-        for (limit, scale), unit in zip(
-            _WRENCH, (vehicle.weight, vehicle.weight * vehicle.arm_l), strict=True
-        ):
+        for limit, scale, arm in _WRENCH:
+            unit = vehicle.weight * vehicle.arm_l**arm
             rows.append((limit * unit, scale * unit))
     if name in FELT:
         rows += _IMU
-    limits, scales = ([row[i] for row in rows for _ in range(3)] for i in (0, 1))
+    limits, scales = np.repeat(rows, 3, axis=0).T.tolist()
     return limits + [1.0] * actions, scales + [1.0] * actions
 
 

@@ -70,16 +70,22 @@ PLANT = np.dtype(
     [
         *MODEL_FIELDS,
         ("seen", "i8"),  # parts of the last pose that were measured
-        ("voltage_ref", "f8"),
-        ("battery_life", "f8"),
-        ("battery", "f8"),  # V now; 0: not modelled
-        ("motor_keep", "f8"),
-        ("omega_lsb", "f8"),
-        ("sigma_position", "f8"),
-        ("sigma_attitude", "f8"),
-        ("disturbance_force", "f8"),
-        ("disturbance_torque", "f8"),
-        ("disturbance_keep", "f8"),
+        # ``battery``: V now; 0: not modelled
+        *[
+            (name, "f8")
+            for name in (
+                "voltage_ref",
+                "battery_life",
+                "battery",
+                "motor_keep",
+                "omega_lsb",
+                "sigma_position",
+                "sigma_attitude",
+                "disturbance_force",
+                "disturbance_torque",
+                "disturbance_keep",
+            )
+        ],
         ("applied", "f8", (6,)),  # a user's part of ``external``, until changed
         ("omega_max", "f8"),
         # a unit normal below loses the pose: after a pose, and after a lost one
@@ -225,9 +231,8 @@ def load_world(
     model = spec.compile()
     if add is None:  # no other constraint or spring
         flags = mujoco.mjtDisableBit
-        model.opt.disableflags |= (
-            int(flags.mjDSBL_CONSTRAINT) | int(flags.mjDSBL_SPRING) | int(flags.mjDSBL_DAMPER)
-        )
+        for flag in (flags.mjDSBL_CONSTRAINT, flags.mjDSBL_SPRING, flags.mjDSBL_DAMPER):
+            model.opt.disableflags |= int(flag)
     model.opt.gravity[2] = -vehicle.gravity
     model.opt.timestep = TICK / SUBSTEPS
     # the drawing follows the vehicle's size

@@ -295,4 +295,4 @@ def _inertial(motion: Array, gravity: float) -> tuple[Array, Array]:
     fallen[:-1] = 0.25 * fallen[:-1] + 0.75 * fallen[1:]
     fallen[:, 2] += gravity
     attitude = Rotation.from_quat(motion[:, :4], scalar_first=True)
-    return rate, np.asarray(attitude.inv().apply(fallen))
+    return rate, attitude.inv().apply(fallen)

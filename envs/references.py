@@ -22,10 +22,9 @@ def along(position: Array, yaw: float) -> Array:
     """
     rows = np.zeros((len(position), 10))
     rows[:, :3], rows[:, 9] = position, yaw
-    if len(position) < 2:
-        return rows
-    rows[:, 3:6] = np.gradient(position, TICK, axis=0)
-    rows[:, 6:9] = np.gradient(rows[:, 3:6], TICK, axis=0)
+    if len(position) > 1:
+        rows[:, 3:6] = np.gradient(position, TICK, axis=0)
+        rows[:, 6:9] = np.gradient(rows[:, 3:6], TICK, axis=0)
     return rows
 
 
@@ -65,4 +64,4 @@ def random_spline(
     points = centre + size * rng.uniform(-1.0, 1.0, (count, 3))
     points[0] = centre
     spline = CubicSpline(every * np.arange(count), points, bc_type=((1, np.zeros(3)), "not-a-knot"))
-    return along(np.asarray(spline(_warped(seconds))), yaw)
+    return along(spline(_warped(seconds)), yaw)

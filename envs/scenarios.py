@@ -1,18 +1,16 @@
 """The scenarios of the fan-tracking tasks, and those of a user's own, as YAML files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from ..controllers.briefing import PLACES
-from ..dynamics.vehicle import NotNegative
+from ..dynamics.vehicle import NotNegative, Vehicle
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.forms import STRICT, Positive, checked, expected
 from ..runtime.python_file import is_file_name, named_in_file
@@ -116,6 +114,28 @@ def kept_scenarios(section: str, form: type[AnyScenario]) -> dict[str, AnyScenar
 SCENARIOS = kept_scenarios("fan", Scenario)
 
 
+def draw_vehicle(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
+    """Return a vehicle as the true one may be where ``vehicle`` is declared: each number times
+    ``exp(share z)``, with the shares of its ``uncertainty`` and standard normal ``z``.
+    """
+    known = vehicle.uncertainty
+
+    def factor(share: float, size: int | None = None) -> Any:
+        return np.exp(share * rng.standard_normal(size))
+
+    command = factor(known.command * (vehicle.omega_source == "commanded"))
+    arm = factor(known.arm_l)
+    return replace(
+        vehicle,
+        mass=vehicle.mass * factor(known.mass),
+        k=vehicle.k * command * factor(known.thrust) * factor(known.rotor, 4),
+        p=vehicle.p * command * factor(known.torque),
+        inertia=vehicle.inertia * factor(known.inertia),
+        arm_l=vehicle.arm_l * arm,
+        rotor_positions=vehicle.positions * arm,
+    )
+
+
 def scenarios_in(path: str, known: Mapping[str, AnyScenario]) -> dict[str, AnyScenario]:
     """Return the scenarios of a YAML file by name: ``FILE.yaml`` where the file states the fields
     of one, ``FILE.yaml:NAME`` where it has the groups of ``scenarios.yaml``.
@@ -164,6 +184,6 @@ def draw_fan_path(scenario: Scenario, rng: np.random.Generator, t: Array) -> tup
     0.8-1.6 m.
     """
     motion = scenario.motions[rng.integers(len(scenario.motions))]
-    speed, sign = rng.uniform(*scenario.speed), float(rng.choice([-1.0, 1.0]))
+    speed, sign = rng.uniform(*scenario.speed), rng.choice([-1.0, 1.0])
     travel = rng.uniform(0.5, 1.2)
     return motion, sign * PLACES[motion](speed, travel, t)

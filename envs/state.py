@@ -58,11 +58,9 @@ class Episodes(NamedTuple):
 
 
 # columns of a world's row, in the core's order
-_TRUE = {"position": 3, "quaternion": 4, "velocity": 3, "angular_velocity": 3} | {
-    "force": 3,
-    "torque": 3,
-}
-_ESTIMATED = {"position": 3, "quaternion": 4, "velocity": 3, "angular_velocity": 3} | {
+_POSE = {"position": 3, "quaternion": 4, "velocity": 3, "angular_velocity": 3}
+_TRUE = _POSE | {"force": 3, "torque": 3}
+_ESTIMATED = _POSE | {
     "torque": 3,
     "force": 3,
     "last": 1,
@@ -70,7 +68,11 @@ _ESTIMATED = {"position": 3, "quaternion": 4, "velocity": 3, "angular_velocity":
     "std_force": 3,
     "attitude_error": 3,
 }
-_BESIDE = {"specific_force": 3, "specific_thrust": 3, "wind": 3, "reference": REFERENCE_SIZE} | {
+_BESIDE = {
+    "specific_force": 3,
+    "specific_thrust": 3,
+    "wind": 3,
+    "reference": REFERENCE_SIZE,
     "fan": 2,
     "fan_velocity": 2,
     "distance": 1,
@@ -90,7 +92,16 @@ def _lay(target: object, rows: Array, first: int, fields: dict[str, int]) -> Non
         first += size
 
 
-class WorldEstimates:
+class _Motions:
+    position: Array
+    quaternion: Array
+    velocity: Array
+    angular_velocity: Array
+    force: Array
+    torque: Array
+
+
+class WorldEstimates(_Motions):
     """The filter's estimate of n worlds.
 
     Attributes:
@@ -104,18 +115,12 @@ class WorldEstimates:
             upright at the reference's yaw, in these axes, to the estimate.
     """
 
-    position: Array
-    quaternion: Array
-    velocity: Array
-    angular_velocity: Array
-    force: Array
-    torque: Array
     std_force: Array
     std_torque: Array
     attitude_error: Array
 
 
-class State:
+class State(_Motions):
     """The state of n worlds after a decision. Arrays are views: the next decision overwrites them.
 
     Attributes:
@@ -138,12 +143,6 @@ class State:
         memory: a task's own arrays from one decision to the next.
     """
 
-    position: Array
-    quaternion: Array
-    velocity: Array
-    angular_velocity: Array
-    force: Array
-    torque: Array
     specific_force: Array
     specific_thrust: Array
     wind: Array
@@ -171,11 +170,10 @@ class State:
 
     def first(self, name: str, now: Array) -> Array:
         """Return values (n, ...) as they were at each episode's start, kept under a name."""
-        starts = self.memory.setdefault(name, np.zeros_like(now))
+        starts: Array = self.memory.setdefault(name, np.zeros_like(now))
         begins = self.decision == 0
         starts[begins] = now[begins]
-        starting_values: Array = starts
-        return starting_values
+        return starts
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: self.__dict__[name] for name in ("rows", "flying", "rng", "memory")}

@@ -1,7 +1,5 @@
 """The base of all tasks: array functions over n worlds, for one environment or a vector."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym
@@ -60,6 +58,8 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         winds: in place of the scenario's: any objects with ``velocity(points, time)``.
         model_in_loop: whether the flight loop counters the effects that ``vehicle`` declares.
         gains: the flight loop's.
+        randomise: ``"vehicle"``: the true vehicle is drawn anew each episode, by the section
+            ``uncertainty`` of its file; filter, flight loop and laws keep the declared one.
 
     Raises:
         InputError: an argument names nothing known.

@@ -212,8 +212,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     @property
     def truncated(self) -> Flags:
         """Whether each episode (n,) has had its last decision."""
-        over: Flags = self.episodes.decisions >= self.max_episode_steps
-        return over
+        return self.episodes.decisions >= self.max_episode_steps
 
     def fly(self, actions: Any, which: Flags) -> None:
         """Fly a decision in some environments with actions (num_envs, n).
@@ -337,11 +336,10 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
     def _settle(self, which: list[int]) -> None:
         """Let the filters of some environments settle."""
-
-        def settle(i: int) -> None:
-            self.loops[i].settle(self.generators[i], SETTLE_TICKS, self._path(i, 1))
-
-        self._spread(settle, which)
+        self._spread(
+            lambda i: self.loops[i].settle(self.generators[i], SETTLE_TICKS, self._path(i, 1)),
+            which,
+        )
         self._see(which)
 
     def _fly(self, which: Flags) -> None:
@@ -417,8 +415,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         from .drawing import Viewer
 
         for i in range(self.num_envs - len(self.viewers)):
-            arguments = self.render_mode, self.task.width, self.task.height
-            self.viewers[i] = Viewer(*arguments)
+            self.viewers[i] = Viewer(self.render_mode, self.task.width, self.task.height)
         goals = (
             self.state.reference[:, :3] if self.task.fan.speed == 0.0 else [None] * self.num_envs
         )
@@ -437,11 +434,10 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
 
 
 def _mode(wanted_mode: AutoresetMode | str, task: str) -> AutoresetMode:
-    modes = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP
-    for mode in modes:
+    for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
         if wanted_mode in (mode, mode.value, mode.name):
             return mode
     raise InputError(
-        f"{task}: autoreset_mode must be {' or '.join(m.name for m in modes)} of "
+        f"{task}: autoreset_mode must be NEXT_STEP or SAME_STEP of "
         f"gymnasium.vector.AutoresetMode, got {wanted_mode!r}"
     )

@@ -1,7 +1,5 @@
 """The scenarios of the tasks in the wind, and draws of their winds and references."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -26,7 +26,7 @@ class WindHoverEnv(Task):
 
     ## Description
 
-    By its scenario, the vehicle hovers 2.3 m in front of a wall of 3 x 3 switching fans, in a sheared
+    The scenario has the vehicle hover 2.3 m in front of a wall of 3 x 3 switching fans, in a sheared
     mean wind with turbulence, in gusts, or below another vehicle. An unscented Kalman filter
     turns rotor speeds and motion-capture pose into the external force and torque, at 200 Hz. A flight
     loop (position, velocity, a weak integral, attitude) flies to the reference by the estimated state.

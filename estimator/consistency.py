@@ -14,7 +14,7 @@ slowly: such a wrench pushes every pose of a second the same way by less than on
 import math
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from ..runtime.errors import InputError
 from .estimate import Array, WrenchEstimate
@@ -53,7 +53,8 @@ def chi2_band(dof: int, runs: int, probability: float = 0.95) -> tuple[float, fl
             f"{dof}, {runs}, {probability}"
         )
     tail = 0.5 * (1.0 - probability)
-    return float(chi2.ppf(tail, dof * runs)) / runs, float(chi2.ppf(1.0 - tail, dof * runs)) / runs
+    low, high = (2.0 / runs * gammaincinv(0.5 * dof * runs, [tail, 1.0 - tail])).tolist()
+    return low, high
 
 
 class Consistency:

@@ -152,10 +152,10 @@ class NoiseFit:
     def __str__(self) -> str:
         (force, torque), (force_before, torque_before) = self.rise_after, self.rise_before
         return (
-            f"The tuning was fitted to this flight: {self.after}, instead of NIS "
-            f"{self.before.nis:.2f}, over a second {self.before.nis_over_second:.3g}; the force "
-            f"rises in {_times(force)} s instead of {_times(force_before)} s, the torque in "
-            f"{_times(torque)} s instead of {_times(torque_before)} s."
+            f"Tuning fitted to this flight: the force rises in {_times(force)} s (before: "
+            f"{_times(force_before)} s), the torque in {_times(torque)} s (before: "
+            f"{_times(torque_before)} s). {self.after}; before: {self.before.nis:.2f}, over a "
+            f"second {self.before.nis_over_second:.3g}."
             + "".join(
                 f" Unseen, the {name} falls to 1/e in {_times(np.asarray(time))} s."
                 for name, time in (

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..envs.fan_tracking import LOST_OFFSET, FanTrackingEnv
+from ..envs.definition import LOST_OFFSET
+from ..envs.fan_tracking import FanTrackingEnv
 from ..runtime.errors import InputError
 from .watched import WatchedInfo
 

@@ -12,7 +12,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from ..envs.fan_tracking import LOST_OFFSET
+from ..envs.definition import LOST_OFFSET
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.python_file import is_file_name, named_in_file
 from ..runtime.yaml_file import read_yaml

@@ -53,14 +53,6 @@ def summary(rows: Sequence[Standing]) -> str:
         worse = [row for row in judged if row.change_over_best > 0]
         truth = ", ".join(f"`{row.controller}`" for row in some if row.uses_truth)
         line = f"* **{scenario}**, {some[0].episodes} episodes each. Terminated: {losses}."
-        means = [
-            f"`{row.controller}` {row.rmse_settled_m:.3f} m, interquartile mean "
-            f"{row.iqm_rmse_m:.3f} m"
-            for row in some
-            if row.lost_episodes and row.ranked_by == SETTLED
-        ]
-        if means:
-            line += f" Their rest counts 2.5 m in the mean: {'; '.join(means)}."
         if truth:
             line += f" With the truth or a preview: {truth}."
         if some[0].ranked_by == SETTLED:
@@ -91,10 +83,9 @@ def _lost(row: Standing) -> str:
     return losses
 
 
-# titles of the columns: figures of a controller, comparisons, and those of a page alone
+# titles of the columns: figures of a controller, and comparisons
 FIGURES = ("law", "RMSE after 3 s", "IQM", "first 3 s", "return", "activity", "at bound", "term")
 COMPARED = ("law", "against", "p", "P", "score", "to the")
-_OF_A_PAGE = ("95 % of P", "wins", "whole")
 
 
 def table(rows: Sequence[Standing]) -> dict[str, list[str]]:
@@ -114,9 +105,7 @@ def table(rows: Sequence[Standing]) -> dict[str, list[str]]:
             "at bound": f"{100 * row.saturated_fraction:.0f} %",
             "terminated": _lost(row),
             "score": "-" if math.isnan(row.score) else f"{row.score:.2f}",
-            "wins": f"{100 * row.wins_over_rival:.0f} %",
             "P": f"{row.improvement_over_rival:.2f}",
-            "95 % of P": "-".join(f"{end:.2f}" for end in row.improvement_ci95),
         }
         if not math.isnan(row.share_of_limit):
             cells["to the limit"] = f"{100 * row.share_of_limit:.0f} %"
@@ -136,7 +125,6 @@ def _by_error(row: Standing) -> dict[str, str]:
         f"against {row.rival}, 95 %": _change_text(row.change_over_rival, row.change_ci95),
         "against the best, 95 %": _change_text(row.change_over_best, row.change_over_best_ci95),
         "p": "-" if p is None else f"{p:.3f}",
-        "whole (mm), 95 %": in_mm(row.rmse_m, row.rmse_ci95_m),
     }
 
 
@@ -154,13 +142,12 @@ def part_of(columns: dict[str, list[str]], titles: Sequence[str]) -> dict[str, l
 def markdown(rows: Sequence[Standing]) -> str:
     """Return the rows as two tables for a page: figures, and comparisons."""
     columns = table(rows)
-    titles = ("scenario", *FIGURES), ("scenario", *COMPARED, *_OF_A_PAGE)
-    parts = [part_of(columns, some) for some in titles]
-    return "\n".join(_markdown(part) for part in parts if part)
+    titles = ("scenario", *FIGURES), ("scenario", *COMPARED)
+    return "\n".join(_markdown(part) for some in titles if (part := part_of(columns, some)))
 
 
 def _markdown(columns: dict[str, list[str]]) -> str:
-    left_aligned = ("scenario", "law", "RMSE", "return, ", "against", "whole")
+    left_aligned = ("scenario", "law", "RMSE", "return, ", "against")
     rule = ["-" if title.startswith(left_aligned) else "-:" for title in columns]
     lines = [list(columns), rule, *zip(*columns.values(), strict=True)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)

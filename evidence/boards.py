@@ -7,15 +7,14 @@ from typing import Any
 from windwrench.evaluation.leaderboard import Standing
 from windwrench.evaluation.tables import markdown, summary
 from windwrench.evidence.kept_results import kept
+from windwrench.runtime.provenance import made_by
 
-TASKS = ("WindHover", "FanTracking")
+TASKS = ("WindHover", "WindTrajectory", "FanTracking", "FanTracking2D")
 
 
 def page() -> dict[str, Any]:
-    """Return what the page shows: each board with its command, and the ranking by rewards."""
-    rewards = kept("results/board/rewards.json")
-    boards = {task: _board(kept(f"results/board/{task}.json.gz")) for task in TASKS}
-    return {"boards": boards, "rewards": rewards["rewards"], "laws": rewards["laws"]}
+    """Return what the page shows: each task's board with its command."""
+    return {"boards": {task: _board(kept(f"results/board/{task}.json.gz")) for task in TASKS}}
 
 
 def _board(submission: dict[str, Any]) -> dict[str, str]:
@@ -25,7 +24,9 @@ def _board(submission: dict[str, Any]) -> dict[str, str]:
         f"windwrench benchmark --task {asked['task']} --scenarios {','.join(asked['scenarios'])} "
         f"--controllers {','.join(asked['controllers'])} --seed {asked['seed']}"
     )
-    return {"command": command, "table": f"{summary(rows)}\n{markdown(rows)}"}
+    made = made_by(command, [submission["commit"]], submission["windwrench"])
+    figures = markdown(rows).partition("\n\n")[0]  # of its two tables
+    return {"made": made, "table": f"{summary(rows)}\n{figures}\n"}
 
 
 def standing(row: dict[str, Any]) -> Standing:

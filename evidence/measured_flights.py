@@ -26,6 +26,7 @@ from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.evidence.fan_wall import fan_wall
 from windwrench.evidence.kept_results import DOCS, kept
+from windwrench.evidence.residual_wrench import residual_wrench
 from windwrench.evidence.runner import start
 from windwrench.identification.comparison.change import NOWHERE, Change
 from windwrench.identification.comparison.change import compare as compare_sets
@@ -40,7 +41,6 @@ from windwrench.identification.findings import Diagnosis
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.text_table import open_table
-from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import Signals, log_signals
 from windwrench.identification.motion.smoothing import low_pass

@@ -179,10 +179,10 @@ def study(
         if name not in GROUPS:
             raise unknown_name("group", name, GROUPS)
     words = " ".join(["python -m evidence.speed", *(groups or ()), f"--rounds {rounds}"])
-    lines = [made_by(words, [commit()]), "", HEADER, "| --- " * 5 + "|"]
+    lines = [HEADER, "| --- " * 5 + "|"]
     for name in groups or GROUPS:
         lines += rows(GROUPS[name](), rounds)
-    table = "\n".join(lines)
+    table = "\n".join([*lines, "", made_by(words, [commit()])])
     print(table)
     if markdown is not None:
         before, rest = markdown.read_text(encoding="utf-8").split(BEGIN)

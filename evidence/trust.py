@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from windwrench.evidence import measured_flights
+from windwrench.evidence import measured_flights, published
 from windwrench.evidence.kept_results import kept
 from windwrench.evidence.nanodrone_benchmark import WAYS, mean
 from windwrench.evidence.probabilities import calibration
@@ -17,6 +17,9 @@ def page() -> dict[str, Any]:
         "predicted": {
             way: [mean(rows, kind, way) for kind in ("after_half_a_second", "sums")] for way in WAYS
         },
+        "published": kept(published.RESULTS),
+        "as_published": published.PUBLISHED,
+        "of_sysid_tools": published.OF_SYSID_TOOLS,
         "flights": measured_flights.shown(),
         "probabilities": calibration.shown(),
     }

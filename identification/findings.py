@@ -27,8 +27,8 @@ class NamedEffect:
         tentative: whether it may stand for another effect: see ``Diagnosis.structure``.
         indistinguishable_from: effects with an equal explanation of these logs.
         evidence: its share of the held-out residual's energy; the logarithm of the Bayes factor of
-            sets with it against sets without; its largest coefficient in typical sizes; and its
-            size over the unexplained rest.
+            sets with it against sets without; its largest coefficient in typical sizes; its size
+            over the unexplained rest; and its gain in log-likelihood on flight left out of the fit.
         channels: channels of the logs with the finding.
     """
 
@@ -95,7 +95,7 @@ class Trace:
     before: Array = field(repr=False)
     after: Array = field(repr=False)
     held_out: Mask = field(repr=False)
-    parts: ArrayMap = field(default_factory=dict, repr=False)
+    parts: ArrayMap = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,8 +267,7 @@ class Diagnosis:
         pushes: one a channel at most, the plainest first.
         cutoff_hz: Hz, of the low-pass of all compared quantities.
         declared: the given vehicle.
-        amended: with the named effects, ready for ``estimate`` and the environment; the declared
-            vehicle if they do not reduce the held-out error.
+        amended: with the named effects, ready for ``estimate`` and the environment.
         logs: names of the fitted logs.
         test_logs: names of the logs for the error, if given apart.
         seconds: s of flight in all.
@@ -282,6 +281,7 @@ class Diagnosis:
             these, ``structure`` is a doubt of all names.
         ranking: the posterior of sets of effects.
         probabilities: of the findings.
+        not_needed: effects of the likeliest set without help on flight left out of their fit.
     """
 
     verdict: str
@@ -312,6 +312,7 @@ class Diagnosis:
     doubts: Mapping[str, Names] = field(default_factory=dict)
     ranking: Ranking | None = None
     probabilities: Probabilities = _UNKNOWN
+    not_needed: tuple[NamedEffect, ...] = ()
 
     @property
     def held_out_by_log(self) -> dict[str, list[Pair]]:

@@ -8,7 +8,6 @@ poses, if there are some); their uncertainty is in the standard deviations.
 """
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.spatial.transform import Rotation
 
@@ -16,15 +15,11 @@ from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning, WrenchEstimate
 from ..estimator.estimate import (
     COASTING,
-    FORCE,
     MODEL,
-    NIS,
     POSITION,
     QUATERNION,
-    RATE,
     STATE_SIZE,
     STATUS,
-    TORQUE,
     TRACKING,
     VELOCITY,
     WITHOUT_COVARIANCE,
@@ -35,7 +30,7 @@ from .logs.flight_log import FlightLog
 from .logs.table import Array, ArrayPair, Names, Pair
 from .motion.inertial_signals import InertialSignals, imu_noise, inertial_signals, pose_rate
 from .motion.residual import acting_wrench, needed_wrench
-from .motion.smoothing import continuous, resampled
+from .motion.smoothing import continuous, resampled, running_integral
 
 
 def inertial_wrench(
@@ -57,23 +52,19 @@ def inertial_wrench(
     """
     noise, count = imu_noise(log), len(log.t)
     numbers, std = np.zeros((count, WITHOUT_COVARIANCE)), np.full((count, 18), np.nan)
-    numbers[:, STATUS] = COASTING
-    table = np.zeros((count, STATE_SIZE + 6 + LOAD[0] * LOAD[1]))
-    before = 0
     pieces = inertial_signals(log, vehicle.gravity)
-    for number, s in enumerate(pieces):
-        # rows between two pieces hold the values of the nearer end of the one before
-        end = count if number + 1 == len(pieces) else int(np.searchsorted(log.t, s.t[-1]) + 1)
-        t = log.t[before:end]
-        table[before:end] = resampled(t, s.t, _piece(s, vehicle, tuning, log.period, noise))
+    # rows between two pieces hold the values of the nearer end of the one before
+    cuts = np.searchsorted(log.t, [s.t[-1] for s in pieces[:-1]]) + 1
+    tables = []
+    for s, rows in zip(pieces, np.split(np.arange(count), cuts), strict=True):
+        t = log.t[rows]
+        tables.append(resampled(t, s.t, _piece(s, vehicle, tuning, log.period, noise)))
         inside = (t >= s.t[0]) & (t <= s.t[-1] + log.period)
-        numbers[before:end, STATUS] = np.where(inside, TRACKING, COASTING)
-        before = end
+        numbers[rows, STATUS] = np.where(inside, TRACKING, COASTING)
     numbers[:, :STATE_SIZE], std[:, 12:], loads = np.split(
-        table, [STATE_SIZE, STATE_SIZE + 6], axis=1
+        np.concatenate(tables), [STATE_SIZE, STATE_SIZE + 6], axis=1
     )
     loads = loads.reshape(-1, *LOAD)
-    numbers[:, NIS] = np.nan
     if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from both
         numbers[:, POSITION], numbers[:, VELOCITY] = np.nan, np.nan
     quaternion = numbers[:, QUATERNION]
@@ -91,60 +82,50 @@ def _piece(
     acting, body = acting_wrench(s, vehicle)
     needed = needed_wrench(s, body)
     steps = s.period / period  # a walk of one step of the log, in one of the signals
-    given = tuning.force_walk, tuning.torque_walk, tuning.thrust_noise, tuning.motor_torque_noise
-    walk_force, walk_torque, miss_force, miss_torque = (np.broadcast_to(x, 3) for x in given)
     # an Ornstein-Uhlenbeck process, or a walk: the factor of a step, and its squared walks
-    (keep_force, new_force), (keep_torque, new_torque) = (
-        decay_of(np.broadcast_to(time, 3), s.period, period)
-        for time in (tuning.force_time, tuning.torque_time)
-    )
-    pushes, turns = _loads(s, body, needed)
-    needs = np.stack([needed[:, :3] - acting[:, :3], *pushes], axis=2)
-    inverse = np.linalg.inv(body.inertia)
-    driven = np.einsum("ij,cnj->nic", inverse, np.stack([acting[:, 3:], *turns]))
-    rates = cumulative_trapezoid(driven, dx=s.period, axis=0, initial=0)
-    rates[:, :, 0] = s.angular_velocity - rates[:, :, 0]
-    force, torque, spread = np.empty_like(needs), np.empty_like(rates), np.empty(6)
-    for i, own in enumerate(np.diagonal(inverse).tolist()):
-        variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
-        # a walk hidden by white noise of this variance
-        walks = np.diag([walk_force[i] ** 2 * new_force[i]])
-        walked, std = _two_sided(needs[:, i], keep_force[i] * np.eye(1), walks, variance)
-        force[:, i], spread[i] = walked[:, 0], std[0]
-        # the change of a rate is a walk, the rate beside it is hit by the rotors' errors
-        model = np.array([[1.0, s.period], [0.0, keep_torque[i]]])
-        missed = own * np.array([miss_torque[i] * s.period, walk_torque[i]])
-        walks = np.diag(missed**2 * [1.0 / steps, new_torque[i]])
-        walked, std = _two_sided(rates[:, i], model, walks, max(noise[0], 1e-6) ** 2)
-        torque[:, i], spread[3 + i] = walked[:, 1], std[1] / own
-    turned = np.square(s.rotation)
-    std_force = np.sqrt(spread[:3] ** 2 + turned @ (body.mass * s.bias_std) ** 2)
-    std_torque = np.sqrt(turned @ spread[3:] ** 2)
-    state = np.zeros((len(s.t), STATE_SIZE))
-    state[:, POSITION], state[:, VELOCITY] = s.position, s.velocity
-    state[:, RATE] = s.angular_velocity
-    state[:, QUATERNION] = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
-    torque = np.einsum("nij,jk,nkc->cni", s.rotation, body.inertia, torque)
-    state[:, TORQUE], state[:, FORCE] = torque[0], force[:, :, 0]
-    loads = *torque[1:3], force[:, :, 1], force[:, :, 2], *torque[3:]
-    return np.column_stack([state, std_torque, std_force, *loads])
-
-
-def _loads(s: InertialSignals, body: Vehicle, needed: Array) -> tuple[list[Array], list[Array]]:
-    """Return the loads (n, 3) of the force, world, and of the torque, body frame, in action.
-
-    The rotors' loads are by the logged speeds: a declared lag or efficiency changes a small part of
-    a deviation.
-    """
+    keep_force, new_force = decay_of(tuning.force_time, s.period, period)
+    keep_torque, new_torque = decay_of(tuning.torque_time, s.period, period)
+    # the loads are by the logged speeds: a declared lag or efficiency changes a small part of a
+    # deviation
     thrust, x, y, z = body.rotor_wrench(s.rotor_speeds).T
     none, omega = np.zeros_like(thrust), s.angular_velocity
     x, y = x - body.com[1] * thrust, y + body.com[0] * thrust
-    turning = needed[:, 3:] + np.cross(omega, omega @ body.inertia.T)
     turns = [(thrust, none, none), (none, thrust, none), (x, y, none), (none, none, z)]
-    return (
-        [thrust[:, None] * s.rotation[:, :, 2], needed[:, :3]],
-        [*map(np.column_stack, turns), turning],
+    turning = needed[:, 3:] + np.cross(omega, omega @ body.inertia.T)
+    pushing = thrust[:, None] * s.rotation[:, :, 2]
+    needs = np.stack([needed[:, :3] - acting[:, :3], pushing, needed[:, :3]], axis=2)
+    inverse = np.linalg.inv(body.inertia)
+    loads = acting[:, 3:], *map(np.column_stack, turns), turning
+    driven = np.einsum("ij,cnj->nic", inverse, np.stack(loads))
+    rates = running_integral(driven, s.t)
+    rates[:, :, 0] = omega - rates[:, :, 0]
+    force, torque, spread = np.empty_like(needs), np.empty_like(rates), np.empty(6)
+    own = np.diagonal(inverse)
+    # a force's walk is hidden by white noise. The change of a rate is a walk, the rate beside it is
+    # hit by the rotors' errors
+    variances = (
+        (body.mass * noise[1]) ** 2 + np.square(tuning.thrust_noise) / steps,
+        np.square(tuning.force_walk) * new_force,
+        np.square(own * s.period) * np.square(tuning.motor_torque_noise) / steps,
+        np.square(own) * np.square(tuning.torque_walk) * new_torque,
     )
+    axes = np.transpose(np.broadcast_arrays(keep_force, keep_torque, *variances))
+    for i, (kept, kept_turn, hiding, walk, hit, turn) in enumerate(axes):
+        walked, std = _two_sided(needs[:, i], kept * np.eye(1), np.diag([walk]), hiding)
+        force[:, i], spread[i] = walked[:, 0], std[0]
+        model, walks = np.array([[1.0, s.period], [0.0, kept_turn]]), np.diag([hit, turn])
+        walked, std = _two_sided(rates[:, i], model, walks, max(noise[0], 1e-6) ** 2)
+        torque[:, i], spread[3 + i] = walked[:, 1], std[1] / own[i]
+    turned = np.square(s.rotation)
+    std_force = np.sqrt(spread[:3] ** 2 + turned @ (body.mass * s.bias_std) ** 2)
+    std_torque = np.sqrt(turned @ spread[3:] ** 2)
+    quaternion = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
+    torque = np.einsum("nij,jk,nkc->cni", s.rotation, body.inertia, torque)
+    outer, *pushed = np.moveaxis(force, 2, 0)
+    state = s.position, quaternion, s.velocity, omega, torque[0], outer
+    no_nis = np.full(len(s.t), np.nan)
+    smooth = *torque[1:3], *pushed, *torque[3:]
+    return np.column_stack([*state, no_nis, std_torque, std_force, *smooth])
 
 
 def _two_sided(y: Array, model: Array, noise: Array, variance: float) -> ArrayPair:
@@ -152,21 +133,19 @@ def _two_sided(y: Array, model: Array, noise: Array, variance: float) -> ArrayPa
     the first, and their standard deviations (m,).
     """
     m = len(model)
-    H = np.eye(1, m)
-    P = solve_discrete_are(model.T, H.T, noise + 1e-18 * np.eye(m), variance * np.eye(1))
-    gain = (P @ H.T / (P[0, 0] + variance))[:, 0]
+    P = solve_discrete_are(model.T, np.eye(m, 1), noise + 1e-18 * np.eye(m), variance * np.eye(1))
+    gain = P[0] / (P[0, 0] + variance)
     after = P - np.outer(gain, P[0])
     back = np.linalg.solve(P, model @ after).T
     smoothed = solve_discrete_lyapunov(back, after - back @ P @ back.T)
-    predicted, states = np.empty((2, len(y), m, y.shape[1]))
+    states = np.empty((len(y), m, y.shape[1]))
     x = np.zeros(states.shape[1:])
     x[0] = np.mean(y[: max(1, len(y) // 200)], axis=0)
     for k, measured in enumerate(y):
-        predicted[k] = x
         states[k] = x + np.outer(gain, measured - x[0])
         x = model @ states[k]
     for k in range(len(y) - 2, -1, -1):
-        states[k] += back @ (states[k + 1] - predicted[k + 1])
+        states[k] += back @ (states[k + 1] - model @ states[k])
     return states, np.sqrt(np.maximum(np.diagonal(smoothed), 0.0))
 
 
@@ -176,7 +155,7 @@ def _notes(log: FlightLog, pieces: list[InertialSignals], vehicle: Vehicle) -> N
             "gyro and accelerometer were smoothed together with the "
             + ("poses" if log.valid.any() else "positions"),
         )
-    bias = vehicle.mass * float(np.max([s.bias_std for s in pieces]))
+    bias = vehicle.mass * np.max([s.bias_std for s in pieces])
     return (
         "the log has no pose: the wrench is read from gyro and accelerometer. Its force is "
         "along level axes, horizontal ones as the vehicle pointed at the start, which drift "

@@ -6,12 +6,10 @@ one: of the torque as the filter shows it, and of the vehicle's place. The loop 
 in one dimension, behind fans of steady speeds.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +17,8 @@ import numpy as np
 from ..controllers.briefing import Air, FilterNoise
 from ..controllers.flight import FlightGains
 from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
-from ..controllers.wrench_lag import axis_lag
+from ..controllers.wrench_lag import lags
+from ..runtime.plain_values import plain
 from .logs.table import Array, ArrayPair, NamedNumbers, Pair
 
 HELD_SHARE = 0.8  # of the flights behind a fan that counts as followed
@@ -48,10 +47,9 @@ class JetShape(NamedTuple):
     peaks: Array  # (2,) m, where they are; beyond, the fan is lost
     edges: Array  # (2,) m; beyond, the torque is below a fifth of the largest
 
-    @property
-    def weaker(self) -> float:
-        """The smaller one of the two largest torques, Nm."""
-        return float(min(-self.torques[0], self.torques[1]))
+    def bounds(self, gains: Array) -> Array:
+        """Return the speeds (g,) m/s that gains (g,) ask for at the weaker peak, at most."""
+        return np.asarray(np.minimum(gains * np.abs(self.torques).min(), MAX_COMMAND))
 
 
 def shape_of(place: Array, torque: Array) -> JetShape | None:
@@ -61,26 +59,24 @@ def shape_of(place: Array, torque: Array) -> JetShape | None:
     low, high = ends = np.array([np.argmin(torque), np.argmax(torque)])
     if low >= high or torque[low] >= 0.0 or torque[high] <= 0.0:
         return None
-    rising = low + np.flatnonzero(torque[low + 1 : high + 1] >= 0.0)[0]
-    axis = np.interp(0.0, torque[[rising, rising + 1]], place[[rising, rising + 1]])
-    ahead, behind = (np.interp(place[low : high + 1] + d, place, torque) for d in (0.1, -0.1))
-    inside = torque < EDGE_SHARE * torque[low], torque > EDGE_SHARE * torque[high]
-    left = low - np.argmin(np.append(inside[0][low::-1], False)) + 1
-    right = high + np.argmin(np.append(inside[1][high:], False)) - 1
-    slope = float((ahead - behind).max()) / 0.2
-    edges = place[[left, right]]
-    return JetShape(place, torque, float(axis), slope, torque[ends], place[ends], edges)
+    rising = low + np.argmax(torque[low + 1 : high + 1] >= 0.0) + [0, 1]
+    axis = np.interp(0.0, torque[rising], place[rising])
+    around = [np.interp(place[low : high + 1] + d, place, torque) for d in (-0.1, 0.1)]
+    left = low - np.argmin(np.append(torque[low::-1] < EDGE_SHARE * torque[low], False)) + 1
+    right = high + np.argmin(np.append(torque[high:] > EDGE_SHARE * torque[high], False)) - 1
+    slope = np.diff(around, axis=0).max() / 0.2
+    return JetShape(place, torque, axis, slope, torque[ends], place[ends], place[[left, right]])
 
 
 def no_jet(place: Array, torque: Array, std: Array) -> str:
     """Return why a profile (n,) with standard deviations allows no law; empty: it allows one."""
-    sure = float(np.max(-torque / std)), float(np.max(torque / std))
-    if max(sure) < SURE:
+    sure = torque / std
+    if (most := np.abs(sure).max()) < SURE:
         return (
             "the torque about z is not distinguishable from zero: at most "
-            f"{max(sure):.1f} standard deviations, {SURE:g} are needed"
+            f"{most:.1f} standard deviations, {SURE:g} are needed"
         )
-    if min(sure) < SURE:
+    if min(sure.max(), -sure.min()) < SURE:
         return "the torque about z does not change its sign: fly on both sides of a jet"
     shape = shape_of(place, torque)
     if shape is None:
@@ -109,22 +105,24 @@ class FollowingLoop:
         """
         answer = gain * self.response
         phase = np.unwrap(np.angle(answer))
-        crossed = int(np.flatnonzero(np.abs(answer) >= 1.0)[-1])
+        crossed = np.flatnonzero(np.abs(answer) >= 1.0)[-1]
         # an integrator at first: a quarter turn behind
         turns = round(phase[0] / (2.0 * math.pi) + 0.25)
-        margin = math.pi + float(phase[crossed]) - 2.0 * math.pi * turns
-        return margin, margin / float(_OMEGA[crossed])
+        margin = phase[crossed] - math.pi * (2 * turns - 1)
+        return margin, margin / _OMEGA[crossed]
 
     @cached_property
     def response(self) -> Any:
         """Answer (n,) of the felt place to a commanded velocity at the frequencies ``_OMEGA``."""
-        z = np.exp(1j * _OMEGA * DECISION_PERIOD)[:, None, None]
-        felt = np.linalg.solve(z * np.eye(3) - self.keep, self.enter[:, None])[:, 2, 0]
-        moved = np.linalg.solve(z * np.eye(len(self.push)) - self.carry, self.push[:, None])
-        return (1.0 - felt * (z[:, 0, 0] - 1.0)) * (moved[..., 0] @ self.show)
+        z = np.exp(1j * _OMEGA * DECISION_PERIOD)
+        felt, moved = (
+            np.linalg.solve(z[:, None, None] * np.eye(len(b)) - A, b[:, None])[..., 0]
+            for A, b in ((self.keep, self.enter), (self.carry, self.push))
+        )
+        return (1.0 - felt[:, 2] * (z - 1.0)) * (moved @ self.show)
 
 
-@lru_cache(maxsize=1)
+@cache
 def _flight_loop() -> tuple[Array, Array, Array]:
     """Return the kit's flight loop along one axis, from decision to decision."""
     from scipy.signal import cont2discrete, tf2ss
@@ -134,7 +132,7 @@ def _flight_loop() -> tuple[Array, Array, Array]:
     rotors = np.polymul([_MOTOR_LAG, 1.0], [1.0, gains.rate, gains.attitude])
     closed = np.polyadd(np.append(rotors, [0.0, 0.0, 0.0]), answer)
     system = tf2ss(answer, np.append(closed, 0.0))  # a velocity moves the set point
-    carry, push, show, _, _ = cont2discrete(system, DECISION_PERIOD)
+    carry, push, show, *_ = cont2discrete(system, DECISION_PERIOD)
     return carry, push[:, 0], show[0]
 
 
@@ -144,9 +142,7 @@ def following_loop(
     """Return the loop of a vehicle with this inertia (kg m2), wrench filter, and measured noise
     (k, 2), under the kit's flight loop.
     """
-    f = filter_noise
-    steps = max(1, round(DECISION_PERIOD / f.period))
-    lag = axis_lag(inertia_z, (f.torque, f.torque_walk, f.attitude), Air(), f.period, steps)
+    lag, _ = lags(1.0, inertia_z, filter_noise, Air(), DECISION_PERIOD)  # whatever the mass
     return FollowingLoop(lag.keep, lag.enter, *_flight_loop(), noise)
 
 
@@ -193,10 +189,10 @@ def followed(
 
 def fastest_followed(loop: FollowingLoop, jet: JetShape, gains: Array) -> Array:
     """Return the fastest fan (g,) m/s that each gain follows in ``HELD_SHARE`` of its flights."""
-    speeds = np.minimum(gains * jet.weaker, MAX_COMMAND)[:, None] * _SHARES
+    speeds = jet.bounds(gains)[:, None] * _SHARES
     shares = np.minimum.accumulate(followed(loop, jet, gains, speeds)[0], axis=1)
-    rows = zip(shares[:, ::-1], speeds[:, ::-1], strict=True)
-    return np.array([np.interp(HELD_SHARE, *row) for row in rows])
+    pairs = np.stack([shares, speeds], axis=1)[..., ::-1]
+    return np.array([np.interp(HELD_SHARE, *pair) for pair in pairs])
 
 
 def design_admittance(
@@ -219,20 +215,23 @@ def design_admittance(
     fastest = fastest_followed(loop, jet, gains)
     if not fastest.any():
         return None
-    wanted = 0.5 * float(fastest.max()) if speed is None else speed
+    wanted = 0.5 * fastest.max() if speed is None else speed
     alike = np.tile(wanted * np.linspace(0.0, 1.0, 5), (len(gains), 1))
     offsets = followed(loop, jet, gains, alike, 1)[1].mean(axis=1)
-    best = int(np.argmin(offsets))
-    gain, crossing = float(gains[best]), crossings[best]
+    best = np.argmin(offsets)
+    crossing = crossings[best]
     margin, delay = loop.margins(crossing)
     slow = [rise for rise in RISE_TIMES if lagging(rise).margins(crossing)[0] >= MARGIN]
-    return {
-        "gain": gain,
-        "bound_m_s": min(gain * jet.weaker, MAX_COMMAND),
-        "fastest_fan_m_s": float(fastest[best]),
-        "designed_up_to_m_s": wanted,
-        "offset_rms_m": float(offsets[best]),
-        "phase_margin_deg": math.degrees(margin),
-        "delay_margin_s": delay,
-        "largest_rise_time_s": float(max(slow, default=0.0)),
-    }
+    law: NamedNumbers = plain(
+        {
+            "gain": gains[best],
+            "bound_m_s": jet.bounds(gains)[best],
+            "fastest_fan_m_s": fastest[best],
+            "designed_up_to_m_s": wanted,
+            "offset_rms_m": offsets[best],
+            "phase_margin_deg": math.degrees(margin),
+            "delay_margin_s": delay,
+            "largest_rise_time_s": max(slow, default=0.0),
+        }
+    )
+    return law

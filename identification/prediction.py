@@ -10,11 +10,11 @@ but the model to explain the motion.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from .. import _core
@@ -29,7 +29,8 @@ from ..runtime.errors import InputError
 from .causal_states import STATE, causal_states, scaled_tuning
 from .logs.commanded_speeds import with_commanded_speeds
 from .logs.flight_log import NORM_TOLERANCE, FlightLog
-from .logs.table import Array, finite_rows
+from .logs.flight_phases import carried
+from .logs.table import Array, Rows, finite_rows
 from .motion.residual import loaded_model
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import known_pieces, log_signals, longest_step
@@ -56,7 +57,7 @@ _FROZEN = 1e-6  # of its usual standard deviation: a fixed wrench state
 class Prediction:
     """The motion predicted by a model from each of n starts, over m steps of ``period``."""
 
-    start: NDArray[np.intp]  # (n,) rows of the log
+    start: Rows  # (n,) rows of the log
     period: float  # s
     position: Array  # (n, m, 3) m, world; the first is a period after the start
     velocity: Array  # (n, m, 3) m/s, world
@@ -115,9 +116,8 @@ def predict(
     )
     starts = starts[finite_rows(states[starts])]
     x = _flown(log, vehicle, states, starts, ahead)
-    return Prediction(
-        starts, log.period, x[..., POSITION], x[..., VELOCITY], x[..., QUATERNION], x[..., RATE]
-    )
+    parts = (x[..., part] for part in (POSITION, VELOCITY, QUATERNION, RATE))
+    return Prediction(starts, log.period, *parts)
 
 
 def _checked(log: FlightLog, state: ArrayLike) -> Array:
@@ -143,9 +143,7 @@ def _checked(log: FlightLog, state: ArrayLike) -> Array:
     return states
 
 
-def _flown(
-    log: FlightLog, vehicle: Vehicle, states: Array, starts: NDArray[np.intp], ahead: int
-) -> Array:
+def _flown(log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead: int) -> Array:
     """Return the model's states (starts, ahead, STATE), a period apart, from the states (N, STATE)
     of a log at some rows in ascending order. For the memory of effects, the last state holds over
     rows without one.
@@ -200,7 +198,7 @@ def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float
     except InputError:
         return math.nan
     off = (starts.flown(vehicle) - starts.seen)[:, -1, POSITION]
-    return math.sqrt(float(np.mean(np.sum(np.square(off), axis=1)))) if len(off) else math.nan
+    return math.sqrt(np.square(off).sum(axis=1).mean()) if len(off) else math.nan
 
 
 QUANTITIES = {"position": "m", "velocity": "m/s", "attitude": "rad", "body rate": "rad/s"}
@@ -217,12 +215,6 @@ class PredictionErrors:
     model: Array  # (4, m)
     still: Array  # (4, m) with velocity and body rate as at the start
 
-    @property
-    def worse(self) -> list[str]:
-        """The quantities with a larger error than the guess, at the horizon's end."""
-        ends = zip(QUANTITIES, self.model[:, -1], self.still[:, -1], strict=True)
-        return [name for name, model, still in ends if model > still]
-
     @classmethod
     def pooled(cls, parts: Sequence[PredictionErrors]) -> PredictionErrors:
         """Return the errors over all starts of several, at the samples of the slowest."""
@@ -236,28 +228,7 @@ class PredictionErrors:
         return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))
 
 
-def prediction_errors(
-    logs: Sequence[FlightLog],
-    vehicle: Vehicle,
-    horizon_s: float = 0.5,
-    windows: Sequence[Segments] | None = None,
-) -> PredictionErrors:
-    """Return a model's prediction errors, beside the guess of an unchanged velocity.
-
-    A prediction starts every 0.25 s, as in ``predict``, and the guess from the same state. Both are
-    compared with the pose below 15 Hz; the angle between two attitudes is their distance.
-
-    Args:
-        logs: with a pose; flights outside the model's fit, or the errors mean little. For commands
-            alone the vehicle's motor curve gives the rotor speeds.
-        vehicle: the predicting model, with its declared effects.
-        horizon_s: s.
-        windows: for each log, its parts: from and to in s after its start; None: all of it.
-
-    Raises:
-        InputError: no stretch of pose is long enough.
-    """
-    return errors_of_models(logs, [vehicle], horizon_s, windows)[0]
+ErrorsByPart = Mapping[str, PredictionErrors]  # of flights or blocks
 
 
 def errors_of_models(
@@ -266,8 +237,18 @@ def errors_of_models(
     horizon_s: float = 0.5,
     windows: Sequence[Segments] | None = None,
 ) -> list[PredictionErrors]:
-    """Return ``prediction_errors`` of several models of one vehicle, from the same starts: by the
-    first one's filters.
+    """Return prediction errors of models of one vehicle, beside the guess of an unchanged velocity.
+
+    A prediction starts every 0.25 s of flight, as in ``predict``, by the first model's filters, and
+    the guess from the same state. Both are compared with the pose below 15 Hz; the angle between
+    two attitudes is their distance.
+
+    Args:
+        logs: with a pose; flights outside the model's fit, or the errors mean little. For commands
+            alone the vehicle's motor curve gives the rotor speeds.
+        vehicles: the predicting models, with their declared effects.
+        horizon_s: s.
+        windows: for each log, its parts: from and to in s after its start; None: all of it.
 
     Raises:
         InputError: no stretch of pose is long enough.
@@ -279,7 +260,7 @@ def errors_of_models(
         starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
     if not any(len(part.rows) for part in starts):
         names = ", ".join(log.name for log in logs)
-        raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s")
+        raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s of flight")
     return errors_at(starts, vehicles)
 
 
@@ -288,9 +269,11 @@ def errors_at(
 ) -> list[PredictionErrors]:
     """Return the errors of several models from the starts of flights, at least one of them."""
     parts = []
-    for part in (part for part in starts if len(part.rows)):
-        still = _distances(part.unchanged, part.seen).mean(axis=0)
-        means = (_distances(part.flown(v), part.seen).mean(axis=0) for v in vehicles)
+    for part in starts:
+        if not len(part.rows):
+            continue
+        still = _distances(part.unchanged, part.seen)
+        means = (_distances(part.flown(v), part.seen) for v in vehicles)
         parts.append([PredictionErrors(len(part.rows), part.ahead, mean, still) for mean in means])
     return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
 
@@ -301,7 +284,7 @@ class LoggedStarts:
 
     log: FlightLog  # without declared sensing effects
     states: Array  # (N, STATE) at each row of the log
-    rows: NDArray[np.intp]  # (n,) the starts'
+    rows: Rows  # (n,) the starts'
     seen: Array  # (n, m, STATE)
 
     def those(self, keep: Mask | slice) -> LoggedStarts:
@@ -334,7 +317,8 @@ def logged_starts(
     log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float
 ) -> LoggedStarts:
     """Return starts every 0.25 s whose horizon (s) lies in one of the segments, times (s) from and
-    to, by the filters of a vehicle.
+    to, by the filters of a vehicle. The rotors carry the vehicle at both ends: no model has the
+    ground's force.
 
     Raises:
         InputError: no stretch of pose is unbroken for 3 s.
@@ -343,20 +327,22 @@ def logged_starts(
     ahead = log.period * np.arange(1, max(1, round(horizon / log.period)) + 1)
     each = (np.arange(t0, min(t1, log.t[-1]) - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
+    aloft = carried(log.rotor_speeds, log.period)
     starts, seen = [], []
     for piece in log_signals(log):
         first, last = piece.t[0] + _START_MARGIN, piece.t[-1] - horizon - _END_MARGIN
         inside = times[(times >= first) & (times <= last)]
         rows = np.unique(np.searchsorted(log.t, inside - 0.5 * log.period))
+        ends = np.searchsorted(log.t, log.t[rows] + ahead[-1], side="right") - 1
+        rows = rows[aloft[rows] & aloft[ends]]
         rows = rows[:: math.ceil(len(rows) / _MOST_STARTS) or 1]
         starts.append(rows)
         turned = continuous(Rotation.from_matrix(piece.rotation).as_quat(scalar_first=True))
         states = np.hstack([piece.position, turned, piece.velocity, piece.angular_velocity])
         at = log.t[rows, None] + ahead
         seen.append(resampled(at.ravel(), piece.t, states).reshape(*at.shape, STATE))
-    rows = np.concatenate(starts)
-    states = causal_states(log, vehicle) if rows.size else np.empty((len(log.t), STATE))
-    return LoggedStarts(log, states, rows, np.concatenate(seen))
+    states = causal_states(log, vehicle)
+    return LoggedStarts(log, states, np.concatenate(starts), np.concatenate(seen))
 
 
 def _attitudes(states: Array) -> Rotation:
@@ -373,8 +359,8 @@ def offsets(x: Array, y: Array) -> Array:
 
 
 def _distances(x: Array, y: Array) -> Array:
-    """Return the distances (n, 4, m), in the order of ``QUANTITIES``, of states (n, m, STATE)."""
-    return np.moveaxis(np.linalg.norm(offsets(x, y), axis=-1), 1, 2)
+    """Return the mean distances (4, m) of states (n, m, STATE), in the order of ``QUANTITIES``."""
+    return np.transpose(np.linalg.norm(offsets(x, y), axis=-1).mean(axis=0))
 
 
 def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:
@@ -408,4 +394,4 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
         return math.nan
     steps = innovations(vehicle, tuning, period, pieces, 0.0, math.inf, covariance)
     inside = np.any([(steps.t >= t0) & (steps.t <= t1) for t0, t1 in segments], axis=0)
-    return float(np.mean(steps.nis[inside])) if inside.any() else math.nan
+    return float(steps.nis[inside].mean()) if inside.any() else math.nan

@@ -1,7 +1,5 @@
 """From a flight through a wind to an admittance law: the profile, the jet in it, and the design."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -11,7 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..controllers.briefing import FilterNoise
-from ..controllers.observation import DECISION_PERIOD, MAX_COMMAND
+from ..controllers.observation import DECISION_PERIOD
 from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning
 from ..runtime.errors import InputError
@@ -26,7 +24,7 @@ from .jet_design import (
 )
 from .logs.flight_log import FlightLog
 from .logs.table import Array, Data, Names, finite_rows
-from .wind_profile import WindProfile, wind_profile
+from .wind_profile import WindProfile, ways_of, wind_profile
 from .wrench_series import WrenchSeries, estimate_log
 
 RISE_TIME = 0.45  # s, of the filter in the tasks
@@ -89,34 +87,32 @@ def profile_log(
         with suppress(InputError):  # too short a line
             others.append(wind_profile(series, profile.direction, beside))
     found = partial(ProfiledJet, profile, tuple(others), notes=series.notes)
-    std = (profile.high - profile.wrench)[5] / 1.96
-    why = no_jet(profile.place, profile.torque, std)
-    shape = None if why else shape_of(profile.place, profile.torque)
+    torque = profile.wrench[5]
+    why = no_jet(profile.place, torque, (profile.high[5] - torque) / 1.96)
+    shape = None if why else shape_of(profile.place, torque)
     if shape is None:
         return found(why, None, None)
 
     def loop(rise: float, *noise: Array) -> FollowingLoop:
         tuning = UKFTuning.for_vehicle(vehicle, log.period, rise)
-        noise_of = FilterNoise.of(tuning, log.period)
-        return following_loop(float(vehicle.inertia[2, 2]), noise_of, *noise)
+        return following_loop(vehicle.inertia[2, 2], FilterNoise.of(tuning, log.period), *noise)
 
-    own = UKFTuning.for_vehicle(vehicle, log.period, rise_time)
-    shown = estimate_log(log, vehicle, own)
+    shown = estimate_log(log, vehicle, UKFTuning.for_vehicle(vehicle, log.period, rise_time))
     noise = _noise(shown, 4.0 * rise_time, profile, shape, loop(rise_time))
     if len(noise) < _ROWS:
         return found(f"only {DECISION_PERIOD * len(noise):.0f} s lie in the jet", shape, None)
-    flying = loop(rise_time, noise)
+    flying = loop(rise_time, noise - noise.mean(axis=0))
     law = design_admittance(flying, loop, shape, speed)
     if law is None:
         return found("the torque's noise lets no gain follow a fan", shape, None)
-    drawn = []
-    for torque in profile.torque_draws:
-        if one := shape_of(profile.place, torque):
-            bound = min(law["gain"] * one.weaker, MAX_COMMAND)
-            drawn.append((bound, *fastest_followed(flying, one, np.array([law["gain"]]))))
-    ends = np.quantile(drawn, (0.025, 0.975), axis=0).T.tolist()
-    names = "bound_ci95_m_s", "fastest_fan_ci95_m_s"
-    return found("", shape, law | dict(zip(names, ends, strict=True)))
+    gain = np.array([law["gain"]])
+    limits = [
+        (jet.bounds(gain), fastest_followed(flying, jet, gain))
+        for drawn in profile.torque_draws
+        if (jet := shape_of(profile.place, drawn))
+    ]
+    bound, fastest = np.quantile(limits, (0.025, 0.975), axis=(0, 2)).T.tolist()
+    return found("", shape, law | {"bound_ci95_m_s": bound, "fastest_fan_ci95_m_s": fastest})
 
 
 def _noise(
@@ -127,14 +123,13 @@ def _noise(
     """
     t = np.arange(series.t[0] + settled, series.t[-1], DECISION_PERIOD)
     rows = np.searchsorted(series.t, t)
-    place = profile.along(series.position)[rows]
-    true = np.interp(place, profile.place, profile.torque)
-    error, expected = np.zeros(3), true.copy()
-    for k, change in enumerate(np.diff(true, prepend=true[:1])):
+    place = series.position[rows] @ ways_of(profile.direction)[1]
+    true = np.interp(place, profile.place, profile.wrench[5])
+    error, felt = np.zeros(3), []
+    for change in np.diff(true, prepend=true[:1]):
         error = loop.keep @ error + loop.enter * change
-        expected[k] -= error[2]
+        felt.append(error[2])
     way = uniform_filter1d(place, round(_SLOW / DECISION_PERIOD), mode="nearest")
-    noise = np.column_stack([series.torque[rows, 2] - expected, place - way])
+    noise = np.column_stack([series.torque[rows, 2] - (true - felt), place - way])
     low, high = jet.edges
-    inside = noise[(place > low) & (place < high) & finite_rows(noise)]
-    return np.asarray(inside - inside.mean(axis=0)) if len(inside) else inside
+    return np.asarray(noise[(place > low) & (place < high) & finite_rows(noise)])

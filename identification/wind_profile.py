@@ -6,8 +6,6 @@ weight of the penalty is the one of the greatest restricted likelihood. The inte
 spline's posterior (Wahba, 1983): they hold 95 % of the places of a curve.
 """
 
-from __future__ import annotations
-
 import math
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -63,17 +61,8 @@ class WindProfile(NamedTuple):
     means: Array
     samples: float
 
-    @property
-    def torque(self) -> Array:
-        """Torque about z (n,), Nm."""
-        return np.asarray(self.wrench[5])
 
-    def along(self, position: Array) -> Array:
-        """Return the places (N,) on the line of positions (N, 3)."""
-        return np.asarray(position @ _ways(self.direction)[1])
-
-
-def _ways(direction: float) -> Array:
+def ways_of(direction: float) -> Array:
     """Return the three directions (3, 3) of a line's parts."""
     c, s = math.cos(direction), math.sin(direction)
     return np.array([[s, -c, 0.0], [c, s, 0.0], [0.0, 0.0, 1.0]])
@@ -97,49 +86,47 @@ def wind_profile(
     rows = np.hstack([series.position, series.force, series.torque])
     good = finite_rows(rows) & (series.status_code == TRACKING)
     good[good] = np.abs(rows[good, 2] - np.median(rows[good, 2])) < _FASTEST
-    second = ((series.t - series.t[0]) / MEAN).astype(int)
-    _, first, counts = np.unique(second[good], return_index=True, return_counts=True)
+    rows, second = rows[good], ((series.t[good] - series.t[0]) / MEAN).astype(int)
+    _, first, counts = np.unique(second, return_index=True, return_counts=True)
     if len(first) < _LEAST[0]:
         raise InputError(f"a torque is known over {len(first)} s; expected {_LEAST[0]} s or more")
-    means = np.add.reduceat(rows[good], first) / counts[:, None]
-    moved = np.linalg.norm(np.gradient(means[:, :3], axis=0), axis=1)
-    slow = moved < _FASTEST * MEAN
+    means = np.add.reduceat(rows, first) / counts[:, None]
+    slow = np.linalg.norm(np.gradient(means[:, :3], axis=0), axis=1) < _FASTEST * MEAN
     used = means[slow]
     direction = _direction(used) if axis is None else axis
-    ways = _ways(direction)
-    if np.sum(used[:, 3:6] @ ways[0]) < 0.0:
+    if np.sum(used[:, 3:6] @ ways_of(direction)[0]) < 0.0:
         direction += math.pi
-        ways = _ways(direction)
+    ways = ways_of(direction)
     beyond = used[:, :3] @ ways[0]
-    number, full = _lines_of(beyond)
-    lines = median(beyond, number, full)
-    nearest = np.bincount(number)[1:] if beside is None else -np.abs(lines - beside)
-    line = int(np.argmax(nearest))
+    bins = np.floor((beyond - beyond.min()) / _BAND).astype(int)
+    runs, count = label(np.bincount(bins) >= _SHARE * len(beyond))  # of full bins, from 1
+    lines = median(beyond, runs[bins], np.arange(1, count + 1))
+    nearest = np.bincount(runs[bins])[1:] if beside is None else -np.abs(lines - beside)
+    line = np.argmax(nearest)
     chosen = np.zeros(len(means), dtype=bool)
-    chosen[slow] = number == full[line]
-    here = good.copy()
-    here[good] = np.repeat(chosen, counts)
+    chosen[slow] = runs[bins] == line + 1
+    here = np.repeat(chosen, counts)
     place = rows[here, :3] @ ways[1]
     if chosen.sum() < _LEAST[0] or np.ptp(place) < _LEAST[1]:
         raise InputError(
             f"the flight holds {chosen.sum():.0f} s over {np.ptp(place):.2g} m of a line; "
             f"expected {_LEAST[0]} s over {_LEAST[1]:g} m or more"
         )
-    values = np.hstack([means[chosen, 3:6] @ ways.T, means[chosen, 6:] @ ways.T])
+    turned = (means[chosen].reshape(-1, 3, 3) @ ways.T).reshape(-1, 9)[:, [1, *range(3, 9)]]
     at = np.arange(place.min(), place.max(), GRID)
-    curves = [_curve(place, second[here], y, at) for y in values.T]
+    curves = [_curve(place, second[here], y, at) for y in turned.T[1:]]
     wrench, std, draws, samples = zip(*curves, strict=True)
     mean, half = np.stack(wrench), 1.96 * np.stack(std)
     return WindProfile(
         math.remainder(direction, 2.0 * math.pi),
-        float(lines[line]),
+        lines[line],
         lines,
         at,
         mean,
         mean - half,
         mean + half,
         draws[5],
-        np.column_stack([means[chosen, :3] @ ways[1], values]),
+        turned,
         samples[5],
     )
 
@@ -153,15 +140,6 @@ def _direction(means: Array) -> float:
     return math.atan2(y, x)
 
 
-def _lines_of(x: Array) -> tuple[Rows, Rows]:
-    """Return the number (n,) of the run of full bins that holds each value, 0: of none; and the
-    numbers of all runs, from 1.
-    """
-    bins = np.floor((x - x.min()) / _BAND).astype(int)
-    number, count = label(np.bincount(bins) >= _SHARE * len(x))
-    return number[bins], np.arange(1, count + 1)
-
-
 def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Array, Array, float]:
     """Return the smooth curve of means ``y`` over the places (N,) of their seconds (N,).
 
@@ -171,9 +149,9 @@ def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Arra
     Beside a mean stands the spline's own mean over the places of its second: the smoothed wrench
     does not follow a faster change of place.
     """
-    low, high = float(place.min()), float(place.max())
-    count = max(4, min(round((high - low) / _KNOT), len(y) // 4))
-    knots = low + (high - low) / count * np.arange(-3, count + 4)
+    width = float(np.ptp(place))
+    count = max(4, min(round(width / _KNOT), len(y) // 4))
+    knots = place.min() + width / count * np.arange(-3, count + 4)
     seconds, first, counts = np.unique(second, return_index=True, return_counts=True)
     rows = np.column_stack([place, BSpline.design_matrix(place, knots, 3, True).toarray()])
     rows = np.add.reduceat(rows, first) / counts[:, None]
@@ -186,14 +164,14 @@ def _curve(place: Array, second: Rows, y: Array, at: Array) -> tuple[Array, Arra
     rough = np.sqrt(np.maximum(variance, 0.05 * np.mean(residual**2) + 1e-300))
     unit = residual / rough
     pairs = np.flatnonzero(np.diff(seconds) == 1)
-    rho = float(np.clip(np.mean(unit[pairs] * unit[pairs + 1]), _TOGETHER, 0.9))
+    rho = np.clip(np.mean(unit[pairs] * unit[pairs + 1]), _TOGETHER, 0.9)
     more = (1.0 + rho) / (1.0 - rho)  # means that are worth one
     weight = 1.0 / (rough * math.sqrt(more))
     beta, covariance = _fit(X * weight[:, None], y * weight)
     B = BSpline.design_matrix(at, knots, 3, True).toarray()
     std = np.sqrt(np.einsum("ni,ij,nj->n", B, covariance, B))
-    rng = np.random.default_rng(0)
-    draws = rng.multivariate_normal(beta, covariance, _DRAWS, method="eigh") @ B.T
+    draw = np.random.default_rng(0).multivariate_normal
+    draws = draw(beta, covariance, _DRAWS, method="eigh") @ B.T
     return B @ beta, std, draws, len(y) / more
 
 
@@ -202,7 +180,7 @@ def _fit(X: Array, y: Array) -> ArrayPair:
     the greatest restricted likelihood of values with unit variance.
     """
     XX, Xy, size = X.T @ X, X.T @ y, X.shape[1]
-    bend, scale = np.diff(np.eye(size), 2, axis=0), float(np.trace(XX)) / size
+    bend, scale = np.diff(np.eye(size), 2, axis=0), np.trace(XX) / size
 
     def fitted(weight: float) -> tuple[float, Array, Any]:
         factor = cho_factor(XX + weight * bend.T @ bend + 1e-9 * scale * np.eye(size))

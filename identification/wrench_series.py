@@ -1,7 +1,5 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -40,9 +38,9 @@ from ..estimator.ukf import CALL, IMU_PARTS, make_calls
 from ..runtime.errors import InputError
 from ..runtime.threads import one_thread
 from .inertial_wrench import inertial_wrench
-from .logs.flight_log import MOTOR_RATES, FlightLog, between_samples
+from .logs.flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, between_samples, serves
 from .logs.screening import screen_log
-from .logs.table import Array, ArrayPair, Names, Rows, finite_rows
+from .logs.table import Array, Names, Rows, finite_rows
 from .logs.tables import write_csv
 from .motion.inertial_signals import reads_imu
 from .motion.smoothing import mean_square
@@ -147,7 +145,7 @@ def _filtered(
     """Return a filter's estimate of a screened log (``screen_log``), smoothed by a recording
     filter, and the loads (N, 7, 3).
     """
-    first, count = int(np.argmax(log.valid)), len(log.t)
+    first, count = np.argmax(log.valid), len(log.t)
     numbers, std = np.empty((count, WITHOUT_COVARIANCE)), np.empty((count, 18))
     loads = np.zeros((count, *LOAD))
     events = np.zeros(count, dtype=np.int64)  # last event of each row, of a recording filter
@@ -180,14 +178,14 @@ def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> 
     """Take the torque out of an estimate with seldom measured rotors, and widen the force with even
     fewer measurements; return the notes on both.
     """
-    rate, least = log.motor_rate, MOTOR_RATES
-    if least.serves(rate, least.torque_hz):
+    rate = log.motor_rate
+    if serves(rate, TORQUE_HZ):
         return ()
     estimate.numbers[:, TORQUE] = np.nan
     estimate.numbers[:, MODEL][:, :3] = np.nan
     said = f"{'motor commands' if log.commanded else 'rotor speeds'} come {rate:.3g} times a second"
-    if least.serves(rate, least.force_hz):
-        return (f"warning: {said}: no torque is estimated. It takes {least.torque_hz:g}",)
+    if serves(rate, FORCE_HZ):
+        return (f"warning: {said}: no torque is estimated. It takes {TORQUE_HZ:g}",)
     slopes = 2.0 * log.rotor_speeds * vehicle.k  # of thrust, N/(rad/s)
     std = np.linalg.norm(slopes * between_samples(log.t, log.rotor_speeds, rate), axis=1)
     up = Rotation.from_quat(estimate.quaternion, scalar_first=True).apply([0.0, 0.0, 1.0])
@@ -195,7 +193,7 @@ def _slow_motors(log: FlightLog, vehicle: Vehicle, estimate: WrenchEstimate) -> 
     return (
         f"warning: {said}: no torque is estimated, and what the thrust does between them, "
         f"{np.sqrt(np.mean(np.square(std))):.2g} N, is in the force's deviation. A force takes "
-        f"{least.force_hz:g} a second, a torque {least.torque_hz:g}",
+        f"{FORCE_HZ:g} a second, a torque {TORQUE_HZ:g}",
     )
 
 
@@ -210,8 +208,7 @@ def pose_notes(log: FlightLog, vehicle: Vehicle) -> Names:
         return ()
     if log.commanded:
         vehicle = replace(vehicle, omega_source="commanded")
-    estimate, _ = _filtered(log, WrenchUKF(vehicle, None, log.period, GATE))
-    return tuple(_notes(log, estimate, False))
+    return tuple(_notes(log, _filtered(log, WrenchUKF(vehicle, None, log.period, GATE))[0], False))
 
 
 def counts(series: WrenchSeries) -> dict[str, int]:
@@ -221,30 +218,27 @@ def counts(series: WrenchSeries) -> dict[str, int]:
 
 def uncertainty_note(series: WrenchSeries) -> str:
     """Return the accuracy of force and torque in words, with the largest part of it."""
-    force = _largest_part(series, series.std_force, 3, "N")
-    force = f"One standard deviation of the force is {force}"
+    force = f"Standard deviation an axis: force {_largest_part(series, slice(3, 6), 'N')}"
     if not np.isfinite(series.std_torque).any():
         return force
-    return f"{force}; of the torque, {_largest_part(series, series.std_torque, 0, 'Nm')}"
+    return f"{force}, torque {_largest_part(series, slice(3), 'Nm')}"
 
 
-def _largest_part(series: WrenchSeries, std: Array, first: int, unit: str) -> str:
-    """Return the deviation (N, 3) of three numbers in words; ``first`` of torque and force."""
+def _largest_part(series: WrenchSeries, axes: slice, unit: str) -> str:
+    """Return the deviation of three ``axes`` of torque and force in words."""
     parts = {
         f"{NAMES[name]}, +-{100.0 * getattr(series.vehicle.uncertainty, name):.3g} %"
-        f"{' between days' if name == 'command' else ''},": np.mean(
-            variances_along(factors, series.loads)[:, first : first + 3]
+        f"{' between days' if name == 'command' else ''}": np.mean(
+            variances_along(factors, series.loads)[:, axes]
         )
         for name, factors in factors_alone(series.vehicle).items()
     }
-    parts["noise"] = np.mean(np.square(series.std[:, 12 + first : 15 + first]))
-    total = np.mean(np.square(std))
-    parts["what the rotors do between samples"] = total - sum(parts.values())
+    parts["noise"] = np.mean(np.square(series.std[:, 12:][:, axes]))
+    total = np.mean(np.square(series.std_wrench[:, axes]))
+    parts["the rotors between samples"] = total - sum(parts.values())
     name = max(parts, key=parts.__getitem__)
-    return (
-        f"{np.sqrt(total):.2g} {unit} an axis, and {name} makes up "
-        f"{100.0 * parts[name] / total:.0f} % of its square"
-    )
+    share = f"{100.0 * parts[name] / total:.0f} % of the variance"
+    return f"{1e3 * np.sqrt(total):.2g} m{unit} ({share}: {name})"
 
 
 def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[str]:
@@ -253,7 +247,7 @@ def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[s
     restarts = np.repeat(log.t[1:], np.diff(estimate.restarts))  # s
     if refused.size:
         yield (
-            f"{refused.size} of {int(log.valid.sum())} poses jump from those before and were "
+            f"{refused.size} of {log.valid.sum()} poses jump from those before and were "
             f"refused, the first at t = {log.t[refused[0]]:.6g} s"
         )
     if restarts.size:
@@ -303,21 +297,15 @@ def _of_poses(
 ) -> T:
     """Return the judgement of a tuning by the columns of a log."""
     log, _ = screen_log(log, vehicle, None)
-    if reads_imu(log):
-        raise InputError(
-            f"{log.source or log.name}: has no pose, or one that is too slow, to fit a tuning to; "
-            "expected 50 poses a second"
-        )
     position = np.where(log.valid[:, None], log.position, np.nan)
     try:
+        if reads_imu(log):
+            raise InputError(
+                "has no pose, or one that is too slow, to fit a tuning to; expected 50 poses a "
+                "second"
+            )
         return judge(
-            vehicle,
-            log.t,
-            log.rotor_speeds,
-            position,
-            log.quaternion,
-            log.voltage,
-            tuning=tuning,
+            vehicle, log.t, log.rotor_speeds, position, log.quaternion, log.voltage, tuning
         )
     except InputError as error:
         raise InputError(f"{log.source or log.name}: {error}") from error
@@ -362,19 +350,17 @@ def write_wrench(series: WrenchSeries, path: Path) -> None:
             series.std_force,
             series.std_torque,
             series.nis,
-            series.numbers[:, STATUS],
+            series.status_code,
         ]
     )
     write_csv(dict(zip(COLUMNS, values.T, strict=True)), path)
 
 
-def truth_rmse(series: WrenchSeries, log: FlightLog) -> ArrayPair | None:
-    """Return the RMSE (3,) of force in N and (3,) of torque in Nm against the log's truth, or None
+def truth_rmse(series: WrenchSeries, log: FlightLog) -> Array | None:
+    """Return the RMSE (2, 3) of force in N and of torque in Nm against the log's truth, or None
     without one.
     """
     if log.force is None or log.torque is None:
         return None
-    return (
-        np.sqrt(mean_square(series.force - log.force)),
-        np.sqrt(mean_square(series.torque - log.torque)),
-    )
+    errors = series.force - log.force, series.torque - log.torque
+    return np.sqrt(mean_square(np.stack(errors, axis=1)))

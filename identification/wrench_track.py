@@ -5,6 +5,8 @@ for Foxglove and PlotJuggler.
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from ..runtime.extras import need
 from ..runtime.whole_files import replaced
 from .wrench_series import WrenchSeries
@@ -17,9 +19,13 @@ _TOPICS = {
 }
 # time, header, vector, point, quaternion, wrench, pose
 _PARTS = (
-    *("builtin_interfaces/msg/Time", "std_msgs/msg/Header"),
-    *("geometry_msgs/msg/Vector3", "geometry_msgs/msg/Point", "geometry_msgs/msg/Quaternion"),
-    *("geometry_msgs/msg/Wrench", "geometry_msgs/msg/Pose"),
+    "builtin_interfaces/msg/Time",
+    "std_msgs/msg/Header",
+    "geometry_msgs/msg/Vector3",
+    "geometry_msgs/msg/Point",
+    "geometry_msgs/msg/Quaternion",
+    "geometry_msgs/msg/Wrench",
+    "geometry_msgs/msg/Pose",
 )
 
 
@@ -36,28 +42,26 @@ def write_mcap(series: WrenchSeries, path: Path) -> None:
 
     store = get_typestore(Stores.ROS2_HUMBLE)
     time, header, vector, point, quaternion, wrench, pose = (store.types[name] for name in _PARTS)
-    begin = min(float(series.t[0]), 0.0)  # a bag's times are not negative
-    columns = (
-        *(series.force, series.torque, series.std_force, series.std_torque),
-        *(series.position, series.quaternion[:, [1, 2, 3, 0]]),
-    )
+    begin = min(series.t[0], 0.0)  # a bag's times are not negative
+    vectors = series.force, series.torque, series.std_force, series.std_torque
+    columns = series.t, series.position, np.roll(series.quaternion, -1, axis=1), *vectors
     with replaced(path) as partial, TemporaryDirectory(dir=partial.parent) as folder:
         bag = Path(folder) / "track"
         with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-            topics = {
-                topic: writer.add_connection(topic, name, typestore=store)
+            topics = [
+                writer.add_connection(topic, name, typestore=store)
                 for topic, name in _TOPICS.items()
-            }
-            for t, *row in zip(series.t.tolist(), *columns, strict=True):
+            ]
+            for t, place, turn, *row in zip(*(x.tolist() for x in columns), strict=True):
                 at = round(1e9 * (t - begin))
                 stamped = header(time(at // 10**9, at % 10**9), _FRAME)
-                force, torque, std_force, std_torque = (vector(*x.tolist()) for x in row[:4])
+                force, torque, std_force, std_torque = (vector(*x) for x in row)
                 parts = (
                     wrench(force, torque),
                     wrench(std_force, std_torque),
-                    pose(point(*row[4].tolist()), quaternion(*row[5].tolist())),
+                    pose(point(*place), quaternion(*turn)),
                 )
-                for (topic, name), part in zip(_TOPICS.items(), parts, strict=True):
-                    message = store.types[name](stamped, part)
-                    writer.write(topics[topic], at, store.serialize_cdr(message, name))
+                for topic, part in zip(topics, parts, strict=True):
+                    message = store.types[topic.msgtype](stamped, part)
+                    writer.write(topic, at, store.serialize_cdr(message, topic.msgtype))
         (bag / "track.mcap").replace(partial)

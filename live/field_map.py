@@ -20,12 +20,11 @@ from ..identification.logs.log_map import (
     constant,
     load_map,
 )
-from ..identification.logs.magnitudes import MAGNITUDES
+from ..identification.logs.magnitudes import LARGEST
 from ..identification.logs.mapped_log import with_range
 from .messages import SECOND, Array, Malformed, Measurement
 
 _OUTSIDE = 0.01  # tolerance, share of a command's range
-_LARGEST = MAGNITUDES.largest
 _FIELDS = {
     "rotors": "rotor_speeds",
     "commands": "command",
@@ -70,8 +69,14 @@ class FieldMap:
         poses = self._sections.get("position", ())
         named = any(name in fields for part in poses for name in part.columns)  # a lost pose
         sample.whole = sample.has_motors and (sample.has_pose or named)
+        there = {
+            "pose": sample.has_pose,
+            "motors": sample.has_motors,
+            "imu": sample.has_imu,
+            "battery": sample.voltage is not None,
+        }
         if not sample.whole:
-            sample.kind = _kind(sample)
+            sample.kind = "+".join(name for name, is_there in there.items() if is_there)
         if not sample.kind:
             raise Malformed(
                 f"none of the fields that are looked for; found {', '.join(fields)[:200]}; "
@@ -117,7 +122,7 @@ class FieldMap:
     def _attitude(self, part: Attitude, values: Array) -> Array:
         quaternion = quaternions(part, values[None])
         if not part.euler:
-            length = float(np.linalg.norm(quaternion))
+            length = np.linalg.norm(quaternion)
             if not abs(length - 1.0) <= NORM_TOLERANCE:
                 raise Malformed(
                     f"a quaternion of length {length:.4g}; expected 1 within {NORM_TOLERANCE:g}"
@@ -126,21 +131,10 @@ class FieldMap:
         return np.asarray(in_kit_axes(self.map, part, quaternion)[0])
 
 
-def _kind(sample: Measurement) -> str:
-    """Return the names of the parts of a row; empty: there is none."""
-    parts = {
-        "pose": sample.has_pose,
-        "motors": sample.has_motors,
-        "imu": sample.has_imu,
-        "battery": sample.voltage is not None,
-    }
-    return "+".join(name for name, there in parts.items() if there)
-
-
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
     """Return a section's numbers, with signs and scale; None: it has none."""
     given: list[Any] = [fields.get(name) for name in part.columns]
-    if all(type(x) is float and abs(x) <= _LARGEST for x in given):  # nearly always, and quick
+    if all(type(x) is float and abs(x) <= LARGEST for x in given):  # nearly always, and quick
         return scaled(part, np.array(given))
     numbers = {name: _number(name, fields) for name in part.columns}
     missing = [name for name in part.named if math.isnan(numbers[name])]
@@ -151,7 +145,7 @@ def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | N
             f"no field {', '.join(missing)}; expected all of {', '.join(part.named)} ({section})"
         )
     values = scaled(part, np.array([numbers[name] for name in part.columns]))
-    if not np.all(np.abs(values) <= _LARGEST):
+    if not np.all(np.abs(values) <= LARGEST):
         raise Malformed(
             f"{section}: {', '.join(f'{x:.3g}' for x in values)}; expected numbers of a flight"
         )

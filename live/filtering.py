@@ -120,10 +120,8 @@ class LiveFilter:
         timed = self._timed
         assert timed is not None
         if math.isnan(timed.time):
-            if not row.has_pose:
+            if row.position is None or row.quaternion is None:
                 return []
-            assert row.position is not None
-            assert row.quaternion is not None
             timed.reset(row.t, row.position, row.quaternion)
             self._before = row
             self._settled = row.t + _STARTUP
@@ -151,10 +149,9 @@ class LiveFilter:
         if before.voltage is not None and row.voltage is not None:
             voltage = 0.5 * (before.voltage + row.voltage)
         steps = steps_between(row.t - now, self.period)
-        at = now
         for step in steps[:-1]:
-            at += step
-            timed.predict(at, speeds, voltage)
+            now += step
+            timed.predict(now, speeds, voltage)
         estimate = timed.predict(row.t, speeds, voltage)
         self._before = row
         estimate = self._correct(timed, row) or estimate

@@ -108,4 +108,4 @@ class Joiner:
             return history[max(after - 1, 0)][1]
         t0, a = history[after - 1]
         t1, b = history[after]
-        return np.asarray(a + (b - a) * ((t - t0) / (t1 - t0)))
+        return a + (b - a) * ((t - t0) / (t1 - t0))

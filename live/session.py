@@ -110,11 +110,9 @@ class Session:
                 outlet.patience = self.source.patience
             self._first = self._last = time.monotonic_ns()
             with _undisturbed():
-                while not self._stop.is_set():
-                    if not self._once():
-                        break
-                else:
-                    self.ended = self.ended or "it was stopped"
+                while not self._stop.is_set() and self._once():
+                    pass
+            self.ended = self.ended or "it was stopped"
             for output in self.filter.begin():
                 self._out(output)
             self._record()
@@ -164,23 +162,20 @@ class Session:
 
     def take(self, sample: Measurement) -> None:
         """Handle one message."""
+        counts = self.tallies.counts
         self.tallies.rates[sample.kind].add(sample.arrival)
-        late = self.tallies.counts["too late"]
-        self._estimate(sample)
-        if sample.has_pose:
-            self.watch.count(max(self.tallies.counts["too late"] - late, 0))
-
-    def _estimate(self, sample: Measurement) -> None:
+        late = counts["too late"]
         t = self.clocks.time(sample)
         row = None if t is None else self._joiner.take(sample, t)
-        if row is None:
-            return
-        for output in self.filter.take(row):
-            self._out(output)
-            if output.row is row and self.source.paced:  # not a row held back
-                self._fresh.append(row.arrival)
-        if self.recording is not None:
-            self._unrecorded.append(row)
+        if row is not None:
+            for output in self.filter.take(row):
+                self._out(output)
+                if output.row is row and self.source.paced:  # not a row held back
+                    self._fresh.append(row.arrival)
+            if self.recording is not None:
+                self._unrecorded.append(row)
+        if sample.has_pose:
+            self.watch.count(max(counts["too late"] - late, 0))
 
     def _record(self) -> None:
         """Record the rows so far, after the first estimate is out."""

@@ -117,17 +117,21 @@ class WebView:
         Raises:
             TimeoutError: the browser reads nothing.
         """
-        source = self._session.source
+        session = self._session
         last = -math.inf
         missed = 0
-        vehicle = source.vehicle
-        first: dict[str, Any] = {"vehicle": vehicle.name, "source": source.name}
-        first |= {"weight": vehicle.weight, "arm": vehicle.arm_l}
-        first["rotors"] = vehicle.positions.tolist()
+        vehicle = session.source.vehicle
+        first: dict[str, Any] = {
+            "vehicle": vehicle.name,
+            "source": session.source.name,
+            "weight": vehicle.weight,
+            "arm": vehicle.arm_l,
+            "rotors": vehicle.positions.tolist(),
+        }
         while not writer.is_closing():
             if writer.transport.get_write_buffer_size():
                 missed += 1
-                self._session.tallies.counts["not shown"] += 1
+                session.tallies.counts["not shown"] += 1
                 if missed * _EVERY > _TIMEOUT:
                     raise TimeoutError
             else:
@@ -135,7 +139,7 @@ class WebView:
                 points = ",".join(text for t, text in self._points if t > last)
                 last = self._points[-1][0] if self._points else last
                 missed = 0
-                ended = (self._session.ended or "the stream ended") if over else ""
+                ended = (session.ended or "the stream ended") if over else ""
                 head = json.dumps({**first, "over": ended})[1:-1]
                 writer.write(f'data: {{{head},{self._state},"points":[{points}]}}\n\n'.encode())
                 first = {}
@@ -145,12 +149,11 @@ class WebView:
 
     def _look(self) -> None:
         """Keep new estimates and the state, for all browsers."""
-        for one in self._session.since(self._points[-1][0] if self._points else -math.inf):
-            values = [one.t, *one.wrench, *one.std]
-            point = [float(f"{x:.5g}") if i else round(x, 3) for i, x in enumerate(values)]
-            self._points.append((one.t, json.dumps(point)))
         session = self._session
-        tallies = self._session.tallies
+        for one in session.since(self._points[-1][0] if self._points else -math.inf):
+            numbers = [float(f"{x:.5g}") for x in (*one.wrench, *one.std)]
+            self._points.append((one.t, json.dumps([round(one.t, 3), *numbers])))
+        tallies = session.tallies
         state: dict[str, Any] = {}
         if session.output is not None:
             estimate = session.output.estimate

@@ -4,10 +4,8 @@ from .ekf import WrenchEKF
 from .observer import NonlinearObserver, ObserverTuning
 
 NAMES = ("fig3", "fig4", "fig5", "fig6", "fig7")
-# of an earlier version: the page keeps its results and says which version made them
-KEPT = ("extension",)
 
-__all__ = ["KEPT", "NAMES", "NonlinearObserver", "ObserverTuning", "WrenchEKF"]
+__all__ = ["NAMES", "NonlinearObserver", "ObserverTuning", "WrenchEKF"]
 
 
 def __dir__() -> list[str]:

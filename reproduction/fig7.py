@@ -20,7 +20,8 @@ from ..controllers import Admittance
 from ..controllers.observation import MAX_COMMAND
 from ..dynamics.vehicle_file import load_vehicle
 from ..envs.fan import Fan
-from ..envs.fan_tracking import DISTANCE, FanTrackingEnv
+from ..envs.fan_task import DISTANCE
+from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.plant import PlantSettings
 from ..envs.scenarios import SCENARIOS, Scenario
 from ..evaluation.episodes import DECISIONS, Episode, fly_episode

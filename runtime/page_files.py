@@ -58,7 +58,7 @@ def write_text(text: str, path: Path) -> None:
         partial.write_bytes(gzip.compress(data, 9, mtime=0) if path.suffix == ".gz" else data)
 
 
-def png_of(figure: "Figure") -> bytes:
+def _png_of(figure: "Figure") -> bytes:
     """Return a figure as a PNG of at most 128 colours."""
     from PIL import Image
 
@@ -79,7 +79,7 @@ def write_png(figure: "Figure", path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    data = png_of(figure)
+    data = _png_of(figure)
     with replaced(path) as partial:
         partial.write_bytes(data)
 

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 Frames = NDArray[np.float32]
 
 AHEAD = 24  # decisions with known places of the fan, for a command
+# largest taught command, m/s: a fan far away on an unknown side needs a mean far beyond 1
+_LIMIT = 2.5 * MAX_COMMAND
 _COUNTS = 10  # decisions flown until a command counts
 _LEAD = 2.0  # 1/s, gain of the law with sight of the fan that flies the first round
 _VELOCITY = 3  # decisions, over which the fan's velocity is taught
@@ -55,13 +57,10 @@ class FanHindsight:
     period = DECISION_PERIOD
     largest = MAX_COMMAND
 
-    def __init__(self, limit: float = 2.5, features: Features | None = FEATURES) -> None:
-        """Take a limit on what is taught, in largest commands, and a policy's inputs; None: the
-        scaled observation. A fan far away on an unknown side needs a mean of commands far beyond 1.
-        """
+    def __init__(self, features: Features | None = FEATURES) -> None:
+        """Take a policy's inputs; None: the scaled observation."""
         self._features = features
         oracle = Oracle()
-        self._limit = limit * self.largest
         model = Oracle.steps(oracle.vehicle)[_ALONG_Y]
         self._gain, self._ahead = preview(*model, oracle.effort, AHEAD)
 
@@ -69,7 +68,7 @@ class FanHindsight:
         """Start an episode in each of ``envs``."""
         self._envs = envs
         self._history = History(self._features or FEATURES, envs.num_envs)
-        self._set_point: Array | None = None
+        self._set_point: Any = None  # (n,) m
         self._flown: list[tuple[Array, ...]] = []
 
     def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
@@ -82,21 +81,29 @@ class FanHindsight:
             seen = self._history.flat()
         fan = infos["fan_y"]
         places = infos["y"]
-        self._set_point = _moved(self._set_point, places, infos["command"][:, 0])
-        self._flown.append((self._own(infos), _felt(infos), fan.copy()))
+        if self._set_point is None:
+            self._set_point = places.copy()
+        else:
+            step = DECISION_PERIOD * infos["command"][:, 0]
+            ahead = self._set_point + step - places
+            # a set point too far ahead of its vehicle waits (``core/flight_loop.hpp``)
+            moves = (np.abs(ahead) <= FlightGains.leash) | (ahead * step <= 0.0)
+            self._set_point = self._set_point + np.where(moves, step, 0.0)
+        felt = infos["force"][:, _ALONG_Y], tilting(infos["torque"])[_ALONG_Y]
+        self._flown.append((self._own(infos), np.column_stack(felt), fan.copy()))
         wanted = infos["fan_velocity"] + _LEAD * (fan - places)
         return seen, wanted[:, None]
 
     def _own(self, infos: dict[str, Any]) -> Array:
         """Return the states (n, 7) of the vehicles along y."""
         truth = self._envs.truth()
-        assert self._set_point is not None
         up = truth["up"]
         y = _ALONG_Y
         turning = tilting(truth["rate"])[y]
         turned = tilting(truth["angular_acceleration"])[y]
         middle = up[:, y] / up[:, 2], turning, turned, truth["integral"][:, y]
-        return np.column_stack([infos["y"], truth["velocity"][:, y], *middle, self._set_point])
+        moved = infos["y"], truth["velocity"][:, y], *middle, self._set_point
+        return np.column_stack(moved)
 
     def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the best command, the fan's offset (m) and its velocity (m/s), (decisions, n, 3),
@@ -112,26 +119,8 @@ class FanHindsight:
         best = -(off @ self._gain + felt[:-1] @ rests)
         best -= np.einsum("kan,a->kn", moves, self._ahead[:, -1])
         velocity = moves[:, :_VELOCITY].mean(axis=1) / self.period
-        best = np.clip(best, -self._limit, self._limit)
+        best = np.clip(best, -_LIMIT, _LIMIT)
         truth = np.stack([best, -off[..., PLACE], velocity], axis=-1)
         return truth, in_flight[np.minimum(now + _COUNTS, self.decisions)] & (
             now + _COUNTS <= self.decisions
         )[:, None]
-
-
-def _felt(infos: dict[str, Any]) -> Array:
-    """Return the true force and tilting torque (n, 2) along y."""
-    return np.column_stack([infos["force"][:, _ALONG_Y], tilting(infos["torque"])[_ALONG_Y]])
-
-
-def _moved(set_point: Array | None, places: Array, commands: Array) -> Array:
-    """Return the set points (n,) m after a decision at ``commands`` (n,) m/s. A set point too far
-    ahead of its vehicle waits (``core/flight_loop.hpp``).
-    """
-    if set_point is None:
-        return places.copy()
-    step = DECISION_PERIOD * commands
-    ahead = set_point + step - places
-    return np.where((np.abs(ahead) <= FlightGains.leash) | (ahead * step <= 0.0), step, 0.0) + (
-        set_point
-    )

@@ -61,9 +61,10 @@ def lanes_of(
     ``observation``: one of ``OBSERVATIONS`` in place of the task's own.
     """
     kind = TASKS[task].environment
-    scenarios = {LATE: _LATE}
     return [
-        TaskLanes(count, task=kind, scenario=scenarios.get(name, name), observation=observation)
+        TaskLanes(
+            count, task=kind, scenario=_LATE if name == LATE else name, observation=observation
+        )
         for name, count in mix_of(scenario, episodes).items()
     ]
 

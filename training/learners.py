@@ -23,7 +23,7 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
     torch.set_num_threads(1)  # the networks are small: threads would only wait for each other
     algorithm = config["algorithm"]
     policy: dict[str, Any] = {
-        "net_arch": list(config["net"]),
+        "net_arch": config["net"],
         "activation_fn": ACTIVATIONS[config["activation"]],
         "optimizer_kwargs": {"fused": True},
     }

@@ -3,6 +3,7 @@
 import platform
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,16 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..controllers.flight import FlightGains
 from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
+from ..envs.definition import TaskDefinition
 from ..evaluation.episodes import fly_episode
 from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
+from ..runtime.plain_values import plain
 from ..runtime.provenance import package_versions
 from ..runtime.regular_files import read_json
 from .configuration import Config, features_of
@@ -57,17 +61,15 @@ def progress_from(data: Any, path: Path) -> Progress:
     Raises:
         InputError: the file holds something else.
     """
-    try:
+    with suppress(InputError):
         progress = checked(Progress, data, str(path))
-    except InputError:
-        progress = None
-    counts = {len(progress.steps), len(progress.rmse_m), len(progress.lost)} if progress else ()
-    if progress is None or len(counts) > 1 or not -1 <= progress.best < len(progress.steps):
-        raise InputError(
-            f"{path}: does not hold the progress of a training "
-            f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
-        )
-    return progress
+        count = len(progress.steps)
+        if count == len(progress.rmse_m) == len(progress.lost) and -1 <= progress.best < count:
+            return progress
+    raise InputError(
+        f"{path}: does not hold the progress of a training "
+        f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
+    )
 
 
 def read_progress(folder: Path) -> Progress | None:
@@ -77,12 +79,11 @@ def read_progress(folder: Path) -> Progress | None:
         InputError: the file cannot be read, or holds something else.
     """
     path = folder / "progress.json"
-    if not path.exists():
-        return None
-    return progress_from(read_json(path, "the progress of a training"), path)
+    told = "the progress of a training"
+    return progress_from(read_json(path, told), path) if path.exists() else None
 
 
-def versions() -> dict[str, str]:
+def _versions() -> dict[str, str]:
     """Return the versions behind a trained policy."""
     return {"windwrench": __version__, "python": platform.python_version(), **package_versions()}
 
@@ -96,7 +97,7 @@ def origin(algorithm: str, scenario: str, seed: int, steps: int, activation: str
         "steps": steps,
         "activation": activation,
         "squash": algorithm in _SQUASHED,
-        "versions": versions(),
+        "versions": _versions(),
     }
 
 
@@ -113,6 +114,24 @@ def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, A
         },
         "config": config,
     }
+
+
+def flight_of(task: TaskDefinition) -> Any:
+    """Return a task's numbers for a flight of its policy elsewhere: the kind of observation (None:
+    the task's own) with limits and divisors, the action with its commands, decisions a second, and
+    the gains of the flight loop.
+    """
+    own = task.chosen is None and type(task).observe is not TaskDefinition.observe
+    numbers = {
+        **vars(task.flown),
+        "action": task.action,
+        "observation": None if own else task.observation,
+        "decision_hz": task.decision_hz,
+        "gains": task.gains or FlightGains(),
+        "limits": task.kept,
+        "divisors": task.divisors,
+    }
+    return plain(numbers)
 
 
 def validate(
@@ -193,7 +212,7 @@ class Run:
                     f"{self.folder}: holds a run with another configuration, scenario or seed; "
                     "give another --out, or delete it"
                 )
-        write_json({**run, "versions": versions()}, path)
+        write_json({**run, "versions": _versions()}, path)
 
     def resume(self, progress: Progress) -> None:
         """Continue from the progress of an earlier part of the run."""
@@ -209,8 +228,12 @@ class Run:
     def card(self, steps: int) -> dict[str, Any]:
         """Return the card of the policy after ``steps`` decisions."""
         card = card_of(self.config, self.scenario, self.seed, steps) | self.own
-        unseen = ("features", "repeat") if "task" in card else ()
-        return {key: value for key, value in card.items() if key not in unseen}
+        if "task" in card:
+            del card["features"], card["repeat"]
+            world = self.judge.unwrapped
+            if isinstance(world, TaskDefinition):
+                card["flight"] = flight_of(world)
+        return card
 
     def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
         """Validate a policy, and save the policy as the last, and as the best if no earlier policy

@@ -17,14 +17,13 @@ def training_seed(seed: int, environment: int, episode: int) -> int:
     return int(words[0]) % FIRST_VALIDATION_SEED
 
 
-def validation_seeds(episodes: int, first: int = 0) -> list[int]:
-    """Return the seeds of validation episodes ``first`` to ``first + episodes``.
+def validation_seeds(episodes: int) -> list[int]:
+    """Return the seeds of the first validation episodes.
 
     Raises:
         InputError: more than there are.
     """
-    seeds = list(range(FIRST_VALIDATION_SEED + first, FIRST_VALIDATION_SEED + first + episodes))
-    if not seeds or first < 0 or seeds[-1] >= FIRST_TEST_SEED:
-        count = FIRST_TEST_SEED - FIRST_VALIDATION_SEED
-        raise InputError(f"validation: there are {count} episodes, got {episodes} from {first}")
-    return seeds
+    count = FIRST_TEST_SEED - FIRST_VALIDATION_SEED
+    if not 0 < episodes <= count:
+        raise InputError(f"validation: there are {count} episodes, got {episodes}")
+    return list(range(FIRST_VALIDATION_SEED, FIRST_VALIDATION_SEED + episodes))

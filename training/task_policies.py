@@ -76,7 +76,7 @@ def _card(
     return card | seen | {"largest": env.largest_action}
 
 
-class FanPlaneLesson:
+class _FanPlaneLesson:
     """FanTracking2D: scaled observations; the fan's offset from the vehicle (m) and its velocity
     (m/s), both in the plane of the commands. A law with sight of both flies the first round.
     """
@@ -111,19 +111,8 @@ def _shares(task: str, gain: float = _GAINS[1]) -> Array:
     return np.eye(3, dtype=np.float32)
 
 
-def _lesson(task: str, scenario: str, episodes: int) -> tuple[Any, list[Any], int, Array | None]:
-    """Return lesson, environments of a round, quantities of a frame, and the signs of a mirrored
-    one.
-    """
-    if task == FAN:
-        return FanHindsight(), fan_lanes(episodes), FEATURES.size, FEATURES.mirrored
-    scales = len(TASKS[task].environment.scales)
-    turned = _TURNED if task == FAN_PLANE else None
-    return _lesson_of(task), lanes_of(task, scenario, episodes), scales, turned
-
-
-def _lesson_of(task: str) -> FanPlaneLesson | WindLesson:
-    return FanPlaneLesson() if task == FAN_PLANE else WindLesson(task)
+def _lesson_of(task: str) -> Any:
+    return _FanPlaneLesson() if task == FAN_PLANE else WindLesson(task)
 
 
 def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | TrainedPolicy:
@@ -136,7 +125,13 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
         **changed: entries of ``_FIT`` in place of the task's: ``rounds``, ``episodes``, ``epochs``.
     """
     settings = _fit_of(task) | changed
-    lesson, envs, quantities, mirrored = _lesson(task, scenario, settings["episodes"])
+    if task == FAN:
+        lesson, envs = FanHindsight(), fan_lanes(settings["episodes"])
+        quantities = FEATURES.size
+    else:
+        lesson, envs = _lesson_of(task), lanes_of(task, scenario, settings["episodes"])
+        quantities = len(TASKS[task].environment.scales)
+    mirrored = {FAN: FEATURES.mirrored, FAN_PLANE: _TURNED}.get(task)
     shares = _shares(task)
     torch.manual_seed(seed)
     shape = settings["cell"], settings["state"], settings["net"], _ACTIVATION
@@ -149,8 +144,7 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
         last = number == settings["rounds"] - 1
         if number == 0 and task != FAN_PLANE:
             network.whiten(flown.seen)
-        epochs = settings["epochs"] * (3 if last else 1)
-        rate = settings["learning_rate"]
+        epochs, rate = settings["epochs"] * (3 if last else 1), settings["learning_rate"]
         rates = rate, 0.0 if last else _LEAST_RATE * rate
         fit(network, flown, epochs, settings["batch_size"], rates, order, mirrored)
         print(f"{flights.episodes} episodes, {time.process_time():.0f} s", flush=True)
@@ -181,7 +175,7 @@ def linear(
     task's own; other arguments as of ``teach``.
     """
     settings = _LINEAR | changed
-    lesson: Any = FanHindsight(features=None) if task == FAN else _lesson_of(task)
+    lesson = FanHindsight(features=None) if task == FAN else _lesson_of(task)
     envs = lanes_of(task, scenario, settings["episodes"], observation)
     law = LinearLaw()
     flights = Flights(envs, lesson, _fit_of(task)["wander"], seed)

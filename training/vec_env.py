@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from ..controllers.features import Features, History
-from ..envs.fan_tracking import LOST_OFFSET
+from ..envs.definition import LOST_OFFSET
 from ..evaluation.episodes import error_of
 from ..evaluation.rewards import Reward, total_of
 from .seeds import training_seed

@@ -1,5 +1,7 @@
 // What a diagnosis computes at each row of a log, for Python. A model's memory is Python's: a NumPy
 // record, laid out as `Model<double>` at its beginning, given by its address.
+#include <nanobind/stl/vector.h>
+
 #include "../diagnosis/causal_filter.hpp"
 #include "../diagnosis/evidence.hpp"
 #include "../diagnosis/flights.hpp"
@@ -94,32 +96,40 @@ void run_causal_filter(std::uintptr_t model, double period, In<-1, 4> speeds, In
 
 void write_sensitivities(double period, In<6, 3, 2> gain, In<6> keep, In<-1, 2> heading,
                          In<-1, 3, 2> pull, In<-1, 3> rate, In<-1, 3, 3> gyration,
-                         In<-1, 6, -1> acting, In<-1, 6, -1> moved, In<-1, 6, -1> jumps,
-                         Ints<-1> jump_state, In<6, 7, -1> slopes, In<-1, 6> innovations,
-                         In<-1, 6> disturbance, Out<6, 3, -1> state, Out<-1, 6, -1> out) {
-  std::size_t columns = acting.shape(2) + jumps.shape(2) + slopes.shape(2);
-  check_rows(acting.shape(0), heading, pull, rate, gyration, moved, jumps, innovations, disturbance,
-             out);
-  if (state.shape(2) != columns || out.shape(2) != columns || jump_state.size() != jumps.shape(2) ||
-      moved.shape(2) > acting.shape(2))
+                         std::vector<In<-1, 6>> acting, std::vector<In<-1, 6>> moved,
+                         In<-1, 6, -1> jumps, Ints<-1> jump_state, In<6, 7, -1> slopes,
+                         In<-1, 6> innovations, In<-1, 6> disturbance, In<6, 6> whiten,
+                         Out<6, 3, -1> state, Out<-1, 6, -1> out) {
+  const std::size_t n = heading.shape(0),
+                    columns = acting.size() + jumps.shape(2) + slopes.shape(2);
+  check_rows(n, pull, rate, gyration, jumps, innovations, disturbance, out);
+  if (state.shape(2) != columns || out.shape(2) != columns + 1 ||
+      jump_state.size() != jumps.shape(2) || moved.size() > acting.size())
     throw nb::value_error("sensitivities: the columns do not match");
+  for (std::size_t j = 0; j < jump_state.size(); j++)
+    if (jump_state.data()[j] < 0 || jump_state.data()[j] > 2)
+      throw nb::value_error("sensitivities: expected a state of 0, 1 or 2");
+  std::vector<const double *> first, last;
+  for (const auto &x : acting) check_rows(n, x), first.push_back(x.data());
+  for (const auto &x : moved) check_rows(n, x), last.push_back(x.data());
   SteadyGains steady = {period, reinterpret_cast<const double (*)[3][2]>(gain.data()), keep.data()};
-  SensitivityInput input = {std::int64_t(acting.shape(0)),
-                            int(acting.shape(2)),
-                            int(moved.shape(2)),
+  SensitivityInput input = {std::int64_t(n),
+                            int(acting.size()),
+                            int(moved.size()),
                             int(jumps.shape(2)),
                             int(slopes.shape(2)),
                             rows(heading),
                             rows(pull),
                             rows(rate),
                             rows(gyration),
-                            acting.data(),
-                            moved.data(),
+                            first.data(),
+                            last.data(),
                             jumps.data(),
                             jump_state.data(),
                             slopes.data(),
                             rows(innovations),
-                            rows(disturbance)};
+                            rows(disturbance),
+                            reinterpret_cast<const double (*)[6]>(whiten.data())};
   sensitivities(steady, input, state.data(), out.data());
 }
 
@@ -137,9 +147,25 @@ bool write_bounded_mode(In<-1, -1> normal, In<-1> right, In<-1> low, In<-1> high
                       mode.data());
 }
 
-void low_pass_columns(Out<-1, -1> x, In<6> section, In<2> start) {
-  low_pass(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(), section.data(),
-           start.data());
+void run_over_columns(Out<-1, -1> x, In<-1, 6> sections, bool steady, int ways) {
+  run_sections(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(),
+               std::int64_t(sections.shape(0)), rows(sections), steady, ways);
+}
+
+void filter_columns(Out<-1, -1> x, int order, double share_of_nyquist, bool high) {
+  if (order < 2 || order % 2 != 0 || !(share_of_nyquist > 0 && share_of_nyquist < 1))
+    throw nb::value_error("filter_both_ways: expected an even order, and a share within (0, 1)");
+  if (x.shape(0) > 0)
+    filter_both_ways(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(), order,
+                     share_of_nyquist, high);
+}
+
+void differentiate_columns(In<-1, -1> x, double period, int order, Out<-1, -1> out) {
+  if (x.shape(0) < 5 || x.shape(0) != out.shape(0) || x.shape(1) != out.shape(1) ||
+      (order != 1 && order != 2))
+    throw nb::value_error("differentiate: expected five samples, and an order of 1 or 2");
+  differentiate(std::int64_t(x.shape(0)), std::int64_t(x.shape(1)), x.data(), period, order,
+                out.data());
 }
 
 void level_from(In<-1, 3> gyro, In<-1, 3> force, double dt, double time, In<4> start,
@@ -201,8 +227,11 @@ void bind_diagnosis(nb::module_ &m) {
         "Run the causal filter of a model over poses; write the fields of its track.");
   m.def("sensitivities", &write_sensitivities, "period"_a, "gain"_a, "keep"_a, "heading"_a,
         "pull"_a, "rate"_a, "gyration"_a, "acting"_a, "moved"_a, "jumps"_a, "jump_state"_a,
-        "slopes"_a, "innovations"_a, "disturbance"_a, "state"_a.noconvert(), "out"_a.noconvert(),
-        "Write the change of the innovations' predictions (n, 6, c) with a unit of each column.");
+        "slopes"_a, "innovations"_a, "disturbance"_a, "whiten"_a, "state"_a.noconvert(),
+        "out"_a.noconvert(),
+        "Write rows (n, 6, c + 1): the whitened change of the innovations' predictions with a unit "
+        "of\n"
+        "each column, and the innovations, whitened by a lower triangle.");
   m.def("evidence", &write_evidence, "normal"_a, "right"_a, "low"_a, "high"_a, "mode"_a.noconvert(),
         "std"_a.noconvert(),
         "Return the logarithm of the evidence of n columns of a quadratic log-likelihood; write "
@@ -213,9 +242,15 @@ void bind_diagnosis(nb::module_ &m) {
         "mode"_a.noconvert(),
         "Write the maximum (n,) of `right @ x - x @ normal @ x / 2` within bounds; return whether\n"
         "there is one.");
-  m.def("low_pass", &low_pass_columns, "x"_a.noconvert(), "section"_a, "start"_a,
-        "Run a second-order section (6,) over columns (n, k) in place, forwards and backwards;\n"
-        "start (2,): the memory of a one.");
+  m.def("run_sections", &run_over_columns, "x"_a.noconvert(), "sections"_a, "steady"_a, "ways"_a,
+        "Run second-order sections (m, 6) over columns (n, k) in place: forwards, and backwards "
+        "where\n"
+        "there are two ways; steady: as if the first row of a way had lasted, else from rest.");
+  m.def("filter_both_ways", &filter_columns, "x"_a.noconvert(), "order"_a, "share_of_nyquist"_a,
+        "high"_a,
+        "Run a Butterworth low-pass or high-pass over columns (n, k) in place, both ways.");
+  m.def("differentiate", &differentiate_columns, "x"_a, "period"_a, "order"_a, "out"_a.noconvert(),
+        "Write the derivative of columns (n, k) by the polynomial through five samples.");
   m.def("level_attitude", &level_from, "gyro"_a, "force"_a, "dt"_a, "time"_a, "start"_a,
         "out"_a.noconvert(),
         "Write the attitude (n, 4) integrated from the gyro (n, 3) and levelled over `time` s by "

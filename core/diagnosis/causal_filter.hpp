@@ -5,7 +5,7 @@
 // and 4, are about the world's x and y, turned with the heading.
 #pragma once
 #include <algorithm>
-#include <vector>
+#include <cstring>
 
 #include "flights.hpp"
 
@@ -30,10 +30,10 @@ struct LevelAxes {
     if (size > 0) cosine = R[0][0] / size, sine = R[1][0] / size;
   }
   // x and y in body axes of a vector about the world's axes, turned with the heading; and back
-  void to_body(double x, double y, double &out_x, double &out_y) const {
+  template <class T> void to_body(T x, T y, T &out_x, T &out_y) const {
     out_x = cosine * x + sine * y, out_y = cosine * y - sine * x;
   }
-  void to_level(double x, double y, double &out_x, double &out_y) const {
+  template <class T> void to_level(T x, T y, T &out_x, T &out_y) const {
     out_x = cosine * x - sine * y, out_y = cosine * y + sine * x;
   }
 };
@@ -177,126 +177,166 @@ class CausalFilter {
 
 // What sensitivities are asked of, c = acting + jumping + sloping columns. Row k of the flight:
 // heading; pull (3, 2), the derivative of the acceleration (world) by an error of the attitude
-// about body x and y; rate; gyration (3, 3), of the angular acceleration by the rate; acting (6,
-// acting), the model's acceleration by a unit of the first columns; moved (6, moving), the shift of
-// the measured pose by a unit of the last of these; jumps (6, jumping) of the state `jump_state` of
-// each axis by a unit of the next columns, before the pose is read. slopes (6, 7, sloping): change
-// of gains and `keep` of each axis by a unit of the last columns. Innovations and disturbances are
-// the filter's
+// about body x and y; rate; gyration (3, 3), of the angular acceleration by the rate. Of each of
+// the first columns acting (n, 6), the model's acceleration by a unit; of the last `moving` of
+// these moved (n, 6), the shift of the measured pose. jumps (6, jumping) of the state `jump_state`
+// of each axis by a unit of the next columns, before the pose is read. slopes (6, 7, sloping):
+// change of gains and `keep` of each axis by a unit of the last columns. Innovations and
+// disturbances are the filter's; whiten (6, 6) is the inverse of the root of their covariance, a
+// lower triangle
 struct SensitivityInput {
   int64_t n;
   int acting_count, moving, jumping, sloping;
   const double (*heading)[2], (*pull)[3][2], (*rate)[3], (*gyration)[3][3];
-  const double *acting, *moved, *jumps;
+  const double *const *acting, *const *moved, *jumps;
   const int64_t *jump_state;
-  const double *slopes, (*innovations)[6], (*disturbance)[6];
+  const double *slopes, (*innovations)[6], (*disturbance)[6], (*whiten)[6];
 };
 
-// Change of the innovations' predictions out (n, 6, c) with a unit of each column; state (6, 3, c)
-// is carried from one call to the next
-inline void sensitivities(const SteadyGains &steady, const SensitivityInput &in, double *state,
-                          double *out) {
-  const int a = in.acting_count, b = in.moving, e = in.jumping, m = in.sloping, c = a + e + m,
-            f = a + e;
-  const double period = steady.period, half = 0.5 * period * period, *keep = steady.keep;
-  std::vector<double> memory(std::size_t(24 * c));
-  double *mid = memory.data(), *turned = mid + 3 * c, *said = turned + 3 * c;
-  auto of = [&](int i, int s) { return state + (3 * i + s) * c; };  // the columns of a state
-  constexpr int STRAIGHT[4] = {0, 1, 2, 5};                         // not turned by the heading
-  for (int64_t k = 0; k < in.n; k++) {
-    const LevelAxes heading(in.heading[k]);
-    double *seen = out + 6 * c * k, x, y;
-    const double *jumps = in.jumps + 6 * e * k, *moved = in.moved + 6 * b * k,
-                 *acting = in.acting + 6 * a * k;
-    for (int j = 0; j < e; j++) {
-      int s = int(in.jump_state[j]);
-      for (int i : STRAIGHT) of(i, s)[a + j] += jumps[e * i + j];
-      heading.to_body(jumps[3 * e + j], jumps[4 * e + j], x, y);
-      of(3, s)[a + j] += x;
-      of(4, s)[a + j] += y;
+// Some columns side by side: columns are independent, so their state stays in registers
+class SideBySide {
+ public:
+  static constexpr int LANES = 8;
+  using T = Lanes<double, LANES>;
+
+  SideBySide(const SteadyGains &steady, const SensitivityInput &in, int first)
+      : steady_(steady),
+        in_(in),
+        first_(first),
+        c_(in.acting_count + in.jumping + in.sloping),
+        jump0_(in.acting_count),
+        slope0_(in.acting_count + in.jumping) {
+    for (int j = 0; j < LANES; j++) {
+      int at = first + j, later = at - slope0_;
+      bool acts = at < in.acting_count, moves = acts && at >= in.acting_count - in.moving;
+      acting_[j] = acts ? in.acting[at] : NOTHING;
+      moved_[j] = moves ? in.moved[at - in.acting_count + in.moving] : NOTHING;
+      each_acting_[j] = acts ? 6 : 0, each_moved_[j] = moves ? 6 : 0;
+      acts_ |= acts, moves_ |= moves;
+      if (at >= jump0_ && at < slope0_) jumps_ = true;
+      if (later < 0 || later >= in.sloping) continue;
+      slopes_ = true;
+      for (int i = 0; i < 42; i++) slope_[i / 7][i % 7][j] = in.slopes[i * in.sloping + later];
     }
+  }
+
+  // Write these columns of the rows out (n, 6, c + 1), and carry their state (6, 3, c)
+  void run(double *state, double *out) {
+    for (int i = 0; i < 18; i++)
+      for (int j = 0; j < LANES && first_ + j < c_; j++)
+        x_[i / 3][i % 3][j] = state[i * c_ + first_ + j];
+    for (int64_t k = 0; k < in_.n; k++) step(k, out + 6 * (c_ + 1) * k + first_);
+    for (int i = 0; i < 18; i++)
+      for (int j = 0; j < LANES && first_ + j < c_; j++)
+        state[i * c_ + first_ + j] = x_[i / 3][i % 3][j];
+  }
+
+ private:
+  static constexpr double NOTHING[6] = {};
+  const SteadyGains steady_;
+  const SensitivityInput &in_;
+  const int first_, c_, jump0_, slope0_;
+  const double *acting_[LANES], *moved_[LANES];
+  int64_t each_acting_[LANES], each_moved_[LANES];
+  bool acts_ = false, moves_ = false, jumps_ = false, slopes_ = false;
+  T slope_[6][7] = {}, x_[6][3] = {};
+
+  static T gathered(const double *const *from, const int64_t *each, int64_t k, int i) {
+    T all;
+    for (int j = 0; j < LANES; j++) all[j] = from[j][each[j] * k + i];
+    return all;
+  }
+
+  void jump(int64_t k, const LevelAxes &heading) {
+    for (int j = 0; j < LANES; j++) {
+      int at = first_ + j - jump0_;
+      if (at < 0 || at >= in_.jumping) continue;
+      const double *jumps = in_.jumps + 6 * in_.jumping * k + at;
+      double now[6];
+      for (int i = 0; i < 6; i++) now[i] = jumps[in_.jumping * i];
+      heading.to_body(now[3], now[4], now[3], now[4]);
+      for (int i = 0; i < 6; i++) x_[i][in_.jump_state[at]][j] += now[i];
+    }
+  }
+
+  void store(const T *seen, double *out) const {
     for (int i = 0; i < 6; i++) {
-      std::copy_n(of(i, 0), c, seen + c * i);
-      for (int j = 0; j < b; j++) seen[c * i + a - b + j] -= moved[b * i + j];
+      T white = in_.whiten[i][0] * seen[0];
+      for (int j = 1; j <= i; j++) white += in_.whiten[i][j] * seen[j];
+      double *row = out + (c_ + 1) * i;
+      if (first_ + LANES <= c_) std::memcpy(row, &white, sizeof(white));
+      else
+        for (int j = 0; first_ + j < c_; j++) row[j] = white[j];
     }
-    for (int j = 0; j < c; j++) {
-      heading.to_level(seen[3 * c + j], seen[4 * c + j], x, y);
-      seen[3 * c + j] = x, seen[4 * c + j] = y;
-    }
+  }
+
+  void step(int64_t k, double *out) {
+    const double period = steady_.period, half = 0.5 * period * period, *keep = steady_.keep;
+    const LevelAxes heading(in_.heading[k]);
+    T seen[6], said[6][3], mid[3], turned[3], x, y;
+    if (jumps_) jump(k, heading);
     for (int i = 0; i < 6; i++) {
-      const double *own = seen + c * i, *other = seen + c * PARTNER[i];
-      x = in.innovations[k][i], y = in.innovations[k][PARTNER[i]];
+      seen[i] = x_[i][0];
+      if (moves_) seen[i] -= gathered(moved_, each_moved_, k, i);
+    }
+    heading.to_level(seen[3], seen[4], seen[3], seen[4]);
+    store(seen, out);
+    for (int i = 0; i < 6; i++) {
+      const int other = PARTNER[i];
+      const double own = in_.innovations[k][i], partner = in_.innovations[k][other];
       for (int s = 0; s < 3; s++) {
-        double *to = said + (3 * i + s) * c;
-        const double *gain = steady.gain[i][s], *slope = in.slopes + (7 * i + 2 * s) * m;
-        for (int j = 0; j < c; j++) to[j] = -gain[0] * own[j] - gain[1] * other[j];
-        for (int j = 0; j < m; j++) to[f + j] += slope[j] * x + slope[m + j] * y;
+        const double *gain = steady_.gain[i][s];
+        said[i][s] = -gain[0] * seen[i] - gain[1] * seen[other];
+        if (slopes_) said[i][s] += slope_[i][2 * s] * own + slope_[i][2 * s + 1] * partner;
       }
     }
     for (int s = 0; s < 3; s++) {
-      for (int i : STRAIGHT)
-        for (int j = 0; j < c; j++) of(i, s)[j] += said[(3 * i + s) * c + j];
-      const double *roll = said + (9 + s) * c, *pitch = said + (12 + s) * c;
-      double *about_x = of(3, s), *about_y = of(4, s);
-      for (int j = 0; j < c; j++) {
-        double to_x, to_y;
-        heading.to_body(roll[j], pitch[j], to_x, to_y);
-        about_x[j] += to_x;
-        about_y[j] += to_y;
-      }
+      heading.to_body(said[3][s], said[4][s], said[3][s], said[4][s]);
+      for (int i = 0; i < 6; i++) x_[i][s] += said[i][s];
+    }
+    for (int i = 0; i < 3; i++) mid[i] = x_[3 + i][0] + 0.5 * period * x_[3 + i][1];
+    for (int i = 0; i < 3; i++) {
+      T g = x_[i][2] + in_.pull[k][i][0] * mid[0] + in_.pull[k][i][1] * mid[1];
+      if (acts_) g += gathered(acting_, each_acting_, k, i);
+      x_[i][0] += period * x_[i][1] + half * g;
+      x_[i][1] += period * g;
     }
     for (int i = 0; i < 3; i++) {
-      const double *pose = of(3 + i, 0), *rate = of(3 + i, 1);
-      for (int j = 0; j < c; j++) mid[c * i + j] = pose[j] + 0.5 * period * rate[j];
-    }
-    for (int i = 0; i < 3; i++) {
-      double px = in.pull[k][i][0], py = in.pull[k][i][1], *pose = of(i, 0), *rate = of(i, 1);
-      const double *disturbance = of(i, 2);
-      for (int j = 0; j < c; j++) {
-        double g = disturbance[j] + px * mid[j] + py * mid[c + j];
-        if (j < a) g += acting[a * i + j];
-        pose[j] += period * rate[j] + half * g;
-        rate[j] += period * g;
-      }
-    }
-    for (int i = 0; i < 3; i++) {
-      const double *by = in.gyration[k][i], *g = of(3 + i, 2);
-      const double *wx = of(3, 1), *wy = of(4, 1), *wz = of(5, 1);
-      for (int j = 0; j < c; j++)
-        turned[c * i + j] = g[j] + by[0] * wx[j] + by[1] * wy[j] + by[2] * wz[j];
+      const double *by = in_.gyration[k][i];
+      turned[i] = x_[3 + i][2] + by[0] * x_[3][1] + by[1] * x_[4][1] + by[2] * x_[5][1];
+      if (acts_) turned[i] += gathered(acting_, each_acting_, k, 3 + i);
     }
     for (int i = 0; i < 3; i++) {
       int u = (i + 1) % 3, v = (i + 2) % 3;
-      double wu = in.rate[k][u], wv = in.rate[k][v], *pose = of(3 + i, 0), *rate = of(3 + i, 1);
-      for (int j = 0; j < c; j++) {
-        double g = turned[c * i + j];
-        if (j < a) g += acting[a * (3 + i) + j];
-        // an error in body axes turns back as these turn on
-        pose[j] +=
-            period * rate[j] + half * g - period * (wu * mid[c * v + j] - wv * mid[c * u + j]);
-        rate[j] += period * g;
-      }
+      double wu = in_.rate[k][u], wv = in_.rate[k][v];
+      // an error in body axes turns back as these turn on
+      x_[3 + i][0] +=
+          period * x_[3 + i][1] + half * turned[i] - period * (wu * mid[v] - wv * mid[u]);
+      x_[3 + i][1] += period * turned[i];
     }
-    double *roll = of(3, 2), *pitch = of(4, 2);
-    for (int j = 0; j < c; j++) {
-      heading.to_level(roll[j], pitch[j], x, y);
-      roll[j] = keep[3] * x, pitch[j] = keep[4] * y;
+    heading.to_level(x_[3][2], x_[4][2], x, y);
+    x_[3][2] = x, x_[4][2] = y;
+    for (int i = 0; i < 6; i++) {
+      x_[i][2] *= keep[i];
+      if (slopes_) x_[i][2] += slope_[i][6] * in_.disturbance[k][i];
     }
-    for (int j = 0; j < m; j++) {
-      roll[f + j] += in.slopes[(7 * 3 + 6) * m + j] * in.disturbance[k][3];
-      pitch[f + j] += in.slopes[(7 * 4 + 6) * m + j] * in.disturbance[k][4];
-    }
-    for (int j = 0; j < c; j++) {
-      heading.to_body(roll[j], pitch[j], x, y);
-      roll[j] = x, pitch[j] = y;
-    }
-    for (int i : STRAIGHT) {
-      double *disturbance = of(i, 2);
-      for (int j = 0; j < c; j++) disturbance[j] *= keep[i];
-      for (int j = 0; j < m; j++)
-        disturbance[f + j] += in.slopes[(7 * i + 6) * m + j] * in.disturbance[k][i];
-    }
+    heading.to_body(x_[3][2], x_[4][2], x_[3][2], x_[4][2]);
   }
+};
+
+// Whitened change of the innovations' predictions out (n, 6, c + 1) with a unit of each column, and
+// the innovations last; state (6, 3, c) is carried from one call to the next
+inline void sensitivities(const SteadyGains &steady, const SensitivityInput &in, double *state,
+                          double *out) {
+  const int c = in.acting_count + in.jumping + in.sloping;
+  for (int first = 0; first < c; first += SideBySide::LANES)
+    SideBySide(steady, in, first).run(state, out);
+  for (int64_t k = 0; k < in.n; k++)
+    for (int i = 0; i < 6; i++) {
+      double white = 0;
+      for (int j = 0; j <= i; j++) white += in.whiten[i][j] * in.innovations[k][j];
+      out[(6 * k + i) * (c + 1) + c] = white;
+    }
 }
 
 }  // namespace windwrench

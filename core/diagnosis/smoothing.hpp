@@ -1,5 +1,6 @@
 // Series of a log, smoothed: a low-pass of zero phase, and a motion by inertial measurements.
 #pragma once
+#include <algorithm>
 #include <cstdint>
 
 #include "../linear_algebra.hpp"
@@ -8,22 +9,80 @@
 
 namespace windwrench {
 
-// Run a second-order section, b0 b1 b2 1 a1 a2, over columns x (n, width) in place, forwards and
-// then backwards, each as if its first row had lasted; start (2): the memory of a one
-inline void low_pass(int64_t n, int64_t width, double *x, const double section[6],
-                     const double start[2]) {
-  const double *b = section, *a = section + 4;
-  Numbers first(width), second(width);
-  for (int way = 0; way < 2; way++) {
-    for (int64_t i = 0; i < n; i++) {
-      double *row = x + width * (way == 0 ? i : n - 1 - i);
+// Run second-order sections (count), b0 b1 b2 1 a1 a2, over columns x (n, width) in place:
+// forwards, and then backwards where there are two ways; steady: as if a way's first row had
+// lasted, else from rest
+inline void run_sections(int64_t n, int64_t width, double *x, int64_t count,
+                         const double (*sections)[6], bool steady, int ways) {
+  Numbers lasted(width), first(width), second(width);
+  for (int way = 0; way < ways && n > 0; way++) {
+    std::copy_n(x + width * (way == 0 ? 0 : n - 1), width, lasted.begin());
+    for (int64_t s = 0; s < count; s++) {
+      const double *b = sections[s], *a = b + 4, gain = (b[0] + b[1] + b[2]) / (1 + a[0] + a[1]);
       for (int64_t j = 0; j < width; j++) {
-        if (i == 0) first[j] = start[0] * row[j], second[j] = start[1] * row[j];
-        double given = row[j], made = b[0] * given + first[j];
-        first[j] = b[1] * given - a[0] * made + second[j];
-        second[j] = b[2] * given - a[1] * made;
-        row[j] = made;
+        double begun = steady ? lasted[j] : 0;
+        second[j] = (b[2] - a[1] * gain) * begun;
+        first[j] = (b[1] - a[0] * gain + (b[2] - a[1] * gain)) * begun;
+        lasted[j] *= gain;
       }
+      for (int64_t i = 0; i < n; i++) {
+        double *row = x + width * (way == 0 ? i : n - 1 - i);
+        for (int64_t j = 0; j < width; j++) {
+          double given = row[j], made = b[0] * given + first[j];
+          first[j] = b[1] * given - a[0] * made + second[j];
+          second[j] = b[2] * given - a[1] * made;
+          row[j] = made;
+        }
+      }
+    }
+  }
+}
+
+// Run the low-pass or high-pass of Butterworth, of an even order and by the bilinear transform,
+// over columns x (n, width) in place, forwards and backwards, behind an odd reflection of either
+// end
+inline void filter_both_ways(int64_t n, int64_t width, double *x, int order,
+                             double share_of_nyquist, bool high) {
+  const double c = 1 / std::tan(0.5 * PI * share_of_nyquist);
+  const int count = order / 2;
+  const int64_t edge = std::min<int64_t>(3 * (order + 1), n - 1);
+  Numbers sections(6 * count), longer((n + 2 * edge) * width);
+  for (int k = 0; k < count; k++) {
+    double *own = sections.data() + 6 * k;
+    double damping = 2 * c * std::sin(0.5 * PI * (2 * k + 1) / order);
+    double whole = 1 + damping + c * c, through = (high ? c * c : 1) / whole;
+    own[0] = own[2] = through, own[1] = high ? -2 * through : 2 * through;
+    own[3] = 1, own[4] = 2 * (1 - c * c) / whole, own[5] = (1 - damping + c * c) / whole;
+  }
+  for (int64_t i = -edge; i < n + edge; i++)
+    for (int64_t j = 0; j < width; j++) {
+      auto at = [&](int64_t row) { return x[width * row + j]; };
+      longer[(i + edge) * width + j] = i < 0   ? 2 * at(0) - at(-i)
+                                       : i < n ? at(i)
+                                               : 2 * at(n - 1) - at(2 * (n - 1) - i);
+    }
+  run_sections(n + 2 * edge, width, longer.data(), count,
+               reinterpret_cast<const double (*)[6]>(sections.data()), true, 2);
+  std::copy_n(longer.data() + edge * width, n * width, x);
+}
+
+// The first or second derivative out (n, width) of columns x: of the polynomial through five
+// samples, at the middle one; at an end at all of them
+inline void differentiate(int64_t n, int64_t width, const double *x, double period, int order,
+                          double *out) {
+  constexpr double WEIGHTS[2][3][5] = {
+      {{-25, 48, -36, 16, -3}, {-3, -10, 18, -6, 1}, {1, -8, 0, 8, -1}},
+      {{35, -104, 114, -56, 11}, {11, -20, 6, 4, -1}, {-1, 16, -30, 16, -1}}};
+  const double scale = 1 / (12 * (order == 1 ? period : period * period));
+  for (int64_t k = 0; k < n; k++) {
+    const int64_t from_end = n - 1 - k, place = std::min<int64_t>({k, from_end, 2});
+    const bool back = from_end < 2;
+    const double *weights = WEIGHTS[order - 1][place];
+    for (int64_t j = 0; j < width; j++) {
+      double sum = 0;
+      for (int64_t i = 0; i < 5; i++)
+        sum += weights[i] * x[width * (back ? n - 1 - i : k - place + i) + j];
+      out[width * k + j] = (back && order == 1 ? -scale : scale) * sum;
     }
   }
 }

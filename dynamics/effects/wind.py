@@ -21,14 +21,13 @@ _LEAST_DRAG = 0.1
 
 
 def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
-    """Return winds along the mean force, and along the force's part with the form of a slow wind's
+    """Return winds with the mean force, along it and along its part with the form of a slow wind's
     drag: a wind does nothing without a drag, nor this drag without a wind. If the vehicle has
     another drag, a wind may act on this one alone.
 
     That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may act.
     """
-    speed, drag = flights.typical["wx"], flights.typical["cd"]
-    force, velocity = flights.force[:, :2], flights.velocity
+    speed, force, velocity = flights.typical["wx"], flights.force[:, :2], flights.velocity
     v = np.linalg.norm(velocity, axis=1) + _LEAST_SPEED
     steady = np.tile(np.eye(2), (len(v), 1))
     with_wind = (
@@ -38,7 +37,8 @@ def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
     slope = np.linalg.lstsq(
         np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None
     )[0][:2]
-    along_force = [(scale * speed, drag) for scale in (0.5, 1.0, 2.0)]
+    mean = math.hypot(*force.mean(axis=0))
+    along_force = [(x * speed, mean / (x * speed) ** 2) for x in (0.5, 1.0, 2.0, 4.0)]
     other = [(speed, 0.0)] if Family.DRAG in flights.beside else []
     return [
         {"wx": size * math.cos(heading), "wy": size * math.sin(heading), "wz": 0.0, "cd": cd}

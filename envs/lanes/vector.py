@@ -89,14 +89,12 @@ class TaskLanes(TaskVectorEnv):
 
     def _rows(self, values: Array) -> Array:
         """Return values (rows, size, lanes) of the vehicles as (num_envs, size)."""
-        rows: Array = np.moveaxis(values, 1, 2).reshape(-1, values.shape[1])
-        return rows[: self.num_envs]
+        return np.moveaxis(values, 1, 2).reshape(-1, values.shape[1])[: self.num_envs]
 
     def late(self) -> Array:
         """Return the delay (n,) s of the flight loop's answer: actuators and pose."""
         ticks = self._flying.view("actuator_late") + self._flying.view("pose_late")
-        late: Array = TICK * self._rows(ticks)[:, 0]
-        return late
+        return TICK * self._rows(ticks)[:, 0]
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()

@@ -5,8 +5,6 @@ do. crazyflow and gym-pybullet-drones take force and torque: those of ``WindDrag
 own drag comes on top.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

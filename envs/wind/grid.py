@@ -6,8 +6,6 @@ A file is ``.npz`` with ``t`` (s), ``x``, ``y``, ``z`` (m), each (n,) and evenly
 dimensions. A file without a time is steady.
 """
 
-from __future__ import annotations
-
 import io
 from importlib import import_module
 from pathlib import Path

@@ -5,8 +5,6 @@ Each rotor blows the mean jet of ``dynamics.mean_jet``. The momentum fluxes of o
 as velocity.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -58,16 +56,16 @@ class _Jets(CompiledWind):
         if turbulence > 0.0:
             sizes = np.full(3, turbulence), np.full(3, gust_length)
             table = waves(np.random.default_rng(seed), "dryden", *sizes, 24, 0.4 * gust_length)
-        self.axes = _axes(direction)  # rows: along the jet, and two across
+        self.axes = axes = _axes(direction)  # rows: along the jet, and two across
         self.places, self.speeds = np.ascontiguousarray(places), np.ascontiguousarray(speeds)
         self.radius = radius
         parameters = np.zeros(1, dtype=JETS)
         w = parameters[0]
         tables = (*jet_table(radius, hub_radius), self.places, self.speeds, table)
-        w["place_steps"], (w["steps"], w["jets"]) = len(self.places), self.speeds.shape
+        w["place_steps"], (w["steps"], w["jets"]) = len(places), speeds.shape
         # gusts travel with the shear layer's eddies, at half the speed of the jet
-        w["waves"], w["axes"] = len(table), self.axes
-        w["advection"] = 0.5 * float(self.speeds.max()) * self.axes[0]
+        w["waves"], w["axes"] = len(table), axes
+        w["advection"] = 0.5 * speeds.max() * axes[0]
         super().__init__("jets", parameters, dict(zip(JETS.names or (), tables, strict=False)))
 
 
@@ -126,8 +124,7 @@ class FanWall(_Jets):
         aside = vector(centre, "centre") - right[None, :, None] * axes[1]
         places = aside + up[:, None, None] * axes[2]
         gusts = turbulence, gust_length, seed
-        places = places.reshape(1, rows * columns, 3)
-        super().__init__(heading, places, table, radius, hub_radius, gusts)
+        super().__init__(heading, places.reshape(1, -1, 3), table, radius, hub_radius, gusts)
 
 
 def switching(

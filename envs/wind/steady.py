@@ -1,7 +1,5 @@
 """Winds that have a formula: uniform, sheared with height, and single gusts."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

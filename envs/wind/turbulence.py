@@ -11,8 +11,6 @@ from a field of its own with the stated spectrum along the mean wind. The field 
 hypothesis): a point sees ``u(x - U t)``.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,7 +20,13 @@ from ...runtime.errors import InputError, unknown_name
 from .field import Array, CompiledWind, number, vector
 
 _FOOT = 0.3048  # m
-_KARMAN = 1.339
+# factor on the length; powers of 1 + x along and across, the latter with a factor on x; factor and
+# power of the energy
+_SPECTRA = {
+    "dryden": (1.0, 1, (2, 3.0), (8.0, 3)),
+    "von-karman": (1.339, 5 / 6, (11 / 6, 8 / 3), (55 / 9, 17 / 6)),
+}
+FORMS = tuple(_SPECTRA)
 
 
 TURBULENCE = np.dtype(
@@ -55,28 +59,21 @@ def spectrum(form: str, axis: str, wave_number: ArrayLike, sigma: float, length:
         raise unknown_name("form", form, FORMS, "wind: turbulence")
     if axis not in ("along", "across"):
         raise unknown_name("axis", axis, ("along", "across"), "wind: turbulence")
-    scale = 1.0 if form == "dryden" else _KARMAN
+    scale, along, (across, share), _ = _SPECTRA[form]
     x = (scale * length * np.asarray(wave_number, dtype=np.float64)) ** 2
     size = sigma**2 * length / math.pi
-    if form == "dryden":
-        return 2.0 * size / (1.0 + x) if axis == "along" else size * (1 + 3 * x) / (1 + x) ** 2
     if axis == "along":
-        return 2.0 * size / (1.0 + x) ** (5 / 6)
-    return size * (1.0 + 8 / 3 * x) / (1.0 + x) ** (11 / 6)
+        return 2.0 * size / (1.0 + x) ** along
+    return size * (1.0 + share * x) / (1.0 + x) ** across
 
 
 def _energy(form: str, k: Array, length: float) -> Array:
     """Return E(k), m, of unit variance on each axis: ``1/2 k^3 d/dk(1/k dF/dk)`` of the spectrum F
     along a line.
     """
-    if form == "dryden":
-        x = length * k
-        return 8.0 * length / math.pi * x**4 / (1.0 + x * x) ** 3
-    x = _KARMAN * length * k
-    return 55 / 9 * length / math.pi * x**4 / (1.0 + x * x) ** (17 / 6)
-
-
-FORMS = ("dryden", "von-karman")
+    scale, *_, (factor, power) = _SPECTRA[form]
+    x = scale * length * k
+    return factor * length / math.pi * x**4 / (1.0 + x * x) ** power
 
 
 def waves(
@@ -155,7 +152,6 @@ class Turbulence(CompiledWind):
         c, s = math.cos(heading), math.sin(heading)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         table[:, :3], table[:, 4:] = table[:, :3] @ turn.T, table[:, 4:] @ turn.T
-        table = np.ascontiguousarray(table)
         parameters = np.array([(0, len(table), carried)], dtype=TURBULENCE)
         super().__init__("waves", parameters, {"waves": table})
 

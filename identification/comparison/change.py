@@ -42,19 +42,24 @@ _ROTORS = {
     "rotor 3 (rear-right)": (-1.0, -1.0),
     "rotor 4 (front-right)": (-1.0, 1.0),
 }
-_SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
-# possible changes, by place and kind; with their share of a place's prior: all places are alike
-_CHANGES = {
-    **{(rotor, kind): 0.5 for rotor in _ROTORS for kind in ("weaker", "carries more")},
-    **dict.fromkeys([(place, "carries more") for place in (*_SIDES, "all rotors")], 1.0),
-    (SOMETHING_ELSE, ""): 1.0,
+_SIDES = {
+    "left": (1.0, 0.0),
+    "rear": (0.0, -1.0),
+    "right": (-1.0, 0.0),
+    "front": (0.0, 1.0),
+    "all rotors": (0.0, 0.0),
 }
-
-_AMOUNTS = 80  # amounts of a change in the sum of its evidence
+# prior probabilities of the possible changes, by place and kind: all ten places are alike
+_CHANGES = {
+    **{(rotor, kind): 0.03 for rotor in _ROTORS for kind in ("weaker", "carries more")},
+    **{(place, "carries more"): 0.06 for place in _SIDES},
+    (SOMETHING_ELSE, ""): 0.06,
+}
 
 # usual amount of a change, as a share of the weight or of one rotor's thrust: the scale of a
 # half-normal prior
 _USUAL_AMOUNT = 0.15
+_AMOUNTS = np.linspace(0.02, 4.0, 80) * _USUAL_AMOUNT  # in the sum of a change's evidence
 # standard deviation of the power of the battery's voltage in the request for one thrust: 0 if the
 # firmware makes up for the battery, up to 2 if rotor speed follows the voltage
 _VOLTAGE_POWER = 0.5
@@ -63,7 +68,7 @@ _VOLTAGE_POWER = 0.5
 # cut propeller do not shrink alike, so the diagonals move.
 # Cuts of 2 to 4 mm moved the diagonals 0.9, and the total 1.0 times as much as the sides
 _BEND = (0.1, 0.1, 0.25, 0.25)
-# prior probability of no change: a comparison has a reason
+# prior probability of no change, beside ``_CHANGES``: a comparison has a reason
 _UNCHANGED = 0.4
 SURE = 0.95  # least probability of a place named without a doubt
 
@@ -71,8 +76,8 @@ SURE = 0.95  # least probability of a place named without a doubt
 class Change(NamedTuple):
     """The change from the flights ``before`` to the flights ``after``."""
 
-    before: tuple[Trim, ...]
-    after: tuple[Trim, ...]
+    before: Sequence[Trim]
+    after: Sequence[Trim]
     difference: Array  # (4,) left - right, front - rear, diagonals, logarithm of the total
     std: Array  # (4,) deviation of the difference, if nothing changed
     # probabilities of "nowhere", each rotor, each side, "all rotors" and "something else"; sum: 1
@@ -104,48 +109,48 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     Raises:
         InputError: a set is empty.
     """
-    if not (len(after) and len(before)):
+    if not (after and before):
         raise InputError("compare: expected at least one flight in each of the two sets")
     ways = difference(after, before)
-    moved = ways.mean[:, None]
     unchanged = ways.variance
-    unchanged[:, 3] += (_VOLTAGE_POWER * _voltage_ratio(after, before)) ** 2
-    shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
+    # a correction of the total by the voltage would hide a change: a heavier vehicle draws more and
+    # pulls its battery down
+    late, early = (np.log([trim.voltage for trim in group]).mean() for group in (after, before))
+    unchanged[:, 3] += (_VOLTAGE_POWER * np.nan_to_num(late - early)) ** 2
+    shares = np.mean([trim.thrust / trim.thrust.sum() for trim in before], axis=0)
 
     def logs_of(means: Array, spread: Array) -> Array:
         """Return the log-likelihoods (n,) of the difference for changes of given ``means`` (n, 4)
         and standard deviations beside the scatter, ``spread`` (n, 4); or one for all of the four.
         """
         variance = unchanged[:, None] + spread**2
-        off = np.square(moved - means) / variance + np.log(2.0 * np.pi * variance)
+        off = np.square(ways.mean[:, None] - means) / variance + np.log(2.0 * np.pi * variance)
         return np.asarray(logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
 
-    amounts = np.linspace(0.02, 4.0, _AMOUNTS) * _USUAL_AMOUNT
-    prior = log_softmax(-0.5 * np.square(amounts / _USUAL_AMOUNT))
+    prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
     zero = np.zeros(1)
     # log posterior, and mean and deviation of the amount; keys: place and kind
     found = {(NOWHERE, ""): (logs_of(zero, zero)[0] + math.log(_UNCHANGED), 0.0, 0.0)}
-    for (place, kind), share in _CHANGES.items():
+    for (place, kind), chance in _CHANGES.items():
         if place == SOMETHING_ELSE:
             means = zero
-            spread = amounts[:, None]
+            spread = _AMOUNTS[:, None]
         else:
-            means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
-            spread = np.linalg.norm(means, axis=1)[:, None] * np.array(_BEND)
+            means = np.array([_moved(place, kind, amount, shares) for amount in _AMOUNTS])
+            spread = np.linalg.norm(means, axis=1)[:, None] * _BEND
         every = logs_of(means, spread) + prior
         weights = softmax(every)
-        middle = float(amounts @ weights)
-        std = math.sqrt(np.square(amounts - middle) @ weights)
-        each = (1.0 - _UNCHANGED) * share / sum(_CHANGES.values())
-        found[place, kind] = logsumexp(every) + math.log(each), middle, std
+        middle = _AMOUNTS @ weights
+        std = math.sqrt(np.square(_AMOUNTS - middle) @ weights)
+        found[place, kind] = logsumexp(every) + math.log(chance), middle, std
     chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
     likeliest = max(places, key=places.__getitem__)
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
     likely = np.exp(ways.log)
     return Change(
-        tuple(before),
-        tuple(after),
+        before,
+        after,
         likely @ ways.mean,
         np.sqrt(likely @ unchanged),
         places,
@@ -155,17 +160,6 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     )
 
 
-def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
-    """Return the logarithm of the mean voltages' ratio; zero where a flight has none.
-
-    The ratio makes the total less certain, and is not taken off the total: a heavier vehicle draws
-    more and pulls its battery down, so a correction would hide the change in question.
-    """
-    volts = ([trim.voltage for trim in group] for group in (after, before))
-    late, early = (np.log(np.array(group, dtype=np.float64)).mean() for group in volts)
-    return float(np.nan_to_num(late - early))
-
-
 def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
     """Return how the four numbers move if something changed by ``amount``."""
     if kind == "weaker":
@@ -173,8 +167,6 @@ def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
         thrust = shares.copy()
         thrust[rotor] /= 1.0 - min(amount, 0.9)
         return features_of(thrust) - features_of(shares)
-    if place == "all rotors":
-        return np.array([0.0, 0.0, 0.0, math.log1p(amount)])
     left, front = {**_ROTORS, **_SIDES}[place]
     # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there
     way = amount / (1.0 + amount)

@@ -13,15 +13,13 @@ sums that run backwards.
 import math
 
 import numpy as np
-from scipy.linalg import toeplitz
-from scipy.ndimage import maximum_filter1d
 
 from ...runtime.arrays import Array, Index, Mask
 from .fault_channels import STEP, Samples
 from .fault_noise import fit_noise
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
-_SIGNS = np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]], dtype=np.float64)
+_SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
 PARTS = (0.0, 0.25, 0.5, 0.75)  # starts of a fault within an interval
 _AROUND = 5  # intervals around a strong acceleration: the model may be as wrong there
 _TURNING = 0.1  # activity per (rad/s)^2: the model's error while the vehicle turns
@@ -37,12 +35,14 @@ class FaultBalance:
     """
 
     def __init__(self, samples: Samples, lag: float, bend: float, dead: float) -> None:
+        from scipy.ndimage import maximum_filter1d  # as late as can be: it takes .1 s
+
         w = samples.angular_velocity
         turning = samples.angular_acceleration
         self.follows = samples.follows
         self.thrust = thrust = samples.thrust(lag, bend, dead)  # (N, 4)
         self.ramps = [_ramp(part, late) for late in (0.0, lag) for part in PARTS]
-        gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, -2, axis=1)
+        gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, 1, axis=1)
         one = np.ones(len(w))
         free = [[one, *own] for own in zip(w.T, gyroscopic.T, strict=True)]
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
@@ -67,7 +67,7 @@ class FaultBalance:
     def fit(self, *step: Array) -> None:
         """Fit the channels' noise to the residual of no change, or beside a ``step`` (N,)."""
         self.channels = [
-            BalanceChannel(columns, self.activity, self.follows, *step) for columns in self.columns
+            _BalanceChannel(columns, self.activity, self.follows, *step) for columns in self.columns
         ]
 
     def nothing(self) -> float:
@@ -76,8 +76,7 @@ class FaultBalance:
 
     def steps(self, rows: Index, ramps: list[Array]) -> Array:
         """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
-        each = [[c.steps(rows, ramp) for c in self.channels] for ramp in ramps]
-        return np.asarray(np.sum(each, axis=1))
+        return np.array([sum(c.steps(rows, ramp) for c in self.channels) for ramp in ramps])
 
     def share(self, row: int, ramp: int) -> Array:
         """Return the elapsed share (N,) of a change beginning at a row, by one of the ramps."""
@@ -97,7 +96,7 @@ def _ramp(part: float, lag: float) -> Array:
     return np.asarray(np.diff(area) / STEP)
 
 
-class BalanceChannel:
+class _BalanceChannel:
     """Innovations of a channel's measurement and moment, the free columns projected out."""
 
     def __init__(self, columns: Array, activity: Array, follows: Mask, *step: Array) -> None:
@@ -139,6 +138,8 @@ class BalanceChannel:
         The size is the best one, at the price of a normal prior: as wide as this size, or as wide
         as a single sample's if wider.
         """
+        from scipy.signal import lfilter  # as late as can be: it takes .6 s
+
         noise = self.noise
         count = len(noise.whole)
         # behind the last row nothing happens
@@ -156,13 +157,12 @@ class BalanceChannel:
         at = at[:, :-1]
         begun = 1.0 / scale[at]
         begun[:, : len(ramp)] *= ramp
-        taps = toeplitz(np.append(noise.filter, np.zeros(len(ramp) - 1)), np.zeros(early))
-        values = begun @ taps.T * whole[at]
+        values = lfilter(noise.filter, 1.0, begun) * whole[at]
         sums[:, :-1] += np.einsum("kj,kjq->kq", values, against[at])
         sy, sm, ss = sums[:, [0, 1, -1]].T
         ss = ss + np.square(values).sum(axis=1) - np.square(sums[:, 2:-1]).sum(axis=1)
         own_share = np.maximum(ss - sm * sm / self.mm, 1e-12 * ss + 1e-300)
         gain = np.square(sy - sm * self.my / self.mm) / own_share
-        width = np.log(np.maximum(gain / noise.variance, 1.0))
-        price = 0.5 * np.maximum(1.0 + width, math.log(noise.whole.sum()))
+        width = 1.0 + np.log(np.maximum(gain / noise.variance, 1.0))
+        price = 0.5 * np.maximum(width, math.log(noise.whole.sum()))
         return np.asarray(noise.log_likelihood(self.rest - gain) - price)

@@ -10,18 +10,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.channels import Stream, readable
 from ..logs.flight_log import FlightLog
-from ..logs.flight_phases import carrying, usual_thrust
+from ..logs.flight_phases import usual_thrust
 from ..logs.readers import px4_ulog
 from ..logs.reading import READERS, read_log, reader_by_content
-from ..logs.table import Data, Names, Rows, median_step
+from ..logs.table import Data, Names, median_step
 from ..motion.smoothing import lagged, runs_of
 
 _PX4 = "px4_ulog"  # the reader
@@ -148,35 +146,38 @@ def sample(channels: Channels) -> Samples:
     Raises:
         InputError: fewer than 3 s of flight, or too few samples a second.
     """
-    c = channels
-    times = c.gyro.t, c.accelerometer.t, c.command.t
+    times = channels.gyro.t, channels.accelerometer.t, channels.command.t
     if min(map(len, times)) < 10:
-        raise InputError(f"{c.name}: fewer than ten samples of gyro, accelerometer or commands")
+        raise InputError(
+            f"{channels.name}: fewer than ten samples of gyro, accelerometer or commands"
+        )
     for what, at in zip(_CHANNELS[:2], times, strict=False):
         if (step := median_step(at)) > LONGEST_GAP:
             raise InputError(
-                f"{c.name}: {what}: {1.0 / step:.3g} samples a second; expected at least "
+                f"{channels.name}: {what}: {1.0 / step:.3g} samples a second; expected at least "
                 f"{1.0 / LONGEST_GAP:g}, to see a rotor fail"
             )
     edges = np.arange(max(at[0] for at in times), min(at[-1] for at in times), STEP)
     if len(edges) < 3:
-        raise InputError(f"{c.name}: gyro, accelerometer and commands do not overlap in time")
+        raise InputError(
+            f"{channels.name}: gyro, accelerometer and commands do not overlap in time"
+        )
     t = 0.5 * (edges[1:] + edges[:-1])
-    gyro = c.gyro.at(edges)
-    force = _means(c.accelerometer.t, c.accelerometer.values, t)
-    stop, why = _end(c)
-    total = c.command.values.sum(axis=1)
-    keep = (np.interp(t, c.command.t, total) > 0.5 * usual_thrust(total)) & (t < stop)
+    gyro = channels.gyro.at(edges)
+    force = _means(channels.accelerometer.t, channels.accelerometer.values, t)
+    total = channels.command.values.sum(axis=1)
+    keep = np.interp(t, channels.command.t, total) > 0.5 * usual_thrust(total)
     for at in times[:2]:
-        keep &= np.diff(at)[_step_around(at, t)] < LONGEST_GAP
-    if keep.any():
-        keep &= t > t[np.argmax(keep)] + SETTLED
+        keep &= np.diff(at)[np.searchsorted(at, t) - 1] < LONGEST_GAP
+    begin = t[keep].min(initial=np.inf) + SETTLED
+    stop, why = _end(channels, begin)
+    keep &= (t > begin) & (t < stop)
     for a, b in runs_of(keep):
         keep[a:b] = (b - a) * STEP > SHORTEST
     if keep.sum() * STEP < LEAST_SECONDS:
         raise InputError(
-            f"{c.name}: {keep.sum() * STEP:.3g} s in flight; expected at least {LEAST_SECONDS:g} s "
-            "without a gap, to see what is usual"
+            f"{channels.name}: {keep.sum() * STEP:.3g} s in flight; expected at least "
+            f"{LEAST_SECONDS:g} s without a gap, to see what is usual"
         )
     return Samples(
         t[keep],
@@ -184,22 +185,17 @@ def sample(channels: Channels) -> Samples:
         (0.5 * (gyro[1:] + gyro[:-1]))[keep],
         force[keep, 2],
         np.append(False, keep[:-1])[keep],
-        _between(c.command, t[keep]),
-        c,
+        _between(channels.command, t[keep]),
+        channels,
         why,
     )
 
 
-def _step_around(times: Array, t: Array) -> Rows:
-    """Return the number (N,) of the step of ``times`` around each of ``t`` (N,)."""
-    return np.clip(np.searchsorted(times, t), 1, len(times) - 1) - 1
-
-
 def _between(command: Stream, t: Array) -> Array:
     """Return the command's possible error between its samples (N,); see ``Samples``."""
-    before = _step_around(command.t, t)
+    before = np.searchsorted(command.t, t) - 1
     step = np.diff(command.t)[before]
-    part = np.clip((t - command.t[before]) / step, 0.0, 1.0)
+    part = (t - command.t[before]) / step
     change = np.abs(np.diff(command.values, axis=0)[before]).mean(axis=1)
     usual = np.median(np.interp(t, command.t, command.values.mean(axis=1)))
     return np.where(step > 1.5 * STEP, change / usual * np.sqrt(part * (1.0 - part)), 0.0)
@@ -207,29 +203,30 @@ def _between(command: Stream, t: Array) -> Array:
 
 def _means(times: Array, values: Array, middles: Array) -> Array:
     """Return the means (N, d) over the grid's intervals; values are linear between ``times``."""
-    new = np.diff(times, prepend=-np.inf) > 0.0
-    integral = make_interp_spline(times[new], values[new], k=1).antiderivative()
-    ends = np.clip([middles - 0.5 * STEP, middles + 0.5 * STEP], times[0], times[-1])
-    return np.asarray(np.diff(integral(ends), axis=0)[0] / STEP)
+    from scipy.interpolate import make_interp_spline
+
+    integral = make_interp_spline(times, values, k=1).antiderivative()
+    return np.asarray(integral(middles + 0.5 * STEP) - integral(middles - 0.5 * STEP)) / STEP
 
 
-def _end(c: Channels) -> tuple[float, str]:
-    """Return the end of the model's validity, and its reason: a clipped gyro, or an impact."""
-    ends = [(np.inf, "")]
+def _end(c: Channels, begin: float) -> tuple[float, str]:
+    """Return the end of the model's validity, and its reason: a clipped gyro, or an impact after
+    ``begin`` (s), since take-off may be hard.
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     count = max(3, round(CLIPPED_SECONDS / median_step(c.gyro.t)))
     rate, size = c.gyro.values, np.abs(c.gyro.values)
     at_limit = np.abs(size[..., None] / RANGES - 1.0).min(axis=2) < RANGE_SHARE
     at_limit |= (size > (1.0 - CLIPPED_SHARE) * size.max(axis=0)) & (size > RANGES[0])
     spread = maximum_filter1d(rate, count, axis=0) - minimum_filter1d(rate, count, axis=0)
     clipped = np.any(at_limit & (spread < CLIPPED_SHARE * size), axis=1)
-    if clipped.any():
-        # the filters look half their width to either side
-        first = max(0, int(np.argmax(clipped)) - count // 2)
-        ends.append((float(c.gyro.t[first]), "the gyro was at its limit"))
-    hit = np.linalg.norm(c.accelerometer.values, axis=1) > IMPACT
-    # take-off may be hard: an impact counts once the rotors carry the vehicle
-    aloft = c.command.t[carrying(c.command.values.sum(axis=1))]
-    hit &= c.accelerometer.t > aloft[0] + SETTLED if len(aloft) else False
-    if hit.any():
-        ends.append((float(c.accelerometer.t[np.argmax(hit)]) - STEP, "the vehicle hit something"))
-    return min(ends)
+    # the filters look half their width to either side
+    ends = c.gyro.t[np.maximum(np.flatnonzero(clipped) - count // 2, 0)]
+    times, force = c.accelerometer.t, np.linalg.norm(c.accelerometer.values, axis=1)
+    hits = times[(force > IMPACT) & (times > begin)] - STEP
+    return min(
+        (ends.min(initial=np.inf), "the gyro was at its limit"),
+        (hits.min(initial=np.inf), "the vehicle hit something"),
+        (np.inf, ""),
+    )

@@ -17,16 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
-from scipy.stats import norm
 
 from ...runtime.arrays import Array, Index
+from ..logs.table import ArrayPair
 from .fault_balance import PARTS, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
 
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
 Interval = tuple[float, float, float]  # middle, low and high; of a trial: lag, bend and dead zone
 
-_LOSSES = (0.05, 1.0)  # share of a rotor's thrust
+_LOSSES = np.linspace(0.05, 1.0, 39)  # tried shares of a rotor's thrust
 _ALL_LOSE = 0.5  # the largest share tried for all rotors together
 _LAGS = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
 # curves of thrust against command: the square's share, and the dead zone in parts of the
@@ -40,7 +40,6 @@ _ERROR = 0.25
 _BEFORE = 25  # least intervals of usual flight before a fault
 _AFTER = 4  # least intervals after a fault
 _PLACES = 2000  # most rows for the start of a fault
-_STEPS = 39  # shares tried within ``_LOSSES``
 # standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
 # usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
@@ -86,20 +85,19 @@ def find_fault(channels: Channels) -> RotorFault:
     tried = _search(samples, rows, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
     evidence, starts, likely = _onsets(samples.t, rows, best)
-    each, shares, weights = _patterns(best)
+    each, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
-    whole = math.log(_NOTHING) + max(one.nothing for one in tried)
-    happened = evidence + math.log(sum(_EVENTS))
-    chances = softmax(np.append(whole, happened + log_softmax(logs)))
+    nothing = math.log(_NOTHING) + max(one.nothing for one in tried)
+    chances = softmax(np.append(nothing, evidence + math.log(sum(_EVENTS)) + log_softmax(logs)))
     rotor = int(np.argmax(logs[:4]))
-    _, least, most = _quantiles(shares, weights[rotor], 0.5 * float(shares[1] - shares[0]))
+    _, least, most = _quantiles(_LOSSES, weights[rotor], 0.5 * (_LOSSES[1] - _LOSSES[0]))
     return RotorFault(
         samples,
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
         1 + rotor,
         _quantiles(starts, likely, STEP),
-        (1.0 - float(weights[rotor] @ shares), max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
+        (1.0 - weights[rotor] @ _LOSSES, max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
 
@@ -126,9 +124,8 @@ def _search(samples: Samples, rows: Index, thrust_known: bool) -> list[_Tried]:
         return max(tried, key=lambda key: tried[key].log)
 
     curves = _CURVES[:1] if thrust_known else _CURVES
-    middle = _LAGS[len(_LAGS) // 2]
-    _, *curve = best_of((middle, *curve) for curve in curves)
-    lag, *_ = best_of((lag, curve[0], curve[1]) for lag in _LAGS)
+    _, bend, dead = best_of((_LAGS[3], *curve) for curve in curves)
+    lag, *_ = best_of((lag, bend, dead) for lag in _LAGS)
     best_of((lag, *curve) for curve in curves)
     return list(tried.values())
 
@@ -137,8 +134,7 @@ def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
     """Return a lag and curve with noise fitted beside the likeliest jump."""
     nothing = balance.nothing()
     for _ in range(_ROUNDS):
-        _, row, ramp = _jump(balance, rows)
-        balance.fit(balance.share(row, ramp))
+        balance.fit(balance.share(*_jump(balance, rows)[1:]))
     return _Tried(balance, max(nothing, balance.nothing()), *_jump(balance, rows))
 
 
@@ -148,7 +144,7 @@ def _jump(balance: FaultBalance, rows: Index) -> tuple[float, int, int]:
     around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
     logs = balance.steps(around, balance.ramps)
     ramp, k = divmod(int(np.argmax(logs)), len(around))
-    return float(logs[ramp, k]), int(around[k]), ramp
+    return logs[ramp, k], around[k], ramp
 
 
 def _onsets(t: Array, every: Index, best: _Tried) -> tuple[float, Array, Array]:
@@ -157,17 +153,18 @@ def _onsets(t: Array, every: Index, best: _Tried) -> tuple[float, Array, Array]:
     ramps = best.balance.ramps
     logs, fine = (best.balance.steps(some, ramps) for some in (every, rows))
     starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), t[rows])
-    evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
+    evidence = max(logsumexp(logs), logsumexp(fine))
     return evidence - math.log(len(ramps) * len(t)), starts.ravel(), softmax(fine).ravel()
 
 
-def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
-    """Return the log-evidence (6,) of rotors 1 to 4, all rotors, and another force and torque.
-
-    Beside it stand the shares (E,) of a loss and their probabilities for each rotor (4, E).
+def _patterns(best: _Tried) -> ArrayPair:
+    """Return the log-evidence (6,) of rotors 1 to 4, all rotors, and another force and torque; and
+    the probabilities of ``_LOSSES`` for each rotor (4, E).
     """
-    shares = np.linspace(*_LOSSES, _STEPS)
-    lost = shares[shares <= _ALL_LOSE, None]
+    from scipy.stats import norm  # as late as can be: it takes .6 s
+
+    each = _LOSSES[:, None]
+    lost = each[_LOSSES <= _ALL_LOSE]
     share = best.balance.share(best.row, best.ramp)
 
     def seen(columns: Array) -> Array:
@@ -176,7 +173,6 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
         return np.array([channel.part(column) for channel, column in pairs]).T
 
     # each channel's visible part, its standard deviation, and the hypothesis' means and spread
-    each = shares[:, None]
     tried = [(*seen(best.balance.lost(rotor, share)), each, _ERROR * each) for rotor in range(4)]
     # a jump of each channel, in parts of one rotor's usual torque or force there
     jumps = seen(np.tile(share[:, None], 4))
@@ -188,20 +184,17 @@ def _patterns(best: _Tried) -> tuple[Array, Array, Array]:
         norm.logpdf(part, means, np.hypot(std, spread)).sum(axis=1, where=says)
         for part, std, means, spread in tried
     ]
-    evidence = np.array([logsumexp(log) - math.log(len(log)) for log in logs])
-    return evidence, shares, softmax(logs[:4], axis=1)
+    evidence = [logsumexp(log) - math.log(len(log)) for log in logs]
+    return np.array(evidence), softmax(logs[:4], axis=1)
 
 
 def _rows(count: int) -> Index:
     """Return the rows for the start of a fault: all, or in a long flight an even spread and all
     rows near the end, with few samples after them.
     """
-    rows = np.arange(_BEFORE, count - _AFTER)
-    if len(rows) > _PLACES:
-        early = rows[: -_PLACES // 4]
-        step = math.ceil(len(early) / (0.75 * _PLACES))
-        rows = np.concatenate([early[::step], rows[-_PLACES // 4 :]])
-    return rows
+    early, late = np.split(np.arange(_BEFORE, count - _AFTER), [-_PLACES // 4])
+    step = max(1, math.ceil(len(early) / (0.75 * _PLACES)))
+    return np.concatenate([early[::step], late])
 
 
 def _quantiles(values: Array, weight: Array, margin: float) -> Interval:

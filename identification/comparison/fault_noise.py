@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.signal import lfilter
 
 from ...runtime.arrays import Array, Mask
 
@@ -33,14 +32,16 @@ class Noise(NamedTuple):
 
     def filtered(self, values: Array) -> Array:
         """Return the filter's output (N, ...); rows outside ``whole`` mean nothing."""
+        from scipy.signal import lfilter  # as late as can be: it takes .6 s
+
         return np.asarray(lfilter(self.filter, 1.0, (values.T / self.scale).T, axis=0))
 
     def log_likelihood(self, rest: Array | float) -> Array:
         """Return the log-likelihood of innovations with ``rest`` as the sum of squares, at the best
         variance.
         """
-        n = int(self.whole.sum())
-        log_scale = float(np.log(self.scale[self.whole]).sum())
+        n = self.whole.sum()
+        log_scale = np.log(self.scale[self.whole]).sum()
         return np.asarray(-0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale)
 
 
@@ -63,6 +64,6 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
         gram = past.T @ past + 1e-6 * (present @ present) * np.eye(ORDER)
         poles = np.linalg.solve(gram, past.T @ present)
         rest = np.square(present - past @ poles).sum()
-        noise = Noise(scale, np.append(1.0, -poles), whole, float(rest / len(present)))
-        tried.append((float(noise.log_likelihood(rest)), noise))
+        noise = Noise(scale, np.append(1.0, -poles), whole, rest / len(present))
+        tried.append((noise.log_likelihood(rest), noise))
     return max(tried, key=itemgetter(0))[1]

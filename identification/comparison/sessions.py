@@ -30,7 +30,8 @@ SESSION_STD = (0.015, 0.01, 0.01, 0.02)
 FLIGHT_STD = (0.0035, 0.0035, 0.005, 0.006)
 # standard deviation of the logarithm of one vehicle's own scale of scatter, at a level
 _SPREAD = 0.5
-_SCALES = 7  # scales in the sum at either level, within two standard deviations
+# (k, 2) standard deviations of the two scales in the sum, between sessions and within one
+_SCALES = np.array([*itertools.product(np.linspace(-2.0, 2.0, 7), repeat=2)])
 # probability of a session's end between two flights, and the same at a rise of the voltage by at
 # least this share
 _ENDS = 0.3
@@ -74,15 +75,15 @@ def _cuts(trims: Sequence[Trim], later: Mask, x: Array) -> Iterator[tuple[Index,
     the logarithm of its prior.
     """
     apart = np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
-    volts = np.array([trim.voltage for trim in trims], dtype=np.float64)
+    volts = np.array([trim.voltage for trim in trims])
     rises = np.diff(volts) > _RISE * volts[:-1]  # False where one is not known
     chance = np.where(rises, _ENDS_AT_RISE, _ENDS)
     names = np.array([trim.session for trim in trims])
     named = names != ""
     told = named[1:] | named[:-1] | np.diff(later)
     known = ~named[1:] | (names[1:] != names[:-1])
-    places = np.argsort(np.where(told, np.inf, -apart), kind="stable")
-    places = places[: min((~told).sum(), _MOST_ENDS)]
+    order = np.argsort(np.where(told, np.inf, -apart), kind="stable")
+    places = order[: min((~told).sum(), _MOST_ENDS)]
     for chosen in itertools.product((False, True), repeat=len(places)):
         ends = told & known
         ends[places] = chosen
@@ -98,16 +99,14 @@ def _of_cut(
     The difference is between flights (n, 4), ``later`` (n,) against earlier, at each pair of scales
     of the scatter; the vehicle's mean is integrated out.
     """
-    scale = np.linspace(-2.0, 2.0, _SCALES)
-    wider = np.exp(2.0 * _SPREAD * scale)[:, None]
-    session = np.repeat(wider * np.square(SESSION_STD), _SCALES, axis=0)  # (k, 4) variances
-    flight = np.tile(wider * np.square(FLIGHT_STD), (_SCALES, 1))
-    prior = -0.5 * np.add.outer(scale**2, scale**2).ravel()
+    wider = np.exp(2.0 * _SPREAD * _SCALES.T[..., None])
+    session, flight = wider * np.square([[SESSION_STD], [FLIGHT_STD]])  # (k, 4) variances
+    prior = -0.5 * np.square(_SCALES).sum(axis=1)
     weight = 1.0 / (flight[:, None] + noise)  # (k, n, 4)
-    of = np.eye(int(cut[-1]) + 1)[cut]  # (n, sessions)
+    of = np.eye(cut[-1] + 1)[cut]  # (n, sessions)
     # products of the vehicle's mean, the difference, and the flights under the inverse covariance;
     # flights of a session share its error (Woodbury)
-    parts = np.stack([np.ones_like(x), np.broadcast_to(later[:, None], x.shape), x])
+    parts = np.stack(np.broadcast_arrays(1.0, later[:, None], x))
     sums = np.einsum("ns,knf,pnf->pksf", of, weight, parts)
     shrink = session[:, None] / (1.0 + session[:, None] * sums[0])
     (aa, ab, ax), (_, bb, bx), (*_, xx) = np.einsum(

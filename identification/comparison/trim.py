@@ -46,13 +46,8 @@ class Trim:
     thrust: Array  # (4,)
     seconds: float  # length of the mean
     noise: Array  # (4,) variance of ``features`` as means of one flight; zero: not known
-    voltage: float | None = None  # V, mean over the same time
+    voltage: float = math.nan  # V, mean over the same time; NaN: not known
     session: str = ""  # common name of a session's flights; empty: not known
-
-    @property
-    def total(self) -> float:
-        """Sum of the four."""
-        return float(self.thrust.sum())
 
     @property
     def features(self) -> Array:
@@ -83,35 +78,29 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
         InputError: fewer than 3 s count, or the rotors do not turn.
     """
     step = np.diff(t, append=t[-1])
-    step = np.minimum(step, 5.0 * median_step(t))  # a gap is no flight
-    seconds = float(step[steady].sum())
+    step = np.minimum(step, 5.0 * median_step(t))[steady]  # a gap is no flight
+    seconds = step.sum()
     if seconds < LEAST_SECONDS:
         raise InputError(
             f"{name}: {seconds:.3g} s of calm flight; expected at least {LEAST_SECONDS:g} s off "
             f"the ground and slower than {CALM:g} m/s, to compare how the rotors share the work"
         )
-    mean = np.average(thrust[steady], axis=0, weights=step[steady])
-    if not (np.all(np.isfinite(mean)) and mean.min() > 0.0):
+    thrust = thrust[steady]
+    mean = np.average(thrust, axis=0, weights=step)
+    if not np.all((mean > 0.0) & (mean < np.inf)):
         raise InputError(
             f"{name}: mean thrusts of the rotors are {np.round(mean, 4).tolist()}; expected four "
             "positive numbers"
         )
-    known = np.zeros(0) if voltage is None else voltage[steady]
-    known = known[np.isfinite(known) & (known > 0.0)]
-    level = float(known.mean()) if known.size else None
-    return Trim(name, mean, seconds, _noise(thrust, steady, step), level)
-
-
-def _noise(thrust: Array, steady: Mask, step: Array) -> Array:
-    """Return the variance (4,) of the four numbers of a flight, from the means of batches."""
-    batch = np.floor(np.cumsum(np.where(steady, step, 0.0)) / BATCH).astype(np.int64)
-    batches = (steady & (batch == number) for number in range(int(batch[-1]) + 1))
+    known = np.empty(0) if voltage is None else voltage[steady]
+    known = known[(known > 0.0) & (known < np.inf)]
+    ends = np.flatnonzero(np.diff(np.floor(np.cumsum(step) / BATCH))) + 1
+    batches = zip(np.split(thrust, ends), np.split(step, ends), strict=True)
     # the last batch may be a short one
-    means = (thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() > 0.5 * BATCH)
-    numbers = [features_of(mean) for mean in means if mean.min() > 0.0]
-    if len(numbers) < 2:
-        return np.zeros(4)
-    return np.asarray(np.var(numbers, axis=0, ddof=1) / len(numbers))
+    means = [batch.mean(axis=0) for batch, steps in batches if steps.sum() > 0.5 * BATCH]
+    numbers = [features_of(some) for some in means if some.min() > 0.0]
+    noise = np.var(numbers, axis=0, ddof=1) / len(numbers) if len(numbers) > 1 else np.zeros(4)
+    return Trim(name, mean, seconds, noise, known.mean() if known.size else math.nan)
 
 
 def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
@@ -132,21 +121,23 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     else:
         thrust = log.command
     total = thrust.sum(axis=1)
-    if not log.has_pose:
-        return trim_of(name, t, thrust, carrying(t, total), log.voltage)
-    at = t[log.valid]
-    place = log.position[log.valid]
-    if len(at) < 3:
-        raise InputError(f"{name}: fewer than three poses; expected a flight")
-    speeds = log.rotor_speeds
-    if not log.has_rotor_speeds:  # then scaled: while the rotors are high, they carry the weight
-        carried = total[flying(total)]
-        scale = vehicle.weight / np.median(carried) if len(carried) else 0.0
-        speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
-    phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
-    flown = [(t >= phase.start) & (t <= phase.end) for phase in phases if phase.name == FLIGHT]
-    speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
-    steady = np.any(flown, axis=0) & (np.interp(t, at, speed) < CALM)
+    steady = carrying(t, total)
+    if log.has_pose:
+        at = t[log.valid]
+        place = log.position[log.valid]
+        if len(at) < 3:
+            raise InputError(f"{name}: fewer than three poses; expected a flight")
+        speeds = log.rotor_speeds
+        if (
+            not log.has_rotor_speeds
+        ):  # then scaled: while the rotors are high, they carry the weight
+            carried = total[flying(total)]
+            scale = vehicle.weight / np.median(carried) if len(carried) else 0.0
+            speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
+        phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
+        flown = [(t >= start) & (t <= end) for phase, start, end in phases if phase == FLIGHT]
+        speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
+        steady = np.any(flown, axis=0) & (np.interp(t, at, speed) < CALM)
     return trim_of(name, t, thrust, steady, log.voltage)
 
 

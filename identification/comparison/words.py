@@ -26,18 +26,25 @@ from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
 _FOUND = {str(i): f"rotor {i}" for i in range(1, 5)}
+# sentences with a place for the probability
+_NO_ROTOR = {
+    NOTHING: "No rotor lost thrust {}.",
+    OTHER: "No rotor fault explains what happened: a force or torque began that no rotor makes, "
+    "a gust, a load or a collision {}.",
+    ALL: "All rotors lost thrust at once {}: the battery, the air, or the vehicle.",
+}
 _NAMED = 0.05  # least probability of a rival in the sentence
 _SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
 
-def _cannot_tell(chances: Values) -> str:
+def _undecided(chances: Values) -> str:
     """Return a sentence on an unsure finding and its rivals."""
-    likeliest, *rivals = (
-        f"{name} ({p:.2f})"
+    likeliest = (
+        f"{name} {p:.2f}"
         for name, p in sorted(chances.items(), key=itemgetter(1), reverse=True)
         if p >= _NAMED
     )
-    return f"Cannot tell {likeliest} from {' or '.join(rivals) or 'the other possibilities'}."
+    return f"Undecided, by probability: {', '.join(likeliest)}."
 
 
 def change_headline(change: Change) -> str:
@@ -48,18 +55,16 @@ def change_headline(change: Change) -> str:
         if change.sure:
             return f"Nothing changed (probability {chance:.2f})."
         other = sorted(change.places, key=change.places.__getitem__, reverse=True)[1]
-        return (
-            f"Cannot tell whether anything changed: nothing with probability {chance:.2f}; if "
-            f"something did, it is likeliest at {other} ({change.places[other]:.2f})."
-        )
+        where = f"{other} ({change.places[other]:.2f})"
+        return f"Undecided: nothing changed (probability {chance:.2f}), or likeliest {where}."
     kind = _kind(change)
     if change.sure:
         return f"Changed: {place}, probability {chance:.2f}; {kind}"
-    return f"{_cannot_tell(change.places)} {kind[:1].upper()}{kind[1:]}"
+    return f"{_undecided(change.places)} If the first: {kind}"
 
 
 def _kind(change: Change) -> str:
-    size = f"{100 * change.amount:.0f} % (+- {100 * change.amount_std:.0f})"
+    size = f"{100 * change.amount:.0f} ± {100 * change.amount_std:.0f} %"
     if change.place == SOMETHING_ELSE:
         return "the rotors share the work otherwise than one weaker rotor or one weight would ask."
     if change.place == "all rotors":
@@ -73,8 +78,8 @@ def _kind(change: Change) -> str:
     if change.carries_more >= 0.95:
         return f"the vehicle carries {size} of its weight more there."
     return (
-        f"either that rotor delivers less (probability {change.weaker:.2f}) or the vehicle carries "
-        f"more there ({change.carries_more:.2f}), by about {size}; these look alike."
+        f"the rotor delivers {size} less (probability {change.weaker:.2f}), or the vehicle carries "
+        f"as much more there ({change.carries_more:.2f}): these look alike."
     )
 
 
@@ -85,8 +90,8 @@ def change_data(change: Change) -> Data:
         return {
             "log": trim.name,
             "seconds": trim.seconds,
-            "thrust_share": trim.thrust / trim.total,
-            "total": trim.total,
+            "thrust_share": trim.thrust / trim.thrust.sum(),
+            "total": trim.thrust.sum(),
             "std": np.sqrt(trim.noise),
             "voltage": trim.voltage,
         }
@@ -167,16 +172,9 @@ def fault_headline(fault: RotorFault) -> str:
     chance = fault.probabilities[likeliest]
     sure = f"(probability {chance:.2f})" if chance < 0.9995 else "(probability above 0.999)"
     if not fault.sure:
-        return _cannot_tell({_finding(fault, k): p for k, p in fault.probabilities.items()})
-    if likeliest == NOTHING:
-        return f"No rotor lost thrust {sure}."
-    if likeliest == OTHER:
-        return (
-            f"No rotor fault explains what happened: a force or torque began that no rotor makes, "
-            f"a gust, a load or a collision {sure}."
-        )
-    if likeliest == ALL:
-        return f"All rotors lost thrust at once {sure}: the battery, the air, or the vehicle."
+        return _undecided({_finding(fault, k): p for k, p in fault.probabilities.items()})
+    if likeliest in _NO_ROTOR:
+        return _NO_ROTOR[likeliest].format(sure)
     when, low, high = fault.onset
     lost, most, least = (100 - 100 * share for share in fault.remaining)
     return (
@@ -193,13 +191,15 @@ def _finding(fault: RotorFault, name: str) -> str:
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
     channels = fault.samples.channels
+    onset, *onset_ci95 = fault.onset
+    remaining, *remaining_ci95 = fault.remaining
     of_rotor = {
         "rotor": fault.rotor,
         "motor": channels.motor_names and channels.motor_names[fault.rotor - 1],
-        "onset_s": fault.onset[0],
-        "onset_ci95_s": list(fault.onset[1:]),
-        "remaining": fault.remaining[0],
-        "remaining_ci95": list(fault.remaining[1:]),
+        "onset_s": onset,
+        "onset_ci95_s": onset_ci95,
+        "remaining": remaining,
+        "remaining_ci95": remaining_ci95,
     }
     return {
         "log": channels.name,
@@ -219,7 +219,7 @@ def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path
     Raises:
         InputError: a file cannot be written.
     """
-    data = [fault_data(fault) for fault in faults]
+    data = list(map(fault_data, faults))
     return _written(folder / "rotor_faults.json", data, _draw_faults(faults))
 
 

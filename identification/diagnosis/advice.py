@@ -31,6 +31,7 @@ SHARE = 0.1
 # rows beyond it for a note
 KNOWN = 0.995
 OUTSIDE = 0.05
+FEW = 3  # effects whose flights an advice describes
 
 
 def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str]:
@@ -77,12 +78,13 @@ def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
         ("the thrust", "weights", thrust / flights.vehicle.weight),
     ):
         most = np.quantile(values[seen], KNOWN)
-        beyond = values[~seen] > most
-        if beyond.mean() > OUTSIDE:
+        others = values[~seen]
+        beyond = np.mean(others > most)
+        if beyond > OUTSIDE:
             yield (
-                f"outside the range of the fit: {name} of {beyond.mean():.0%} of the held-out "
-                f"flight is above {most:.3g} {unit}, up to {values[~seen].max():.3g} {unit}. The "
-                "errors there are those of an extrapolation"
+                f"outside the range of the fit: {name} of {beyond:.0%} of the held-out flight is "
+                f"above {most:.3g} {unit}, up to {others.max():.3g} {unit}. The errors there are "
+                "those of an extrapolation"
             )
 
 
@@ -136,12 +138,12 @@ def advice(
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)
-            yield f"To separate {' from '.join(group)}, fly: {_excitations(group)}"
+            yield f"To tell {' and '.join(group)} apart, fly: {_excitations(group)}"
     if remainder == "structured":
         yield (
-            "Fly one thing at a time (hover, climbs, level flight at several speeds, turns) to see "
-            "the variable that the residual follows: no effect of the library explains the "
-            "residual's structure."
+            "Fly hover, climbs, level flight at several speeds and turns one at a time: they show "
+            "the variable that the residual follows. No effect of the library explains its "
+            "structure."
         )
     if needs_pose:
         yield (
@@ -150,10 +152,10 @@ def advice(
             "pose as well."
         )
     if not_identifiable:
-        yield (
-            f"Not identifiable from these flights: {', '.join(not_identifiable)}. To identify one "
-            f"of them, fly: {_excitations(not_identifiable[:4])}"
-        )
+        how = "docs/effects.md says what to fly for each"
+        if len(not_identifiable) <= FEW:
+            how = f"To identify one, fly: {_excitations(not_identifiable)}"
+        yield f"Not identifiable from these flights: {', '.join(not_identifiable)}. {how}"
 
 
 def _excitations(effects: Iterable[str]) -> str:

@@ -32,6 +32,7 @@ class Poses:
     voltage: Array  # (n,) V; 0 where unknown
     velocity: Array  # (3,) m/s, at the start
     angular_velocity: Array  # (3,) rad/s, body, at the start
+    log: int = 0  # index among the flights
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +68,8 @@ def level(heading: Array, x: Array) -> Array:
     heading (n, 2), and body z.
     """
     c, s = heading.T
-    out = x.copy()
-    out[:, 0] = c * x[:, 0] - s * x[:, 1]
-    out[:, 1] = s * x[:, 0] + c * x[:, 1]
-    return out
+    ahead, left, up = x.T
+    return np.column_stack([c * ahead - s * left, s * ahead + c * left, up])
 
 
 def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
@@ -86,13 +85,18 @@ def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> T
     n = len(poses.t)
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
     out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
-    measured = (poses.rotor_speeds, poses.voltage, poses.position, poses.quaternion)
-    begun = np.append(poses.velocity, poses.angular_velocity)
     models = loaded_model(vehicle)[0].copy()
     _core.run_causal_filter(
         models.ctypes.data,
         poses.period,
-        *map(np.ascontiguousarray, (*measured, begun, steady.gain, steady.keep, known)),
+        poses.rotor_speeds,
+        poses.voltage,
+        poses.position,
+        poses.quaternion,
+        np.append(poses.velocity, poses.angular_velocity),
+        steady.gain,
+        steady.keep,
+        known,
         *(getattr(out, field.name) for field in fields(out)[1:]),
     )
     raise_errors()

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...runtime.errors import InputError
-from .priors import Base, Setting, declared
-from .regression import RegressedFlights, coefficient
+from .priors import Base, Setting, changed, from_declared
+from .regression import RegressedFlights
 
 # minus the logarithm of likelihood and prior at a setting, and a function for the mode of the
 # linearised posterior there
@@ -59,15 +59,14 @@ def linearised(
     m = base.marginal(base.asked, base.plain, power)
     every = range(len(m.at))
     size = base.size[m.at]
-    z = np.array([setting[c[0]].get(c[1], 0.0) - declared(c, flights) for c in base.asked]) / size
+    z = from_declared(base.asked, flights, setting)
     value = 0.5 * (float(z @ z) - m.quadratic.explained(every, z)) - m.quadratic.constant
 
     def target() -> Setting:
         out = {e: dict(values) for e, values in setting.items()}
         best = m.evidence(every).mode * size
         for c, x in zip(base.asked, best.tolist(), strict=True):
-            limits = coefficient(c)
-            out[c[0]][c[1]] = min(max(declared(c, flights) + x, limits.minimum), limits.maximum)
+            out[c[0]][c[1]] = changed(c, x, flights)
         return out
 
     return value, target

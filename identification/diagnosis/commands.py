@@ -10,7 +10,6 @@ from ..findings import NamedEffect
 from ..logs.table import NamedNumbers
 from .commanded_rotors import THRUST_FACTORS
 from .regression import CENTRAL, RegressedFlights
-from .turning_delay import turning_delay
 
 
 @dataclass(frozen=True)
@@ -43,6 +42,8 @@ def what_commands_show(flights: RegressedFlights, library: Sequence[str]) -> Giv
         # a lag delays slow changes as much, and a wrong clock of the log looks like late commands
         same = [x for x in playing(Role.LAG, Role.DELAY, among=library) if x != delay]
         library = [e for e in library if e not in same]
+        from .turning_delay import turning_delay  # needs much of SciPy
+
         if shown := turning_delay(seen, flights.vehicle, flights.logs[0].period):
             library.remove(delay)
             seconds, std, ratio = shown

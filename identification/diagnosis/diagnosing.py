@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...dynamics.effects import get, names, playing
+from ...dynamics.effects import Role, get, names, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.threads import one_thread
@@ -42,7 +42,7 @@ from .advice import FILTERED, advice, composites, inertial_notes, late_rotors, o
 from .commanded_rotors import THRUST_FACTORS
 from .commands import what_commands_show
 from .log_offsets import delays_at_bound
-from .priors import NUISANCE
+from .priors import NUISANCE, declared
 from .ranking import LEAST_RIVAL, Report, rank, rank_by_rows
 from .regression import (
     CENTRAL,
@@ -53,7 +53,7 @@ from .regression import (
     without,
 )
 from .residuals import balance, is_beyond_calm, transient_disturbances
-from .row_nuisances import THRUST_STD
+from .row_nuisances import between_flights
 from .settings import DIAGNOSIS, DiagnosisSettings
 from .traces import carrying_channels, signature
 from .unknown import beside_unknown, unknown
@@ -109,7 +109,7 @@ def diagnose(
         *((log, pose_notes(log, vehicle)) for log, _ in checked),
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
-    said = Judged(flights, [n for n in names() if n not in without], settings, report)
+    said = _Judged(flights, [n for n in names() if n not in without], settings, report)
     effects = said.effects
     residuals = said.balance
     sure = said.remainder == "none" and not any(
@@ -131,6 +131,7 @@ def diagnose(
         verdict=verdict,
         remainder=said.remainder,
         effects=effects,
+        not_needed=said.not_needed,
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
         before=Errors(*residuals.error_before, *predicted[vehicle]),
         after=Errors(*residuals.error_after, *predicted[amended]),
@@ -147,11 +148,11 @@ def diagnose(
             for e in effects
         ),
         structure=said.structure,
-        gusts=said.gusts,
+        gusts=said.fitted.gusts,
         pushes=said.pushes,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
-        amended=amended if residuals.better else vehicle,
+        amended=amended,
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in every)),
@@ -159,12 +160,12 @@ def diagnose(
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(hidden)),
         doubts=said.doubts,
-        ranking=said.ranking,
+        ranking=said.fitted.ranking,
         probabilities=said.probabilities,
     )
 
 
-class Judged:
+class _Judged:
     """The effects behind flights, by the evidence of sets of effects, and the residual.
 
     Args:
@@ -176,6 +177,7 @@ class Judged:
     Public attributes are as in ``Diagnosis``, and beside them:
 
     Attributes:
+        fitted: the posterior, and the fit of the likeliest set.
         setting: coefficients of the effects; under no name the sensors' errors.
         balance: the residual with them.
         parts: growth of the residual (rows, 6) with one effect left out.
@@ -195,30 +197,34 @@ class Judged:
         library = [e for e in library if e not in flights.not_identifiable]
         given = self._given = what_commands_show(flights, library)
         report("asking how probable each effect is")
-        fitted = self._fitted = (
+        likeliest = (
             rank(flights, library, report)
             if flights.has_raw_poses
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
-        self.ranking = fitted.ranking
-        best = self._best = fitted.ranking.sets[0]
-        self.setting = {e: dict(x) for e, x in {**given.fixed, **fitted.setting}.items()}
-        if fitted.sensors:
-            self.setting[""] = {name: value for name, (value, _) in fitted.sensors.items()}
-        self.balance = balance(flights, self.setting)
+        self._best = likeliest.ranking.sets[0]
+        sensors = {name: value for name, (value, _) in likeliest.sensors.items()}
+        known_apart = {**given.fixed, **({"": sensors} if sensors else {})}
+        # no set with a larger error on held-out flight is printed
+        for fitted in (likeliest, replace(likeliest, setting={}, behind={})):
+            self.setting = known_apart | fitted.setting
+            self.balance = balance(flights, self.setting)
+            if self.balance.better:
+                break
+        self.fitted = fitted
         self.parts = {
             e: flights.residual(without(self.setting, e)) - self.balance.after
             for e in self.setting
             if e
         }
-        self.gusts = fitted.gusts
         self.pushes = tuple(transient_disturbances(flights, self.setting))
-        known = {e: self._differs(e) for e in given.first if e in best.effects}
-        named = [e for e in fitted.setting if known.get(e, 1.0) >= rule.least_sure_probability]
+        known = {e: self._differs(e) for e in given.first if e in self._best.effects}
+        said = [e for e in self._best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
+        named = [e for e in fitted.setting if e in said]
         structure = fitted.ranking.structure
         strange = unknown(structure, bool(self.pushes))
         rivals = {e: self._rivals(e) for e in named}
-        for e in (e for e in named if e not in known):  # an effect, or its rivals in these flights
+        for e in {*named}.difference(known):  # an effect, or its rivals in these flights
             alike = [x.probability for x in fitted.ranking.sets if {e, *rivals[e]} & {*x.effects}]
             factor = fitted.posterior.factor_in_set(e)
             known[e] = beside_unknown(min(sum(alike), 1.0), factor, structure, strange)
@@ -229,9 +235,19 @@ class Judged:
         names = {e: known[e] for e in named}
         if late := given.late:
             names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
-            doubted = unsure or names[late.name] < rule.least_sure_probability
-            effects.append(replace(late, tentative=doubted))
+            effects.append(
+                replace(
+                    late,
+                    std=self._of_any_flight(late.name, late.coefficients, late.std),
+                    tentative=unsure or names[late.name] < rule.least_sure_probability,
+                )
+            )
         self.effects = tuple(effects)
+        self.not_needed = tuple(
+            self._stated(e, self._best.coefficients[e], self._best.std[e])
+            for e in said
+            if e not in fitted.setting
+        )
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
         if structured:  # the dictionary's best column beside the likeliest set
@@ -240,7 +256,7 @@ class Judged:
             column, _, channel = what.rpartition(" in ")
             where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
             self.structure = (Structure(group, where, gained / fitted.posterior.left()),)
-        some = self.balance.noisy or is_beyond_calm(self.gusts, flights.vehicle) or self.pushes
+        some = self.balance.noisy or is_beyond_calm(fitted.gusts, flights.vehicle) or self.pushes
         self.remainder = "structured" if structured else "random" if some else "none"
         by_bias = fitted.posterior.shown([("", f"{NUISANCE}{name}") for _, name in flights.biases])
         unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
@@ -262,18 +278,16 @@ class Judged:
         self.probabilities = Probabilities(names, stated, strange)
 
     def _std(self, effect: str) -> NamedNumbers:
-        """Return the standard deviations of an effect in the likeliest set. For a factor on the
-        thrust of commands, they include the spread of thrust from flight to flight.
+        """Return the standard deviations of an effect in the likeliest set, with the spread from
+        flight to flight.
         """
-        flights = self._flights
-        varies = flights.commanded and get(effect).role in THRUST_FACTORS
-        spread = varies * THRUST_STD / math.sqrt(len(flights.logs))
-        return self._widened(effect, self._best.std[effect], spread)
+        std = {**self._best.std, **self.fitted.std}[effect]
+        return self._of_any_flight(effect, self._best.coefficients[effect], std)
 
-    def _widened(self, effect: str, std: Values, relative: float) -> NamedNumbers:
-        """Return standard deviations of coefficients with a relative one besides."""
+    def _of_any_flight(self, effect: str, values: Values, std: Values) -> NamedNumbers:
+        """Return standard deviations of coefficients with the spread from flight to flight."""
         return {
-            name: math.hypot(x, relative * unit_of_change((effect, name), self._flights.vehicle))
+            name: math.hypot(x, between_flights((effect, name), values[name], self._flights))
             for name, x in std.items()
         }
 
@@ -281,11 +295,13 @@ class Judged:
         """Return the probability of a calibration, in every set, to differ from the vehicle's
         statement; 0 where the difference is too small for a name.
         """
-        own = self._flights.coefficients({}, effect)
         apart = [0.0]
-        for name, std in self._std(effect).items():
-            off = abs(self._best.coefficients[effect][name] - own.get(name, 0.0))
-            if off > LEAST_SIZE * typical_size((effect, name), self._flights.vehicle) and std:
+        # these flights are late, however late others are
+        delays = get(effect).role == Role.DELAY
+        for name, std in (self._best.std[effect] if delays else self._std(effect)).items():
+            c = effect, name
+            off = abs(self._best.coefficients[effect][name] - declared(c, self._flights))
+            if off > LEAST_SIZE * typical_size(c, self._flights.vehicle) and std:
                 apart.append(_apart(off, std))
         return max(apart)
 
@@ -296,58 +312,54 @@ class Judged:
         if effect in self._given.first:
             factors = playing(*THRUST_FACTORS)
             return tuple(x for x in factors if x != effect) if effect in factors else ()
-        rest = {*self._best.effects} - {effect}
+        own = {*self._best.effects}
         least = LEAST_RIVAL * self._best.probability
-        return tuple(
-            e
-            for x in self.ranking.sets
-            if rest < {*x.effects} and len(x.effects) == len(rest) + 1 and x.probability > least
-            for e in {*x.effects} - rest - {effect}
-        )
+        swapped = [
+            own ^ {*x.effects}
+            for x in self.fitted.ranking.sets
+            if x.probability > least and len(x.effects) == len(own)
+        ]
+        return tuple(e for x in swapped if effect in x and len(x) == 2 for e in x - {effect})
 
     def _doubts(self, named: Sequence[str], strange: float) -> dict[str, Names]:
         """Return for each check, by its name, sentences with a reason to doubt a name."""
         flights = self._flights
         rule = self._rule
-        alike = composites(flights.vehicle, self._fitted.setting, self._best.std)
-        doubts = {"composite": tuple(alike)}
-        if strange > rule.most_unknown:
-            doubts["unknown"] = (
-                f"a cause outside the library acts with a probability of {strange:.0%}"
-                f"{': all names are tentative' if named else ''}",
+        unsure = ": all names are tentative" if named else ""
+        doubts = {
+            "composite": tuple(composites(flights.vehicle, self.fitted.setting, self.fitted.std)),
+            "unknown": (
+                f"a cause outside the library acts with a probability of {strange:.0%}{unsure}",
             )
-        if flights.seconds < rule.least_seconds:
-            doubts["short"] = (
+            * (strange > rule.most_unknown),
+            "short": (
                 f"{flights.seconds:.1f} s of flight are too few for a sure name: fly at least "
                 f"{rule.least_seconds:g} s",
             )
-        if named and not self.balance.better:
-            growth, std = (100.0 * x for x in self.balance.growth)
-            doubts["held out"] = (
-                "on held-out flight the named effects do not make the squared error smaller "
-                f"({growth:+.2g} +- {std:.2g} %): the model stays as it was declared",
-            )
-        if flights.filtered and named:
-            doubts["filtered pose"] = (FILTERED,)
-        doubts["hidden cause"] = tuple(
-            f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like it. "
-            "Log the pose to tell them apart"
-            for effect, hidden in self._fitted.behind.items()
-        )
-        if flights.thrust_std > 0.0:
-            doubts["assumed thrust"] = tuple(
+            * (flights.seconds < rule.least_seconds),
+            "filtered pose": (FILTERED,) * (flights.filtered and bool(named)),
+            "hidden cause": tuple(
+                f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like "
+                "it. Log the pose to tell them apart"
+                for effect, hidden in self.fitted.behind.items()
+                if hidden
+            ),
+            "assumed thrust": tuple(
                 f"{effect}: the log holds motor commands and the vehicle file states no motor "
                 "curve, so how much thrust a command makes is an assumption, and this effect may "
                 "be its error alone. State motor_curve in the vehicle file, or log rotor speeds"
                 for effect in playing(*THRUST_FACTORS, among=named)
-            )
+                if flights.thrust_std > 0.0
+            ),
+        }
         return {check: sentences for check, sentences in doubts.items() if sentences}
 
     def _named(
         self, effect: str, probability: float, size: float, unsure: bool, others: Names
     ) -> NamedEffect:
         flights = self._flights
-        fitted = self._fitted
+        vehicle = flights.vehicle
+        fitted = self.fitted
         std = self._std(effect)
         # the point of action of an effect at the rotors, as declared, is nothing to report
         values = {
@@ -357,24 +369,20 @@ class Judged:
         }
         uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
         if uncertain:
-            std = self._widened(effect, std, flights.thrust_std)
-        sizes = [
-            abs(x) / typical_size((effect, name), flights.vehicle)
-            for name, x in values.items()
-            if name != CENTRAL
-        ]
+            std = {
+                name: math.hypot(x, flights.thrust_std * unit_of_change((effect, name), vehicle))
+                for name, x in std.items()
+            }
         # shares of the residual's energy without it, each channel over its sensors' noise
         after = self.balance.after
-        over = mean_square(flights.visible_noise) ** 0.5
+        over = mean_square(flights.visible_noise) ** 0.5 + 1e-12
         left, whole = (
-            float(np.mean(np.square(x[~flights.fit_rows] / (over + 1e-12))))
+            float(mean_square(x[~flights.fit_rows] / over).mean())
             for x in (after, after + self.parts[effect])
         )
-        return NamedEffect(
-            name=effect,
-            coefficients=values,
-            std={name: std.get(name, 0.0) for name in values},
-            units={name: coefficient((effect, name)).unit for name in values},
+        stated = self._stated(effect, values, std)
+        return replace(
+            stated,
             tentative=unsure
             or uncertain
             or probability < self._rule.least_sure_probability
@@ -383,10 +391,27 @@ class Judged:
             evidence={
                 "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
                 "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
-                "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
+                "largest_coefficient_in_typical_sizes": max(
+                    abs(x) / typical_size((effect, name), vehicle) * (name != CENTRAL)
+                    for name, x in values.items()
+                ),
                 "size_over_what_is_left": size,
+                **stated.evidence,
             },
             channels=carrying_channels(flights, fitted.setting, effect),
+        )
+
+    def _stated(self, effect: str, values: Values, std: Values) -> NamedEffect:
+        """Return an effect with its gain on flight left out of its fit."""
+        gained, spread = self.fitted.gains[effect]
+        return NamedEffect(
+            name=effect,
+            coefficients=values,
+            std={name: std.get(name, 0.0) for name in values},
+            units={name: coefficient((effect, name)).unit for name in values},
+            tentative=True,
+            indistinguishable_from=(),
+            evidence={"held_out_gain": gained, "held_out_gain_std": spread},
         )
 
     def traces(self) -> Iterator[Trace]:

@@ -4,15 +4,15 @@ The columns are of the filter's predicted state: none holds the noise of the pos
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.signal import bilinear, lfilter
 
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array, ArrayMap, NamedArrays, median_step
 from ..motion.signals import in_body
+from ..motion.smoothing import filtered
 from .causal_filter import FlightState
 from .priors import UNKNOWN
 from .regression import Column, RegressedFlights
@@ -54,6 +54,15 @@ class Product:
 Columns = dict[Column, Array | Product]
 
 
+def along_axis(axis: int, rotation: Array) -> tuple[Array | None, slice]:
+    """Return the last two fields of a product along an axis of the body, three of force and three
+    of torque.
+    """
+    if axis < 3:
+        return rotation[:, :, axis], slice(3)
+    return None, slice(axis, axis + 1)
+
+
 def weight_and_torque(vehicle: Vehicle) -> Array:
     """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
     quarter of the arm.
@@ -85,60 +94,56 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
     rate = whole.angular_velocity
     body = in_body(whole.velocity, rotation)
-    above = position[:, 2] - position[:, 2].min()
-    shapes = []  # group, name, variable, channels
-    every = range(6)
+    # from the sample before: later samples hold the poses' noise
+    change = np.diff(rotors, axis=0, prepend=rotors[:1])
+    size = weight_and_torque(flights.vehicle) / flights.inertias
+    one = np.ones(len(t))
+    torques = range(3, 6)
+    out: Columns = {}
+
+    def add(group: str, name: str, x: Array, channels: Iterable[int] = range(6)) -> None:
+        z = _scaled(x)
+        for i in channels if z.any() else ():
+            column = Product(size[i], z, *along_axis(i, rotation))
+            out["", f"{UNKNOWN}{group}: {name} in {i}"] = column
+
     for i, axis in enumerate("xyz"):
         along = body[:, i]
-        torque = rotors[:, 1 + i]
-        shapes += [
-            ("velocity", f"velocity {axis}", along, every),
-            ("velocity", f"squared velocity {axis}", along * np.abs(along), every),
-            ("rotors", f"angular velocity {axis}", rate[:, i], every),
-            ("rotors", f"torque {axis}", torque, (3, 4, 5)),
-            ("rotors", f"change of torque {axis}", _change(torque), (3 + i,)),
-        ]
-    shapes += [
-        ("rotors", "thrust", rotors[:, 0], every),
-        ("rotors", "change of thrust", _change(rotors[:, 0]), (2, 3, 4, 5)),
-    ]
+        add("velocity", f"velocity {axis}", along)
+        add("velocity", f"squared velocity {axis}", along * np.abs(along))
+        add("rotors", f"angular velocity {axis}", rate[:, i])
+        add("rotors", f"torque {axis}", rotors[:, 1 + i], torques)
+        add("rotors", f"change of torque {axis}", change[:, 1 + i], (3 + i,))
+    add("rotors", "thrust", rotors[:, 0])
+    add("rotors", "change of thrust", change[:, 0], (2, *torques))
     for a, b in ((0, 1), (1, 2), (0, 2)):
         axes = f"{'xyz'[a]} and {'xyz'[b]}"
-        shapes += [
-            ("velocity", f"velocities {axes}", body[:, a] * body[:, b], every),
-            ("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], (3, 4, 5)),
-        ]
+        add("velocity", f"velocities {axes}", body[:, a] * body[:, b])
+        add("rotors", f"angular velocities {axes}", rate[:, a] * rate[:, b], torques)
+    for i, name in enumerate(("x", "y", "height")):
+        add("place", name, position[:, i])
+    for height in HEIGHTS:
+        above = position[:, 2].min() - position[:, 2]
+        add("place", f"height below {height:g} m", np.exp(above / height))
     heading = heading_of(rotation)
-    places = list(zip(("x", "y", "height"), position.T, strict=True))
-    places += [(f"height below {h:g} m", np.exp(-above / h)) for h in HEIGHTS]
-    places += [("heading's sine", np.sin(heading)), ("heading's cosine", np.cos(heading))]
-    places += [(f"tilt {axis}", rotation[:, 2, i]) for i, axis in enumerate("xy")]
-    shapes += [("place", name, x, every) for name, x in places]
+    add("place", "heading's sine", np.sin(heading))
+    add("place", "heading's cosine", np.cos(heading))
+    for i, axis in enumerate("xy"):
+        add("place", f"tilt {axis}", rotation[:, 2, i])
     turn = np.pi * (t - t[0]) / max(t[-1] - t[0], 1e-9)
-    shapes += [("time", f"time {i}", np.cos(i * turn), every) for i in (1, 2, 3)]
+    for i in (1, 2, 3):
+        add("time", f"time {i}", np.cos(i * turn))
     period = median_step(t)
     for hertz, i in itertools.product(MOUNT_HZ, range(3)):
-        z = _resonance(rotors[:, 1 + i], hertz, period, ends)
-        shapes.append(("resonance", f"a part that swings at {hertz:g} Hz", z, (3 + i,)))
-    size = weight_and_torque(flights.vehicle) / flights.inertias
-    out: Columns = {}
-    for group, name, x, channels in shapes:
-        z = _scaled(x)
-        for channel in channels if z.any() else ():
-            if channel < 3:
-                made = Product(size[0], z, rotation[:, :, channel], slice(3))
-            else:
-                made = Product(size[channel], z, None, slice(channel, channel + 1))
-            out["", f"{UNKNOWN}{group}: {name} in {channel}"] = made
-    for channel in every:
-        made = Product(size[channel], np.ones(len(t)), None, slice(channel, channel + 1))
-        out["", f"{UNKNOWN}constant: a constant in {channel}"] = made
+        swing = _resonance(rotors[:, 1 + i], hertz, period, ends)
+        add("resonance", f"a part that swings at {hertz:g} Hz", swing, (3 + i,))
+    for i in range(6):
+        made = Product(size[i], one, None, slice(i, i + 1))
+        out["", f"{UNKNOWN}constant: a constant in {i}"] = made
     for hertz in LOAD_HZ:
-        column = np.zeros((len(t), 6))
-        column[:, :2] = _resonance(whole.acceleration[:, :2], hertz, period, ends)
-        column *= size[0] / max(column[:, :2].std(), 1e-9)
-        name = f"a load that swings at {hertz:g} Hz in 0"
-        out["", f"{UNKNOWN}resonance: {name}"] = column
+        swing = _resonance(whole.acceleration[:, :2], hertz, period, ends)
+        made = Product(size[0] / max(swing.std(), 1e-9), one, swing, slice(2))
+        out["", f"{UNKNOWN}resonance: a load that swings at {hertz:g} Hz in 0"] = made
     return out
 
 
@@ -147,18 +152,16 @@ def heading_of(rotation: Array) -> Array:
     return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
 
 
-def _change(x: Array) -> Array:
-    """Return differences from the sample before: later samples hold the poses' noise."""
-    return np.diff(x, prepend=x[:1])
-
-
 def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
     """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
     # s'' = -a - rate^2 s - 2 damping rate s'; the pull is rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
-    damping = 2.0 * DAMPING_RATIO * rate
-    shape = bilinear([-damping, -(rate**2)], [1.0, damping, rate**2], 1.0 / period)
-    return np.concatenate([lfilter(*shape, x, axis=0) for x in np.split(drive, ends)])
+    back = np.array([0.0, 4.0 * DAMPING_RATIO * rate / period, rate**2])
+    both = np.append(-back, back)
+    both[3] = 4.0 / period**2
+    # the bilinear transform of both
+    section = both @ np.kron(np.eye(2), [[1, -2, 1], [1, 0, -1], [1, 2, 1]])
+    return np.concatenate([filtered(x, section / section[3]) for x in np.split(drive, ends)])
 
 
 def variables(whole: FlightState) -> NamedArrays:

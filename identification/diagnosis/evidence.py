@@ -46,7 +46,7 @@ class Marginal:
         return float(2.0 * self.right[index] @ z - z @ self.normal[np.ix_(index, index)] @ z)
 
 
-def marginal(products: Array, asked: Index, others: Index, size: Array) -> Marginal:
+def marginal(products: Array, asked: Index, others: Index, size: Array | float = 1.0) -> Marginal:
     """Return the log-likelihood with ``others`` integrated out over their standard normal prior.
 
     Args:
@@ -56,6 +56,7 @@ def marginal(products: Array, asked: Index, others: Index, size: Array) -> Margi
         others: columns to integrate out; they may be among the kept ones as well.
         size: (len(others),) standard deviations of their prior.
     """
+    size = np.full(len(others), size)
     kept = np.append(asked, len(products) - 1)
     inner = products[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
     factor = np.linalg.cholesky(inner)
@@ -91,7 +92,7 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
     """
     at = np.array(index, dtype=np.intp)
     mode, std = np.empty((2, len(at)))
-    value = _core.evidence(*(m.normal[np.ix_(at, at)], m.right[at], low[at], high[at]), mode, std)
+    value = _core.evidence(m.normal[at[:, None], at], m.right[at], low[at], high[at], mode, std)
     if math.isnan(value):
         raise np.linalg.LinAlgError("no prior tells columns of the set apart")
     return SetEvidence(m.constant + value, mode, std)
@@ -125,20 +126,21 @@ def tempering(blocks: Array, chosen: Index) -> float:
         chosen: the fitted columns.
     """
     total = blocks.sum(axis=0)
-    mode = np.linalg.solve(total[np.ix_(chosen, chosen)] + np.eye(len(chosen)), total[chosen, -1])
+    normal = total[np.ix_(chosen, chosen)]
+    mode = np.linalg.solve(normal + np.eye(len(chosen)), total[chosen, -1])
     scores = blocks[:, chosen, -1] - blocks[:, chosen[:, None], chosen] @ mode
-    known = np.diagonal(total)[chosen] > 1.0  # columns better known by the flight than by the prior
+    known = np.diagonal(normal) > 1.0  # columns better known by the flight than by the prior
     if not known.any():
         return 1.0
     # the scores as independent ones: in the eigenvectors of their expected products
-    size, axes = np.linalg.eigh(total[np.ix_(chosen, chosen)][np.ix_(known, known)])
+    size, axes = np.linalg.eigh(normal[np.ix_(known, known)])
     keep = size > 1e-6 * size[-1]
     ratio = np.square(scores[:, known] @ axes[:, keep]).sum(axis=0) / size[keep]
     # a fit brings their sum over all blocks to zero: the cost is one block of all
     return 1.0 / max(1.0, float(np.mean(ratio)) * len(blocks) / max(len(blocks) - 1, 1))
 
 
-def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[float]) -> float:
+def evidence_of_one_more(m: Marginal, tried: Index, sizes: Sequence[float]) -> float:
     """Return the logarithm of the Bayes factor of one further column, any of those tried, against
     none.
 
@@ -154,4 +156,4 @@ def evidence_of_one_more(m: Marginal, tried: Sequence[int], sizes: Sequence[floa
     left = m.own[tried]
     gained = 0.5 * square * np.square(m.right[tried]) / (1.0 + square * left)
     factors = gained - 0.5 * np.log1p(square * left)
-    return float(logsumexp(factors)) - math.log(factors.size)
+    return float(logsumexp(factors, b=1.0 / factors.size))

@@ -13,23 +13,29 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from ... import _core
 from ...dynamics.effects import Role, get, playing
-from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
-from ..logs.flight_log import FlightLog
+from ..logs.flight_log import FlightLog, Logs
 from ..logs.table import Array, ArrayPair, Mask
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
-from ..motion.smoothing import continuous, turn_between
+from ..motion.smoothing import continuous, filtered, turn_between
 from .causal_filter import Poses, Track, level, run
-from .discrepancy import Columns, changing_columns, discrepancy_columns, joined, variables
+from .discrepancy import (
+    Columns,
+    Product,
+    along_axis,
+    changing_columns,
+    discrepancy_columns,
+    joined,
+    variables,
+)
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -93,44 +99,33 @@ class Likelihood:
         self.flights = flights
         self.setting = setting
         self.vehicle = flights.amended(setting)
-        self.tracks: list[Track]
-        self.known: list[Array]
-        if near is None or sensing_of(near.vehicle) != sensing_of(self.vehicle):
-            finer = iter(near.finer if near else ())
-            self.pieces: list[Poses] = []
-            self._fit: list[Mask] = []  # (n,) samples open to the fit
-            for i, log in enumerate(flights.logs):
-                rows = flights.log == i
-                if not flights.fit_rows[rows].any():  # a test log
-                    continue
-                for piece in _read_poses(log, self.vehicle, finer):
-                    at = np.searchsorted(flights.t[rows], piece.t).clip(max=int(rows.sum()) - 1)
-                    self.pieces.append(piece)
-                    self._fit.append(flights.fit_rows[rows][at])  # as the rows of its block
-        else:
-            self.pieces = near.pieces
-            self._fit = near._fit
-        self.period = self.pieces[0].period
-        lengths = [len(piece.t) for piece in self.pieces]
-        if near is not None and [len(piece.t) for piece in near.pieces] != lengths:
-            near = None
-        same = near if same_noise else None
-        self.noise: PoseNoise = near.noise if near else self._first_noise()
-        # on the rotors' innovations
-        self.gains: Array = near.gains if near else np.zeros((len(PAIRS), len(JUMP_STATE)))
         # of each piece: the rounding error of its logged rotor speeds (n, 4), which is added back,
         # and the rotors' innovations, by a filter that follows the pose closely
         self.finer: list[Array] = []
-        self.answers: list[Array] = []
         if near:
             self.finer = near.finer
-            self.answers = near.answers
-            self.known = near.known
-            self.tracks = near.tracks
-        else:
+            self.answers: list[Array] = near.answers
+            self.tracks: list[Track] = near.tracks
+            self.pieces: list[Poses] = near.pieces
+            self.noise: PoseNoise = near.noise
+            self.gains: Array = near.gains  # on the rotors' innovations
+        if not near or sensing_of(near.vehicle) != sensing_of(self.vehicle):
+            finer = iter(self.finer)
+            self.pieces = [
+                piece
+                for log in np.unique(flights.log[flights.fit_rows]).tolist()
+                for piece in _read_poses(flights.logs, log, self.vehicle, finer)
+            ]
+        self.period = self.pieces[0].period
+        self._counts = [self._counted(piece) for piece in self.pieces]  # samples in the fit
+        if not near:
+            self.noise = self._first_noise()
+            self.gains = np.zeros((len(PAIRS), len(JUMP_STATE)))
             self._see_rotors()
-        if same:
-            self._run(self.steady, self._said(self._jumps(), self.gains))
+        if near and same_noise:
+            self._run(self.steady, self._jumps(), self.gains)
+            if np.isnan([track.predicted[-1] for track in self.tracks]).any():
+                raise np.linalg.LinAlgError("the filter diverges with these effects")
         else:
             self._search_noise()
         self.signals = [_signals(piece, track) for piece, track in self._seen]
@@ -140,12 +135,12 @@ class Likelihood:
         # effects
         self._acting: Columns = {}
         self._posed: Columns = {}
-        if same:
+        if near and same_noise:
             self._acting, self._posed = (
                 {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
-                for part in (same._acting, same._posed)
+                for part in (near._acting, near._posed)
             )
-        if not self._acting:
+        else:
             self._add_what_any_flight_may_have()
 
     @property
@@ -154,14 +149,14 @@ class Likelihood:
 
     def _see_rotors(self) -> None:
         nothing = [np.zeros((len(piece.t), 6, 3)) for piece in self.pieces]
-        self._run(self.steady, nothing)
+        self._run(self.steady, nothing, self.gains)
         if self._rounding_std:
             self.finer = unrounded(self._seen, self.vehicle.omega_lsb)
             self.pieces = [
                 replace(piece, rotor_speeds=piece.rotor_speeds + x)
                 for piece, x in zip(self.pieces, self.finer, strict=True)
             ]
-            self._run(self.steady, nothing)
+            self._run(self.steady, nothing, self.gains)
         self.answers = rotor_innovations(self._seen)
 
     @property
@@ -169,17 +164,14 @@ class Likelihood:
         """The filter."""
         return steady_filter(self.noise, self.period, self.vehicle.gravity)
 
-    def _run(self, steady: SteadyFilter, known: list[Array]) -> None:
-        self.known = known
+    def _run(self, steady: SteadyFilter, jumps: Iterable[Array], gains: Array) -> None:
+        each = (OWN @ gains).reshape(6, -1, len(STATES)) * self._units
+        # of each piece, the jumps of the states (n, 6, 3) by the rotors' innovations
+        self.known = [(x.swapaxes(0, 1) @ each).swapaxes(0, 1) for x in jumps]
         self.tracks = [
-            run(piece, self.vehicle, steady, x) for piece, x in zip(self.pieces, known, strict=True)
+            run(piece, self.vehicle, steady, x)
+            for piece, x in zip(self.pieces, self.known, strict=True)
         ]
-
-    @staticmethod
-    def _said(jumps: Iterable[Array], gains: Array) -> list[Array]:
-        """Return the jumps of each piece's states (n, 6, 3) by the rotors' innovations."""
-        said = (x * (OWN @ gains) for x in jumps)
-        return [x.reshape(len(x), 6, -1, len(STATES)).sum(axis=2) for x in said]
 
     # Noise
 
@@ -219,31 +211,29 @@ class Likelihood:
         jumps = self._jumps()
 
         def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
-            self._run(steady, self._said(jumps, gains))
-            for i, track in enumerate(self.tracks):
-                none = np.empty((len(track.t), 6, 0))
-                counts = self._counts(i)
+            self._run(steady, jumps, gains)
+            for i, (track, counts) in enumerate(zip(self.tracks, self._counts, strict=True)):
                 if explained is not None:
-                    pose = explained[i][:, 0, :, None]
-                    force = explained[i][:, 1, :, None]
+                    pose, force = explained[i].swapaxes(0, 1)
                     begun = np.zeros((6, 3, 1))
-                    change = self._changes(track, steady, slice(None), begun, force, pose)
-                    track = replace(track, innovations=track.innovations - change[:, :, 0])
+                    rows = self._changes(track, steady, slice(None), begun, [force], [pose])
+                    left = (rows[:, :, 1] - rows[:, :, 0]) @ np.linalg.inv(steady.whitening).T
+                    track = replace(track, innovations=left)
                 if slopes is None:
-                    yield track.innovations[counts], none[counts]
+                    yield track.innovations[counts], track.innovations
                     continue
                 state = np.zeros((6, 3, gains.size + slopes.shape[2]))
                 for at in self._blocks(track):
-                    own = (jumps[i][at, :, None] * OWN[:, :, None]).reshape(-1, 6, gains.size)
-                    changes = self._changes(
-                        track, steady, at, state, none[at], none[at], own, slopes
-                    )
-                    yield track.innovations[at][counts[at]], changes[counts[at]]
+                    each = jumps[i][at, :, None, :, None] * self._units
+                    own = (each * OWN[:, :, None, None]).reshape(-1, 6, gains.size)
+                    rows = self._changes(track, steady, at, state, (), (), own, slopes)
+                    if counts[at].any():
+                        yield track.innovations[at][counts[at]], rows[counts[at]]
 
         held = np.array(PRIORS.gains)[JUMP_STATE]
         search = NoiseSearch(see, held, self.period, self.vehicle.gravity)
         self.noise, self.gains = search.likeliest(self.noise, self.gains)
-        self._run(self.steady, self._said(jumps, self.gains))
+        self._run(self.steady, jumps, self.gains)
 
     def _blocks(self, track: Track) -> Iterator[slice]:
         """Return the parts of a piece. One part's columns are in memory at a time."""
@@ -251,9 +241,11 @@ class Likelihood:
         n = len(track.t)
         return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
 
-    def _counts(self, piece: int) -> Mask:
-        """Return the samples of a piece in the fit."""
-        out = self._fit[piece].copy()
+    def _counted(self, piece: Poses) -> Mask:
+        """Return the samples of a piece in the fit, like the rows of their block."""
+        rows = np.flatnonzero(self.flights.log == piece.log)
+        at = np.searchsorted(self.flights.t[rows], piece.t).clip(max=len(rows) - 1)
+        out: Mask = self.flights.fit_rows[rows[at]]
         out[: round(SETTLING_TIME / self.period)] = False
         return out
 
@@ -261,23 +253,24 @@ class Likelihood:
         """Return the disturbance of each channel. The rotors show a part: a flight loop on a gyro
         answers most of a gust's torque before the pose shows any.
         """
-        out = []
-        own = (self.flights.inertias, self.noise.disturbance, self.noise.time)
-        for axis, (inertia, std, time) in enumerate(np.transpose(own).tolist()):
-            keep = math.exp(-self.period / time)
-            shown = [lfilter([1.0], [1.0, -keep], known[:, axis, 2]) for known in self.known]
-            size = inertia * std
-            said = inertia * float(np.concatenate(shown).std())
-            out.append(Disturbance(CHANNELS[axis], math.hypot(size, said), time, size))
-        return tuple(out)
+        keep = self.steady.keep.tolist()
+        shown = [
+            np.concatenate([filtered(x[:, i, 2], (1, 0, 0, 1, -keep[i], 0)) for x in self.known])
+            for i in range(6)
+        ]
+        size = self.flights.inertias * self.noise.disturbance
+        whole = np.hypot(size, self.flights.inertias * np.std(shown, axis=1))
+        each = np.transpose([whole, self.noise.time, size]).tolist()
+        return tuple(Disturbance(c, *x) for c, x in zip(CHANNELS, each, strict=True))
 
     # Columns
 
     def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> Array:
         """Return the accelerations (n, 6) of a setting along the pieces' signals."""
         wrench = np.concatenate([self.flights.acting(s, setting) for s in signals])
-        turning = np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T
-        return np.column_stack([wrench[:, :3] / self.flights.vehicle.mass, turning])
+        wrench[:, :3] /= self.flights.vehicle.mass
+        wrench[:, 3:] = wrench[:, 3:] @ np.linalg.inv(self.flights.vehicle.inertia).T
+        return wrench
 
     def _change(self, setting: Setting) -> Array:
         """Return the change of the acceleration (n, 6) with another setting."""
@@ -304,7 +297,7 @@ class Likelihood:
             change = self._change(there) / delta
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
-            self._acting[column] = change
+            self._acting[column] = _without_zeros(change)
 
     def _moved(self, column: Column) -> Array:
         """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
@@ -340,7 +333,7 @@ class Likelihood:
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
-                acting[c] = self._change({**self.setting, c[0]: dict(start)})
+                acting[c] = _without_zeros(self._change({**self.setting, c[0]: dict(start)}))
         for effect in library:
             for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
@@ -367,9 +360,8 @@ class Likelihood:
         bent = []  # away from the straight line, by the second difference
         for s in self.signals:
             # the speeds are of k + 1/2: nothing later than sample k + 1
-            u = s.rotor_speeds.copy()
-            u[2:] += np.diff(s.rotor_speeds, 2, axis=0)
-            bent.append(replace(s, rotor_speeds=u))
+            u = np.pad(np.diff(s.rotor_speeds, 2, axis=0), ((2, 0), (0, 0)))
+            bent.append(replace(s, rotor_speeds=s.rotor_speeds + u))
         self._acting["", BETWEEN] = self._accelerations(self.setting, bent) - self._base
         self._add_model_errors()
         self._add_answers()
@@ -440,14 +432,14 @@ class Likelihood:
         share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
         for i, axis in enumerate("xyz"):
-            force, torque, hidden = np.zeros((3, len(whole.t), 6))
-            force[:, :3] = whole.rotors[:, :1] * whole.rotation[:, :, i]
-            torque[:, 3 + i] = whole.rotors[:, 1 + i]
-            hidden[:, 3 + i] = scale[i] * expected[:, i]
-            errors = {"force": force, "torque": torque, "expected torque": hidden}
-            self._acting |= {
-                ("", f"{MODEL_ERROR} of {name} {axis}"): x for name, x in errors.items()
+            own = along_axis(3 + i, whole.rotation)
+            errors = {
+                "force": Product(1.0, whole.rotors[:, 0], *along_axis(i, whole.rotation)),
+                "torque": Product(1.0, whole.rotors[:, 1 + i], *own),
+                "expected torque": Product(scale[i], expected[:, i], *own),
             }
+            for name, x in errors.items():
+                self._acting["", f"{MODEL_ERROR} of {name} {axis}"] = x
 
     def _add_answers(self) -> None:
         """Add the columns of a flight loop's answers to disturbances: along thrust and torques,
@@ -471,36 +463,36 @@ class Likelihood:
         disturbed = np.array([gust.rms for gust in self.gusts()]) / self.flights.inertias
         for axis, rotors, own in zip(DRIVEN, whole.rotors.T, states, strict=True):
             size = max(rotors.std(), 1e-9)
-            answer = PRIORS.answer * min((disturbed[axis] / size) ** 2, 1.0) * size
+            answer = min((disturbed[axis] / size) ** 2, 1.0) * size
             change = np.diff(rotors, prepend=rotors[:1])
+            along = along_axis(axis, whole.rotation)
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
-                column = np.zeros((len(x), 6))
-                along = answer * x / max(x.std(), 1e-9)
-                if axis == DRIVEN[0]:
-                    column[:, :3] = along[:, None] * whole.rotation[:, :, 2]
-                else:
-                    column[:, axis] = along
+                column = Product(answer / max(x.std(), 1e-9), x, *along)
                 self._acting["", f"answer {i} of axis {axis}"] = column
 
     def _jumps(self) -> list[Array]:
-        """Return the jumps of the states (n, 6, e) of each piece for a unit of each gain of a pair
-        of axes.
+        """Return the accelerations (n, 6, 3) of each piece for a unit of the gains of a pair of
+        axes on thrust, on torque and on the turn; ``_units`` makes jumps of the states.
 
         Thrust and torques inform about the axes they drive. A loop that rolls or pitches the
         vehicle has seen its position and the force aside.
         """
         out = []
         tilt = SIDEWAYS * self.flights.vehicle.gravity
-        units = np.array([self.period**2, self.period, 1.0])  # states after a period, of one m/s2
         for answer, track in zip(self.answers, self.tracks, strict=True):
             # the innovation of sample k changes the state after k: the jump is before sample k + 1
-            answer = np.vstack([np.zeros(4), answer[:-1]])
-            x = np.zeros((len(answer), 6, len(JUMP_STATE) // len(STATES)))
+            answer = np.pad(answer[:-1], ((1, 0), (0, 0)))
+            x = np.zeros((len(answer), 6, 3))
             x[:, :3, 0] = answer[:, :1] * track.rotation[:, :, 2]
             x[:, 3:, 1] = level(track.heading, answer[:, 1:])
-            x[:, 0, 2], x[:, 1, 2] = tilt * x[:, 4, 1], tilt * x[:, 3, 1]
-            out.append((x[..., None] * units).reshape(len(x), 6, -1))
+            x[:, :2, 2] = tilt * x[:, 4:2:-1, 1]
+            out.append(x)
         return out
+
+    @property
+    def _units(self) -> Array:
+        """The states (3,) after a period of one m/s2 or rad/s2."""
+        return np.array([self.period**2, self.period, 1.0])
 
     def _products(self, starts: Starts) -> Base:
         moved = self._posed
@@ -509,38 +501,36 @@ class Likelihood:
         # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
         names = (*asked, *drives)
-        root = np.linalg.cholesky(steady.covariance)
-        inverse = np.linalg.inv(root)
-        samples = 0
         first = 0
         still = np.zeros_like(self._base)
         most = sum(len([*self._blocks(track)]) for track in self.tracks)
         products = np.empty((most, len(names) + 1, len(names) + 1))
-        count = 0
-        for i, (track, jumps) in enumerate(zip(self.tracks, self._jumps(), strict=True)):
+        flown: list[int] = []
+        for piece, track, jumps, counts in zip(
+            self.pieces, self.tracks, self._jumps(), self._counts, strict=True
+        ):
             state = np.zeros((6, 3, len(names)))
-            counts = self._counts(i)
             for at in self._blocks(track):
                 rows = at.stop - at.start
                 here = slice(first + at.start, first + at.stop)
-                x = np.stack([self._acting.get(c, still)[here] for c in asked], axis=2)
-                y = np.stack([column[here] for column in moved.values()], axis=2)
-                driven = np.zeros((rows, 6, len(DRIVEN), len(STATES)))
-                driven[:, :3, 0] = jumps[at, :3, : len(STATES)]
-                for j in range(1, len(DRIVEN)):
-                    driven[:, 2 + j, j] = jumps[at, 2 + j, len(STATES) : 2 * len(STATES)]
-                out = np.empty((rows, 6, len(names) + 1))
-                changes = self._changes(track, steady, at, state, x, y, driven.reshape(rows, 6, -1))
-                out[:, :, :-1] = changes
-                out[:, :, -1] = track.innovations[at]
-                kept = (inverse @ out[counts[at]]).reshape(-1, out.shape[2])
-                samples += int(counts[at].sum())
+                x = [self._acting.get(c, still)[here] for c in asked]
+                y = [column[here] for column in moved.values()]
+                driven = np.zeros((rows, 6, len(DRIVEN)))
+                driven[:, :3, 0] = jumps[at, :3, 0]
+                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1]
+                own = (driven[..., None] * self._units).reshape(rows, 6, -1)
+                out = self._changes(track, steady, at, state, x, y, own)
+                kept = out[counts[at]].reshape(-1, out.shape[2])
                 if len(kept):
-                    np.matmul(kept.T, kept, out=products[count])
-                    count += 1
+                    np.matmul(kept.T, kept, out=products[len(flown)])
+                    flown.append(piece.log)
             first += len(track.position)
-        penalty = 2.0 * samples * float(np.log(np.diagonal(root)).sum())
-        return in_prior_units(self.flights, names, products[:count], penalty, self.setting, starts)
+        samples = np.concatenate(self._counts).sum()
+        penalty = float(samples * np.linalg.slogdet(steady.covariance)[1])
+        blocks = products[: len(flown)]
+        return in_prior_units(
+            self.flights, names, blocks, np.array(flown), penalty, self.setting, starts
+        )
 
     def _changes(
         self,
@@ -548,39 +538,41 @@ class Likelihood:
         steady: SteadyFilter,
         at: slice,
         state: Array,
-        acting: Array,
-        moved: Array,
+        acting: Sequence[Array] = (),
+        moved: Sequence[Array] = (),
         jumps: Array | None = None,
         slopes: Array | None = None,
     ) -> Array:
-        """Return the change of the predictions (n, 6, c) of a part of a piece with each column.
+        """Return the change of the predictions of a part of a piece with each of c columns, and the
+        innovations, whitened (n, 6, c + 1).
 
         Args:
             track: the piece.
             steady: the filter.
             at: the part.
             state: (6, 3, c) carried from one part to the next.
-            acting: (n, 6, a) acceleration of the model by a unit of the first ``a`` columns.
-            moved: (n, 6, b) shift of the measured pose by a unit of the last ``b`` of these.
+            acting: acceleration of the model (n, 6) by a unit of each of the first columns.
+            moved: shift of the measured pose (n, 6) by a unit of the last of these.
             jumps: (n, 6, e) jump of one state of each axis, of the states in turn, by a unit of
                 the next columns, before the pose of a sample is read; default: none.
             slopes: (6, 7, m) change of the gains of each axis, in the order of
                 ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns; default:
                 none.
         """
-        jumps = np.empty((len(acting), 6, 0)) if jumps is None else jumps
+        rate = track.angular_velocity[at]
+        jumps = np.empty((len(rate), 6, 0)) if jumps is None else jumps
         slopes = np.empty((6, 7, 0)) if slopes is None else slopes
         disturbance = track.disturbance[at].copy()
         disturbance[:, 3:] = level(track.heading[at], disturbance[:, 3:])
-        out = np.empty((len(acting), 6, state.shape[2]))
+        out = np.empty((len(rate), 6, state.shape[2] + 1))
         _core.sensitivities(
             self.period,
             steady.gain,
             steady.keep,
             track.heading[at],
             track.rotors[at, :1, None] * track.rotation[at, :, 1::-1] * [-1.0, 1.0],
-            track.angular_velocity[at],
-            gyration(self.vehicle, track.angular_velocity[at]),
+            rate,
+            _gyration(self.vehicle, rate),
             acting,
             moved,
             jumps,
@@ -588,21 +580,29 @@ class Likelihood:
             slopes,
             track.innovations[at],
             disturbance,
+            steady.whitening,
             state,
             out,
         )
-        raise_errors()
         return out
 
 
-def gyration(vehicle: Vehicle, rate: Array) -> Array:
+def _without_zeros(column: Array) -> Array | Product:
+    """Return a column (n, 6); without the torque's zeros, half of the memory, if a force alone."""
+    if column[:, 3:].any():
+        return column
+    return Product(1.0, np.broadcast_to(1.0, len(column)), column[:, :3].copy(), slice(3))
+
+
+def _gyration(vehicle: Vehicle, rate: Array) -> Array:
     """Return the derivative of the angular acceleration (n, 3, 3) by the angular velocity."""
     # -u x J v over the inertia J, of all pairs of axes u and v
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)
-    return np.asarray(np.einsum("nk,kji->nij", rate, twist + twist.swapaxes(0, 1)))
+    both: Array = (twist + twist.swapaxes(0, 1)).swapaxes(1, 2)
+    return (rate @ both.reshape(3, 9)).reshape(-1, 3, 3)
 
 
-def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
+def _read_poses(logs: Logs, at: int, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
     """Return the unbroken pieces of a log as measured, with the vehicle's sensing effects undone;
     ``finer`` is added to the rotor speeds (n, 4) of each.
 
@@ -611,7 +611,7 @@ def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> lis
     late = [e for e in sensing_of(vehicle) if is_delay(e.name)]
     offset = sum(sum(e.coefficients.values()) for e in late)
     undone = undo_log_sensing(
-        log, replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in late))
+        logs[at], replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in late))
     )
     out = []
     for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
@@ -622,12 +622,13 @@ def _read_poses(log: FlightLog, vehicle: Vehicle, finer: Iterator[Array]) -> lis
             Poses(
                 raw.t,
                 raw.period,
-                np.ascontiguousarray(raw.position),
+                raw.position,
                 continuous(q),
                 raw.rotor_speeds,
                 np.zeros(len(raw.t)) if raw.voltage is None else raw.voltage,
                 smooth.velocity[0],
                 smooth.angular_velocity[0],
+                at,
             )
         )
     return out

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Role, get, playing
@@ -81,14 +80,15 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
     To first order: behind a lag of ``tau -+ asymmetry``, rotor speeds follow ``u + asymmetry
     |dW/dt|`` with the lag ``tau``, where W follows u.
     """
-    lags = [
+    lags = (
         e.coefficients.get(get(e.name).coefficients[0].name, 0.0)
         for e in vehicle.effects
         if get(e.name).role == Role.LAG
-    ]
-    if asymmetry == 0.0 or not any(lags):
+    )
+    lag = max(lags, default=0.0)
+    if asymmetry == 0.0 or lag == 0.0:
         return signals
-    followed = lagged(signals.rotor_speeds, max(lags), signals.period)
+    followed = lagged(signals.rotor_speeds, lag, signals.period)
     rate = np.abs(np.diff(followed, axis=0, prepend=followed[:1])) / signals.period
     return replace(signals, rotor_speeds=signals.rotor_speeds + asymmetry * rate)
 
@@ -100,6 +100,8 @@ def with_time_offsets(signals: Signals, offsets: Values) -> Signals:
         speeds = resampled(n - rotors / signals.period, n, signals.rotor_speeds)
         signals = replace(signals, rotor_speeds=speeds)
     if spread := offsets.get(ROTOR_SPREAD[1]):
+        from scipy.ndimage import gaussian_filter1d  # needed without a pose alone
+
         over = np.sqrt(spread) / signals.period
         smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")
         signals = replace(signals, rotor_speeds=smooth)

@@ -35,8 +35,8 @@ class NoiseSearch:
     Attributes:
         see: returns the innovations (n, 6) of a flight's parts through a filter with gains (3, e)
             of each pair. With slopes (6, 7, m) of the filter's gains and ``keep`` by a noise, also
-            the changes (n, 6, 3 e + m) of the predictions, behind the changes by the gains of each
-            pair in turn.
+            the whitened changes (n, 6, 3 e + m + 1) of the predictions, behind the changes by the
+            gains of each pair in turn; the innovations last.
         held: (e,) standard deviations of the gains' prior. Without it nearly predicted rotor speeds
             would have unlimited gains.
         period: s.
@@ -96,17 +96,17 @@ class NoiseSearch:
         square += np.square(self._gains(at) / self.held).sum()
         return float(0.5 * (square + n * np.linalg.slogdet(covariance)[1]))
 
+    @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
     def _slopes(self, at: Array) -> tuple[float, Array, Array]:
         """Return the height, Fisher's information (c, c), and minus the height's gradient (c,)."""
         steady = self._filter(at)
         slopes, change = self._filter_slopes(at, steady)
         size = len(at)
         n = 0
-        whiten = np.linalg.inv(np.linalg.cholesky(steady.covariance))
         whole = np.zeros((size + 1, size + 1))
         own = np.zeros((6, 6))
         for e, changes in self.see(steady, self._gains(at), slopes):
-            rows = (whiten @ np.dstack([changes, e])).reshape(-1, size + 1)
+            rows = changes.reshape(-1, size + 1)
             whole += rows.T @ rows
             own += e.T @ e
             n += len(e)
@@ -133,7 +133,7 @@ class NoiseSearch:
         gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
         slopes = np.concatenate([gain, (there.keep - here.keep)[..., None]], axis=2) / STEP
         change = (there.covariance - here.covariance) / STEP
-        return np.ascontiguousarray(np.moveaxis(slopes, 0, -1)), change
+        return np.moveaxis(slopes, 0, -1), change
 
 
 def _free(noise: PoseNoise) -> Array:

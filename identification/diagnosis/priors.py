@@ -36,7 +36,7 @@ MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown 
 
 
 @dataclass(frozen=True)
-class PriorSettings:
+class _PriorSettings:
     """Beliefs before a flight is seen."""
 
     expected: float = 1.0  # number of effects missing in a model
@@ -50,8 +50,6 @@ class PriorSettings:
     # error of any model as a share of an axis' force or torque: of thrust along its axis and across
     # it, and of the torques. Propellers and bearings are not stable to less
     model_error: float = 0.003
-    # of a thrust or torque which answers disturbances alone: share along each signal of the loop
-    answer: float = 1.0
     # standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
     # units of one period of such an acceleration. They leave the gains free: a loop that shows the
     # tilt it sees has gains of some 3,000, 100 and 1
@@ -61,7 +59,7 @@ class PriorSettings:
     between_samples: float = 0.5
 
 
-PRIORS = PriorSettings()
+PRIORS = _PriorSettings()
 # columns of one variant of an effect: all coefficients, or one of its starting points
 Variant = tuple[Column, ...]
 Variants = tuple[Variant, ...]  # of a set, one of each effect
@@ -77,6 +75,7 @@ class Base:
     high: Array
     total: Array  # (c + 1, c + 1) sums of products, true to rounding
     blocks: Array  # (blocks, k + 1, k + 1), the same of each block, of the columns ``single``
+    flight: Index  # (blocks,) index of the log
     single: Index  # (k,) columns without the dictionary, nine tenths of all
     penalty: float
     effects: Effects  # of the setting
@@ -85,7 +84,7 @@ class Base:
     dictionary: Sequence[Column]  # columns of the discrepancy
     starts: Starts
     # the evidence of sets, by the likelihood's power and their columns; None for an impossible set
-    tried: dict[tuple[float, Variants], SetEvidence | None] = field(default_factory=dict)
+    tried: dict[float, dict[Variants, SetEvidence | None]] = field(default_factory=dict)
 
     @cached_property
     def columns(self) -> dict[Column, int]:
@@ -106,7 +105,7 @@ class Base:
         asked: Sequence[Column],
         others: Index,
         power: float = 1.0,
-        size: Array | None = None,
+        size: Array | float = 1.0,
     ) -> "_Asked":
         """Return the likelihood, to a power, of the columns asked about, with others integrated
         out; ``size``: standard deviations of their prior, if not their own.
@@ -114,7 +113,6 @@ class Base:
         products = power * self.total
         products[-1, -1] += power * self.penalty
         at = self.at(asked)
-        size = np.ones(len(others)) if size is None else size
         return _Asked(self, asked, at, marginal(products, at, others, size))
 
     def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, Pair]:
@@ -127,6 +125,44 @@ class Base:
         std = np.sqrt(np.diag(np.linalg.inv(normal))) * self.size[chosen]
         modes = zip(chosen, mode.tolist(), std.tolist(), strict=True)
         return {self.names[i]: (x, s) for i, x, s in modes}
+
+    def scatter(self, columns: Iterable[Column], mode: Array, power: float) -> Array:
+        """Return the deviations of coefficients (c,) by their scatter over blocks and over flights,
+        in those of the likelihood; at least one.
+
+        The likelihood takes all samples as independent, but an error of the model lasts for
+        seconds, and differs from flight to flight. The covariance of the sums over blocks, or over
+        flights, is true for any such error (K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986),
+        13-22). Few sums estimate a small variance badly, so the largest of the three counts (J. D.
+        Angrist and J.-S. Pischke, Mostly Harmless Econometrics, 2009, section 8.2).
+
+        Args:
+            columns: the columns of a set.
+            mode: (c,) their coefficients. One at its bound keeps its deviation.
+            power: of the likelihood.
+        """
+        own = self.at(columns)
+        inside = (mode > self.low[own]) & (mode < self.high[own])
+        free = np.append(self.plain, own[inside])
+        there = np.zeros(len(self.total))
+        there[own] = -mode
+        there[free] = 0.0
+        there[-1] = 1.0
+        inverse = np.linalg.inv(power * self.total[np.ix_(free, free)] + np.eye(len(free)))
+        there[free] = -power * inverse @ (self.total[free] @ there)
+        kept = np.append(self.single, len(self.names))
+        each = power * self.blocks[:, np.searchsorted(self.single, free)] @ there[kept] @ inverse
+        stated = np.diagonal(inverse)
+        largest = stated.copy()
+        by_prior = np.square(inverse).sum(axis=0)
+        by_flight = [each[self.flight == i].sum(axis=0) for i in np.unique(self.flight)]
+        for sums in (each, by_flight):
+            if (count := len(sums)) > 1:
+                spread = np.square(sums).sum(axis=0) * count / (count - 1)
+                largest = np.maximum(largest, spread + by_prior)
+        out = np.ones(len(own))
+        out[inside] = np.sqrt(largest / stated)[len(self.plain) :]
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,14 +248,30 @@ def declared(column: Column, flights: RegressedFlights) -> float:
     """Return a column's coefficient by the vehicle's file, the zero of the likelihood's
     coefficient; 0 if not stated.
     """
-    effect, name = bare(column)
-    return flights.coefficients({}, effect).get(name, 0.0)
+    return flights.value({}, bare(column))
+
+
+def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting: Setting) -> Array:
+    """Return the coefficients (c,) of a setting, in standard deviations of their priors."""
+    return np.array(
+        [
+            (flights.value(setting, c) - declared(c, flights)) / prior_size(c, flights)
+            for c in columns
+        ]
+    )
+
+
+def changed(column: Column, change: float, flights: RegressedFlights) -> float:
+    """Return a column's coefficient by the vehicle's file, changed as far as its limits allow."""
+    limits = coefficient(bare(column))
+    return min(max(declared(column, flights) + change, limits.minimum), limits.maximum)
 
 
 def in_prior_units(
     flights: RegressedFlights,
     names: Sequence[Column],
     blocks: Array,
+    flight: Index,
     penalty: float,
     setting: Setting,
     starts: Starts,
@@ -232,6 +284,7 @@ def in_prior_units(
         names: (c,) columns.
         blocks: (blocks, c + 1, c + 1) sums of products, of columns and of the residual at the
             setting (last), whitened. They are changed in place: ten minutes take 0.2 GB.
+        flight: (blocks,) index of the log of each block.
         penalty: twice the sum over samples of the logarithm of the standard deviations.
         setting: the setting of effects.
         starts: columns of whole effects.
@@ -239,8 +292,7 @@ def in_prior_units(
     size = np.array([prior_size(c, flights) for c in names])
     # about zero: the residual without all effects of the setting
     own = [*map(bare, names)]
-    here = [flights.coefficients(setting, e).get(n, 0.0) for e, n in own]
-    back = np.append(np.subtract(here, [declared(c, flights) for c in own]), 1.0)
+    back = np.append([flights.value(setting, c) - declared(c, flights) for c in own], 1.0)
     whole = blocks @ back
     blocks[:, :, -1] = blocks[:, -1, :] = whole
     blocks[:, -1, -1] = whole @ back
@@ -250,9 +302,7 @@ def in_prior_units(
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
     typical = np.array([typical_size(c, flights.vehicle) for c in own])
     total = blocks.sum(axis=0)
-    free = np.array([not effect for effect, _ in names], dtype=np.bool_)
-    unknown = np.array([name.startswith(UNKNOWN) for _, name in names], dtype=np.bool_)
-    single = np.flatnonzero(~unknown)
+    single = np.flatnonzero([not name.startswith(UNKNOWN) for _, name in names])
     held = np.append(single, len(names))
     return Base(
         names,
@@ -261,10 +311,11 @@ def in_prior_units(
         high,
         total + np.diag(1e-12 * np.diagonal(total)),
         blocks[:, held[:, None], held],
+        flight,
         single,
         penalty,
         frozenset(k for k in setting if k),
-        np.flatnonzero(free & ~unknown),
+        single[[not names[i][0] for i in single.tolist()]],
         typical / size,
         [c for c in names if c[1].startswith(UNKNOWN)],
         starts,

@@ -54,7 +54,9 @@ class _FittedPosterior:
 
     posterior: Posterior
     ranking: Ranking
-    setting: Setting  # coefficients of the likeliest set
+    setting: Setting  # coefficients of the likeliest set's needed effects
+    std: Setting  # their standard deviations
+    gains: Mapping[str, Pair]  # as of ``Posterior.leave_out_needless``
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
     # biases and time offsets of the sensors, with their standard deviations
@@ -84,7 +86,11 @@ def rank(
         tried[frozenset(setting)] = setting
         # a slow disturbance does much of what a steady effect does: each is fitted beside the other
         for _ in range(ROUNDS):
-            near = Likelihood(flights, setting, near)
+            try:
+                near = Likelihood(flights, setting, near)
+            except np.linalg.LinAlgError:  # the filter diverges: halfway to the declared vehicle
+                setting = {e: {n: 0.5 * x for n, x in own.items()} for e, own in setting.items()}
+                continue
             begun = setting
             setting = mode(begun, partial(height, near=near))
             moved = (
@@ -101,8 +107,8 @@ def rank(
         return starts, Posterior(flights, library, (loud, best.base(library, starts)))
 
     def alone(best: Likelihood) -> float:
-        base = best.base(best.setting, {})
-        scores = Posterior(flights, [*best.setting], (base, base)).scores
+        bases = [best.base(best.setting, {})] * 2
+        scores = Posterior(flights, [*best.setting], bases).scores
         return scores.get(frozenset(best.setting), -math.inf)
 
     def first() -> tuple[Likelihood, Starts, Base]:
@@ -123,10 +129,9 @@ def rank(
         score = alone(best)
         starts, posterior = around(best)
         # a similar effect counts as a disturbance beside it: each is judged beside its own noise
-        rivals = [fitted(x, best) for x in posterior.rivals(setting)]
-        scores = [score, *map(alone, rivals)]
-        if max(scores) > score:
-            best = [best, *rivals][scores.index(max(scores))]
+        rivals = {alone(x): x for x in (fitted(y, best) for y in posterior.rivals(setting))}
+        if max(rivals, default=score) > score:
+            best = rivals[max(rivals)]
             starts, posterior = around(best)
         del rivals  # each holds a tenth of a diagnosis' memory
     for _ in range(ROUNDS):
@@ -148,8 +153,11 @@ def rank(
     by_chance = 2.0 * math.log(len(whole.dictionary))
     quieter = best.quieter({column: size}, starts) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
+    gains = posterior.leave_out_needless(ranking.probability)
     late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
-    return _FittedPosterior(posterior, ranking, posterior.best_setting(), best.gusts(), late)
+    return _FittedPosterior(
+        posterior, ranking, *posterior.likeliest_setting(), gains, best.gusts(), late
+    )
 
 
 def rank_by_rows(
@@ -206,9 +214,8 @@ def rank_by_rows(
         if not flights.is_nonlinear(effect) or effect in given:
             continue
         report(f"trying {effect}")
-        own = [{**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect]
-        own.sort(key=likelihood.objective)
-        if own:
+        each = ({**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect)
+        if own := sorted(each, key=likelihood.objective):
             near = map(likelihood.fitted, own[:MOST_STARTS])
             add(min(near, key=likelihood.objective))
 
@@ -220,7 +227,7 @@ def rank_by_rows(
         the sets with one effect less are fitted as well.
         """
         while True:
-            setting = posterior().best_setting(len(library))
+            setting = posterior().best_setting()
             new = [setting]
             if (key := frozenset(setting)) in bases:
                 best = fitted[key]
@@ -238,12 +245,18 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
+    ranking = last.ranking()
+    gains = last.leave_out_needless(ranking.probability)
+    setting, std = last.likeliest_setting()
+    setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
     return _FittedPosterior(
         last,
-        last.ranking(),
-        best,
-        sensors=likelihood.sensors(best),
-        behind=_behind(likelihood, best),
+        ranking,
+        setting,
+        std,
+        gains,
+        sensors=likelihood.sensors(setting),
+        behind=_behind(likelihood, setting),
     )
 
 
@@ -264,8 +277,7 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
-    behind = {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
-    return {e: others for e, others in behind.items() if others}
+    return {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
 
 
 def starts_of(

@@ -14,14 +14,13 @@ from functools import cached_property, lru_cache
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.effects import Need, Role, get, names, needing, playing
 from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
+from ...runtime.arrays import Index
 from ...runtime.errors import InputError
-from ..logs.excerpt import excerpt
-from ..logs.flight_log import FlightLog, Logs
+from ..logs.flight_log import FlightLog, Logs, excerpt
 from ..logs.table import Array, ArrayPair, Mask, Pair, Rows, Values, finite_rows, median_step
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
@@ -51,7 +50,6 @@ from .log_offsets import (
     with_uneven_lag,
 )
 
-Index = NDArray[np.int64]
 K = TypeVar("K")
 V = TypeVar("V")
 
@@ -141,10 +139,10 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)
-    large, small = (abs(x) for x in c.typical)
-    if large == 0 or small == 0:
+    if not all(c.typical):
         same_unit = (o for o in get(column[0]).coefficients if o.unit == c.unit)
-        return max((abs(o.typical[0]) for o in same_unit if o.typical[0]), default=1.0)
+        return max(abs(o.typical[0]) for o in same_unit) or 1.0
+    large, small = np.abs(c.typical)
     share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
     return float(small * (large / small) ** share)
 
@@ -201,7 +199,8 @@ class RegressedFlights:
         self.has_raw_poses = not (self.commanded or self.inertial or self.filtered) and np.allclose(
             [log.period for log in self.logs], self.logs[0].period, rtol=0.01
         )
-        self.logs = tuple(excerpt(self.logs))
+        seconds = sum(log.t[-1] - log.t[0] for log in self.logs)
+        self.logs = tuple(excerpt(log, seconds) for log in self.logs)
         self._fit_logs = len(logs)
         self._drift: np.random.Generator | None = None  # of a copy with other errors of the fusion
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
@@ -212,8 +211,7 @@ class RegressedFlights:
         self.biases = self._biases()
         self.offsets = self._timings() | self.biases
         # in a log read by its IMU: effects without any trace, and effects a pose would show
-        self.without_trace: Effects = frozenset()
-        self.needs_pose: Effects = frozenset()
+        self.without_trace = self.needs_pose = Effects()
         # the noise is added to the logs once more; the change is the effect of noise
         noisy = self._noisier()
         self.visible_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
@@ -374,7 +372,7 @@ class RegressedFlights:
     @property
     def inertias(self) -> Array:
         """Mass (kg), three times, and moments of inertia (kg m2), (6,)."""
-        return np.array([self.vehicle.mass] * 3 + np.diagonal(self.vehicle.inertia).tolist())
+        return np.append([self.vehicle.mass] * 3, np.diagonal(self.vehicle.inertia))
 
     @property
     def rotor_speeds_vary(self) -> bool:
@@ -460,6 +458,10 @@ class RegressedFlights:
         """Return an effect's coefficients at a setting; outside the setting, the vehicle's own."""
         return setting[effect] if effect in setting else self._declared.get(effect, {})
 
+    def value(self, setting: Setting, column: Column) -> float:
+        """Return one of these coefficients; 0 if nothing states it."""
+        return self.coefficients(setting, column[0]).get(column[1], 0.0)
+
     def stated(self, effect: str) -> Values:
         """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
         the file states some. All may have changed where it states all.
@@ -534,11 +536,11 @@ class RegressedFlights:
         """Return a coefficient's value at a setting, and the step of a derivative from there: so
         many typical sizes, within the coefficient's limits.
         """
-        value = self.coefficients(setting, column[0]).get(column[1], 0.0)
+        value = self.value(setting, column)
         delta = size * typical_size(column, self.vehicle)
         if column[0]:
             c = coefficient(column)
-            delta = -delta if c.typical[0] < 0.0 else delta
+            delta = math.copysign(delta, c.typical[0])
             delta = delta if c.minimum <= value + delta <= c.maximum else -delta
         return value, delta
 
@@ -593,13 +595,12 @@ def _accelerometer(log: FlightLog) -> ArrayPair | None:
         return None
     read = finite_rows(log.accelerometer)
     times = log.t[read]
-    values = log.accelerometer[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
     if not len(times) or np.diff(ends).max() >= LONGEST_GAP:
         return None
     period = median_step(times)
     even = np.arange(times[0], times[-1], period)
-    return even, low_pass(resampled(even, times, values), CUTOFFS.pose_hz, period)
+    return even, low_pass(resampled(even, times, log.accelerometer[read]), CUTOFFS.pose_hz, period)
 
 
 def _smooth(x: Array, signals: Signals) -> Array:

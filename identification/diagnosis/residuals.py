@@ -1,6 +1,5 @@
 """The residual of flights before and after effects are named: its noise, and its transients."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,7 +8,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Disturbance, TransientDisturbance
 from ..logs.table import Array, Pair
-from ..motion.smoothing import CUTOFFS
+from ..motion.smoothing import CUTOFFS, mean_square
 from .discrepancy import weight_and_torque
 from .regression import RegressedFlights, Setting
 
@@ -35,14 +34,7 @@ class _Balance:
     error_before: Pair  # RMS on held-out rows, N and Nm
     error_after: Pair
     noisy: bool  # whether the error is above the sensors' noise
-    # growth of the mean square of force and torque on held-out blocks, as a share, with its
-    # standard error over the blocks
-    growth: Pair
-
-    @property
-    def better(self) -> bool:
-        """Whether the amended vehicle's held-out error is smaller."""
-        return self.growth[0] < 0.0
+    better: bool  # whether the mean square of force and torque on held-out blocks falls
 
 
 def balance(flights: RegressedFlights, setting: Setting) -> _Balance:
@@ -59,10 +51,7 @@ def balance(flights: RegressedFlights, setting: Setting) -> _Balance:
     quiet = CALM * weight_and_torque(flights.vehicle)[[0, 3]]
     least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
     noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
-    old = np.square(before[held_out])
-    change = np.mean((np.square(after[held_out]) - old) / (old.mean(axis=0) + 1e-30), axis=1)
-    block = flights.block[held_out]
-    blocks = np.array([change[block == b].mean() for b in np.unique(block)])
+    new, old = (mean_square(x[held_out]) for x in (after, before))
     return _Balance(
         before,
         after,
@@ -70,7 +59,7 @@ def balance(flights: RegressedFlights, setting: Setting) -> _Balance:
         _rms(before[held_out]),
         error,
         noisy,
-        (float(blocks.mean()), float(blocks.std() / math.sqrt(max(len(blocks) - 1, 1)))),
+        bool(np.mean(new / (old + 1e-30)) < 1.0),
     )
 
 

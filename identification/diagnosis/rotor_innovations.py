@@ -104,19 +104,16 @@ def _known_before(track: Track, rotors: Array) -> Array:
     count = max(len(rotors) - LAGS, 0)
     known = [rotors[i : i + count] for i in reversed(range(LAGS))]
     before = slice(LAGS - 1, LAGS - 1 + count)
-    tilt = track.rotation[before][:, 2, :2]
-    body = in_body(track.velocity[before], track.rotation[before])
-    rate = track.angular_velocity[before]
-    state = np.hstack([tilt, body, rate])
+    turn = track.rotation[before]
+    body = in_body(track.velocity[before], turn)
+    state = np.hstack([turn[:, 2, :2], body, track.angular_velocity[before]])
     i, j = np.triu_indices(state.shape[1])
     # along the heading and to its left, and about the body's axes
     back = track.heading * [1.0, -1.0]
     seen = np.hstack([level(back, x) for x in np.hsplit(track.innovations, 2)])
     known += [
-        tilt,
-        body,
+        state,
         track.position[before],
-        rate,
         track.acceleration[before] - track.model[before],
         seen[before],
         # the loop may have read this sample's pose before the rotors were logged

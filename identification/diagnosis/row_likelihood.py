@@ -2,12 +2,14 @@
 settings.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...dynamics.effects import Role, playing
+from ...dynamics.effects import Role, get, playing
 from ..logs.table import Array, ArrayMap, Pair
+from ..motion.smoothing import mean_square
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
@@ -17,14 +19,21 @@ from .priors import (
     Base,
     Setting,
     Starts,
-    declared,
+    from_declared,
     in_prior_units,
     prior_size,
 )
-from .regression import Column, RegressedFlights, delivered, without
-from .row_noise import ROUNDS, RowNoise, fitted_noise, white_noise
+from .regression import Column, Effects, RegressedFlights, delivered, without
+from .row_noise import ROUNDS, RowNoise, fitted_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
+
+# a wind beside its mean: standard deviation, relative to the mean, correlation time, s, and fastest
+# change, Hz, outside the rows' noise
+GUST_STD = 0.2
+GUST_TIME = 2.0
+GUST_HZ = 0.4
+GUSTY_ROUNDS = 2  # fits of the noise beside gusts, each with a fit of the wind
 
 
 class RowLikelihood:
@@ -47,6 +56,7 @@ class RowLikelihood:
         self.rows = Rows(flights, fixed)
         self.nuisances = _named(row_nuisances(self.rows))
         self.power = 1.0
+        self._gusty: dict[Effects, RowNoise] = {}  # sets with a gusty wind, and their noise
         self.noise: RowNoise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
 
@@ -60,39 +70,84 @@ class RowLikelihood:
         own = [x * prior_size(c, self.flights) for c, x in columns.items() if c[0] in traced]
         signals = followers(rows)
         explained = np.zeros_like(y)
+        without_memory = np.zeros((0, rows.channels, rows.channels))
+        size = mean_square(y[rows.fit]) + np.square(rows.least)
+        begun = RowNoise(without_memory, np.diag(size), rows.begins)
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
-            noise, explained = self._noise_beside(y, own, answers)
+            X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
+            noise, z = self._noise_beside(y, X, X.shape[2] - len(answers), begun)
+            explained = X[:, :, : len(own)] @ z[: len(own)]
         self.nuisances |= answers
+        self._own = own
         return noise
 
+    def _gusts(self, setting: Setting) -> dict[Column, Array]:
+        """Return the columns of a wind's change beside its mean: an Ornstein-Uhlenbeck process, as
+        cosines over the flight.
+
+        A gust acts like the wind, through each drag and by the flight's airspeed. As a force of its
+        own, or as a noise, the gusts of a periodic flight pass for more drag and less wind.
+        """
+        whole = {**self.rows.fixed, **setting}
+        winds = [
+            (e, c.name)
+            for e in whole
+            if get(e).sets_wind
+            for c in get(e).coefficients
+            if c.unit == "m/s"
+        ]
+        std = GUST_STD * math.hypot(*(self.flights.value(whole, c) for c in winds))
+        t = np.concatenate([[0.0], np.cumsum(np.diff(self.rows.t) * ~self.rows.begins[1:])])
+        rate = np.arange(1, int(2.0 * GUST_HZ * t[-1]) + 1) * math.pi / t[-1]
+        size = std * np.sqrt(4.0 * GUST_TIME / t[-1] / (1.0 + np.square(rate * GUST_TIME)))
+        shape = np.cos(np.outer(t, rate)) * size
+        slopes = self.rows.columns(setting, winds)
+        return _named(
+            {
+                f"gust {k} of {name}": x[:, None] * slope
+                for (_, name), slope in slopes.items()
+                for k, x in enumerate(shape.T)
+            }
+        )
+
+    def _noise_beside_gusts(self, setting: Setting) -> RowNoise:
+        """Return the noise of a set with a gusty wind, by a draw of the gusts' posterior: their
+        mode would leave too little noise.
+
+        Source: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82.
+        """
+        columns = self.nuisances | self._gusts(setting)
+        X = np.stack([*self._own, *columns.values()], axis=2)
+        count = X.shape[2]
+        draw = np.random.default_rng(0).standard_normal(count)
+        return self._noise_beside(self.rows.residual(setting), X, count, self.noise, draw)[0]
+
     def _noise_beside(
-        self, y: Array, own: Sequence[Array], answers: Mapping[Column, Array]
+        self, y: Array, X: Array, known: int, noise: RowNoise, draw: Array | float = 0.0
     ) -> tuple[RowNoise, Array]:
-        """Return the noise of the residual ``y`` (n, channels) and the effects' part of it.
+        """Return the noise of the residual ``y`` (n, channels), and the coefficients beside it.
 
         A signal that follows disturbances explains them without making them less: they stay noise.
 
         Args:
             y: with the given effects of every set.
-            own: columns of effects, in standard deviations of their priors.
-            answers: columns of signals that follow disturbances.
+            X: (n, channels, c) columns, in standard deviations of their priors.
+            known: number of the first columns; the others follow disturbances.
+            noise: at the start.
+            draw: (c,) standard deviations of the posterior from its mode.
         """
         rows = self.rows
-        X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
-        known = X.shape[2] - len(answers)
-        noise = white_noise(y, rows.begins, rows.fit, rows.least)
         for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
-            mode = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ noise.white(y)[use].ravel())
-            left = y - X[:, :, :known] @ mode[:known]
+            factor = np.linalg.cholesky(x.T @ x + np.eye(x.shape[1]))
+            right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
+            z = np.linalg.solve(factor.T, right + draw)
+            left = y - X[:, :, :known] @ z[:known]
             noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
-        return noise, X[:, :, : len(own)] @ mode[: len(own)]
-
-    def _white(self, x: Array) -> Array:
-        return self.noise.white(x)[self._use]
+        return noise, z
 
     def base(
         self,
@@ -111,10 +166,13 @@ class RowLikelihood:
         """
         rows = self.rows
         flights = self.flights
-        residual = self.rows.residual(setting)
+        residual = rows.residual(setting)
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
+        noise = self._gusty.get(frozenset(setting), self.noise)
         columns = dict(self.nuisances)
+        if noise is not self.noise:
+            columns |= self._gusts(setting)
         if not flights.commanded and playing(Role.LAG, among=list(setting)):
             # lagging rotors may speed up sooner than they slow down
             columns |= rows.columns(setting, [LAG_ASYMMETRY])
@@ -123,11 +181,15 @@ class RowLikelihood:
             columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
         if unknown:
             columns |= self._dictionary(setting)
-        x = self._white(np.stack([*columns.values(), residual], axis=2))
+        x = noise.white(np.stack([*columns.values(), residual], axis=2))[self._use]
+        sizes = np.linalg.slogdet(noise.covariance)[1] - np.linalg.slogdet(self.noise.covariance)[1]
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
+        flight = flights.log[rows.at[self._use]][np.append(0, ends)]
         parts = (p.reshape(-1, x.shape[2]) for p in np.split(x, ends))
         blocks = np.array([p.T @ p for p in parts])
-        return in_prior_units(flights, list(columns), blocks, 0.0, setting, starts)
+        return in_prior_units(
+            flights, list(columns), blocks, flight, len(x) * sizes, setting, starts
+        )
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns, changing coefficients among them."""
@@ -165,10 +227,7 @@ class RowLikelihood:
         """
         base = self.base(setting, {}, ())
         m = base.marginal((), base.plain, self.power).quadratic
-        off = [
-            (setting[c[0]].get(c[1], 0.0) - declared(c, self.flights)) / prior_size(c, self.flights)
-            for c in self.flights.columns_of(setting)
-        ]
+        off = from_declared(self.flights.columns_of(setting), self.flights, setting)
 
         def target() -> Setting:
             base = self.base(setting, {}, setting)
@@ -183,8 +242,22 @@ class RowLikelihood:
         return height(setting, self._height)[0]
 
     def fitted(self, setting: Setting) -> Setting:
-        """Return the mode of the posterior of a setting's effects."""
-        return mode(setting, self._height)
+        """Return the mode of the posterior of a setting's effects; a wind is steady or gusty, as
+        is likelier.
+        """
+        key = frozenset(setting)
+        self._gusty.pop(key, None)
+        steady = mode(setting, self._height)
+        if not any(get(e).sets_wind for e in (*self.rows.fixed, *setting)):
+            return steady
+        least = self.objective(steady)
+        for _ in range(GUSTY_ROUNDS):
+            self._gusty[key] = self._noise_beside_gusts(setting)
+            setting = mode(setting, self._height)
+        if self.objective(setting) <= least:
+            return setting
+        del self._gusty[key]
+        return steady
 
     def sensors(self, setting: Setting) -> dict[str, Pair]:
         """Return the likeliest biases of accelerometers from which the motion was read, and the

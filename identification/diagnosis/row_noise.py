@@ -51,26 +51,13 @@ class RowNoise:
         return np.asarray(np.einsum("ij,nj...->ni...", root, out))
 
 
-def white_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
-    """Return noise without memory, of the size of the rows ``fit`` of ``x`` (n, c) and of ``least``
-    (c,).
-    """
-    return RowNoise(
-        np.zeros((0, x.shape[1], x.shape[1])), np.diag(_size(x[fit], least) ** 2), begins
-    )
-
-
-def _size(x: Array, least: Array) -> Array:
-    return np.sqrt(mean_square(x) + np.square(least))
-
-
 def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     """Return the noise of rows ``x`` (n, c) from its sample ``fit`` (n,): least squares, with a
     little white noise added, and white noise of ``least`` (c,).
     """
     channels = x.shape[1]
-    lags = int(np.clip(int(fit.sum()) // (ROWS_PER_NUMBER * channels), 1, MOST_LAGS))
-    size = _size(x[fit], least)
+    lags = min(max(int(fit.sum()) // (ROWS_PER_NUMBER * channels), 1), MOST_LAGS)
+    size = np.sqrt(mean_square(x[fit]) + np.square(least))
     z = x / size
     use = fit & RowNoise(np.zeros((lags, channels, channels)), np.eye(channels), begins).known
     for k in range(1, lags + 1):
@@ -82,9 +69,5 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     fitted = np.linalg.solve(past.T @ past + np.diag(np.tile(loading, lags)), past.T @ now)
     left = now.T @ now + np.diag(loading) - fitted.T @ (past.T @ now)
     covariance = left / max(len(at) - lags * channels, 1)
-    parts = [fitted[k * channels : (k + 1) * channels].T for k in range(lags)]
-    return RowNoise(
-        np.array([size[:, None] * a / size for a in parts]),
-        size[:, None] * covariance * size,
-        begins,
-    )
+    each = fitted.reshape(lags, channels, channels).swapaxes(1, 2)
+    return RowNoise(size[:, None] * each / size, size[:, None] * covariance * size, begins)

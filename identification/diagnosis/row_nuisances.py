@@ -2,26 +2,50 @@
 integrated out.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from ...dynamics.effects import Role, get
 from ..logs.table import Array, NamedArrays
+from .commanded_rotors import THRUST_FACTORS
 from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import MODEL_ERROR, PRIORS
+from .regression import Column, RegressedFlights, coefficient, unit_of_change
 from .rows import Rows
 
 # standard deviations of the differences from flight to flight
 THRUST_STD = 0.02  # relative, of a flight to the usual thrust: cells, propellers, air
 DRIFT_STD = 0.003  # relative, of thrust over a flight, beside the fade and the battery's sag
-DELAY_STD = 0.02  # s, of commands
+DELAY_STD = 0.02  # s, of commands: 32 to 102 ms of one vehicle
 TILT_STD = 0.01  # rad, of the motion capture's vertical, and of the rotors' mean axis
 BIAS_STD = 0.3  # m/s2, of a MEMS accelerometer between warm and cold
 SCALE_STD = 0.02  # relative, of an accelerometer
+# relative, of the thrust of measured rotors: measured sessions differed by .6 to 2.4 %
+SESSION_STD = 0.012
+# relative, of the swing of a load: by a load's own track a cable of .51 m swung like .46 to .56 m
+SWING_STD = 0.08
 STOPPED_WITHIN = 0.1  # s, in which a flight loop stops an unwanted angular velocity
 # signals (n,) by name, each with the channels of the disturbances that it follows
 Followers = dict[str, tuple[Array, Sequence[int]]]
 AXES = dict(zip("xyz", np.eye(3), strict=True))  # of the body
+
+
+def between_flights(column: Column, value: float, flights: RegressedFlights) -> float:
+    """Return the standard deviation of a coefficient from flight to flight, of the mean of these
+    flights, in its unit; 0 if unknown. With measured rotors these flights may be of one session.
+    """
+    role = get(column[0]).role
+    each = math.sqrt(len(flights.logs))
+    load = role == Role.SUSPENDED_LOAD
+    unit = coefficient(column).unit
+    if role in THRUST_FACTORS or (load and unit == "kg"):  # thrust carries the load
+        share = THRUST_STD / each if flights.commanded else SESSION_STD
+        return share * unit_of_change(column, flights.vehicle)
+    if load:
+        return SWING_STD * abs(value) / each
+    return DELAY_STD / each if flights.commanded and role == Role.DELAY else 0.0
 
 
 def row_nuisances(rows: Rows) -> NamedArrays:
@@ -137,8 +161,10 @@ def followers(rows: Rows) -> Followers:
     turned = [p.smooth(p.signals.angular_velocity) for p in flights.pieces({})]
     rates = rows.at_rows(np.concatenate(turned) / STOPPED_WITHIN)
     out |= {"thrust": (wrench[:, 0], forces[2]), "change of thrust": (wrench[:, 4], forces[2])}
-    out |= {f"torque {x}": (wrench[:, 1 + i], [torque + i]) for i, x in enumerate("xyz")}
-    return out | {f"rate {x}": (rates[:, i], [torque + i]) for i, x in enumerate("xyz")}
+    for i, x in enumerate("xyz"):
+        out[f"torque {x}"] = wrench[:, 1 + i], [torque + i]
+        out[f"rate {x}"] = rates[:, i], [torque + i]
+    return out
 
 
 def answered(rows: Rows, signals: Followers, disturbance: Array) -> NamedArrays:

@@ -9,16 +9,13 @@ commands, and commands say nothing of torques.
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...runtime.arrays import Index
 from ..logs.table import Array, Mask
 from ..motion.signals import in_body
 from ..motion.smoothing import CUTOFFS
 from .discrepancy import weight_and_torque
 from .regression import Column, RegressedFlights, Setting, blocks
-
-Index = NDArray[np.intp]
-
 
 COMMANDED_CUTOFF_HZ = 3.5  # for rotors known by commands
 FILTERED_CUTOFF_HZ = 2.0  # for a filtered pose: well below any filter
@@ -43,8 +40,10 @@ class Rows:
 
     Attributes:
         fit: (n,) rows in the fit.
+        at: (n,) rows of ``flights``.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
+        log: (n,) index of the log.
         t: (n,) s.
         channels: 3, 6 or 9.
         least: (channels,) best accuracy of a motion.
@@ -54,24 +53,23 @@ class Rows:
 
     def __init__(self, flights: RegressedFlights, fixed: Setting) -> None:
         self.with_torques = not flights.commanded
-        cutoff = CUTOFFS.residual_hz
-        self._cutoff = np.inf
-        if flights.commanded or flights.filtered:
-            self._cutoff = cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else FILTERED_CUTOFF_HZ
+        self._cutoff = FILTERED_CUTOFF_HZ if flights.filtered else np.inf
+        if flights.commanded:
+            self._cutoff = COMMANDED_CUTOFF_HZ
+        cutoff = min(self._cutoff, CUTOFFS.residual_hz)
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
         self.flights = flights
         self.fixed = fixed
-        self._at: Index = np.concatenate([rows[::step] for rows in flights.runs])
-        self.begins: Mask = flights.start[self._at]
-        self.t: Array = flights.t[self._at]
-        self.fit: Mask = flights.fit_rows[self._at]
+        self.at: Index = np.concatenate([rows[::step] for rows in flights.runs])
+        self.begins: Mask = flights.start[self.at]
+        self.t: Array = flights.t[self.at]
+        self.fit: Mask = flights.fit_rows[self.at]
         self.block = blocks(self.t, self.begins, BLOCK)
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
-        self._inertias = flights.inertias
         force, torque = np.split(LEAST * weight_and_torque(flights.vehicle) / flights.inertias, 2)
-        self.least = np.concatenate(
-            [force] * (1 + self.has_accelerometer) + [torque] * self.with_torques
+        self.least = np.append(
+            np.tile(force, 1 + self.has_accelerometer), np.tile(torque, self.with_torques)
         )
         self.rotation = flights.at_rows("rotation")
 
@@ -102,7 +100,7 @@ class Rows:
 
     def at_rows(self, x: Array) -> Array:
         """Return samples of ``flights`` at the rows (n, ...), low-passed."""
-        return self.flights.low_passed(x, self._cutoff)[self._at]
+        return self.flights.low_passed(x, self._cutoff)[self.at]
 
     def residual(self, setting: Setting) -> Array:
         """Return the residual (n, channels) with these effects.
@@ -111,16 +109,16 @@ class Rows:
             InputError: no vehicle is possible.
         """
         setting = {**self.fixed, **setting}
-        left = self.flights.residual(setting) / self._inertias
+        left = self.flights.residual(setting) / self.flights.inertias
         felt = self.flights.felt(setting)
         rotation = self.flights.at_rows("rotation", setting)
         shown = in_body(left[:, :3], rotation)
-        read = None if felt is None else shown + in_body(felt / self._inertias[:3], rotation)
+        read = None if felt is None else shown + in_body(felt / self.flights.vehicle.mass, rotation)
         return self.from_body(shown, read, left[:, 3:])
 
     def noise(self) -> Array:
         """Return rows of the sensors' noise, as far as visible in the logs."""
-        return self.from_world(self.flights.visible_noise / self._inertias, felt=False)
+        return self.from_world(self.flights.visible_noise / self.flights.inertias, felt=False)
 
     def columns(self, setting: Setting, wanted: Iterable[Column]) -> dict[Column, Array]:
         """Return the columns of coefficients (n, channels), by differences."""

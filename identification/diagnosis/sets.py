@@ -7,19 +7,15 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
 from .discrepancy import CHANGING, SHARE_OF_EFFECT
-from .evidence import (
-    Marginal,
-    SetEvidence,
-    evidence_of_one_more,
-    tempering,
-)
+from .evidence import Index, Marginal, SetEvidence, evidence_of_one_more, tempering
+from .left_out import LeftOut
 from .priors import (
     PRIORS,
     WHOLE_PREFIX,
@@ -28,7 +24,7 @@ from .priors import (
     Variant,
     Variants,
     bare,
-    declared,
+    changed,
     variants_of,
 )
 from .regression import (
@@ -88,7 +84,7 @@ def is_possible(
         return False
     if not plausible or words.implausible is None:
         return True
-    beside = {*(e for e in setting if e), *(e.name for e in vehicle.effects)} - {effect}
+    beside = {*setting, *(e.name for e in vehicle.effects)} - {"", effect}
     return not words.implausible(
         Found(
             own,
@@ -125,21 +121,56 @@ class Posterior:
     ) -> None:
         self.flights, self.library, self.bases, self.power = flights, library, bases, power
         self.idle = idle
-        self.given = given
-        self.asked_about = len(library) - len(given or ())
-        self.inclusion = min(PRIORS.expected / max(self.asked_about, 1), 0.5)
+        self.given = given or frozenset()
+        self.one_noise = given is not None
+        inclusion = min(PRIORS.expected / max(len(library) - len(self.given), 1), 0.5)
+        self.odds = math.log(inclusion / (1.0 - inclusion))  # before the flight, of an effect
         self.known: dict[Effects, _Candidate] = {}
         self.scores: dict[Effects, float] = {}
+        # the likeliest set without needless effects, once asked
+        self._needed: _Candidate | None = None
         # beside the noise of nothing explained no effect shows: only sets found elsewhere go there
-        for i in range(1 if given is None else 0, len(bases)):
+        for i in range(0 if self.one_noise else 1, len(bases)):
             self._search(i)
-        if given is None:
+        if not self.one_noise:
             likeliest = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
             self._search(0, [self.known[k].variants for k in likeliest[:KEPT_ASKED]])
 
     def _likeliest(self) -> tuple[Base, _Candidate]:
-        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        best = self._needed or self.known[max(self.scores, key=self.scores.__getitem__)]
         return best.base, best
+
+    def leave_out_needless(self, probability: Values) -> dict[str, Pair]:
+        """Put the likeliest set's needed effects in its place, and return each effect's gain
+        together with the effects already left out: nats, and its standard error.
+
+        A gain must exceed the odds against these effects before the flight. The least probable
+        effect goes first: another may need its place.
+
+        Args:
+            probability: each effect's probability.
+        """
+        base, best = self._likeliest()
+        columns = best.columns
+        left_out = LeftOut(base, columns, self.power)
+        m = base.marginal(columns, base.plain, self.power)
+        every = {e for e, _ in columns} - self.given
+        gains: dict[str, Pair] = {}
+        while True:
+            weak = {}
+            for variant in best.variants:
+                effect = variant[0][0]
+                rest = tuple(x for x in best.variants if x != variant)
+                kept = {v[0][0] for v in rest}
+                less = [i for i, (e, _) in enumerate(columns) if e in kept]
+                gained, std = gains[effect] = left_out.gain(less)
+                smaller = _Candidate(base, rest, m.evidence(less))
+                least = left_out.least * std - self.odds * len(every - kept)
+                if gained < least and self._possible(smaller):
+                    weak[probability[effect], gained / (std + 1e-9)] = smaller
+            if not weak:
+                return gains
+            self._needed = best = weak[min(weak)]
 
     def tempering(self) -> float:
         """Return the power of the likelihood by the scatter beside the likeliest set."""
@@ -147,93 +178,87 @@ class Posterior:
         fitted = np.sort(np.append(base.plain, base.at(best.columns)))
         return tempering(base.blocks, np.searchsorted(base.single, fitted))
 
-    def _negligible(self, base: Base) -> Array:
-        """Return the share (len(base.asked),) of each column in any flight."""
-        little = PRIORS.negligible * base.typical[base.at(base.asked)]
+    def _of_any_flight(self, base: Base) -> tuple[Index, Array]:
+        """Return the columns of everything any flight may have, and of a little of every effect,
+        with standard deviations.
+        """
+        at = base.at(base.asked)
+        little = PRIORS.negligible * base.typical[at]
         # a start of another base is no small effect
-        if self.given is not None:
+        if self.one_noise:
             little[[name.startswith(START_PREFIX) for _, name in base.asked]] = 0.0
-        return little
-
-    def _counts(self, number: int, key: Effects) -> bool:
-        """Return whether a set is judged beside a base."""
-        if self.given is None:  # another base has the columns of this set
-            return number > 0 or not any(x.effects and key >= x.effects for x in self.bases[1:])
-        most = max(len(x.effects) for x in self.bases if x.effects <= key)
-        return key not in self.idle and len(self.bases[number].effects) == most
+        return np.append(base.plain, at), np.append(np.ones(len(base.plain)), little)
 
     def _variants(self, base: Base) -> list[Variant]:
         out = []
         for effect in self.library:
             for columns in variants_of(self.flights, effect, base.effects, base.starts):
-                if self.given is not None:  # a balance does not see the point of action
-                    columns = tuple(c for c in columns if c in base.columns)
-                if columns and all(c in base.columns for c in columns):
-                    out.append(columns)
+                known = tuple(c for c in columns if c in base.columns)
+                # a balance does not see the point of action
+                if known and (self.one_noise or known == columns):
+                    out.append(known)
         return out
 
-    def _search(self, number: int, asked_sets: Sequence[Variants] | None = None) -> None:
+    def _search(self, number: int, asked: Sequence[Variants] = ()) -> None:
         base = self.bases[number]
-        # integrated out: everything any flight may have, and a little of every effect
-        little = np.append(np.ones(len(base.plain)), self._negligible(base))
-        m = base.marginal(
-            base.asked, np.append(base.plain, base.at(base.asked)), self.power, little
-        )
+        others, little = self._of_any_flight(base)
+        m = base.marginal(base.asked, others, self.power, little)
         variants = self._variants(base)
         ways = Counter(v[0][0] for v in variants)
-        always = len(self.given or ())
+        before = {e: self.odds - math.log(count) for e, count in ways.items()}
+        tried = base.tried.setdefault(self.power, {})
 
         def score(some: Variants) -> float:
             key = frozenset(v[0][0] for v in some)
-            if not self._counts(number, key):
+            if self.one_noise:
+                most = max(len(x.effects) for x in self.bases if x.effects <= key)
+                judged = key not in self.idle and len(base.effects) == most
+            else:  # another base has the columns of this set
+                judged = number > 0 or not any(
+                    x.effects and key >= x.effects for x in self.bases[1:]
+                )
+            if len(key) < len(some) or not judged:
                 return -math.inf
-            if (self.power, some) not in base.tried:
-                index = [m.place[c] for v in some for c in v]
-                base.tried[self.power, some] = None
+            if some not in tried:
+                tried[some] = None
                 with suppress(np.linalg.LinAlgError):
+                    index = [m.place[c] for v in some for c in v]
                     new = _Candidate(base, some, m.evidence(index))
                     if self._possible(new):
-                        base.tried[self.power, some] = new.evidence
-            if (evidence := base.tried[self.power, some]) is None:
+                        tried[some] = new.evidence
+            if (evidence := tried[some]) is None:
                 return -math.inf
-            total = evidence.log_evidence - sum(math.log(ways[v[0][0]]) for v in some)
-            more = len(some) - always
-            total += more * math.log(self.inclusion) + (self.asked_about - more) * math.log1p(
-                -self.inclusion
-            )
+            total = evidence.log_evidence + sum(before[e] for e in key)
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
                 self.known[key] = _Candidate(base, some, evidence)
             return total
 
-        first = tuple(v for v in variants if self.given is not None and v[0][0] in base.effects)
+        first = tuple(v for v in variants if self.one_noise and v[0][0] in base.effects)
         score(first)
-        for some in asked_sets or ():
+        for some in asked:
             if all(c in m.place for v in some for c in v):
                 score(some)
         level = [(*first, v) for v in variants if v not in first]
-        begun = len(first) + 1
-        most = MOST_EFFECTS + always
-        for size in range(begun, begun + 1 if asked_sets is not None else max(most, begun) + 1):
+        more = 1 if asked else max(MOST_EFFECTS + len(self.given) - len(first), 1)
+        for size in range(more):
             level.sort(key=score, reverse=True)
             grown: dict[frozenset[Variant], Variants] = {}
-            for some in level[: KEPT_SETS * (2 if size == begun else 1)]:
-                for v in variants:
-                    if v[0][0] not in {x[0][0] for x in some}:
-                        grown.setdefault(frozenset((*some, v)), (*some, v))
+            kept = level[: KEPT_SETS if size else 2 * KEPT_SETS]
+            for new in ((*some, v) for some in kept for v in variants):
+                grown.setdefault(frozenset(new), new)
             level = list(grown.values())
 
     def _possible(self, candidate: _Candidate) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
-        plausible = self.given is not None
         asked = [
             e
             for (e, name), *_ in candidate.variants
-            if get(e).possible or (plausible and get(e).implausible)
+            if get(e).possible or (self.one_noise and get(e).implausible)
             if not name.startswith(START_PREFIX)
         ]
         setting, std = self._at_mode(candidate) if asked else ({}, {})
-        return all(is_possible(self.flights, setting, std[e], e, plausible) for e in asked)
+        return all(is_possible(self.flights, setting, std[e], e, self.one_noise) for e in asked)
 
     def structure(self, quieter: Base | None = None) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
@@ -245,16 +270,17 @@ class Posterior:
             quieter: the last base with the likeliest noise beside the strangest column. The set,
                 and the set with one more column, have the likelier noise of both.
         """
+        group = np.array([name.split(": ")[0] for _, name in self.bases[-1].dictionary])
         none = []
         more = []
-        for base in (self.bases[-1], *((quieter,) if quieter else ())):
+        for base in filter(None, (self.bases[-1], quieter)):
             m = self._dictionary_beside_best(base)
-            groups: dict[str, list[int]] = {}
-            for i, (_, name) in enumerate(base.dictionary):
-                groups.setdefault(name.split(": ")[0], []).append(i)
-            factors = [evidence_of_one_more(m, i, UNKNOWN_SIZES) for i in groups.values()]
+            factors = [
+                evidence_of_one_more(m, np.flatnonzero(group == own), UNKNOWN_SIZES)
+                for own in np.unique(group)
+            ]
             none.append(m.constant)
-            more.append(m.constant + float(logsumexp(factors)) - math.log(len(factors)))
+            more.append(m.constant + float(logsumexp(factors, b=1.0 / len(factors))))
         return max(more) - max(none)
 
     def strangest(self) -> tuple[Column, float, float]:
@@ -272,8 +298,7 @@ class Posterior:
         """Return the log-likelihood ratio of the likeliest set with an effect to the likeliest
         without it, less the prior odds.
         """
-        each = math.log(self.inclusion / (1.0 - self.inclusion))
-        value = {key: x - each * len(key) for key, x in self.scores.items()}
+        value = {key: x - self.odds * len(key) for key, x in self.scores.items()}
         have = max(x for key, x in value.items() if effect in key)
         return have - max((x for key, x in value.items() if effect not in key), default=-math.inf)
 
@@ -299,18 +324,17 @@ class Posterior:
         """Return the deviance of each effect of the library alone, beside the given effects, over
         the deviance of all effects together.
         """
-        given = self.given or frozenset()
-        base = next(x for x in self.bases if x.effects == given)
-        asked = [c for c in base.asked if c[0] not in given]
-        always = base.at(c for c in base.asked if c[0] in given)
+        base = next(x for x in self.bases if x.effects == self.given)
+        asked = [c for c in base.asked if c[0] not in self.given]
+        always = base.at(c for c in base.asked if c[0] in self.given)
         m = base.marginal(asked, np.append(base.plain, always), self.power)
         right = m.quadratic.right
         normal = m.quadratic.normal + np.eye(len(asked))
         whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
         out: NamedNumbers = {}
-        for columns in self._variants(base):
-            if (effect := columns[0][0]) not in given:
-                gained = m.explained([m.place[c] for c in columns])
+        for v in self._variants(base):
+            if (effect := v[0][0]) not in self.given:
+                gained = m.explained([m.place[c] for c in v])
                 out[effect] = max(out.get(effect, 0.0), gained / whole)
         return out
 
@@ -347,18 +371,32 @@ class Posterior:
         own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
         # an effect of the set is true to some per cent, whatever makes it change
         changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
-        wrong = np.full(len(changing), EFFECT_ERROR / SHARE_OF_EFFECT)
-        ones = np.ones(len(base.plain) + len(own))
-        chosen = np.concatenate([base.plain, own, base.at(base.asked), changing])
+        others, little = self._of_any_flight(base)
+        wrong = np.repeat([1.0, EFFECT_ERROR / SHARE_OF_EFFECT], [len(own), len(changing)])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
-        power = self.power * (1.0 if varied else ROUNDED)
-        size = np.concatenate([ones, self._negligible(base), wrong])
-        return base.marginal(base.dictionary, chosen, power, size).quadratic
+        return base.marginal(
+            base.dictionary,
+            np.concatenate([others, own, changing]),
+            self.power if varied else ROUNDED * self.power,
+            np.append(little, wrong),
+        ).quadratic
 
-    def best_setting(self, most: int = MOST_EFFECTS) -> Setting:
+    def best_setting(self, most: float = math.inf) -> Setting:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._at_mode(self.known[key])[0]
+
+    def likeliest_setting(self) -> tuple[Setting, Setting]:
+        """Return the coefficients of the likeliest set, or of its needed effects, and their
+        standard deviations. These contain the changes by needless effects left out.
+        """
+        whole = self.best_setting()
+        setting, std = self._at_mode(self._likeliest()[1])
+        wide = {
+            e: {n: math.hypot(x, setting[e][n] - whole[e][n]) for n, x in own.items()}
+            for e, own in std.items()
+        }
+        return setting, wide
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects with, each alone, at least half of
@@ -382,42 +420,40 @@ class Posterior:
             for name, value in values.items()
         )
 
-    def _at_mode(self, candidate: _Candidate) -> tuple[Setting, Setting]:
-        """Return the coefficients of a set at the mode, and their standard deviations."""
+    def _at_mode(self, candidate: _Candidate, widened: bool = False) -> tuple[Setting, Setting]:
+        """Return the coefficients of a set at the mode, and their standard deviations; ``widened``:
+        by the scatter over blocks and flights.
+        """
         base = candidate.base
-        setting = {}
-        std = {}
-        modes = zip(candidate.evidence.mode.tolist(), candidate.evidence.std.tolist(), strict=True)
-        for columns in candidate.variants:
-            effect = columns[0][0]
-            own = dict(self.flights.coefficients({}, effect))
-            off = {}
-            for c, (mode, deviation) in zip(columns, modes, strict=False):
-                if c[1].startswith(START_PREFIX):
-                    own |= base.starts[c]
-                    if moves_time(effect):
-                        own[get(effect).coefficients[0].name] *= mode
-                    continue
-                name = bare(c)[1]
-                size = float(base.size[base.columns[c]])
-                limits = coefficient((effect, name))
-                value = mode * size + declared(c, self.flights)
-                own[name] = min(max(value, limits.minimum), limits.maximum)
-                off[name] = deviation * size
-                if c[1].startswith(WHOLE_PREFIX):
-                    own[CENTRAL] = 1.0
-            setting[effect] = own
-            std[effect] = off
+        columns = candidate.columns
+        mode, deviations = candidate.evidence.mode, candidate.evidence.std
+        if widened:
+            deviations = deviations * base.scatter(columns, mode, self.power)
+        setting = {e: dict(self.flights.coefficients({}, e)) for e, _ in columns}
+        std: Setting = {e: {} for e in setting}
+        size = base.size[base.at(columns)]
+        sized = zip(columns, (mode * size).tolist(), (deviations * size).tolist(), strict=True)
+        for c, x, deviation in sized:
+            effect, name = bare(c)
+            own = setting[effect]
+            if name.startswith(START_PREFIX):
+                own |= base.starts[c]
+                if moves_time(effect):
+                    own[get(effect).coefficients[0].name] *= x
+                continue
+            own[name] = changed(c, x, self.flights)
+            std[effect][name] = deviation
+            if c[1].startswith(WHOLE_PREFIX):
+                own[CENTRAL] = 1.0
         return setting, std
 
     def ranking(self, quieter: Base | None = None) -> Ranking:
         """Return probabilities; ``quieter`` as of ``structure``."""
-        total = float(logsumexp(list(self.scores.values())))
-        p = {k: math.exp(v - total) for k, v in self.scores.items()}
+        p = dict(zip(self.scores, softmax([*self.scores.values()]).tolist(), strict=True))
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)
         sets = tuple(
-            RankedSet(tuple(sorted(key)), p[key], *self._at_mode(self.known[key]))
+            RankedSet(tuple(sorted(key)), p[key], *self._at_mode(self.known[key], key == best[0]))
             for key in best
             if p[key] >= LEAST_PROBABILITY
         )

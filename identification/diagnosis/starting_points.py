@@ -62,23 +62,23 @@ def starting_points(
         return starts
     # an effect without a state or clock of its own does the same in the same sample, so a few
     # samples are enough. To find out, one sample is repeated for a minute, in step with no whole Hz
-    one = flights.pieces({})[0].signals.at(np.zeros(200, dtype=np.int64))
+    pieces = flights.pieces({})
+    one = pieces[0].signals.at(np.zeros(200, dtype=np.int64))
     acts = flights.acting(replace(one, period=0.317), {effect: starts[0]})
     steady = bool(np.all(acts == acts[0]))
-    sampled = []
-    every = []
-    for p in flights.pieces({}):
-        chosen = np.arange(len(p.rows)) % max(1, SAMPLE_STEP // int(p.rows[1] - p.rows[0])) == 0
-        at = p.rows[chosen]
-        sampled.append((p.signals.at(at), slice(None)) if steady else (p.signals, at))
-        every.append(chosen)
-    chosen = np.concatenate(every)
-    target = residual[chosen & seen]
+    step = max(1, SAMPLE_STEP // int(np.diff(pieces[0].rows)[0]))
+    sampled = [
+        (p.signals.at(p.rows[::step]), slice(None)) if steady else (p.signals, p.rows[::step])
+        for p in pieces
+    ]
+    chosen = np.concatenate([rows[::step] for rows in flights.runs])
+    used = seen[chosen]
+    target = residual[chosen[used]]
     scale = 1.0 / np.maximum(np.sqrt(mean_square(target)), 1e-12)
 
     def acting(setting: Setting) -> Array:
         parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
-        return np.asarray(np.concatenate(parts)[seen[chosen]] * scale)
+        return np.asarray(np.concatenate(parts)[used] * scale)
 
     # share of the residual along each start's wrench; the later one of equals, and none without a
     # wrench

@@ -8,6 +8,7 @@ whatever the yaw. Up and yaw are a pair without a link.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -45,6 +46,11 @@ class SteadyFilter:
     keep: Array
     covariance: Array
 
+    @cached_property
+    def whitening(self) -> Array:
+        """The inverse (6, 6) of the root of the covariance, a lower triangle."""
+        return np.linalg.inv(np.linalg.cholesky(self.covariance))
+
 
 def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilter:
     """Return the steady filter of poses, every ``period`` s, with this noise."""
@@ -57,22 +63,20 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     white = np.square(noise.white[..., PAIRS] * unit)
     Q = np.repeat(white, 3, axis=-1)[..., None] * np.kron(np.eye(2), np.outer(half, half))
     Q[..., _LAST, _LAST] = np.square(noise.disturbance[..., PAIRS] * unit) * (1.0 - decay**2)
-    F = np.zeros_like(Q)
-    F += np.kron(np.eye(2), [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    F = np.zeros_like(Q) + np.kron(np.eye(2), [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
     F[..., _LAST, _LAST] = decay
     pull = gravity * PULL * unit[..., 0] * pose[..., 1]
     F[..., :3, 3:6] = pull[..., None, None] * np.outer(half, [1.0, 0.5, 0.0])
     P = _riccati(F, Q)
     S = P[..., ::3, ::3] + np.eye(2)
     K = P[..., :, ::3] @ np.linalg.inv(S)
-    gain = np.empty((*keep.shape, 3, 2))
-    covariance = np.zeros((*keep.shape, 6))
+    one, other = pose[..., :, None], pose[..., None, :]
     units = np.array([1.0, 1.0 / period, 1.0 / period**2])
-    for i in range(2):
-        for j in range(2):
-            at = K[..., 3 * i : 3 * i + 3, j] * (pose[..., i] / pose[..., j])[..., None] * units
-            gain[..., PAIRS[:, i], :, int(i != j)] = np.moveaxis(at, -2, 0)
-            covariance[..., PAIRS[:, i], PAIRS[:, j]] = S[..., i, j] * pose[..., i] * pose[..., j]
+    gain = K.reshape(*pose.shape, 3, 2) * (one / other)[..., None, :] * units[:, None]
+    gain[..., 1, :, :] = gain[..., 1, :, ::-1].copy()  # its own first
+    gain = gain.reshape(*keep.shape, 3, 2).take(np.argsort(PAIRS.ravel()), axis=-3)
+    covariance = np.zeros((*keep.shape, 6))
+    covariance[..., PAIRS[:, :, None], PAIRS[:, None]] = S * one * other
     return SteadyFilter(gain, keep, covariance)
 
 

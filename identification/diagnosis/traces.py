@@ -67,22 +67,22 @@ def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[
     body = in_body(velocity, rotation)
     speed = np.linalg.norm(body, axis=1)
     heading = heading_of(rotation)
-    named = [
-        *((f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")),
-        ("speed (m/s)", speed),
-        ("squared speed (m2/s2)", speed**2),
-        ("height (m)", position[:, 2]),
-        ("sine of the heading", np.sin(heading)),
-        ("cosine of the heading", np.cos(heading)),
-        ("time (s)", flights.at_rows("t", setting)),
-    ]
+    named = {
+        **{f"body velocity {a} (m/s)": body[:, i] for i, a in enumerate("xyz")},
+        "speed (m/s)": speed,
+        "squared speed (m2/s2)": speed**2,
+        "height (m)": position[:, 2],
+        "sine of the heading": np.sin(heading),
+        "cosine of the heading": np.cos(heading),
+        "time (s)": flights.at_rows("t", setting),
+    }
     if flights.rotor_speeds_vary:
-        named.append(("thrust (N)", flights.rotor_wrench(setting)[:, 0]))
-    named += [(f"angular velocity {a} (rad/s)", rate[:, i]) for i, a in enumerate("xyz")]
-    named += [(f"world position {a} (m)", position[:, i]) for i, a in enumerate("xy")]
+        named["thrust (N)"] = flights.rotor_wrench(setting)[:, 0]
+    named |= {f"angular velocity {a} (rad/s)": rate[:, i] for i, a in enumerate("xyz")}
+    named |= {f"world position {a} (m)": position[:, i] for i, a in enumerate("xy")}
     if all(p.signals.voltage is not None for p in pieces):
-        named.append(("battery voltage (V)", flights.at_rows("voltage", setting)))
-    return [(name, x) for name, x in named if x.std() > 1e-9]
+        named["battery voltage (V)"] = flights.at_rows("voltage", setting)
+    return [(name, x) for name, x in named.items() if x.std() > 1e-9]
 
 
 def carrying_channels(flights: RegressedFlights, setting: Setting, effect: str) -> Names:
@@ -118,6 +118,7 @@ def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[
 
     s = flights.pieces(setting)[0].signals.at(slice(2000))  # enough to see a change
     own = added(s)
+    least = LEAST_CHANGE * max(np.sqrt(mean_square(own)).sum(), 1e-12)
     placed = any(np.isfinite(log.position).any() for log in flights.logs)
     place = "position" if placed else "accelerometer"
     turn = "gyro" if flights.inertial else "attitude"
@@ -134,10 +135,5 @@ def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[
     if s.voltage is not None:
         changed.append(("battery voltage", {"voltage": 0.97 * s.voltage}))
     for channel, moved in changed:
-        if _size(added(replace(s, **moved)) - own) > LEAST_CHANGE * max(_size(own), 1e-12):
+        if np.sqrt(mean_square(added(replace(s, **moved)) - own)).sum() > least:
             yield channel
-
-
-def _size(wrench: Array) -> float:
-    """Return the sum of a wrench's RMS (n, 6) over its axes."""
-    return float(np.sqrt(mean_square(wrench)).sum())

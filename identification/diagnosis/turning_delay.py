@@ -17,9 +17,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
-from scipy.signal import csd, welch
+from scipy.optimize import fminbound
+from scipy.signal import detrend
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
@@ -32,29 +33,36 @@ BAND_HZ = (1.0, 8.0)
 # log-likelihood ratio over no visible moments, with one number less an axis
 LEAST_LOG_LIKELIHOOD_RATIO = 40.0
 SEGMENT = 2.0  # s, of a spectrum
+MEMORY = 5  # overlapping segments
 LONGEST_DELAY = 0.12  # s
 
 
 class _Spectra(NamedTuple):
-    """Spectra (f, 2) of moments and turns, roll and pitch."""
+    """Spectra (s, f, 2) of moments and turns, roll and pitch, of s segments."""
 
     omega: Array  # (f, 1) rad/s, in the band
     moment: Array
     turning: Array
     cross: NDArray[np.complex128]
-    segments: float  # independent ones
+    share: float  # independent segments a segment: they overlap
 
-    def deviance(self, response: NDArray[np.complex128]) -> float:
-        """Return minus twice the log likelihood, up to a constant, at the best gain an axis."""
-        along = np.real(np.conj(response) * self.cross)
-        power = np.square(np.abs(response)) * self.moment
+    def deviance(self, response: NDArray[np.complex128]) -> tuple[float, Array]:
+        """Return minus twice the log likelihood, up to a constant, at the best gain an axis, and
+        its slope (s,) by the delay, a part of each segment.
+        """
+        cross, turning = self.cross.mean(axis=0), self.turning.mean(axis=0)
+        along = np.real(np.conj(response) * cross)
+        power = np.square(np.abs(response)) * self.moment.mean(axis=0)
         # the gain changes its own weights, the noise
-        noise = self.turning
+        noise = turning
         for _ in range(6):
             gain = np.sum(along / noise, axis=0) / (np.sum(power / noise, axis=0) + 1e-300)
             gain = np.maximum(gain, 0.0)
-            noise = self.turning - 2.0 * gain * along + gain**2 * power
-        return 2.0 * self.segments * float(np.sum(np.log(noise / self.turning)))
+            noise = turning - 2.0 * gain * along + gain**2 * power
+        steep = self.omega * np.imag(np.conj(response) * self.cross) * gain / noise
+        slopes = 4.0 * self.share * steep.sum(axis=(1, 2))
+        count = self.share * len(self.cross)
+        return 2.0 * count * float(np.sum(np.log(noise / turning))), slopes
 
 
 def turning_delay(
@@ -88,17 +96,28 @@ def turning_delay(
         angles = (np.arctan(omega * x) if role == Role.LAG else omega * x for role, x in declared)
         return omega * seconds + sum(angles)
 
+    def seen(seconds: float) -> list[tuple[float, Array]]:
+        return [s.deviance(np.exp(-1j * behind(s.omega, seconds))) for s in spectra]
+
     def deviance(seconds: float) -> float:
-        return sum(s.deviance(np.exp(-1j * behind(s.omega, seconds))) for s in spectra)
+        return sum(x for x, _ in seen(seconds))
 
     step = 0.005
+    near = 0.1 * step
     at = min(np.arange(0.0, LONGEST_DELAY + step, step).tolist(), key=deviance)
-    best = minimize_scalar(
-        deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
-    )
-    seconds, least, near = float(best.x), float(best.fun), 0.1 * step
+    bounds = max(at - step, 0.0), at + step
+    seconds = fminbound(deviance, *bounds, xtol=1e-5).item()
+    least = deviance(seconds)
     bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
-    std = float(np.sqrt(2.0 / max(bend, 1e-6)))
+    # an answer of the loop lasts longer than a segment, and a delay differs from flight to flight:
+    # the slopes' own scatter counts where larger
+    slopes = [x for _, x in seen(seconds)]
+    count = len(slopes)
+    flights = np.square([x.sum() for x in slopes]).sum() * count / max(count - 1, 1)
+    # W. K. Newey and K. D. West, Econometrica 55 (1987), 703-708
+    sums = np.convolve(np.concatenate(slopes), np.ones(MEMORY))
+    lasting = sums @ sums / MEMORY
+    std = math.sqrt(max(2.0 * bend, flights, lasting)) / max(bend, 1e-6)
     # a lag delays each frequency differently, and the frequencies shown by the loop are not known
     omega = spectra[0].omega
     spread = float(np.std(behind(omega, 0.0) / omega))
@@ -109,12 +128,18 @@ def turning_delay(
 
 def _spectra(piece: Signals, vehicle: Vehicle) -> _Spectra:
     """Return the spectra of a piece, of two segments at least."""
-    rate = 1.0 / piece.period
-    length = round(SEGMENT * rate)
-    x = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
-    y = piece.angular_acceleration[:, :2]
-    f, xx = welch(x, rate, nperseg=length, axis=0)
-    yy, xy = (csd(z, y, rate, nperseg=length, axis=0)[1] for z in (y, x))
+    length = round(SEGMENT / piece.period)
+    moments = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
+    f = np.fft.rfftfreq(length, piece.period)
     band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
-    omega = 2.0 * np.pi * f[band, None]
-    return _Spectra(omega, xx[band], np.real(yy[band]) + 1e-300, xy[band], len(x) / length)
+    x, y = (
+        np.fft.rfft(
+            detrend(sliding_window_view(z, length, axis=0)[:: length // 2], type="constant")
+            * np.hanning(length)
+        ).swapaxes(1, 2)[:, band]
+        for z in (moments, piece.angular_acceleration[:, :2])
+    )
+    share = len(moments) / length / len(x)
+    moment, turning = np.square(np.abs(x)), np.square(np.abs(y)) + 1e-300
+    omega = np.asarray(2.0 * np.pi * f[band, None], dtype=np.float64)
+    return _Spectra(omega, moment, turning, np.conj(x) * y, share)

@@ -39,8 +39,8 @@ def signs(structure: float, push: bool) -> tuple[float, float, float]:
 
 def unknown(structure: float, push: bool) -> float:
     """Return the probability of a cause outside the likeliest set; arguments as of ``signs``."""
-    always, clipped, pushed = signs(structure, push)
-    odds = UNKNOWN.nothing * always + clipped + UNKNOWN.push * pushed
+    _, clipped, pushed = signs(structure, push)
+    odds = UNKNOWN.nothing + clipped + UNKNOWN.push * pushed
     return 1.0 / (1.0 + math.exp(-odds))
 
 

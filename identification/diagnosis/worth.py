@@ -3,10 +3,10 @@
 from collections.abc import Collection
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from ...dynamics.effects import get
 from ..motion.smoothing import mean_square
+from .evidence import bounded_mode
 from .priors import prior_size
 from .regression import RegressedFlights, Setting, without
 from .row_nuisances import row_nuisances
@@ -16,6 +16,7 @@ NOISE_KNOWN = 0.2  # relative accuracy of the sensors' noise
 # standard deviations made by chance: of other priors in an effect's place, and of a nuisance worth
 # a note
 BY_CHANCE = 3.0
+LEAST_KNOWN = 1e-6  # of columns without a trace
 
 
 def worth(
@@ -54,6 +55,9 @@ def worth(
         ]
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size
-        done = lsq_linear(X.reshape(-1, X.shape[2]), y.ravel(), (-BY_CHANCE, BY_CHANCE)).x
+        x = X.reshape(-1, X.shape[2])
+        far = np.full(x.shape[1], BY_CHANCE)
+        normal = x.T @ x + LEAST_KNOWN * np.eye(len(far))
+        done = bounded_mode(normal, x.T @ y.ravel(), -far, far)
         out[effect] = float(np.sqrt(mean_square(y - X @ done)).max())
     return out

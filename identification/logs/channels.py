@@ -10,11 +10,10 @@ The clock of a recording may not be one clock: a stamp is wrong, rows were writt
 rolls over, or a vehicle was switched on twice. Each group keeps its stamps in the order of writing.
 """
 
-import math
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf, isfinite, nan
 from pathlib import Path
 from statistics import mode
 
@@ -24,15 +23,25 @@ from scipy.spatial.transform import Rotation, Slerp
 from ...runtime.errors import InputError
 from ..motion.smoothing import resampled
 from .log_map import UNITS, Attitude, Battery, Columns, Commands, LogMap, Rotors, Sensor, constant
-from .table import Array, ArrayMap, Mask, NamedArrays, Rows, Table, finite_rows
+from .table import (
+    Array,
+    ArrayMap,
+    Lines,
+    Mask,
+    NamedArrays,
+    Noted,
+    Piece,
+    Rows,
+    SomeArray,
+    Table,
+    finite_rows,
+)
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 # from the log's world, or its body axes, to the kit's
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 BODY_TURNS: NamedArrays = {"flu": np.eye(3), "frd": _HALF_TURN, "y_up": _Y_UP}
 WORLD_TURNS = {"enu": BODY_TURNS["flu"], "ned": _HALF_TURN, "y_up": _Y_UP}
-
-_SENSOR_GAP = 3.5  # median steps, the longest gap for interpolating an inertial sensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +83,10 @@ class ChannelGroup:
         """Return where a sample stands, for errors: the table's row, else its time."""
         if self.table is None or self.rows is None:
             return f"at {self.t[index]:.6g} s"
-        return self.table.row(int(self.rows[index]))
+        return self.table.row(self.rows[index])
+
+
+Groups = list[ChannelGroup]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +106,7 @@ class Stream:
         """Return the values (M, K) at times (M,) in s: each column is linear between its finite
         values and held beyond the first and the last. A column without any is NaN.
         """
-        out = np.full((len(t), self.values.shape[1]), np.nan)
+        out = np.full((len(t), self.values.shape[1]), nan)
         for i, column in enumerate(self.values.T):
             good = np.isfinite(column)
             if good.any():
@@ -110,24 +122,24 @@ class Stream:
             return self.values
         out = resampled(t, times, self.values)
         step = np.diff(times)
-        after = np.clip(np.searchsorted(times, t), 1, len(step))
-        there = (step[after - 1] <= _SENSOR_GAP * np.median(step)) | np.isin(t, times)
-        out[~there | (t < times[0]) | (t > times[-1])] = np.nan
+        after = np.searchsorted(times, t).clip(1, len(step))
+        there = (step[after - 1] <= LONGEST_STEPS * np.median(step)) | np.isin(t, times)
+        out[~there | (t < times[0]) | (t > times[-1])] = nan
         return out
 
 
 def readable(stream: Stream | None) -> Stream | None:
     """Return the finite samples (N, K); None: fewer than two."""
-    finite = None if stream is None else stream.whole()
-    return None if finite is None or len(finite.t) < 2 else finite
+    finite = stream and stream.whole()
+    return finite if finite and len(finite.t) > 1 else None
 
 
-def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
+def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
     """Return attitudes (M, 4), scalar first, at times (M,) in s; NaN outside the samples, and
     within a gap of more than ``longest`` s. Samples at all of the times are returned as they are,
     whatever their length.
     """
-    out = np.full((len(t), 4), np.nan)
+    out = np.full((len(t), 4), nan)
     good = np.linalg.norm(attitude.values, axis=1) > 0.5  # False where NaN
     times, values = attitude.t[good], attitude.values[good]
     after = np.searchsorted(times, t)
@@ -137,7 +149,7 @@ def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
     if len(times) < 2:
         return out
     inside = (t >= times[0]) & (t <= times[-1])
-    inside &= exact | (np.diff(times)[np.clip(after, 1, len(times) - 1) - 1] <= longest)
+    inside &= exact | (np.diff(times)[after.clip(1, len(times) - 1) - 1] <= longest)
     if inside.any():
         turn = Slerp(times, Rotation.from_quat(values, scalar_first=True))(t[inside])
         out[inside] = turn.as_quat(scalar_first=True)
@@ -146,7 +158,7 @@ def slerp(t: Array, attitude: Stream, longest: float = np.inf) -> Array:
 
 def scaled(part: Columns, values: Array) -> Array:
     """Return columns (N, k), with the section's signs and scale."""
-    return np.asarray(values * np.array(part.signs or (1,)) * part.scale)
+    return np.asarray(values * (part.signs or 1) * part.scale)
 
 
 def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) -> Array:
@@ -183,11 +195,11 @@ def quaternions(part: Attitude, values: Array) -> Array:
 def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
     """Return quaternions (N, 4) of length 1 as turns from the kit's body axes to its world."""
     if part.sense == "world_to_body":
-        attitude = attitude * np.array([1.0, -1.0, -1.0, -1.0])
+        attitude = attitude * [1.0, -1.0, -1.0, -1.0]
     if log_map.world == "enu" and log_map.body == "flu":
         return attitude
     if log_map.world == "ned" and log_map.body == "frd":  # quaternions of any length, NaN included
-        return np.asarray(attitude * np.array([1.0, 1.0, -1.0, -1.0]))
+        return np.asarray(attitude * [1.0, 1.0, -1.0, -1.0])
     matrix = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
     turn = Rotation.from_matrix(WORLD_TURNS[log_map.world] @ matrix @ BODY_TURNS[log_map.body].T)
     return np.asarray(turn.as_quat(scalar_first=True))
@@ -203,9 +215,7 @@ _ALONE = 100.0  # median steps, and at least ``jitter``: a lone first or last st
 # this far off all others is wrong
 
 
-def on_one_clock(
-    path: Path, recorded: Sequence[ChannelGroup], piece: int | None = None
-) -> tuple[list[ChannelGroup], list[str]]:
+def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Groups]:
     """Return groups of columns with times that increase strictly, and notes.
 
     Args:
@@ -219,7 +229,7 @@ def on_one_clock(
     groups = []
     notes = []
     for samples in recorded:
-        over = np.cumsum(np.abs(np.diff(samples.t, prepend=np.nan) + ROLLOVER) < _JITTER)
+        over = (np.abs(np.diff(samples.t, prepend=nan) + ROLLOVER) < _JITTER).cumsum()
         groups.append(replace(samples, t=samples.t + ROLLOVER * over))
         if over.any():
             notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
@@ -240,9 +250,7 @@ def on_one_clock(
     return groups, list(dict.fromkeys(notes))
 
 
-def _of_piece(
-    path: Path, groups: list[ChannelGroup], piece: int | None
-) -> tuple[list[ChannelGroup], list[str]]:
+def _of_piece(path: Path, groups: Groups, piece: Piece) -> Noted[Groups]:
     """Return each group's rows of one piece, and a note on the number of pieces.
 
     A group with another number of pieces was not written in each of them. Such a group stays whole,
@@ -258,17 +266,16 @@ def _of_piece(
         for samples, cut in cuts
     ]
     seconds = np.max([[np.ptp(s.t[rows]) for rows in part] for s, part in parts if part], axis=0)
-    chosen = np.argmax(seconds) if piece is None else piece - 1
+    chosen = seconds.argmax() if piece is None else piece - 1
     lengths = ", ".join(f"{x:.3g}" for x in seconds)
-    why, how = ("the longest, ", "; --piece reads another") if piece is None else ("", "")
     note = (
         f"the clock starts anew {many - 1} time(s): the file holds {many} pieces of {lengths} s; "
-        f"{why}piece {chosen + 1}, was read{how}"
+        f"piece {chosen + 1} was read (default: the longest; --piece reads another)"
     )
     return [samples.cut(part[chosen]) if part else samples for samples, part in parts], [note]
 
 
-def check_piece(path: Path, piece: int | None, many: int) -> None:
+def check_piece(path: Path, piece: Piece, many: int) -> None:
     """Check the number of a piece.
 
     Raises:
@@ -288,7 +295,7 @@ def _resets(t: Array) -> Rows:
         enough = min(len(before), len(after)) >= _LEAST_WINDOW
         if enough and np.median(after) < np.median(before) - _RESET:
             resets.append(i)
-    return np.array(resets, dtype=np.intp)
+    return np.array(resets, np.intp)
 
 
 def in_order(t: Array) -> tuple[Rows, int]:
@@ -297,7 +304,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     Most rows are right: the longest increasing sequence is kept. A row outside the sequence is put
     at its time, if a row is missing there. The others have a wrong or a repeated time.
     """
-    increases = np.all(np.diff(t) > 0.0)
+    increases = (np.diff(t) > 0.0).all()
     rows = np.arange(len(t)) if increases else _longest_increase(t)
     if len(rows) > 3:  # a first or a last one far off all others is left out
         steps = np.diff(t[rows])
@@ -311,7 +318,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     after = np.searchsorted(t[rows], t[late])
     late = late[(steps[after - 1] > _HOLE * np.median(steps)) & (t[rows[after]] != t[late])]
     together = np.concatenate([rows, late])
-    return together[np.argsort(t[together], kind="stable")], len(late)
+    return together[t[together].argsort(kind="stable")], len(late)
 
 
 def _longest_increase(t: Array) -> Rows:
@@ -323,13 +330,13 @@ def _longest_increase(t: Array) -> Rows:
     before = {}
     for i, x in enumerate(t.tolist()):
         k = bisect_left(ends, x)
-        if math.isfinite(x) and ends[k : k + 1] != [x]:  # the first of two samples at one time
+        if isfinite(x) and ends[k : k + 1] != [x]:  # the first of two samples at one time
             before[i] = at[k - 1] if k else -1
             ends[k : k + 1], at[k : k + 1] = [x], [i]
     rows = at[-1:] or [-1]
     while rows[-1] >= 0:
         rows.append(before[rows[-1]])
-    return np.array(rows[-2::-1], dtype=np.intp)
+    return np.array(rows[-2::-1], np.intp)
 
 
 # A table's rows: their times, empty fields, and gaps of the motors.
@@ -345,7 +352,7 @@ _DENSE = 0.5  # share of the rows; a channel with more counts as one of every ro
 _FEWEST = 10  # samples of a channel to decide on its rows
 
 
-def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGroup, list[str]]:
+def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGroup]:
     """Return the map's columns, as written, and notes.
 
     Raises:
@@ -366,15 +373,15 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGr
     if is_whole:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
     samples = samples.cut(np.isfinite(samples.t))
-    if len(samples.t) < len(rows):
-        notes.append(f"{len(rows) - len(samples.t)} row(s) without a time were left out")
-    if len(samples.t) < 2:
-        raise InputError(f"{where}: {len(samples.t)} time(s); expected at least two")
     raw = samples.t
+    if left := table.rows - len(raw):
+        notes.append(f"{left} row(s) without a time were left out")
+    if len(raw) < 2:
+        raise InputError(f"{where}: {len(raw)} time(s); expected at least two")
     # a channel with a value in every row has one time for each value
     full = any(np.isfinite(x).all() for n, x in samples.columns.items() if n not in clock.named)
     if full and (even := _even_times(raw)) is not None:
-        rounded, raw = np.min(np.diff(np.unique(raw))), even
+        rounded, raw = np.diff(np.unique(raw)).min(), even
         notes.append(
             f"column {clock.column}: rounded to {rounded:.3g} {unit}, with several rows a time; "
             "the rows were taken as even in time"
@@ -390,7 +397,7 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGr
         )
     begin = raw[0] if clock.offset is None else 0.0
     t = (raw - begin) * UNITS["time"][unit] + (clock.offset or 0.0)
-    if not np.isfinite(t).all() or np.any((np.diff(t) <= 0.0) & (step > 0.0)):
+    if not np.isfinite(t).all() or ((np.diff(t) <= 0.0) & (step > 0.0)).any():
         raise InputError(
             f"{where}: times of {raw[0]:.6g} to {raw[-1]:.6g} {unit} cannot be told apart; "
             "expected those of one flight"
@@ -399,37 +406,35 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> tuple[ChannelGr
     if is_whole:
         _check_whole(samples, log_map)
         step = np.diff(t)
-        gaps = np.flatnonzero(step[: log_map.stray_rows] > _STRAY_GAP * np.median(step))
-        if gaps.size:
-            last = gaps[-1]
+        gaps = np.flatnonzero(step[: log_map.stray_rows] > _STRAY_GAP * np.median(step)) + 1
+        for stray in gaps[-1:]:
             notes.append(
-                f"dropped {last + 1} stray sample(s) before a gap of {step[last]:.2g} s at the "
+                f"dropped {stray} stray sample(s) before a gap of {step[stray - 1]:.2g} s at the "
                 "start"
             )
-            samples = samples.cut(slice(last + 1, None))
+            samples = samples.cut(slice(stray, None))
         return samples, notes
-    begins = np.flatnonzero(np.diff(raw, prepend=np.nan) != 0.0)
+    begins = np.flatnonzero(np.diff(raw, prepend=nan) != 0.0)
     if len(begins) < len(t):
         notes.append(f"{len(t) - len(begins)} row(s) repeat a time and were joined to the one row")
         joined = {}
         for name, column in samples.columns.items():  # the last value of each
             there = np.where(np.isnan(column), -1, np.arange(len(t)))
-            latest = np.maximum.reduceat(there, begins)
-            joined[name] = np.where(latest < 0, np.nan, column[latest])
+            joined[name] = column[np.maximum.reduceat(there, begins).clip(begins)]
         samples = replace(samples.cut(np.append(begins[1:], len(t)) - 1), columns=joined)
     return samples, notes
 
 
-def _even_times(raw: Array) -> Array | None:
+def _even_times(raw: Array) -> SomeArray:
     """Return even times (N,) of rows whose times (N,) were rounded; None: the rows are not even, or
     a time repeats in fewer than a fifth of them.
     """
     step = np.diff(raw)
-    if not np.any(step > 0.0) or np.any(step < 0.0) or np.mean(step == 0.0) < _ROUNDED:
+    if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < _ROUNDED:
         return None
     rows = np.arange(len(raw))
     even = np.polynomial.Polynomial.fit(rows, raw, 1)(rows)
-    return even if np.max(np.abs(raw - even)) <= np.min(step[step > 0.0]) else None
+    return even if np.abs(raw - even).max() <= step[step > 0.0].min() else None
 
 
 def _refuse(
@@ -437,7 +442,7 @@ def _refuse(
 ) -> None:
     """Raise InputError at the first ``bad`` (N,) value of a column (N,)."""
     if bad.any():
-        i = int(np.argmax(bad))
+        i = int(bad.argmax())
         value = f"{column[i]:g}"
         words = {"nan": "empty or NaN", "inf": "infinite", "-inf": "infinite"}.get(value, value)
         assert samples.table is not None
@@ -461,7 +466,7 @@ def _check_whole(samples: ChannelGroup, log_map: LogMap) -> None:
     others = [name for names in whole for name in names if name not in pose]
     for names in (pose, accelerometer, gyro, others):
         columns = np.array([samples.columns[name] for name in names])
-        there = np.any(~np.isnan(columns), axis=0) | (names is others)
+        there = (~np.isnan(columns)).any(axis=0) | (names is others)
         words = "" if names is others else f"; only {', '.join(names)} together may be empty"
         for name, column in zip(names, columns, strict=True):
             _refuse(samples, name, column, ~np.isfinite(column) & there, _FINITE + words)
@@ -478,7 +483,7 @@ def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
         return False
     placed = there.pop(base)
     turned = there.get("attitude", placed)
-    if 0.0 < min(placed.mean(), turned.mean()) < _DENSE and np.any(placed != turned):
+    if 0.0 < min(placed.mean(), turned.mean()) < _DENSE and (placed != turned).any():
         return True
     return any(
         x.sum() >= _FEWEST and x[~placed].sum() > (1.0 - 0.5 * placed.mean()) * x.sum()
@@ -487,7 +492,7 @@ def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
     )
 
 
-def check_rows(samples: ChannelGroup, log_map: LogMap) -> list[str]:
+def check_rows(samples: ChannelGroup, log_map: LogMap) -> Lines:
     """Return notes on the gaps of motors, of a true wrench, and of whole rows' voltage.
 
     Args:
@@ -505,7 +510,7 @@ def check_rows(samples: ChannelGroup, log_map: LogMap) -> list[str]:
             continue
         read = np.flatnonzero(np.isfinite(samples.values(part)).any(axis=1))
         inside = samples.cut(slice(read[0], read[-1] + 1)) if len(read) else samples
-        low, high, words = -np.inf, np.inf, ""
+        low, high, words = -inf, inf, ""
         if section == "battery":
             low, words = 0.0, "a voltage of at least 0"
         elif section == "rotors" and log_map.is_own:
@@ -516,7 +521,7 @@ def check_rows(samples: ChannelGroup, log_map: LogMap) -> list[str]:
         for name, column in zip(part.columns, inside.values(part).T, strict=True):
             gap = _longest_gap(inside, name, column)
             _refuse(inside, name, column, (column < low) | (column > high), words)
-            count = np.count_nonzero(~np.isnan(column))
+            count = (~np.isnan(column)).sum()
             if count < _DENSE * len(column):
                 slow.append(f"{name} {count} of {len(column)}")
             elif count < len(column):
@@ -543,7 +548,7 @@ def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
     steps = np.diff(t[read])
     limit = max(_LONGEST_GAP, LONGEST_STEPS * np.median(steps) if len(steps) else 0.0)
     gaps = np.diff(t[read], prepend=t[0], append=t[-1])
-    at = np.argmax(gaps)
+    at = gaps.argmax()
     is_long = not len(read) or gaps[at] > limit * (1.0 + 1e-9)
     words = (
         f"{_FINITE}: it has no value for {gaps[at]:.3g} s, and gaps of up to {limit:.3g} s are "

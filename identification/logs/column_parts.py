@@ -10,6 +10,7 @@ telling names are tried by adjacent threes and fours.
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -18,8 +19,6 @@ from .column_names import WORDS, Group, Name, groups_of, named_alone
 from .magnitudes import likely_unit
 from .table import Array, ArrayMap, ArrayPair, Names, finite_rows
 
-_FOURS = (("1", "2", "3", "4"), ("0", "1", "2", "3"))
-_TRIPLES = (("x", "y", "z"), ("roll", "pitch", "yaw"))  # their columns are no other group's
 Verdict = tuple[float, str]  # how well columns obey a part's physics, and in words
 Judge = Callable[[Names], Verdict]
 
@@ -27,14 +26,9 @@ Judge = Callable[[Names], Verdict]
 # When numbers speak for a part, and their score beside a name's (4 for the likeliest).
 _NUMBERS = 4.0  # score of numbers by the part's physics
 CERTAIN_LEAD = 2.0  # lead over the next candidate
-_LENGTH_ERROR = (2e-3, 0.02)  # of a quaternion: median error, and of 98 %
-_WINDOW = 0.2  # s, of the window for rates
 _MOST_ROWS = 20_000  # at most, from the middle of the flight
 _MOST_SAMPLES = 4000  # at most, of the rows compared
-_LEVELS = 10  # of a switch, at most
 _FEWEST = 30  # for a decision
-_ALIKE = 1.6  # ratio of medians of four rotors
-_FELT = 0.5  # correlation of rotors with the specific force
 SHOWN = 4  # candidates in a map
 
 
@@ -59,16 +53,14 @@ class Numbers:
         # times (n,) in s of comparisons of motors
         self.clock = self.t[np.linspace(0, rows - 1, min(_MOST_SAMPLES, rows)).astype(int)]
         self.data = {name: x for name, x in data.items() if np.isfinite(x[self.order]).any()}
-        self._rows: dict[Names, ArrayPair] = {}
+        self.rows = cache(self._rows)
         self.felt: list[Array] = []  # likely specific forces, at ``self.clock``
 
-    def rows(self, columns: Names) -> ArrayPair:
+    def _rows(self, columns: Names) -> ArrayPair:
         """Return the times (n,) and values (n, k) of the rows with all columns."""
-        if columns not in self._rows:
-            values = np.column_stack([self.data[name][self.order] for name in columns])
-            there = finite_rows(values)
-            self._rows[columns] = self.t[there], values[there]
-        return self._rows[columns]
+        values = np.column_stack([self.data[name][self.order] for name in columns])
+        there = finite_rows(values)
+        return self.t[there], values[there]
 
     def some(self, columns: Names) -> Array:
         """Return values (n, k) of some rows, spread over all."""
@@ -91,8 +83,8 @@ class Numbers:
         x = self.some(columns)
         length = np.linalg.norm(x, axis=1)
         off = np.abs(length[length > 0.5] - 1.0)  # zeros stand for a missing quaternion
-        few = len(off) < max(2, 0.5 * len(x))
-        if few or np.any(np.quantile(off, [0.5, 0.98]) >= _LENGTH_ERROR):
+        # median error of a quaternion's length, and of 98 %
+        if len(off) < max(2, 0.5 * len(x)) or np.any(np.quantile(off, [0.5, 0.98]) >= (2e-3, 0.02)):
             return -np.inf, ""
         return 1.0, "their length is 1"
 
@@ -109,12 +101,12 @@ class Numbers:
     def moves_together(self, columns: Names) -> Verdict:
         """Return 1 where four columns are of one size and move with the specific force."""
         x = self.some(columns)
-        x = x[np.any(x != 0.0, axis=1)]
-        if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.all(np.ptp(x, axis=0) > 0.0):
+        x = x[x.any(axis=1)]
+        if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.ptp(x, axis=0).all():
             return 0.0, ""
         middle, total = np.median(x, axis=0), self.between(self.clock, columns).sum(axis=1)
-        together = any(_correlation(total, felt) > _FELT for felt in self.felt)
-        together &= middle.min() * _ALIKE >= middle.max() > 0.0
+        together = any(_correlation(total, felt) > 0.5 for felt in self.felt)
+        together &= middle.min() * 1.6 >= middle.max() > 0.0
         return float(together), "they move together with the specific force"
 
     def feel(self, accelerometer: Group | None, position: Group | None) -> None:
@@ -122,7 +114,7 @@ class Numbers:
         if accelerometer:
             self.felt = [np.linalg.norm(self.between(self.clock, accelerometer.columns), axis=1)]
         elif position:
-            force = second_difference(self.clock, _WINDOW, *self.rows(position.columns)).T
+            force = second_difference(self.clock, 0.2, *self.rows(position.columns)).T
             self.felt = [*force, *-force]
 
     def elasticity(self, values: Array) -> float:
@@ -184,8 +176,10 @@ def candidates(
             contradict the part), and in words.
     """
     names = [name for name in names if name.column in numbers.data]
-    named = {column for way in _TRIPLES for g in groups_of(names, way) for column in g.columns}
-    fours = (group for ending in _FOURS for group in groups_of(names, ending))
+    # the columns of triples are no other group's
+    triples = groups_of(names, "xyz") + groups_of(names, ("roll", "pitch", "yaw"))
+    named = {column for group in triples for column in group.columns}
+    fours = groups_of(names, "1234") + groups_of(names, "0123")
     commanded = part == "motors" and any(_named(group, part) for group in fours)
     ways = []
     for number, way in enumerate(WORDS["parts"][part]):
@@ -206,15 +200,15 @@ def candidates(
             n.column
             for n in names
             if n.column not in named
-            and len(np.unique(numbers.some((n.column,)))) > _LEVELS
+            # a switch has at most 10 levels
+            and len(np.unique(numbers.some((n.column,)))) > 10
             and not re.search(WORDS["not_measured"], n.base)
         )
         for i in range(len(measured) - width + 1):  # adjacent columns
             ways.append((Group(measured[i : i + width], ""), 0.0, ""))
     found = []
     for group, score, why in ways:
-        there = len(numbers.rows(group.columns)[0])
-        strength, told = judge(group.columns) if there else (0.0, "")
+        strength, told = judge(group.columns) if len(numbers.rows(group.columns)[0]) else (0.0, "")
         words = "; ".join(filter(None, (why, told if strength else "")))
         if words and strength >= 0.0:
             found.append(ColumnCandidate(group, score + _NUMBERS * strength, words))

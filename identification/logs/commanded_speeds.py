@@ -16,11 +16,11 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import unbroken
-from .flight_log import FlightLog
+from .flight_log import FlightLog, SomeVehicle
 from .flight_phases import flying
 from .log_map import Commands
 from .magnitudes import within
-from .table import Array
+from .table import Array, Noted, SomeArray
 
 # s, the longest dip of thrust in flight: a vehicle falls 5 m meanwhile. Without dips, high thrusts
 # alone would remain, with a mean above the weight
@@ -30,7 +30,7 @@ _FELT = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be ano
 
 
 def with_commanded_speeds(
-    log: FlightLog, vehicle: Vehicle | None, model: Commands | None = None
+    log: FlightLog, vehicle: SomeVehicle, model: Commands | None = None
 ) -> FlightLog:
     """Return a log with rotor speeds from its commands, unless speeds were measured. Speeds that
     another vehicle's thrust model gave are replaced by those of ``vehicle``'s motor curve.
@@ -50,8 +50,8 @@ def with_commanded_speeds(
 
 
 def _speeds(
-    log: FlightLog, command: Array, vehicle: Vehicle | None, model: Commands
-) -> tuple[Array | None, list[str]]:
+    log: FlightLog, command: Array, vehicle: SomeVehicle, model: Commands
+) -> Noted[SomeArray]:
     """Return the rotor speeds (N, 4) in rad/s of commands (N, 4), None without a thrust model, and
     notes.
     """
@@ -78,11 +78,11 @@ def _speeds(
             "battery's voltage. A constant factor on thrust and the mass cannot be found from this "
             "log"
         ]
-        if saturated := np.mean(command.max(axis=1) >= _SATURATED):
+        if saturated := (command.max(axis=1) >= _SATURATED).mean():
             notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
         return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
     least, most = model.thrust_span
-    share = np.clip((command - least) / (most - least), 0.0, None)
+    share = ((command - least) / (most - least)).clip(0.0, None)
     factor, rest = model.thrust_factor, 1.0 - model.thrust_factor
     relative = factor * np.square(share) + rest * share
     total = relative.sum(axis=1)
@@ -117,7 +117,7 @@ def _speeds(
     ]
 
 
-def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]:
+def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> Noted[Array]:
     """Return rotor speeds (N, 4) in rad/s of commanded collective thrusts and torques (N, 4), and
     notes.
     """
@@ -129,8 +129,8 @@ def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> tuple[Array, list[str]]
         "What the firmware's thrust curve, the battery and the motors made of the command is not "
         "in the log; a constant factor on thrust remains unknown"
     ]
-    within_reach = np.clip(square, 0.0, vehicle.omega_max**2)
-    if clipped := np.count_nonzero(np.any(square != within_reach, axis=1)):
+    within_reach = square.clip(0.0, vehicle.omega_max**2)
+    if clipped := (square != within_reach).any(axis=1).sum():
         notes.append(
             f"the commands of {clipped} sample(s) were out of the rotors' reach and were clipped"
         )
@@ -143,7 +143,7 @@ def _polynomial(coefficients: Sequence[float]) -> str:
     return " + ".join(f"{c:.4g}{u}" for c, u in zip(coefficients, powers, strict=False) if c)
 
 
-def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -> float | None:
+def _scale(log: FlightLog, total: Array, felt: SomeArray, vehicle: Vehicle) -> float | None:
     """Return N of a motor at full command, or None where no motor runs in flight: from ``felt``
     (N,), the specific force along the rotors' axis in m/s2, else from the weight. In flight are
     samples of high thrust, and of low for a moment between high ones.
@@ -160,5 +160,5 @@ def _scale(log: FlightLog, total: Array, felt: Array | None, vehicle: Vehicle) -
         return vehicle.mass * float(np.median(share)) if len(share) else None
     _, x, y, _ = log.quaternion[rows].T
     vertical = (total * (1.0 - 2.0 * (x * x + y * y)))[aloft]
-    mean = float(np.mean(vertical)) if len(vertical) else 0.0
+    mean = float(vertical.mean()) if len(vertical) else 0.0
     return vehicle.weight / mean if mean > 0.0 else None

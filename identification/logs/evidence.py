@@ -35,8 +35,7 @@ from ..motion.smoothing import (
     turning,
     unbroken,
 )
-from .excerpt import excerpt
-from .flight_log import FlightLog
+from .flight_log import FlightLog, excerpt
 from .flight_phases import usual_thrust
 from .log_map import UNITS, Attitude
 from .readings import (
@@ -52,41 +51,23 @@ from .readings import (
 from .table import Array, ArrayPair, Rows, finite_rows, median_step
 
 # Filters, and when a reading is certain.
-# Hz, of the angular acceleration: from, to, and to of yaw, where rotors do least. Below, steady
-# moments of the air are larger than the torques of turning; above, the pose's noise is
-_TURN_HZ = (1.0, 4.0, 3.0)
-_RATE_HZ = 20.0  # rate of the samples compared
-_MOST = 2000  # samples; of longer flights every second one, or third ...
-_PERIOD = 0.005  # s, the shortest of the filters' clock
-_EDGE = 0.3  # s at either end of a run, for the filters' start
-_PAUSE = 2.0  # s, between two runs on the even clock: longer than the filters remember
 _FEWEST = 60  # samples in flight for a decision
 
 # gains and delays (s) by undeclared effects
 _FORCE_GAIN = (0.6, 1.6)
 _TORQUE_GAIN = (0.4, 2.5)  # and of thrust in commands
-_MOST_THRUST = 1.5  # of its 99th percentile: more is a wrong reading of a sensor
 # s: the motion comes up to 0.22 s behind the rotors' columns on measured flights, by motors, radio
-# and filters on one clock. Then the longest delay searched, and the search's step
-_DELAYS = tuple(0.02 * k for k in range(-5, 13))
-_FAR = 5.0
+# and filters on one clock
 _STEP = 0.02
+_DELAYS = tuple(_STEP * k for k in range(-5, 13))
 
-_SAMPLES = 20.0  # independent samples of one component in a flight, at most
-_LEAST_SHARE = 0.01  # smaller shares count the same: no model is better
 _MOST_SHARE = 2.0  # larger shares count the same
-_FALLEN = 60.0  # log-likelihood ratio against a flight on its side
-_BELOW = 3.0  # the same against a flight below its origin
 GOOD = 0.5  # share: a reading below is believed
 GOOD_TORQUE = 0.65  # the same of torques without a vehicle
-# share of the vertical force, from which thrust alone shows a delay: the best of some 500 delays
-# leaves .3 by chance where a flight repeats its path
-_BY_THRUST = 0.1
 _CERTAIN_LEAD = 3.4  # log-likelihood ratio over the next best: 30 to 1
 # rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
 # answer disturbances more than they turn the body, and the mirrored order may explain more
 TURNING_RATE = 0.06
-_TRIED = 6  # readings, each with a second one behind
 _G = 9.81
 # roll and pitch of rotors 1 to 4, whatever the vehicle
 SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
@@ -96,8 +77,8 @@ def likelihood(left: ArrayLike) -> Array:
     """Return the log-likelihoods (...), up to a constant, of shares (..., k) of one component
     each.
     """
-    bounded = np.clip(left, _LEAST_SHARE, _MOST_SHARE)
-    return np.asarray(-0.5 * _SAMPLES * np.log(bounded).sum(axis=-1))
+    # no model leaves less than 1 %; a flight has at most 20 independent samples of one component
+    return np.asarray(-10.0 * np.log(np.clip(left, 0.01, _MOST_SHARE)).sum(axis=-1))
 
 
 def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
@@ -147,7 +128,7 @@ class Evidence:
         vehicle: Vehicle | None = None,
         sides: Array = SIDES,
     ) -> None:
-        self._t, self._position, self._attitude = t, position, attitude
+        self._t, self._position, self.attitude = t, position, attitude
         self._gyro, self._along = gyro, np.zeros(len(t)) if along is None else along
         self._k, self._inertia, self._mixing = np.ones(4), np.eye(3), sides
         self._gains = [_TORQUE_GAIN, (0.0, np.inf), (0.0, np.inf)]  # of thrust, and of torques
@@ -156,11 +137,11 @@ class Evidence:
             self._gains = [_FORCE_GAIN, _TORQUE_GAIN, _TORQUE_GAIN, _TORQUE_GAIN]
         self._thrusts = thrusts
         if np.isfinite(thrusts).any():
-            self._thrusts = np.minimum(thrusts, _MOST_THRUST * np.nanquantile(thrusts, 0.99))
+            # more than 1.5 of the 99th percentile is a wrong reading of a sensor
+            self._thrusts = np.minimum(thrusts, 1.5 * np.nanquantile(thrusts, 0.99))
         moving = (x for x in (t[:, None], position, attitude, gyro) if x is not None)
         there = np.all([finite_rows(x) for x in moving], axis=0)
         self._compared = self._laid_out(np.flatnonzero(there))
-        self.has_pose = attitude is not None
         self.enough = len(self._compared) >= _FEWEST  # whether the flight is long enough
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
@@ -179,18 +160,18 @@ class Evidence:
         return cls(log.t, squares, position, quaternion, vehicle=vehicle)
 
     def _laid_out(self, rows: Rows) -> Rows:
-        """Lay the runs of known motion out on one even clock, ``_PAUSE`` apart. Return the samples
+        """Lay the runs of known motion out on one even clock, 2 s apart. Return the samples
         in flight, far enough from the runs' ends for the filters.
         """
         step = median_step(self._t[rows]) if len(rows) > 1 else 0.0
-        self._period = period = max(step, _PERIOD)
+        self._period = period = max(step, 0.005)
         runs = unbroken(self._t, rows, max(LONGEST_GAP, 3.5 * step), 8, SHORTEST_PIECE)
         known = finite_rows(self._thrusts)
         runs = [run for run in runs if known[run[0] : run[-1] + 1].any()]
         if not runs:
             return rows[:0]
         ends = np.array([self._t[run[[0, -1]]] for run in runs])
-        before = np.append(0.0, np.cumsum(np.diff(ends)[:-1, 0] + _PAUSE))
+        before = np.append(0.0, np.cumsum(np.diff(ends)[:-1, 0] + 2.0))
         laid = before[:, None] + ends - ends[:, :1]
         # of the rows; NaN outside the runs
         self._times = np.interp(self._t, ends.ravel(), laid.ravel(), left=np.nan, right=np.nan)
@@ -198,8 +179,9 @@ class Evidence:
         self._ends = begin, end = laid[np.searchsorted(before, clock, "right") - 1].T
         total = self._slow(self._even(self._thrusts)) @ self._k
         aloft = total > 0.5 * usual_thrust(total[clock <= end])
-        aloft &= (clock >= begin + _EDGE) & (clock <= end - _EDGE)
-        every = np.ceil(len(rows) * step * _RATE_HZ / _MOST) / (_RATE_HZ * period)
+        aloft &= (clock >= begin + 0.3) & (clock <= end - 0.3)  # the filters' start
+        # 20 a second, at most 2000: of longer flights every second one, or third ...
+        every = np.ceil(len(rows) * step * 20.0 / 2000) / (20.0 * period)
         return np.flatnonzero(aloft & (np.arange(len(clock)) % max(1, round(every)) == 0))
 
     def _even(self, x: Array) -> Array:
@@ -215,7 +197,9 @@ class Evidence:
 
     def _band(self, x: Array) -> Array:
         """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
-        low, high, yaw = (low_pass(x, hz, self._period) for hz in _TURN_HZ)
+        # Below 1 Hz, steady moments of the air are larger than the torques of turning; above 4 Hz
+        # (of yaw, where rotors do least, 3 Hz), the pose's noise is
+        low, high, yaw = (low_pass(x, hz, self._period) for hz in (1.0, 4.0, 3.0))
         return np.stack([high - low, yaw - low], axis=1)
 
     @cached_property
@@ -224,7 +208,7 @@ class Evidence:
         assert self._position is not None
         place = self._even(self._position)
         second = derivative(low_pass(place, CUTOFFS.pose_hz, self._period), self._period, 2)
-        return self._slow(second)[self._compared], np.asarray(np.median(place, axis=0))
+        return self._slow(second)[self._compared], np.median(place, axis=0)
 
     @cached_property
     def _driving(self) -> Array:
@@ -253,12 +237,12 @@ class Evidence:
         body's axes (n, 3, 3), in m/s2, in the world. Turns in two bands (n, 2, 15) are angular
         velocity, angular acceleration and products of the angular velocity.
         """
-        if self._attitude is None:
+        if self.attitude is None:
             assert self._gyro is not None
             w = self._even(self._gyro)
             matrices = np.zeros((len(w), 3, 3))
         else:
-            good, rotation = as_written(self._attitude, attitude)
+            good, rotation = as_written(self.attitude, attitude)
             quaternion = np.full((len(good), 4), np.nan)
             quaternion[good] = continuous(rotation.as_quat(scalar_first=True))
             smooth = low_pass(self._even(quaternion), CUTOFFS.pose_hz, self._period)
@@ -288,7 +272,7 @@ class Evidence:
         horizontal force, the penalty on the flight's place (log-likelihood ratio), and ``_needed``.
         """
         reading = Convention(*moves)
-        if self._attitude is None:
+        if self.attitude is None:
             felt = self._slow(self._even(self._along[:, None]))[self._compared]
             return 0.0, 0.0, self._needed(felt[:, 0], reading)
         frames, axes = reading.frames, self._motion(reading.attitude)[0]
@@ -299,10 +283,11 @@ class Evidence:
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
         mean = push.mean(axis=0)
         along = np.sum(force * push, axis=1) / np.maximum(np.linalg.norm(push, axis=1), 1e-9)
-        cost = _FALLEN * (mean[2] <= GOOD * np.linalg.norm(mean))
-        cost += _BELOW * ((frames.position @ middle)[2] < 0.0)
+        # log-likelihood ratios against a flight on its side, and below its origin
+        cost = 60.0 * (mean[2] <= GOOD * np.linalg.norm(mean))
+        cost += 3.0 * ((frames.position @ middle)[2] < 0.0)
         left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
-        return float(left), float(cost), self._needed(along, reading)
+        return float(left), cost, self._needed(along, reading)
 
     def fit(self, reading: Convention, torques: bool = True) -> Fit:
         """Return how well a reading explains the flight; without torques, by forces alone. A flight
@@ -318,7 +303,7 @@ class Evidence:
         """Return the fit of a reading at the likeliest delay of the rotors beyond a flight loop's
         own.
         """
-        far = np.arange(-_FAR, _FAR, _STEP)
+        far = np.arange(-5.0, 5.0, _STEP)
         parts = np.array_split(far[(far < _DELAYS[0]) | (far > _DELAYS[-1] + _STEP)], 20)
         reading = replace(reading, unlikely=reading.unlikely + OFFSET)
         fits = (self._fit(reading, self._mixing, *part.tolist()) for part in parts)
@@ -338,8 +323,8 @@ class Evidence:
         given = rows @ thrusts
         left = shares(  # (d, 1 + torques)
             there @ np.square(needed).T,
-            np.sum(given * given, axis=2),
-            np.sum(given * needed, axis=2),
+            (given * given).sum(axis=2),
+            (given * needed).sum(axis=2),
             np.transpose(self._gains[: len(rows)]),
         )
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
@@ -350,8 +335,7 @@ class Evidence:
 
     def turns(self, reading: Convention) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
-        rates = self._motion(reading.attitude)[1][:, 0, :2]
-        return float(np.sqrt(np.mean(np.square(rates))))
+        return float(np.sqrt(np.mean(np.square(self._motion(reading.attitude)[1][:, 0, :2]))))
 
 
 class RankedFits:
@@ -390,13 +374,17 @@ class RankedFits:
         is_good = self.fit.torque <= GOOD_TORQUE
         if self.best.moves[:3] != DECLARED.moves[:3]:  # another pose: forces tell, not torques
             is_good = self.fit.horizontal <= GOOD
-        if self.best.late and self.fit.vertical < _BY_THRUST:
+        # thrust alone shows a delay: the best of some 500 delays leaves .3 of the vertical force by
+        # chance where a flight repeats its path
+        if self.best.late and self.fit.vertical < 0.1:
             is_good = True
         if self.best is DECLARED or not is_good:
             return []
-        least = self.fit.score - _CERTAIN_LEAD
-        alike = (fit.reading for fit in self.ranked if fit.score >= least)
-        return [reading for reading in alike if reading is not DECLARED]
+        return [
+            fit.reading
+            for fit in self.ranked
+            if fit.score >= self.fit.score - _CERTAIN_LEAD and fit.reading is not DECLARED
+        ]
 
     def says(self, name: str) -> tuple[Any, bool, str]:
         """Return the best value of a property, whether it is certain, and why."""
@@ -409,7 +397,7 @@ class RankedFits:
 
 def log_ranking(evidence: Evidence) -> RankedFits:
     """Return the ranking of the readings of the kit's own columns, and of a delay of the rotors."""
-    fits = [evidence.fit(reading) for reading in log_readings(evidence.has_pose)]
+    fits = [evidence.fit(reading) for reading in log_readings(evidence.attitude is not None)]
     return RankedFits([*fits, evidence.late()] if evidence.enough else fits)
 
 
@@ -431,13 +419,14 @@ def remedies(
             spins = replace(vehicle, spin=-vehicle.spin)
         return log_ranking(Evidence.of_log(applied(log, reading), spins, by_imu)).best is DECLARED
 
-    log = excerpt([log])[0]
+    log = excerpt(log)
     evidence = Evidence.of_log(log, vehicle, by_imu)
     ranking = log_ranking(evidence)
     if not ranking.departures():
         return [], True
     fits = [*ranking.ranked]
-    for one in (fit.reading for fit in ranking.ranked[:_TRIED] if fit.reading is not DECLARED):
+    # six readings, each with a second one behind
+    for one in (fit.reading for fit in ranking.ranked[:6] if fit.reading is not DECLARED):
         if not one.late:
             fits.append(evidence.late(one))
         if one.rotors == ROTORS and not one.mirrored:

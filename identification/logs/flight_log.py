@@ -21,12 +21,11 @@ a row with an inertial sensor's three fields empty, the sensor was not read: a s
 Other columns are ignored. The vehicle's name stands in a header, so the table holds numbers alone.
 """  # noqa: E501
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from math import inf, nan
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +41,7 @@ from .table import (
     NamedArrays,
     Names,
     Rows,
+    SomeArray,
     Values,
     finite_rows,
     median_step,
@@ -54,6 +54,7 @@ ROTORS = ("omega1", "omega2", "omega3", "omega4")
 TRUTH = ("fx", "fy", "fz", "tx", "ty", "tz")
 ACCELEROMETER = ("ax", "ay", "az")
 GYRO = ("gx", "gy", "gz")
+IMU = (*ACCELEROMETER, *GYRO)
 COMMANDS = ("cmd1", "cmd2", "cmd3", "cmd4")
 REQUIRED = ("t", *POSE, *ROTORS)
 
@@ -100,18 +101,18 @@ class FlightLog:
     position: Array
     quaternion: Array
     rotor_speeds: Array
-    voltage: Array | None = None
-    force: Array | None = None
-    torque: Array | None = None
-    accelerometer: Array | None = None
-    gyro: Array | None = None
+    voltage: SomeArray = None
+    force: SomeArray = None
+    torque: SomeArray = None
+    accelerometer: SomeArray = None
+    gyro: SomeArray = None
     name: str = ""
     source: str = ""
     notes: Names = ()
-    valid: Mask = field(default_factory=lambda: np.empty(0, dtype=bool))
+    valid: Mask = field(default_factory=lambda: np.empty(0, bool))
     extra: ArrayMap = field(default_factory=dict)
     commanded: bool = False
-    command: Array | None = None
+    command: SomeArray = None
     vehicle: str = ""
     rates: Values = field(default_factory=dict)
     flown: WhatFlew = UNSTATED
@@ -123,7 +124,7 @@ class FlightLog:
         for name in ("accelerometer", "gyro"):
             x = getattr(self, name)
             if x is not None and not (read := finite_rows(x)).all():
-                object.__setattr__(self, name, np.where(read[:, None], x, np.nan))
+                object.__setattr__(self, name, np.where(read[:, None], x, nan))
 
     def __repr__(self) -> str:
         t = self.t
@@ -145,7 +146,7 @@ class FlightLog:
     def motor_rate(self) -> float:
         """Rate of measured rotor speeds, else of commands, Hz."""
         names = ("rotors", "commands", "wrench")[self.commanded :]
-        return next((self.rates[name] for name in names if name in self.rates), np.inf)
+        return next((self.rates[name] for name in names if name in self.rates), inf)
 
     @property
     def period(self) -> float:
@@ -154,9 +155,10 @@ class FlightLog:
 
 
 Logs = Sequence[FlightLog]
+SomeVehicle = Vehicle | None  # None: unknown
 
 
-def flown_vehicle(vehicle: Vehicle | None, name: str) -> Vehicle | None:
+def flown_vehicle(vehicle: SomeVehicle, name: str) -> SomeVehicle:
     """Return the vehicle, or else the preset of a log's vehicle name; None: there is none."""
     return _preset(name) if vehicle is None and name in preset_names() else vehicle
 
@@ -167,36 +169,28 @@ _preset = cache(load_vehicle)  # asked three times a log
 def time_notes(t: Array) -> Names:
     """Return a note on the gaps in times (N,) in s: steps of more than 3 median ones."""
     step = np.diff(t)
-    usual = np.median(step) if step.size else np.inf
-    gaps = np.count_nonzero(step > _GAP * usual)
+    usual = np.median(step) if step.size else inf
+    gaps = (step > _GAP * usual).sum()
     if not gaps:
         return ()
-    longest = np.argmax(step)
+    longest = step.argmax()
     return (
         f"{gaps} gap(s) in time; the longest is {step[longest]:.3g} s, at t = {t[longest]:.6g} s "
         f"(median step {usual:.4g} s)",
     )
 
 
-@dataclass(frozen=True)
-class _MotorRates:
-    """How often rotor speeds or commands must be measured.
-
-    Between samples they are taken along a straight line: 0.9 of an oscillation's amplitude passes
-    up to 0.18 of their rate. Forces are judged up to 3.5 Hz. Torques turn a vehicle within a tenth
-    of a second: they need the rate of a pose and a gyro.
-    """
-
-    force_hz: float = 20.0
-    torque_hz: float = 45.0
-    jitter: float = 1.1  # tolerance of a rate, as a factor
-
-    def serves(self, rate: float, least: float) -> bool:
-        """Return whether a rate is high enough, Hz."""
-        return rate * self.jitter >= least
+# How often rotor speeds or commands must be measured, Hz. Between samples they are taken along a
+# straight line: 0.9 of an oscillation's amplitude passes up to 0.18 of their rate. Forces are
+# judged up to 3.5 Hz. Torques turn a vehicle within a tenth of a second: they need the rate of a
+# pose and a gyro.
+FORCE_HZ, TORQUE_HZ = 20.0, 45.0
+_JITTER = 1.1  # tolerance of a rate, as a factor
 
 
-MOTOR_RATES = _MotorRates()
+def serves(rate: float, least: float) -> bool:
+    """Return whether a rate is high enough, Hz."""
+    return rate * _JITTER >= least
 
 
 # When values repeat because nothing was measured, and not because they were rounded.
@@ -210,17 +204,20 @@ _ON_LINE = 1e-3
 _ROUNDED = 1.001  # rounding steps by which three rounded values leave a line, at most
 _MOST_CORNERS = 2 / 3  # of the rows; with more no two corners can be told apart
 _LEAST_CHANGES = 8  # for a spacing
+_MOST_ROWS = 100_000  # from the middle of a long flight
 
 
 def source_rate(t: Array, values: Array) -> float:
-    """Return a channel's rate of measurement, Hz; 0: less than two samples.
+    """Return a channel's rate of measurement, Hz; 0: less than two samples. The middle tells for a
+    long flight.
 
     Args:
         t: (N,) s, increasing.
         values: (N, K); a row with NaN is no sample.
     """
-    finite = finite_rows(values)
-    t, values = t[finite], values[finite]
+    middle = slice(max(0, len(t) - _MOST_ROWS) // 2, (len(t) + _MOST_ROWS) // 2)
+    finite = finite_rows(values[middle])
+    t, values = t[middle][finite], values[middle][finite]
     if len(t) < 2:
         return 0.0
     changes = np.flatnonzero(np.diff(values, axis=0).any(axis=1))
@@ -247,16 +244,16 @@ def _corners(t: Array, values: Array) -> Rows:
     both.
     """
     if len(t) < 3:
-        return np.empty(0, dtype=np.intp)
+        return np.empty(0, np.intp)
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
     steps = np.abs(np.diff(values, axis=0))
-    rounding = np.min(steps, axis=0, where=steps > 0.0, initial=np.inf)
+    rounding = steps.min(axis=0, where=steps > 0.0, initial=inf)
     line = values[:-2] + share * (values[2:] - values[:-2])
     off = np.abs(values[1:-1] - line)
     least = np.maximum(_ON_LINE * np.sqrt(mean_square(off)), _ROUNDED * rounding)
     is_corner = (off > least).any(axis=1)
-    if np.mean(is_corner) > _MOST_CORNERS:
-        return np.empty(0, dtype=np.intp)
+    if is_corner.mean() > _MOST_CORNERS:
+        return np.empty(0, np.intp)
     return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))
 
 
@@ -268,7 +265,7 @@ def _spacing(events: Rows) -> float:
     median = np.median(spacing)
     beat = np.quantile(spacing, _EARLY) >= _LEAST_SPACING * median
     usual = spacing[spacing < median / _LEAST_SPACING]  # no gap
-    return float(np.mean(usual)) if beat and median >= _LEAST_ROWS else 1.0
+    return float(usual.mean()) if beat and median >= _LEAST_ROWS else 1.0
 
 
 def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
@@ -279,6 +276,33 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
     return replace(log, **parts, extra={name: x[keep] for name, x in log.extra.items()})
 
 
+LONGEST = 480.0  # s of flight, all logs together, used whole
+_WINDOW = 60.0  # s, a window of longer flights
+
+
+def excerpt(log: FlightLog, seconds: float = 0.0) -> FlightLog:
+    """Return a log, or windows of a minute spread evenly over a flight of more than ``LONGEST``.
+    They give the same diagnosis as a whole hour, in a tenth of the memory. A note says so.
+
+    Args:
+        log: the flight; the rest becomes a gap.
+        seconds: s, of all logs used together.
+    """
+    length = log.t[-1] - log.t[0]
+    share = LONGEST / max(seconds, length, LONGEST)
+    if share == 1.0 or length <= _WINDOW:
+        return log
+    count, spare = max(1, round(share * length / _WINDOW)), length - _WINDOW
+    first = 0.0 if count > 1 else 0.5 * spare
+    begins = log.t[0] + np.linspace(first, spare, count)
+    keep = np.any([(log.t >= at) & (log.t <= at + _WINDOW) for at in begins], axis=0)
+    note = (
+        f"of {length:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "
+        "rest was left out"
+    )
+    return replace(with_rows(log, keep), notes=(*log.notes, note))
+
+
 def parts_of(log: FlightLog) -> list[tuple[Names, Array]]:
     """Return a log's channels (N, k), with their columns' names in a file."""
     speeds, command, force, torque = log.rotor_speeds, log.command, log.force, log.torque
@@ -286,8 +310,8 @@ def parts_of(log: FlightLog) -> list[tuple[Names, Array]]:
     is_whole = log.has_pose or accelerometer is None or gyro is None
     if is_whole:
         pose = np.column_stack([pose, log.quaternion])
-        pose[~log.valid] = np.nan
-    parts: list[tuple[Names, Array | None]] = [
+        pose[~log.valid] = nan
+    parts: list[tuple[Names, SomeArray]] = [
         (("t",), log.t),
         (POSE[: pose.shape[1]], pose if is_whole or np.isfinite(pose).any() else None),
         (ROTORS, speeds if log.has_rotor_speeds or command is None else None),

@@ -2,17 +2,20 @@
 ground, take-off, flight and landing.
 """
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
+from ..motion.smoothing import CUTOFFS, low_pass
 from .flight_log import FlightLog
 from .table import Array, Mask, finite_rows
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
 
 _TURNING = 0.1  # share of the weight: less thrust is a rotor at rest
+_CARRIED = 0.3  # share of the usual load: a vehicle below it stands on the ground
 _CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
 _WELL_ABOVE = 0.2  # of the typical height
 _CLIMB = 0.1  # m/s: slower is not climbing or sinking
@@ -37,7 +40,7 @@ def usual_thrust(total: Array) -> float:
     turns.
     """
     turning = total[total > 0.3 * np.quantile(total, 0.95)]
-    return float(np.median(turning)) if turning.size else np.inf
+    return float(np.median(turning)) if turning.size else inf
 
 
 def carrying(total: Array) -> Mask:
@@ -45,6 +48,14 @@ def carrying(total: Array) -> Mask:
     vehicle: more than half of the usual thrust.
     """
     return total > 0.5 * usual_thrust(total)
+
+
+def carried(rotors: Array, period: float) -> Mask:
+    """Return the samples (N,), ``period`` s apart, where rotors carry a vehicle, dives included:
+    by the squares of their speeds or commands (N, 4), slowly averaged.
+    """
+    load = low_pass(np.mean(np.square(rotors), axis=1), CUTOFFS.flying_hz, period)
+    return load > _CARRIED * usual_thrust(load)
 
 
 def flew(log: FlightLog) -> tuple[str, str]:
@@ -58,7 +69,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
         total = np.nan_to_num(log.command).sum(axis=1)
     else:
         return "unknown", "neither rotor speeds nor motor commands"
-    if not np.any(total > 0.0):
+    if not (total > 0.0).any():
         return "no", "the motors never turn"
     aloft = carrying(total)
     told = f"yes, {np.diff(log.t)[aloft[:-1]].sum():.3g} s"
@@ -72,7 +83,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
             )
         x, y, z = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
         far = np.linalg.norm((x, y, z))
-        said = f"the motors turn, and the position spans {far:.3g} m, {z:.3g} m of height"
+        said = f"the position spans {far:.3g} m, {z:.3g} m in height"
         drove = np.hypot(x, y) > _DROVE[0] and z < _DROVE[1]
         return "not shown" if far < _MOVES or drove else told, said
     if log.gyro is not None:
@@ -80,9 +91,9 @@ def flew(log: FlightLog) -> tuple[str, str]:
         count = max(1, round(_MEAN / log.period))
         means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
         turns = np.std(means, axis=0).max(initial=0.0) if len(means) else 0.0
-        said = f"the motors turn, and the body by {turns:.2g} rad/s"
+        said = f"the motors run, and the body turns at {turns:.2g} rad/s"
         return "unknown" if turns < _TURNS else told, said
-    return "unknown", "the motors turn, and no motion was logged"
+    return "unknown", "the motors run, and no motion was logged"
 
 
 class Phase(NamedTuple):
@@ -111,8 +122,8 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
     on = _run(at_rest)
     off = last - _run(at_rest[::-1])
     starts, lands = on > 0, off < last  # whether the log shows take-off and landing
-    before = float(np.median(height[:on])) if starts else -np.inf
-    after = float(np.median(height[off + 1 :])) if lands else -np.inf
+    before = float(np.median(height[:on])) if starts else -inf
+    after = float(np.median(height[off + 1 :])) if lands else -inf
     clear = height > max(before, after) + _CLEARANCE
     clear[:on] = clear[off + 1 :] = False
     if not clear.any():  # the vehicle never left the ground
@@ -141,10 +152,10 @@ def _first_climb(
     clear: Mask, height: Array, ground: float, typical: float, climb: Array
 ) -> tuple[int, int]:
     """Return the first sample off the ground, and the first behind the climb (N,) from there."""
-    up = int(np.argmax(clear & (height >= ground + _WELL_ABOVE * (typical - ground))))
+    up = int((clear & (height >= ground + _WELL_ABOVE * (typical - ground))).argmax())
     return up - _run(clear[up::-1]) + 1, up + _run(climb[up:] > _CLIMB)
 
 
 def _run(true: Mask) -> int:
     """Return how many elements from the first on are True."""
-    return int(np.argmin(np.append(true, False)))
+    return int(np.append(true, False).argmin())

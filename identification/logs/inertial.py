@@ -12,14 +12,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.vehicle import Vehicle
-from ..motion.smoothing import resampled, second_difference
+from ..motion.smoothing import resampled, running_integral, second_difference
 from .evidence import GOOD, likelihood, remedies
-from .flight_log import ACCELEROMETER, GYRO, FlightLog
-from .magnitudes import MAGNITUDES
+from .flight_log import ACCELEROMETER, GYRO, FlightLog, excerpt
+from .magnitudes import STRONGEST
 from .readings import (
     ACCELEROMETER_READINGS,
     AS_DECLARED,
@@ -33,14 +32,9 @@ from .table import Array, Data, Names, finite_rows
 
 # How inertial sensors are compared.
 WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
-_STEP = 0.05  # s between two comparisons
-_GAP = 0.1  # s without a sample; no comparison across
 _FEWEST = 10  # comparisons for a decision
 LEAST_SAMPLES = 20  # of pose and of sensor, at least
 STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
-_MOVING = 0.5  # m/s2 of horizontal acceleration, far above pose noise
-_FAR_SHARE = 0.01  # of the samples: with more, a specific force is no flight's
-_ONE_WAY = 0.8  # length of the mean direction: gravity's is near 1, that of a tumble far below
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
@@ -66,30 +60,32 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
 
 
 def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
-    """Return a log without the inertial sensors contradicting its pose, and a note on each."""
-    notes = []
-    seen = np.flatnonzero(log.valid)
-    pose = log.t[seen], Rotation.from_quat(log.quaternion[seen], scalar_first=True)
+    """Return a log without the inertial sensors contradicting its pose, and a note on each. Windows
+    of a long flight are asked.
+    """
+    notes: list[str] = []
+    part = excerpt(log)
+    seen = np.flatnonzero(part.valid)
+    pose = part.t[seen], Rotation.from_quat(part.quaternion[seen], scalar_first=True)
     for field, names in (("gyro", GYRO), ("accelerometer", ACCELEROMETER)):
-        values, columns = getattr(log, field), ", ".join(names)
+        values, columns = getattr(part, field), ", ".join(names)
         if values is None or not (read := np.isfinite(values[:, 0])).any():
             continue
-        t, measured = log.t[read], values[read]
+        t, measured = part.t[read], values[read]
         if field == "gyro":
             shares = gyro_shares(t, measured, *pose, (AS_DECLARED, *GYRO_READINGS))
             doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
-            fast = np.quantile(np.abs(measured), 0.99) > MAGNITUDES.fastest_gyro
-            alone = GYRO_READINGS[0].says if fast else ""
+            # 70 rad/s (4000 deg/s) is the range of the fastest gyros
+            alone = GYRO_READINGS[0].says if np.quantile(np.abs(measured), 0.99) > 70.0 else ""
         else:
-            shares, turned = _force_shares(t, measured, *pose, log.position[seen], gravity)
-            if turned is not None:
-                values = np.full_like(values, np.nan)
-                values[read] = turned
-                log = replace(log, accelerometer=values)
+            shares, up = _force_shares(t, measured, *pose, part.position[seen], gravity)
+            if up is not None:
+                checked, more = _agreeing(_in_body_axes(log, up), gravity)
                 notes.append(
                     f"{columns} are an acceleration in world axes, by the position's own: they "
                     "were turned into body axes by the attitude"
                 )
+                return checked, (*notes, *more)
             otherwise = "contradict the position's acceleration and gravity"
             doubt = _blown_up(measured)
             doubt = doubt or _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
@@ -104,9 +100,17 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
     return log, tuple(notes)
 
 
+def _in_body_axes(log: FlightLog, up: Array) -> FlightLog:
+    """Return a log with its accelerometer, in world axes and less ``up`` (3,), in body axes."""
+    assert log.accelerometer is not None
+    at = Slerp(log.t[log.valid], Rotation.from_quat(log.quaternion[log.valid], scalar_first=True))
+    body = at(np.clip(log.t, at.times[0], at.times[-1]))
+    return replace(log, accelerometer=body.inv().apply(log.accelerometer + up))
+
+
 def is_stuck(measured: Array) -> bool:
     """Return whether the readings (N, 3) of a sensor are all the same."""
-    return len(measured) >= LEAST_SAMPLES and bool(np.all(np.ptp(measured, axis=0) == 0.0))
+    return len(measured) >= LEAST_SAMPLES and not np.ptp(measured, axis=0).any()
 
 
 def _sensor_doubt(
@@ -152,8 +156,7 @@ def gyro_shares(
     if len(begins) < _FEWEST:
         return None
     motion = unbiased(turn_rates(begins, pose_times, attitude))
-    sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
-    seen = unbiased(mean_rate(begins, t, sum_of))
+    seen = unbiased(mean_rate(begins, t, running_integral(gyro, t)))
     size = median_square(motion) + STILL**2
     return [median_square(motion - seen @ reading.turn.T) / size for reading in readings]
 
@@ -172,7 +175,7 @@ def mean_rate(begins: Array, t: Array, sum_of: Array) -> Array:
 def mean_force(middles: Array, t: Array, force: Array) -> Array:
     """Return a force's (N, 3) means (n, 3) over two windows, weighted as by a second difference."""
     for _ in range(2):
-        force = cumulative_trapezoid(force, t, axis=0, initial=0.0)
+        force = running_integral(force, t)
     return second_difference(middles, WINDOW, t, force) / WINDOW**2
 
 
@@ -190,8 +193,8 @@ def _force_shares(
     gravity: float,
 ) -> tuple[list[float] | None, Array | None]:
     """Return the shares of acceleration and gravity left by an accelerometer, as declared and by
-    each reading; None: too little is measured. For an acceleration in world axes return the
-    specific force in body axes (N, 3), too, else None.
+    each reading; None: too little is measured. For an acceleration in world axes return the rest
+    (3,) of the specific force, too, else None.
 
     Gravity hides the axes: along z both look alike. The horizontal acceleration of the position
     tells them.
@@ -200,30 +203,27 @@ def _force_shares(
     if len(middles) < _FEWEST:
         return None, None
     inside = (t >= pose_times[0]) & (t <= pose_times[-1])
-    body = Slerp(pose_times, attitude)(np.clip(t, pose_times[0], pose_times[-1]))
-
-    def mean(force: Array) -> Array:
-        return mean_force(middles, t[inside], force[inside])
-
-    up, turned = np.zeros(3), None
+    t, measured = t[inside], measured[inside]
+    body = Slerp(pose_times, attitude)(t)
+    up = np.array([0.0, 0.0, gravity])
     needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2
-    moves = np.linalg.norm(needed[:, :2], axis=1) > _MOVING
+    # far above pose noise
+    moves = np.linalg.norm(needed[:, :2], axis=1) > 0.5
     if np.count_nonzero(moves) >= _FEWEST:
         in_body, in_world = (
-            median_square((needed - mean(x))[moves, :2]) / median_square(needed[moves, :2])
+            median_square((needed - mean_force(middles, t, x))[moves, :2])
+            / median_square(needed[moves, :2])
             for x in (body.apply(measured), measured)
         )
-        lead = likelihood([in_world] * 2) - likelihood([in_body] * 2)
-        if in_world <= GOOD and lead >= OTHER:
-            up[2] = gravity if np.median(measured[inside, 2]) < 0.5 * gravity else 0.0
-            turned = measured = body.inv().apply(measured + up)
-    up[2] = gravity
+        if in_world <= GOOD and likelihood([in_world] * 2) - likelihood([in_body] * 2) >= OTHER:
+            return None, up * (np.median(measured[:, 2]) < 0.5 * gravity)
     needed += up
+    readings = AS_DECLARED, *ACCELEROMETER_READINGS
+    means = (mean_force(middles, t, body.apply(measured @ r.turn.T)) for r in readings)
     return [
-        median_square(needed - mean(body.apply(measured @ r.turn.T)) - r.lacks_gravity * up)
-        / median_square(needed)
-        for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
-    ], turned
+        median_square(needed - mean - r.lacks_gravity * up) / median_square(needed)
+        for mean, r in zip(means, readings, strict=True)
+    ], None
 
 
 def _blown_up(force: Array) -> str:
@@ -231,14 +231,15 @@ def _blown_up(force: Array) -> str:
     unit has one direction.
     """
     size = np.linalg.norm(force, axis=1, keepdims=True)
-    far = size[:, 0] > MAGNITUDES.strongest
+    far = size[:, 0] > STRONGEST
     share = np.mean(far)
-    if len(force) < LEAST_SAMPLES or share <= _FAR_SHARE:
+    if len(force) < LEAST_SAMPLES or share <= 0.01:
         return ""
-    if np.linalg.norm(np.mean(force[far] / size[far], axis=0)) > _ONE_WAY:
+    # the mean direction's length: gravity's is near 1, that of a tumble far below
+    if np.linalg.norm(np.mean(force[far] / size[far], axis=0)) > 0.8:
         return ""
     return (
-        f"are beyond {MAGNITUDES.strongest:g} m/s2, in changing directions, in {share:.0%} of the "
+        f"are beyond {STRONGEST:g} m/s2, in changing directions, in {share:.0%} of the "
         "samples: no quadrotor flies so, but a simulation that blew up does"
     )
 
@@ -258,13 +259,13 @@ def gravity_doubt(force: Array, gravity: float, is_flight: bool = True) -> str:
     if length < 0.5 * gravity:
         otherwise += " (an acceleration without gravity is none)"
     up, readings = np.array([0.0, 0.0, gravity]), (AS_DECLARED, *_BY_GRAVITY)
-    shares = [float(np.sum(np.square(up - r.turn @ median))) / gravity**2 for r in readings]
+    shares = [float(np.square(up - r.turn @ median).sum()) / gravity**2 for r in readings]
     return _sensor_doubt(shares, _BY_GRAVITY, otherwise if is_flight else "")
 
 
 def median_square(vectors: Array) -> float:
     """Return the median squared length of vectors (n, 3): robust to single leaps of a pose."""
-    return float(np.median(np.sum(np.square(vectors), axis=1)))
+    return float(np.median(np.square(vectors).sum(axis=1)))
 
 
 def windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
@@ -277,9 +278,9 @@ def windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     last = min(pose_times[-1], sensor_times[-1]) - WINDOW
     if last <= first:
         return np.empty(0)
-    times = np.linspace(first, last, min(int((last - first) / _STEP), 100_000) + 1)
+    times = np.linspace(first, last, min(int((last - first) / 0.05), 100_000) + 1)
     for clock in (pose_times, sensor_times):
-        gaps = np.flatnonzero(np.diff(clock) > _GAP)
+        gaps = np.flatnonzero(np.diff(clock) > 0.1)
         begun = np.searchsorted(clock[gaps], times + WINDOW)
         times = times[begun == np.searchsorted(clock[gaps + 1], times - before, "right")]
     return times

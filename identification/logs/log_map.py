@@ -44,7 +44,7 @@ place of one states alternatives: the first is taken with columns in the log, an
 """
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
@@ -58,6 +58,7 @@ from pydantic import (
     Strict,
     StringConstraints,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
     WrapValidator,
 )
 
@@ -65,39 +66,27 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .table import Array, ArrayMap, Data, NamedNumbers, Names, Pair
+from .table import Array, ArrayMap, Data, Lines, NamedNumbers, Names, Pair, Wanted
 from .what_flew import ORDERS, Order, rotor_order
 
 _T = TypeVar("_T")
 
+Ways = tuple[Any, ...]  # to fill a section
 MAPS = Path(__file__).parent / "maps"  # the kit's own maps
 OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # a field that a person must choose
 
-WORLDS = {"enu": "enu", "nwu": "enu", "flu": "enu", "ned": "ned", "frd": "ned", "y_up": "y_up"}
+WORLDS: dict[str, str] = WORDS["worlds"]
 BODIES = ("flu", "frd", "y_up")
 UNITS: dict[str, NamedNumbers] = WORDS["factors"]
 COMMAND_UNITS: dict[str, Pair | None] = {
     unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()
 }
-SECTIONS = {  # columns of each
-    "position": 3,
-    "attitude": 4,
-    "rotors": 4,
-    "commands": 4,
-    "wrench": 4,
-    "battery": 1,
-    "accelerometer": 3,
-    "gyro": 3,
-    "force": 3,
-    "torque": 3,
-}
+SECTIONS: dict[str, int] = WORDS["sections"]  # columns of each
 SENSES = ("body_to_world", "world_to_body")
-QUATERNIONS = ("wxyz", "xyzw")
-EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 
-def _known(value: Any, known: Collection[str], what: str) -> str:
+def _known(value: Any, known: Wanted, what: str) -> str:
     """Return a value as one of the known words, in any case or spelling."""
     text = str(value).lower()
     for name in known:
@@ -106,7 +95,7 @@ def _known(value: Any, known: Collection[str], what: str) -> str:
     raise unknown_name(what, str(value), known)
 
 
-def one_of(known: Collection[str]) -> BeforeValidator:
+def one_of(known: Wanted) -> BeforeValidator:
     """Return a validator for one of some words, as ``_known``."""
     return BeforeValidator(lambda value, info: _known(value, known, info.field_name))
 
@@ -136,6 +125,7 @@ _Range = Annotated[
     AfterValidator(_two_levels),
     expected("two numbers, what stands for no and for full command, such as [1000, 2000]"),
 ]
+_Body = Annotated[str, one_of(BODIES)]
 _Order = Annotated[Order, BeforeValidator(rotor_order)]
 
 
@@ -161,7 +151,7 @@ class Columns(_Form):
         return self.topic or self.columns[0] + " ..." * (len(self.columns) > 1)
 
     @property
-    def named(self) -> list[str]:
+    def named(self) -> Lines:
         """The columns of the table, without constants such as ``=0``."""
         return [name for name in self.columns if constant(name) is None]
 
@@ -201,8 +191,10 @@ class Position(Columns):
 class Attitude(Columns):
     """A quaternion, or Euler angles about x, y and z."""
 
-    order: Annotated[str, one_of(QUATERNIONS)] = "wxyz"  # order of a quaternion's columns
-    euler: Annotated[str, one_of(EULER_ORDERS)] = ""  # of turns; empty: a quaternion
+    order: Annotated[str, one_of(("wxyz", "xyzw"))] = "wxyz"  # order of a quaternion's columns
+    euler: Annotated[str, one_of(("xyz", "xzy", "yxz", "yzx", "zxy", "zyx"))] = (
+        ""  # of turns; empty: a quaternion
+    )
     sense: Annotated[str, one_of(SENSES)] = "body_to_world"
     of: Names = ()  # topics of positions; empty: of all
 
@@ -241,14 +233,14 @@ class Battery(Columns):
 class Sensor(Columns):
     """An inertial sensor of three axes."""
 
-    body: Annotated[str, one_of(BODIES)] = ""  # empty: the map's
+    body: _Body = ""  # empty: the map's
 
 
-def _section(given: Any, inner: Callable[[Any], Any], info: ValidationInfo) -> Any:
+def _section(given: Any, inner: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
     """Check a section: the number of columns, their unit and signs."""
     name = info.field_name or ""
     count = SECTIONS.get(name, 0)
-    units: Collection[str] = COMMAND_UNITS if name == "commands" else UNITS.get(name, ())
+    units: Wanted = COMMAND_UNITS if name == "commands" else UNITS.get(name, ())
     stated = given if isinstance(given, Mapping) else {}
     if stated:
         given = {str(key): value for key, value in stated.items() if value is not None}
@@ -293,7 +285,7 @@ class LogMap(_Form):
 
     time: Annotated[TimeColumn, AfterValidator(_clock)]
     world: Annotated[str, one_of(WORLDS), AfterValidator(WORLDS.__getitem__)] = "enu"
-    body: Annotated[str, one_of(BODIES)] = "flu"
+    body: _Body = "flu"
     position: _Part[Position] = None
     attitude: _Part[Attitude] = None
     rotors: _Part[Rotors] = None
@@ -313,7 +305,7 @@ class LogMap(_Form):
     stray_rows: Annotated[int, Field(ge=0)] = 0
     extra: Mapping[str, _Section[Columns]] = field(default_factory=dict)
     # further ways to fill a section (``time`` among them), in their order
-    alternatives: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+    alternatives: Mapping[str, Ways] = field(default_factory=dict)
 
     @property
     def sections(self) -> dict[str, Columns]:
@@ -325,7 +317,7 @@ class LogMap(_Form):
         """Are the columns this kit's own?"""
         return self.name == OWN_MAP
 
-    def ways(self, section: str) -> tuple[Any, ...]:
+    def ways(self, section: str) -> Ways:
         """Return the ways to fill a section, in their order."""
         first = getattr(self, section)
         return () if first is None else (first, *self.alternatives.get(section, ()))
@@ -342,7 +334,7 @@ class LogMap(_Form):
         return self.with_ways({n: [replace(w, order=order) for w in x] for n, x in motors.items()})
 
     @property
-    def wanted(self) -> list[str]:
+    def wanted(self) -> Lines:
         """The map's columns, each once."""
         parts = [way for section in self.sections for way in self.ways(section)]
         parts += [*self.extra.values(), self.time]
@@ -367,7 +359,7 @@ def constant(name: str) -> float | None:
         return None
 
 
-def map_names() -> list[str]:
+def map_names() -> Lines:
     """Return the names of the kit's own maps."""
     return sorted(path.stem for path in MAPS.glob("*.yaml"))
 

@@ -6,7 +6,6 @@ The guess of a map, the reading of a log and its screening decide here, with the
 import re
 from dataclasses import replace
 from itertools import combinations
-from typing import ClassVar
 
 import numpy as np
 
@@ -18,53 +17,27 @@ from .flight_phases import carrying, usual_thrust
 from .log_map import UNITS
 from .table import Array, Mask, Pair, finite_rows
 
-
-class _Magnitudes:
-    """How large and how small the numbers of a log may be."""
-
-    # sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
-    units: ClassVar[dict[str, tuple[Pair, Pair]]] = {
-        "time": ((2e-4, 0.2), (4e-4, 1.0 / 15.0)),
-        "battery": ((2.7, 100.0), (2.7, 60.0)),
-        "accelerometer": ((8.335, 11.278), (8.335, 11.278)),
-    }
-
-    shortest_period = 1e-5  # s, of the median step: 100 kHz, far above any pose's rate
-    # s, of any step. A log in nanoseconds has steps of 1e7; a step of a year is no flight
-    longest_step = 1e12
-    largest = 1e9  # SI units, all other numbers; millimetres or rpm stay far below
-    widest = 300.0  # m, spread of one flight's positions
-    flies = 0.2, 5.0  # median thrust by weight; beyond, another vehicle flew
-    doubtful = 0.5, 2.0  # the same; beyond, another may have flown
-    strongest = 300.0  # m/s2 of specific force, above all racers and most sensors' range
-    fastest_gyro = 70.0  # rad/s, the range of the fastest gyros (4000 deg/s)
-    fast_gyro = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
-    slow_gyro = 6.0  # rad/s: 99.5 % of a flight's angular velocities are less
-    named_rates = 0.5, 20_000.0  # Hz of rows; beyond, no name counts
-    # limits of four motors' median. Above the first, only rpm is left: no propeller turns as fast
-    # in rad/s. Above the second, rpm is likelier: in rad/s only palm-sized vehicles hover as fast.
-    # Above the third, rpm may also be a command of 16 bits
-    rpm, fast, counts = 4500.0, 2600.0, 20_000.0
-    # rad/s: the largest drones' rotors (1.4 m across) hover at 150; slower, the unit is wrong
-    slow = 100.0
-    uneven = 2.0  # ratio of two rotors' medians in flight, at most
-    # power of the specific force's growth: with rotor speeds, and with pulses at least
-    squares = 1.5, 2.5
-    offset = 2.8
-
-
-MAGNITUDES = _Magnitudes()
-# thrust by weight of rotors in their right unit; mass and thrust curve may be off
-_CARRIES = 0.55, 1.8
-# changes of a column: fewer are no measurement, and equal by chance
-_CHANGES = 20
+# sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
+_LIKELY = {"time": (0.0002, 0.2), "battery": (2.7, 100.0), "accelerometer": (8.335, 11.278)}
+_CERTAIN = _LIKELY | {"time": (0.0004, 1.0 / 15.0), "battery": (2.7, 60.0)}
 _TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+# of rotors, in words, and in rad/s
 _SPEEDS = {
     "rad/s": ("", 1.0),
-    "rpm": ("revolutions per minute", UNITS["rotors"]["rpm"]),
-    "Hz": ("revolutions per second", UNITS["rotors"]["Hz"]),
-    "deg/s": ("degrees per second", np.pi / 180.0),
+    "rpm": ("revolutions per minute", 0.10471975511965977),
+    "Hz": ("revolutions per second", 6.283185307179586),
+    "deg/s": ("degrees per second", 0.017453292519943295),
 }
+_SHORTEST_PERIOD = 1.0e-5  # s, of the median step: 100 kHz, far above any pose's rate
+# s, of any step. A log in nanoseconds has steps of 1e7; a step of a year is no flight
+_LONGEST_STEP = 1.0e12
+LARGEST = 1.0e9  # SI units, all other numbers; millimetres or rpm stay far below
+# median thrust by weight; beyond, another vehicle may have flown
+DOUBTFUL = 0.5, 2.0
+STRONGEST = 300.0  # m/s2 of specific force, above all racers and most sensors' range
+# rad/s: the largest drones' rotors (1.4 m across) hover at 150; slower, the unit is wrong
+_SLOW = 100.0
+_UNEVEN = 2.0  # ratio of two rotors' medians in flight, at most
 
 
 def within(value: float, limits: Pair) -> bool:
@@ -77,19 +50,18 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     unit is certain. The size is a battery's median voltage, the time's median step, or an
     accelerometer's median length.
     """
-    units = UNITS[section].items()
-    sizes = {unit: size * one for unit, one in units if unit not in ("min", "raw")}
-    likely, sure = MAGNITUDES.units[section]
-    unit = next((unit for unit in sizes if within(sizes[unit], likely)), next(iter(sizes)))
-    return unit, within(sizes[unit], sure)
+    sizes = {u: size * one for u, one in UNITS[section].items() if u not in ("min", "raw")}
+    likely = (unit for unit in sizes if within(sizes[unit], _LIKELY[section]))
+    unit = next(likely, next(iter(sizes)))
+    return unit, within(sizes[unit], _CERTAIN[section])
 
 
 def time_doubt(step: float) -> str:
     """Return a doubt on the time's unit by a median step (s), or nothing."""
     unit, is_sure = likely_unit("time", step)
     words = (
-        f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: divide t "
-        f"by {1.0 / UNITS['time'][unit]:g}"
+        f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: "
+        f"divide t by {1.0 / UNITS['time'][unit]:g}"
     )
     return words if is_sure and unit != "s" else ""
 
@@ -109,12 +81,13 @@ def _carrying_units(thrust: float) -> list[str]:
     """Return the units of rotor speeds able to carry the vehicle, by the median thrust by weight of
     the numbers as rad/s.
     """
-    return [u for u, (_, factor) in _SPEEDS.items() if within(thrust * factor**2, _CARRIES)]
+    # mass and thrust curve may be off
+    return [u for u, (_, one) in _SPEEDS.items() if within(thrust * one**2, (0.55, 1.8))]
 
 
 def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     """Return a doubt on rotor speeds in rad/s by a median thrust by weight, or nothing."""
-    if within(thrust, MAGNITUDES.flies):
+    if within(thrust, (0.2, 5.0)):  # beyond, another vehicle flew
         return ""
     for unit in _carrying_units(thrust):
         name, factor = _SPEEDS[unit]
@@ -135,22 +108,23 @@ def motor_doubts(log: FlightLog) -> list[str]:
     """
     measured = log.has_rotor_speeds and not log.commanded
     motors = log.rotor_speeds if measured else log.command
-    if motors is None or not np.isfinite(motors).all() or not np.any(motors > 0.0):
+    if motors is None or not np.isfinite(motors).all() or not (motors > 0.0).any():
         return []
     what = "rotor speeds" if measured else "motor commands"
     alike = [
         f"{what} of motors {i + 1} and {j + 1} are equal in every row; expected four motors"
         for i, j in combinations(range(4), 2)
         if np.array_equal(motors[:, i], motors[:, j])
-        and np.count_nonzero(np.diff(motors[:, i])) >= _CHANGES
+        # a column of fewer changes is no measurement, and equal by chance
+        and np.count_nonzero(np.diff(motors[:, i])) >= 20
     ]
     doubts = [] if len(alike) == 2 else alike[:1]  # two pairs: a flight in one plane without noise
     medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
     expected = ""
-    if medians.max() > MAGNITUDES.uneven * medians.min():
-        expected = f"a ratio of at most {MAGNITUDES.uneven:g}"
-    elif medians.max() < MAGNITUDES.slow:
-        expected = f"at least {MAGNITUDES.slow:g}: no rotor carries a drone at less. Check the unit"
+    if medians.max() > _UNEVEN * medians.min():
+        expected = f"a ratio of at most {_UNEVEN:g}"
+    elif medians.max() < _SLOW:
+        expected = f"at least {_SLOW:g}: no rotor carries a drone at less. Check the unit"
     if measured and expected:
         listed = ", ".join(f"{x:.3g}" for x in medians)
         doubts.append(
@@ -173,9 +147,9 @@ def motor_unit(
         return "commands", "normalised", False, "all are zero"
     low, middle, high = np.quantile(turning, [0.01, 0.5, 1.0]).tolist()
     named = group.unit or next((unit for unit in ("eRPM", "rpm") if unit.lower() in names), "")
-    commanded = bool(re.search("|".join(WORDS["command_words"]), names))
+    commanded = re.search("|".join(WORDS["command_words"]), names)
     speeds = bool(re.search("omega|speed|rotor|rpm", names))
-    speeds |= within(power, MAGNITUDES.squares) and not commanded
+    speeds |= within(power, (1.5, 2.5)) and not commanded  # about 2: squares
     pulses = low >= 850.0 and high <= 2250.0
     carrier = ""  # the one unit in which the rotors carry the vehicle
     if vehicle is not None and not commanded:
@@ -201,17 +175,17 @@ def motor_unit(
         (commanded and pulses, "commands", "us", True, between),
         (commanded and high <= 100.0, "commands", "percent", False, up_to),
         (commanded and high <= 65535.0, "commands", "counts", False, up_to),
-        (pulses and power >= MAGNITUDES.offset, "commands", "us", True, between),
+        (pulses and power >= 2.8, "commands", "us", True, between),
         (carrier, "rotors", carrier, not doubt, carries),
         (
-            middle > MAGNITUDES.counts and high <= 65535.0,
+            middle > 20000.0 and high <= 65535.0,
             "commands",
             "counts",
             False,
             f"{up_to}, which may be 16 bits of a command, or rpm",
         ),
         (
-            not commanded and middle > MAGNITUDES.rpm,
+            not commanded and middle > 4500.0,
             "rotors",
             "rpm",
             True,
@@ -219,7 +193,7 @@ def motor_unit(
         ),
         (pulses and not speeds, "commands", "us", False, between),
         (
-            middle > MAGNITUDES.fast,
+            middle > 2600.0,  # in rad/s only palm-sized vehicles hover as fast
             "rotors",
             "rpm",
             False,
@@ -238,26 +212,26 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
     """
     step = np.diff(log.t)
     where, longest = f"{log.source}: column", np.argmax(step)
-    if not log.period >= MAGNITUDES.shortest_period:
+    if not log.period >= _SHORTEST_PERIOD:
         raise InputError(
             f"{where} t: the median time step is {log.period:.3g} s; expected at least "
-            f"{MAGNITUDES.shortest_period:g} s"
+            f"{_SHORTEST_PERIOD:g} s"
         )
-    if not step[longest] <= MAGNITUDES.longest_step:
+    if not step[longest] <= _LONGEST_STEP:
         raise InputError(
             f"{where} t, row {longest + 2}: {step[longest]:.3g} s after the row before; expected "
-            f"at most {MAGNITUDES.longest_step:g} s"
+            f"at most {_LONGEST_STEP:g} s"
         )
     for names, values in parts_of(log)[1:]:
         columns = values.reshape(len(log.t), -1)
-        for row, i in np.argwhere(np.abs(columns) > MAGNITUDES.largest)[:1]:  # False where NaN
+        for row, i in np.argwhere(np.abs(columns) > LARGEST)[:1]:  # False where NaN
             raise InputError(
                 f"{where} {names[i]}, row {row + 1}: {columns[row, i]:.3g}; expected a number "
-                f"within {MAGNITUDES.largest:g}"
+                f"within {LARGEST:g}"
             )
     doubts = [time_doubt(log.period), *motor_doubts(log)]
     spread = np.max(np.ptp(log.position[log.valid], axis=0)) if log.has_pose else 0.0
-    if spread > MAGNITUDES.widest:
+    if spread > 300.0:
         doubts.append(
             f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres"
         )
@@ -274,9 +248,6 @@ def interpolated(log: FlightLog, broken: Mask) -> FlightLog:
     return replace(log, rotor_speeds=speeds)
 
 
-_BROKEN = 3.0  # times the speed that 99 % of a rotor's samples stay below: 9 times their thrust
-
-
 def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     """Return a log without broken rotor speeds, and a doubt where there are some: no rotor triples
     its speed in a sample or two and falls back. Neighbours are interpolated.
@@ -284,13 +255,14 @@ def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     if not log.has_rotor_speeds or log.commanded:
         return log, []
     high = np.nanquantile(log.rotor_speeds, 0.99, axis=0)
-    fast = log.rotor_speeds > _BROKEN * np.where(high > 0.0, high, np.inf)
+    # 3 times the speed: 9 times the thrust
+    fast = log.rotor_speeds > 3.0 * np.where(high > 0.0, high, np.inf)
     # a sample counts if the third before it and the third behind it are sound
     far = np.pad(fast, ((3, 3), (0, 0)))
     broken = fast & ~far[:-6] & ~far[6:]
     if not broken.any():
         return log, []
-    highest = np.max(log.rotor_speeds[broken])
+    highest = log.rotor_speeds[broken].max()
     return interpolated(log, broken), [
         f"{np.count_nonzero(broken)} rotor speeds are broken, up to {highest:.0f} rad/s where "
         f"99 % are below {high.max():.0f}: they were interpolated"

@@ -33,7 +33,7 @@ from .column_parts import (
     named_columns,
 )
 from .evidence import GOOD, GOOD_TORQUE, TURNING_RATE, Evidence, Fit, RankedFits, likelihood
-from .excerpt import LONGEST
+from .flight_log import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
     COMMAND_UNITS,
@@ -48,7 +48,7 @@ from .log_map import (
     Sensor,
     TimeColumn,
 )
-from .magnitudes import MAGNITUDES, likely_unit, motor_unit, within
+from .magnitudes import DOUBTFUL, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
 from .table import Array, ArrayMap, Data, NamedArrays, Names, Table
 from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
@@ -56,15 +56,19 @@ from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
 _G = UNITS["accelerometer"]["g"]
 # fields of a body's turns
-_FRAMES = "frames.map_world", "frames.map_body"
-_TURNS = *_FRAMES, "attitude.sense", "attitude.order", "attitude.unit", "pitch_sign"
+_TURNS = (
+    "frames.map_world",
+    "frames.map_body",
+    "attitude.sense",
+    "attitude.order",
+    "attitude.unit",
+    "pitch_sign",
+)
 _MOTORS = ("motors", "commands")
 _GYROS = [
     SensorReading(turn=UNITS["gyro"][unit] * turn, unit=unit, body=body)
     for unit, (body, turn) in product(("rad/s", "deg/s"), BODY_TURNS.items())
 ]
-# roll and pitch of a plus, by rotors at the left, rear, right and front
-_PLUS = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
 _EXAMPLES = {
     "position": "x, y, z",
     "attitude": "qw, qx, qy, qz or roll, pitch, yaw",
@@ -74,7 +78,7 @@ _EXAMPLES = {
 
 
 @dataclass(frozen=True)
-class Reason:
+class _Reason:
     """The reason for a field's value."""
 
     section: str
@@ -89,9 +93,9 @@ class Guess:
     """A guessed map."""
 
     log_map: LogMap
-    reasons: tuple[Reason, ...]
+    reasons: tuple[_Reason, ...]
     unused: Names = ()  # columns
-    missing: tuple[Reason, ...] = ()  # fields ``?``; the log is not read without them
+    missing: tuple[_Reason, ...] = ()  # fields ``?``; the log is not read without them
 
     @property
     def lacks(self) -> str:
@@ -99,7 +103,7 @@ class Guess:
         return "; ".join(f"{m.section}.{m.field}: {m.why}" for m in self.missing)
 
     @property
-    def doubts(self) -> tuple[Reason, ...]:
+    def doubts(self) -> tuple[_Reason, ...]:
         """The uncertain fields."""
         return tuple(reason for reason in self.reasons if not reason.certain)
 
@@ -153,7 +157,7 @@ def _time_column(names: Sequence[Name], data: ArrayMap) -> Name | None:
         steps = np.diff(values[np.isfinite(values)])
         if np.any(steps > 0.0) and np.mean(steps >= 0.0) > 0.9:
             return name
-    rises = (n for n in there if len(x := data[n.column]) > 2 and np.all(np.diff(x) > 0.0))
+    rises = (n for n in there if len(x := data[n.column]) > 2 and (np.diff(x) > 0.0).all())
     return next(rises, None)
 
 
@@ -163,7 +167,7 @@ class _Guessing:
     def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
         self.table, self.vehicle = table, vehicle
         self.sections: Data = {}
-        self.reasons: list[Reason] = []
+        self.reasons: list[_Reason] = []
         self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
         self.unnamed: set[str] = set()  # sections without telling names
@@ -172,7 +176,7 @@ class _Guessing:
         names = take_apart(table.header, table.units)
         self.data = _numbers_of(table, names)
         self.clock = _time_column(names, self.data)
-        self.t: Array = 0.01 * np.arange(table.rows, dtype=np.float64)
+        self.t: Array = 0.01 * np.arange(0.0, table.rows)
         if self.clock is not None:
             # a column of nanoseconds may stand beside a clock of whole seconds
             key = re.sub("(^|_)secs?$", "", self.clock.base)
@@ -218,7 +222,7 @@ class _Guessing:
         """Return the values (N, k) of columns."""
         return np.column_stack([self.data[name] for name in columns])
 
-    def missing(self) -> list[Reason]:
+    def missing(self) -> list[_Reason]:
         """Return the fields missing for a flight log."""
         lacks: dict[str, str] = {}
         if self.clock is None:
@@ -244,7 +248,7 @@ class _Guessing:
             why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
             lacks["motors"] = why
         return [
-            Reason(
+            _Reason(
                 "rotors" if part in _MOTORS else part,
                 "column" if part == "time" else "columns",
                 False,
@@ -272,7 +276,7 @@ class _Guessing:
     def say(self, section: str, name: str, certain: bool, why: str) -> None:
         """Keep the reason for a field's value."""
         certain = certain and section not in self.unnamed
-        self.reasons.append(Reason(section, name, certain, why))
+        self.reasons.append(_Reason(section, name, certain, why))
 
     def take(self, section: str, name: str, choice: _Choice) -> str:
         """Return the choice for a field, and keep the reason."""
@@ -300,8 +304,8 @@ class _Guessing:
         steps = np.diff(known)
         step = max(float(np.median(steps[steps > 0.0])), 1e-300)
         guessed, sure = likely_unit("time", step)
-        if clock.unit in units:  # an unusual rate is no reason to doubt a name
-            sure &= not within(1.0 / (step * units[clock.unit]), MAGNITUDES.named_rates)
+        if clock.unit in units:  # an unusual rate (Hz) is no reason to doubt a name
+            sure &= not within(1.0 / (step * units[clock.unit]), (0.5, 20000.0))
         choice = guessed, sure, f"{1.0 / (step * units[guessed]):.4g} rows a second"
         unit = self.unit("time", "s" if nanoseconds else clock.unit, choice)
         t = (raw - known[0]) * units[unit]
@@ -379,7 +383,7 @@ class _Guessing:
         if group.unit in units or is_gravity:
             guessed = guessed if is_gravity else group.unit
             unit = self.unit("accelerometer", group.unit, (guessed, True, why))
-            if unit == group.unit and not within(size * units[unit] / _G, MAGNITUDES.doubtful):
+            if unit == group.unit and not within(size * units[unit] / _G, DOUBTFUL):
                 self.say("accelerometer", "unit", False, f"{unit}: {why}, which is not gravity's")
         else:
             scale = float(f"{_G / size:.6g}")
@@ -418,8 +422,7 @@ class _Guessing:
 
     def gyro(self, group: Group) -> None:
         """Find unit and axes of the gyro: from the pose's turns, or from size and accelerometer."""
-        named = group.unit if group.unit in UNITS["gyro"] else ""
-        ranking = self.gyro_fits(group.columns, named)
+        ranking = self.gyro_fits(group.columns, group.unit if group.unit in UNITS["gyro"] else "")
         if ranking is not None:
             guessed = ranking.says("unit")
             axes, sure, why = ranking.says("body")
@@ -432,8 +435,10 @@ class _Guessing:
             sure = self.ranking is None and ("accelerometer", "body") in told
             self.say("gyro", "body", sure, "as the accelerometer's")
             high = float(np.nanquantile(np.abs(self.values(group.columns)), 0.995))
-            unit = "deg/s" if high > MAGNITUDES.slow_gyro else "rad/s"
-            guessed = unit, high > MAGNITUDES.fast_gyro, f"its fast values are {high:.3g}"
+            # 99.5 % of a flight's angular velocities are less than 6 rad/s; 35 rad/s
+            # (2000 deg/s) is the range of usual gyros
+            unit = "deg/s" if high > 6.0 else "rad/s"
+            guessed = unit, high > 35.0, f"its fast values are {high:.3g}"
         unit = self.unit("gyro", group.unit, guessed)
         self.sections["gyro"] = Sensor(group.columns, unit, body=axes)
 
@@ -484,7 +489,7 @@ class _Guessing:
         evidence = Evidence(self.t, np.square(values), **motion)
         if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
-        ways = [replace(best, rotors=(a, b, c, d)) for a, b, c, d in permutations(ROTORS)]
+        ways = [replace(best, rotors=order) for order in permutations(ROTORS)]
         ranking = RankedFits(map(evidence.fit, ways))
         left, lead, order = ranking.fit.torque, ranking.other("rotors")[1], ranking.best.motors
         names = order_names(order)
@@ -497,7 +502,9 @@ class _Guessing:
             )
             return order, is_sure, why
         why = f"{hint}: no order is much likelier than all others"
-        evidence = Evidence(self.t, np.square(values), sides=_PLUS, **motion)
+        # roll and pitch of a plus, by rotors at the left, rear, right and front
+        sides = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
+        evidence = Evidence(self.t, np.square(values), sides=sides, **motion)
         plus = RankedFits(map(evidence.fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))

@@ -11,19 +11,19 @@ rows is interpolated to the position's rows.
 """
 
 import re
-from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
+from math import nan
 from pathlib import Path
 
 import numpy as np
 
-from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.smoothing import resampled
 from .channels import (
     LONGEST_STEPS,
     ChannelGroup,
+    Groups,
     Stream,
     check_rows,
     in_kit_axes,
@@ -41,6 +41,7 @@ from .flight_log import (
     NORM_TOLERANCE,
     VEHICLE,
     FlightLog,
+    SomeVehicle,
     flown_vehicle,
     source_rate,
     time_notes,
@@ -55,12 +56,25 @@ from .log_map import (
     Rotors,
     check_whole,
 )
-from .table import Array, Mask, Table, finite_rows, median_step
-from .what_flew import UNSTATED, WhatFlew, more_rotors, order_names, order_words
+from .table import (
+    Array,
+    Lines,
+    Mask,
+    Noted,
+    Piece,
+    Table,
+    Texts,
+    Wanted,
+    finite_rows,
+    median_step,
+    stem,
+)
+from .what_flew import UNSTATED, Order, WhatFlew, more_rotors, order_names, order_words
 
 _SHOWN = 30  # columns in an error
 _MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commanded wrenches"}
 NO_QUATERNION = 0.5  # length; shorter stands for a missing quaternion
+MOTOR_NAMES = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])), re.IGNORECASE)
 _IMU = ("accelerometer", "gyro")
 _ATTITUDE_GAP = 0.1  # s, the longest gap for interpolating an attitude
 _OUTSIDE = 0.5  # share of commands beyond a wrong range
@@ -70,15 +84,16 @@ _ROTOR_GAP = 0.5  # s without rotor speeds; longer gaps get a note
 # times faster than the pose: an inertial sensor has rows of its own. A pose is put to the nearest
 # row, so the pose moves by a tenth of its step at most, with its own noise
 _OWN_ROWS = 5.0
-Sections = tuple[LogMap, dict[str, Stream], dict[str, Stream], list[str]]
+Streams = dict[str, Stream]
+Sections = tuple[LogMap, Streams, Streams, Lines]
 
 
 def map_table(
     table: Table,
     log_map: LogMap,
-    vehicle: Vehicle | None = None,
+    vehicle: SomeVehicle = None,
     reader: str = "",
-    piece: int | None = None,
+    piece: Piece = None,
 ) -> FlightLog:
     """Return the flight log of a table by a map.
 
@@ -116,28 +131,13 @@ def map_table(
     return flight_log(table.path, reader, sections, vehicle)
 
 
-def log_of(
-    path: Path,
-    recorded: Sequence[ChannelGroup],
-    log_map: LogMap,
-    reader: str,
-    notes: Sequence[str],
-    vehicle: Vehicle | None,
-    piece: int | None = None,
-    flown: WhatFlew = UNSTATED,
-) -> FlightLog:
-    """Return the flight log of groups of columns by a map, as of ``sections_of``."""
-    sections = sections_of(path, recorded, log_map, reader, notes, piece, flown)
-    return flight_log(path, reader, sections, vehicle, flown)
-
-
 def sections_of(
     path: Path,
-    recorded: Sequence[ChannelGroup],
+    recorded: Groups,
     log_map: LogMap,
     reader: str,
-    notes: Sequence[str],
-    piece: int | None = None,
+    notes: Texts,
+    piece: Piece = None,
     flown: WhatFlew = UNSTATED,
 ) -> Sections:
     """Return the map with the sections that are there; their streams and those of further channels,
@@ -167,7 +167,7 @@ def sections_of(
     poses = log_map.ways("position")
     log_map, sources = chosen(recorded, log_map)
     of_clock += [note for s in recorded if s.table for note in check_rows(s, log_map)]
-    if not (log_map.rotors or log_map.commands or log_map.wrench):
+    if _MOTORS.keys().isdisjoint(log_map.sections):
         names = [s.topic for s in recorded if s.topic] or [x for s in recorded for x in s.columns]
         wanted = " or ".join(
             f"{w.topic + ' with ' if w.topic else ''}{w.columns[0]} ..." for w in motors
@@ -218,7 +218,7 @@ def sections_of(
             said.append(f"no pose{what if poses else ' in the log'}")
         if log_map.rows == "whole":  # all rows are the log's
             t = recorded[0].t
-            streams["position"] = Stream("pose", t, np.full((len(t), 7), np.nan))
+            streams["position"] = Stream("pose", t, np.full((len(t), 7), nan))
     extra = {
         name: Stream(name, samples.t, samples.values(part))
         for name, part in log_map.extra.items()
@@ -228,16 +228,15 @@ def sections_of(
     return log_map, streams, extra, said
 
 
-def motors_left_out(names: Sequence[str], used: Collection[str]) -> list[str]:
+def motors_left_out(names: Texts, used: Wanted) -> Lines:
     """Return a note on columns named as four motors', none of them used."""
-    words = "|".join((WORDS["motor_words"], *WORDS["command_words"]))
     taken_apart = take_apart(names)
     left = {
         f"{group.columns[0]} ...": None
         for way in WORDS["parts"]["motors"]
         for endings in way["endings"]
         for group in groups_of(taken_apart, endings)
-        if re.search(words, group.key) and not re.search(WORDS["sticks"], group.key)
+        if MOTOR_NAMES.search(group.key) and not re.search(WORDS["sticks"], group.key)
         if not {*group.columns} & {*used}
     }
     listed = ", ".join([*left][:_SHOWN])
@@ -246,7 +245,7 @@ def motors_left_out(names: Sequence[str], used: Collection[str]) -> list[str]:
 
 def _pose(
     path: Path, log_map: LogMap, samples: ChannelGroup, turned: ChannelGroup | None
-) -> tuple[Stream, list[str]]:
+) -> Noted[Stream]:
     """Return positions in m and attitudes (N, 7) in the kit's frames, NaN where there is none, and
     notes.
 
@@ -273,17 +272,18 @@ def _pose(
     if len(t) < len(keep):
         notes.append(f"{len(t)} of {len(keep)} rows kept: those with a pose or an IMU's sample")
     if isinstance(place, Position) and place.held:
-        new = np.append(True, np.any(np.diff(position, axis=0) != 0.0, axis=1))
+        new = np.append(True, (np.diff(position, axis=0) != 0.0).any(axis=1))
         placed &= new
         if not new.all():
             notes.append(
-                f"position: sampled and held; {np.count_nonzero(~new)} of {len(t)} rows repeat the "
+                f"position: sampled and held; {(~new).sum()} of {len(t)} rows repeat the "
                 "one before and are not valid"
             )
-    pose = np.full((len(t), 7), np.nan)
+    pose = np.full((len(t), 7), nan)
+    poses = Stream(place.label, t, pose)
     if turn is None or turned is None:
         pose[:, :3] = position
-        return Stream(place.label, t, pose), notes
+        return poses, notes
     measured = turned.cut(turned.there(turn))
     turns = quaternions(turn, measured.values(turn))
     with np.errstate(over="ignore"):
@@ -307,7 +307,7 @@ def _pose(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
         )
-    alone = np.count_nonzero(~np.isin(t[placed], attitude.t))
+    alone = (~np.isin(t[placed], attitude.t)).sum()
     if turned is samples and alone:
         notes.append(
             f"{alone} of {placed.sum()} positions stand in rows without an attitude, which "
@@ -319,7 +319,7 @@ def _pose(
         for name in turn.columns
         if name not in turn.named
     ]
-    return Stream(place.label, t, pose), notes
+    return poses, notes
 
 
 def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
@@ -340,7 +340,7 @@ def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
     return np.asarray(np.any([*there.values()], axis=0))
 
 
-def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream) -> list[str]:
+def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream) -> Lines:
     """Return notes on commands (N, 4).
 
     Raises:
@@ -348,7 +348,7 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
     """
     low, high = part.range or (0.0, 1.0)
     u = commands.values[np.isfinite(commands.values)]
-    if np.count_nonzero((u < -0.01) | (u > 1.01)) > _OUTSIDE * len(u):
+    if ((u < -0.01) | (u > 1.01)).sum() > _OUTSIDE * len(u):
         raw = low + (high - low) * u
         what, hint = ("", ": state the range in the map")
         if u.max() < 0.0 and part.topic:  # an autopilot knows its range
@@ -362,18 +362,18 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
         is_said = part.note or (low, high) == (0.0, 1.0)
         taken = "" if is_said else f"{low:g} to {high:g} taken as 0 to 1, "
         notes.append(f"commands: {commands.name}, {part.unit}, {taken}{_order_note(part.order)}")
-    if outside := np.count_nonzero((u < -1e-9) | (u > 1.0 + 1e-9)):
+    if outside := ((u < -1e-9) | (u > 1.0 + 1e-9)).sum():
         notes.append(f"{outside} motor command(s) beyond that range were set to its end")
     return notes
 
 
-def _order_note(order: tuple[int, int, int, int]) -> str:
+def _order_note(order: Order) -> str:
     names = order_names(order)
     return f"{order_words(order)}{f' ({names[0]})' if names else ''}"
 
 
 def fitted(
-    names: Sequence[str], source: object, log_map: LogMap, vehicle: Vehicle | None, reader: str
+    names: Texts, source: object, log_map: LogMap, vehicle: SomeVehicle, reader: str
 ) -> LogMap:
     """Return a map with the ways to fill a section from a table's columns, and with the range of
     its commands. Optional sections without columns are left out.
@@ -410,7 +410,7 @@ def fitted(
     return with_range(replace(log_map, extra=extra), vehicle, where)
 
 
-def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
+def with_range(log_map: LogMap, vehicle: SomeVehicle, where: str) -> LogMap:
     """Return a map with the range of its commands: its own, or the vehicle's.
 
     Raises:
@@ -428,9 +428,7 @@ def with_range(log_map: LogMap, vehicle: Vehicle | None, where: str) -> LogMap:
     return replace(log_map, commands=replace(commands, range=vehicle.motor_curve.command))
 
 
-def chosen(
-    recorded: Sequence[ChannelGroup], log_map: LogMap
-) -> tuple[LogMap, dict[str, ChannelGroup]]:
+def chosen(recorded: Groups, log_map: LogMap) -> tuple[LogMap, dict[str, ChannelGroup]]:
     """Return a map with one way to fill each section, and the columns' groups. The first way with
     columns and measurements is taken; a position together with its attitude. Optional sections
     without columns are left out.
@@ -479,7 +477,7 @@ def flight_log(
     path: Path,
     reader: str,
     sections: Sections,
-    vehicle: Vehicle | None,
+    vehicle: SomeVehicle,
     flown: WhatFlew = UNSTATED,
 ) -> FlightLog:
     """Return the flight log of streams.
@@ -518,7 +516,7 @@ def flight_log(
         )
     valid = finite_rows(pose)
     if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
-        pose[~valid] = np.nan
+        pose[~valid] = nan
     pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
     there = {
         name: stream.between(t) if name in _IMU else stream.at(t)
@@ -526,17 +524,17 @@ def flight_log(
         if name != "position"
     }
     measured = {name: x for name, x in there.items() if name in _IMU and np.isfinite(x).any()}
-    speeds = there.get("rotors", np.full((len(t), 4), np.nan))
+    speeds = there.get("rotors", np.full((len(t), 4), nan))
     if kind == "wrench" and vehicle is not None:
         speeds, words = speeds_of_wrench(there["wrench"], vehicle)
         notes += words
     times = t - t[0] if log_map.time.offset is None else t
     notes += time_notes(times)
-    without = np.count_nonzero(~valid) if valid.any() else 0
+    without = (~valid).sum() if valid.any() else 0
     if without and measured:  # the sensor may be faster than the pose
         notes += [f"of the pose: {text}" for text in time_notes(times[valid])]
     elif without:
-        first = times[np.argmin(valid)]
+        first = times[valid.argmin()]
         notes.append(f"{without} of {len(t)} rows without a pose, the first at t = {first:.6g} s")
     log = FlightLog(
         times,
@@ -546,11 +544,11 @@ def flight_log(
         voltage=there["battery"][:, 0] if "battery" in there else None,
         force=there.get("force"),
         torque=there.get("torque"),
-        name=Path(path.name.removesuffix(".gz")).stem if path.is_file() else path.name,
+        name=stem(path) if path.is_file() else path.name,
         source=f"{path} (reader {reader})" if reader else str(path),
         notes=tuple(notes),
         valid=valid,
-        extra={n: x if (x := s.between(t)).shape[1] > 1 else x[:, 0] for n, s in extra.items()},
+        extra={name: stream.between(t).squeeze() for name, stream in extra.items()},
         commanded=kind == "wrench",
         command=there.get("commands"),
         vehicle=log_map.vehicle,
@@ -561,7 +559,7 @@ def flight_log(
     return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
-def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Stream], list[str]]:
+def _cleaned(path: Path, streams: Streams) -> Noted[Streams]:
     """Return the streams with values, within a flight's limits, and notes.
 
     Raises:
@@ -583,11 +581,11 @@ def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Strea
                 f"{path}: {name}: no two samples have four finite {_MOTORS[section]}; expected some"
             )
         if section == "rotors":
-            if np.any(values < 0.0):
+            if (values < 0.0).any():
                 notes.append(f"{name}: negative rotor speeds were taken as positive")
             values = np.abs(values)
         elif section == "commands":
-            values = np.clip(values, 0.0, 1.0)
+            values = values.clip(0.0, 1.0)
         elif section == "battery":
             plausible = (values >= LEAST_VOLTS) & (values <= MOST_VOLTS)
             wrong = values[~plausible & (values > 0.0)]
@@ -596,32 +594,29 @@ def _cleaned(path: Path, streams: Mapping[str, Stream]) -> tuple[dict[str, Strea
                     f"{name}: {len(wrong)} of {count} voltages, {wrong.min():.3g} to "
                     f"{wrong.max():.3g} V, are none of a vehicle's battery; left out"
                 )
-            values = np.where(plausible, values, np.nan)
+            values = np.where(plausible, values, nan)
         elif section in _IMU:
-            values = np.where(finite_rows(values)[:, None], values, np.nan)
+            values = np.where(finite_rows(values)[:, None], values, nan)
         if section == "position" or (np.isfinite(values).any() and count > 1):
             made[section] = Stream(name, stream.t, values)
-        elif section == "battery" and not np.any(values > 0.0):
+        elif section == "battery" and not (values > 0.0).any():
             notes.append(f"{name}: no positive voltage; left out")
     return made, notes
 
 
 def _rows(
     path: Path, pose: Stream | None, motors: Stream, sensor: Stream | None
-) -> tuple[Array, Array, list[str]]:
+) -> tuple[Array, Array, Lines]:
     """Return the rows' times (M,) in s, the poses (M, 7) in them, NaN where there is none, and
     notes.
 
     Raises:
         InputError: fewer than two rows lie within the span of the motors' stream.
     """
-    of_sensor = sensor is not None and (
-        pose is None or median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0
-    )
+    if pose and sensor and not median_step(pose.t) > _OWN_ROWS * median_step(sensor.t) > 0.0:
+        sensor = None
     begin, end = motors.t[0], motors.t[-1]
-    for stream in (pose, sensor if of_sensor else None):  # both must meet the motors
-        if stream is None:
-            continue
+    for stream in filter(None, (pose, sensor)):  # both must meet the motors
         inside = (stream.t >= begin) & (stream.t <= end)
         if inside.sum() < 2:
             raise InputError(
@@ -630,20 +625,19 @@ def _rows(
                 "over the same flight"
             )
         t = stream.t[inside]
-    if sensor is None or not of_sensor:
+    if sensor is None:
         assert pose is not None
         return t, pose.values[inside], []
     rows = f"rows are those of {sensor.name}, {1.0 / median_step(sensor.t):.4g} Hz"
-    placed = np.full((len(t), 7), np.nan)
+    placed = np.full((len(t), 7), nan)
     if pose is None:
         return t, placed, [rows]
     if (seen := readable(pose)) is not None:
         own, values = seen.t, seen.values
-        near = np.clip(np.searchsorted(t, own), 1, len(t) - 1)
+        near = np.searchsorted(t, own).clip(1, len(t) - 1)
         near -= own - t[near - 1] < t[near] - own
         reach = max(0.6 * median_step(t), 0.5 * median_step(own) / _OWN_ROWS)
         near = np.unique(near[np.abs(t[near] - own) <= reach])
-        near = near[(t[near] >= own[0]) & (t[near] <= own[-1])]
         placed[near, :3] = resampled(t[near], own, values[:, :3])
         placed[near, 3:] = slerp(t[near], replace(seen, values=values[:, 3:]))
     rate = 1.0 / median_step(pose.t)

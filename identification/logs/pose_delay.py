@@ -19,51 +19,32 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import (
     high_pass,
     resampled,
     robust_std,
+    running_integral,
     second_difference,
     turned,
     unbroken,
 )
 from .evidence import SIDES
-from .excerpt import excerpt
-from .flight_log import FlightLog
+from .flight_log import FlightLog, excerpt
 from .table import Array, Pair, Rows, median_step
 
 FARTHEST = 0.3  # s, of the search
 # s: smaller delays are of filters, and of stamps at a sample's end
 LEAST = 0.01
 SURE = 4.0  # standard deviations
-# s: rotor speeds of flown vehicles act by up to so much later. A flight loop falls over more
-HONEST = 0.04
-# s: rotor speeds that pass a filter of their own act by up to so much earlier
-AHEAD = 0.03
 # s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
 _LAGS = 0.01 * np.arange(11)
 _STEP = 0.001  # s, of the search
-_DELAYS = _STEP * np.arange(-300, 301, dtype=np.float64)
-_BAND_HZ = (0.8, 10.0)
-_SHARE_OF_RATE = 0.4  # of the poses' rate, the highest frequency
+_DELAYS = _STEP * np.arange(-300.0, 301.0)
 _SEGMENT = 2.0  # s, of a spectrum
-_PERIOD = 0.01  # s, the shortest of the spectra's clock
-_INDEPENDENT = 0.55  # of half overlapping segments
-_GAP = 0.1  # s (or 3.5 periods) without a pose end a piece
-_ROUNDS = 10  # of the search, each around the delay of the last
 _PARTS = 5  # of the flight; the scatter of their delays is the uncertainty
 _FEWEST = 10  # segments
-_VISIBLE = 40.0  # deviance explained by the moments, at least
-_BEYOND = 9.0  # deviance against an honest delay and any lag
-_NOISE_SHARE = 0.25  # of the poses' rate: above is noise alone
-# correlation of second differences with the next ones: -2/3 of white noise, above 0 of motion
-_WHITE = -0.5
-_APART = 0.01  # s, of the differences, at least
-_FINEST = 0.005  # s, between two delays of an answer
-_FEWEST_POSES = 100
 _ANSWERED = 6.0  # standard deviations of a chance correlation
 
 Spectra = NDArray[np.complex128]
@@ -90,7 +71,7 @@ class _Response(NamedTuple):
         """
         shape = np.exp(-1j * self.omega * delays[:, None, None]) / (1.0 + 1j * self.omega * lag)
         along = np.sum(self.weight * np.real(np.conj(shape) * self.gain), axis=1)
-        power = np.sum(self.weight * np.square(np.abs(shape)), axis=1)
+        power = (self.weight * np.square(np.abs(shape))).sum(axis=1)
         explained: Array = np.sum(np.square(np.maximum(along, 0.0)) / power, axis=1)
         return explained
 
@@ -106,9 +87,9 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
         log: the flight, with rotor speeds.
         vehicle: as declared; None: rotors on one side turn the body to the other.
     """
-    log = excerpt([log])[0]
+    log = excerpt(log)
     late = 0.0
-    for _ in range(_ROUNDS):  # a window over delayed signals cuts the two of them differently
+    for _ in range(10):  # a window over delayed signals cuts the two of them differently
         segments = _segments(log, vehicle, late)
         if segments is None:
             return None
@@ -120,20 +101,22 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
             break
     best = response.explained(np.zeros(1))[0]
     whole = response.weight * np.square(np.abs(response.gain))
-    left = np.sum(whole) - best
+    left = whole.sum() - best
     scale = max(1.0, left / (2.0 * whole.size - 3.0))  # beyond what noise leaves
-    if best < _VISIBLE * scale:
+    if best < 40.0 * scale:
         return None
     # gusts answered by the loop leave a response of another shape, and turn its phase by as much
     misfit = np.sqrt(left / np.sum(np.square(response.omega) * whole))
     parts = zip(*(np.array_split(x, _PARTS) for x in both), strict=True)
     scatter = np.std([_response(omega, noise, *part).likeliest() for part in parts])
     std = float(np.hypot(scatter / np.sqrt(_PARTS), misfit))
-    honest = np.arange(-AHEAD, HONEST + _STEP, _STEP)
+    # s: rotor speeds of flown vehicles act by up to 0.04 later (a flight loop falls over more), and
+    # those that pass a filter of their own by up to 0.03 earlier
+    honest = np.arange(-0.03, 0.04 + _STEP, _STEP)
     as_good = max(
-        np.max(response.explained(honest[honest <= _LAGS[-1] - lag] - late, lag)) for lag in _LAGS
+        np.max(response.explained(honest[honest <= 0.1 - lag] - late, lag)) for lag in _LAGS
     )
-    return _PoseDelay(late, std, bool(best - as_good > _BEYOND * scale))
+    return _PoseDelay(late, std, bool(best - as_good > 9.0 * scale))
 
 
 def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> _Response:
@@ -141,7 +124,8 @@ def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> 
     xx, yy = (np.mean(np.square(np.abs(z)), axis=0) + 1e-300 for z in (moment, turning))
     xy = np.mean(np.conj(moment) * turning, axis=0)
     left = np.maximum(yy - np.square(np.abs(xy)) / xx, 1e-12 * yy)
-    variance = left / (2.0 * _INDEPENDENT * len(moment)) + noise
+    # a half overlapping segment counts for 0.55 independent ones
+    variance = left / (1.1 * len(moment)) + noise
     return _Response(omega, xy / xx, xx / variance)
 
 
@@ -156,15 +140,16 @@ def _segments(
     if len(rows) < _FEWEST:
         return None
     step = median_step(log.t[rows])
-    period = max(_PERIOD, log.period)
+    period = max(0.01, log.period)
     count = round(_SEGMENT / period)
     inertia = np.eye(3) if vehicle is None else vehicle.inertia
     window = np.hanning(count)[:, None]
     moments = _moments(log, vehicle)
     transforms, noises = [], []
-    for piece in unbroken(log.t, rows, max(_GAP, 3.5 * step), 60, _SEGMENT):
+    for piece in unbroken(log.t, rows, max(0.1, 3.5 * step), 60, _SEGMENT):
         t, angles = log.t[piece], _angles(log, piece)
-        noises.append(robust_std(high_pass(angles, _NOISE_SHARE)))
+        # above a quarter of the poses' rate is noise alone
+        noises.append(robust_std(high_pass(angles, 0.25)))
         first = max(t[0], log.t[0] + late) + period
         last = min(t[-1], log.t[-1] + late) - period
         at = np.arange(first, last, period)
@@ -179,14 +164,13 @@ def _segments(
             transforms.append(np.fft.rfft(part, axis=1))
     if len(transforms) < _FEWEST:
         return None
-    frequency = np.asarray(np.fft.rfftfreq(count, period), dtype=np.float64)
-    highest = min(_BAND_HZ[1], _SHARE_OF_RATE / step)
-    band = (frequency >= _BAND_HZ[0]) & (frequency <= highest)
+    frequency = np.fft.rfftfreq(count, period).astype(float)
+    band = (frequency >= 0.8) & (frequency <= min(10.0, 0.4 / step))
     frequency = frequency[band, None]
     # white noise of the angles, through the mean over a period and two differences
     passed = np.sinc(frequency * period) * np.square(2.0 * np.sin(np.pi * frequency * period))
     noise = np.square(passed / period**2 * np.mean(noises) * np.diag(inertia)[:2])
-    noise *= step / period * np.sum(np.square(window))
+    noise *= step / period * np.square(window).sum()
     moment, turning = np.array(transforms)[:, :, band].swapaxes(0, 1)
     return 2.0 * np.pi * frequency, noise, moment, turning
 
@@ -195,14 +179,13 @@ def _means(at: Array, width: float, t: Array, x: Array) -> Array:
     """Return means (m, k) over ``width`` s around times (m,) of columns (n, k), linear between
     times (n,).
     """
-    sums = cumulative_trapezoid(x, t, axis=0, initial=0.0)
+    sums = running_integral(x, t)
     return (resampled(at + 0.5 * width, t, sums) - resampled(at - 0.5 * width, t, sums)) / width
 
 
 def _moments(log: FlightLog, vehicle: Vehicle | None) -> Array:
     """Return the rotors' roll and pitch moments (N, 2); without a vehicle, in no unit."""
-    mixing = SIDES if vehicle is None else vehicle.mixing[1:3]
-    return np.square(log.rotor_speeds) @ mixing.T
+    return np.square(log.rotor_speeds) @ (SIDES if vehicle is None else vehicle.mixing[1:3]).T
 
 
 def _angles(log: FlightLog, piece: Rows) -> Array:
@@ -223,10 +206,10 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
         late: s, of the pose behind the rotor speeds. Turns by moments of so much earlier, a row
             more or less, are no noise.
     """
-    log = excerpt([log])[0]
+    log = excerpt(log)
     rows = np.flatnonzero(log.valid)
-    step, fine = median_step(log.t[rows]), max(log.period, _FINEST)
-    apart = max(1, round(_APART / step))  # rows
+    step, fine = median_step(log.t[rows]), max(log.period, 0.005)
+    apart = max(1, round(0.01 / step))  # rows
     width = apart * step
     most = round(FARTHEST / fine)
     lags = fine * np.arange(-most, most + 1)
@@ -234,14 +217,15 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
     moments = _moments(log, vehicle)
     turns = moments - moments.mean(axis=0)
     for _ in range(2):
-        turns = cumulative_trapezoid(turns, log.t, axis=0, initial=0.0)
-    for piece in unbroken(log.t, rows, 1.5 * step, _FEWEST_POSES):
+        turns = running_integral(turns, log.t)
+    for piece in unbroken(log.t, rows, 1.5 * step, 100):
         t, angles = log.t[piece], _angles(log, piece)[:, :2]
         at = t[apart:-apart]
         noise = angles[2 * apart :] - 2.0 * angles[apart:-apart] + angles[: -2 * apart]
         after = np.sum(noise[apart:] * noise[:-apart]) / np.sum(np.square(noise) + 1e-300)
         inside = (at > t[0] + lags[-1] + width) & (at < t[-1] - lags[-1] - width)
-        if after > _WHITE or not inside.any():
+        # the differences' correlation with the next ones: -2/3 of white noise, above 0 of motion
+        if after > -0.5 or not inside.any():
             continue
         at, noise = at[inside], noise[inside]
         driven = np.hstack(

@@ -1,11 +1,9 @@
 """Reading a flight log from a file, by a reader or by a map of a table's columns."""
 
-from __future__ import annotations
-
 import os
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,18 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.regular_files import open_regular
 from .clocks import on_one_clock
 from .flight_log import (
-    ACCELEROMETER,
     COMMANDS,
-    GYRO,
+    IMU,
     POSE,
     REQUIRED,
     ROTORS,
     FlightLog,
+    SomeVehicle,
     flown_vehicle,
 )
 from .inertial import check_inertial
@@ -33,7 +30,7 @@ from .log_map import OWN_MAP, load_map
 from .magnitudes import unit_doubts, without_broken_speeds
 from .mapped_log import map_table
 from .readers import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
-from .table import SUFFIXES, Names, Table
+from .table import SUFFIXES, Names, Piece, Table, Texts, one_line
 from .text_table import is_table, open_table
 
 _SHOWN = 20  # columns in an error
@@ -77,17 +74,17 @@ READERS["betaflight_csv"] = Reader(
 
 
 def read_log(
-    path: str | Path,
+    path: str | Path | Table,
     reader: str | None = None,
-    vehicle: Vehicle | None = None,
+    vehicle: SomeVehicle = None,
     map: str | Path | None = None,
-    piece: int | None = None,
+    piece: Piece = None,
 ) -> FlightLog:
     """Read a flight log.
 
     Args:
         path: the log, in the kit's own form (``.csv``, ``.csv.gz`` or ``.parquet``) or in the form
-            of a reader in ``identification/logs/readers/``.
+            of a reader in ``identification/logs/readers/``; or its open table.
         reader: name of a reader, with an option behind a colon (``rosbag:topics.yaml``); None:
             chosen by the file's content.
         vehicle: the vehicle, for checking units and for converting commands into rotor speeds;
@@ -105,13 +102,13 @@ def read_log(
         UserWarning: numbers look as if they were in other units. The same text is in the log's
             notes.
     """
-    path = Path(path)
+    path = Path(path) if isinstance(path, str) else path
     with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for themselves
         log = _read(path, reader, vehicle, map, piece)
     return finished(log, vehicle)
 
 
-def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
+def finished(log: FlightLog, vehicle: SomeVehicle) -> FlightLog:
     """Return a reader's log as from ``read_log``: with doubts about its units, and without the
     inertial sensors contradicting its pose.
 
@@ -129,52 +126,40 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
 
 
-def is_own(header: Sequence[str]) -> bool:
-    """Return whether a table has this kit's own columns: a time; a pose, or an inertial sensor; and
-    rotor speeds or motor commands. Further rules are in the map.
-    """
-    has = set(header).issuperset
-    moves = has(POSE) or has((*ACCELEROMETER, *GYRO))
-    return has(("t",)) and moves and (has(ROTORS) or has(COMMANDS))
-
-
-def unknown_table(path: Path) -> Table | None:
-    """Return a file's table of unknown columns, neither the kit's nor a reader's; None: any other
-    file.
+def opened(path: Path) -> Table | None:
+    """Return a file's table; None: the file is another one, or a reader knows its first bytes.
 
     Raises:
         InputError: the file is a table by its name, but unreadable.
     """
-    if not is_table(path) or reader_by_content(path) is not None:
-        return None
-    table = open_table(path)
-    known = is_own(table.header) or reader_by_columns(path, table.header) is not None
-    return None if known else table
+    return open_table(path) if is_table(path) and reader_by_content(path) is None else None
 
 
 def _read(
-    path: Path,
+    source: Path | Table,
     reader: str | None,
-    vehicle: Vehicle | None,
+    vehicle: SomeVehicle,
     map: str | Path | None,
-    piece: int | None,
+    piece: Piece,
 ) -> FlightLog:
     """Read a log by the given map or reader, else by its content."""
+    path = source.path if isinstance(source, Table) else source
     if map is not None:
         if reader is not None:
             raise InputError(f"{path}: both a reader and a map; expected one of them")
         if reader_by_content(path) is READERS["rosbag"]:
             return rosbag.read(path, vehicle, str(map), piece)
         return map_table(open_table(path), load_map(map), vehicle, piece=piece)
-    chosen = reader_by_content(path) if reader is None else find_reader(reader)
-    if chosen is not None and not chosen.signature:
-        return chosen.read(path, vehicle, piece=piece)
-    if chosen is None and not is_table(path):
-        raise _unknown_content(path)
-    table = open_table(path)
+    if isinstance(source, Table):
+        chosen, table = None, source
+    else:
+        chosen = reader_by_content(path) if reader is None else find_reader(reader)
+        if chosen is not None and not chosen.signature:
+            return chosen.read(path, vehicle, piece=piece)
+        if chosen is None and not is_table(path):
+            raise _unknown_content(path)
+        table = open_table(path)
     header = set(table.header)
-    if chosen is None and is_own(table.header):
-        return map_table(table, load_map(OWN_MAP), vehicle, piece=piece)
     chosen = chosen or reader_by_columns(path, table.header)
     if chosen is not None:
         if missing := [name for name in chosen.signature if name not in header]:
@@ -190,8 +175,8 @@ def _read(
         said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
         return replace(log, notes=(said, *log.notes))
     known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in _table_readers())
-    has_imu = header.issuperset((*ACCELEROMETER, *GYRO))
-    missing = [name for name in (("t", *ROTORS) if has_imu else REQUIRED) if name not in header]
+    needed = ("t", *ROTORS) if header.issuperset(IMU) else REQUIRED
+    missing = [name for name in needed if name not in header]
     raise InputError(
         f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
         f"columns of {known}, found {', '.join(table.header[:_SHOWN])}. A table of "
@@ -236,10 +221,8 @@ def reader_by_content(path: Path) -> Reader | None:
                 if reader.begins and re.match(reader.begins, head):
                     return reader
         return None
-    try:
+    with one_line(f"{path}: cannot be read as a folder"):
         names = sorted(os.listdir(path))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read as a folder: {error.strerror}") from error
     if any(name.lower().endswith(_BAG_FOLDER) for name in names):
         return READERS["rosbag"]
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
@@ -281,13 +264,17 @@ def _unknown_content(path: Path) -> InputError:
     )
 
 
-def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:
-    """Return the reader by a table's columns; None: no reader's.
+def reader_by_columns(path: Path, header: Texts) -> Reader | None:
+    """Return the reader by a table's columns; None: no reader's. This kit's own are a time; a pose,
+    or an inertial sensor; and rotor speeds or motor commands; further rules are in the map.
 
     Raises:
         InputError: the columns fit several readers.
     """
-    readers = [reader for reader in _table_readers() if set(header).issuperset(reader.signature)]
+    has = set(header).issuperset
+    if has(("t",)) and (has(POSE) or has(IMU)) and (has(ROTORS) or has(COMMANDS)):
+        return Reader(OWN_MAP, "", partial(map_table, log_map=load_map(OWN_MAP)))
+    readers = [reader for reader in _table_readers() if has(reader.signature)]
     if len(readers) > 1:
         raise InputError(
             f"{path}: its columns are those of {' and of '.join(r.what for r in readers)}; "

@@ -55,7 +55,6 @@ def _frames(
 
 _USUAL_FRAMES = tuple(_frames(**stated) for stated in _STATED["frames"])
 MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.map_world)  # with names in a map
-PLAIN = MAP_FRAMES[0]
 
 
 _FACTS: dict[str, str] = _STATED["positions"]
@@ -95,7 +94,6 @@ def _sensor(says: str, scale: float = 1.0, axes: str = "x y z", **more: Any) -> 
 GYRO_READINGS = tuple(_sensor(**stated) for stated in _STATED["gyro"])
 ACCELEROMETER_READINGS = tuple(_sensor(**stated) for stated in _STATED["accelerometer"])
 
-
 AS_WRITTEN = Attitude(())  # without columns
 
 
@@ -104,7 +102,7 @@ class Convention:
     """One way to read a flight's columns: frames, units, order, sense, clock and sensors."""
 
     attitude: Attitude = AS_WRITTEN
-    frames: Frames = PLAIN
+    frames: Frames = MAP_FRAMES[0]
     length: str = "m"  # unit of the position
     gyro: SensorReading = AS_DECLARED
     rotors: Order = ROTORS  # the kit's rotor, from 1, in each column
@@ -118,11 +116,6 @@ class Convention:
         return self.attitude, self.frames, self.length, self.gyro
 
     @property
-    def is_delay(self) -> bool:
-        """Whether the rotors' clock alone is another one."""
-        return bool(self.late) and not replace(self, late=0.0).says
-
-    @property
     def pitch_sign(self) -> int:
         """Sign of the angle about y."""
         return -1 if self.attitude.signs else 1
@@ -130,8 +123,7 @@ class Convention:
     @property
     def motors(self) -> Order:
         """Motor, from 1, of each of the kit's rotors."""
-        a, b, c, d = (self.rotors.index(rotor) + 1 for rotor in ROTORS)
-        return a, b, c, d
+        return tuple(self.rotors.index(rotor) + 1 for rotor in ROTORS)
 
     @property
     def says(self) -> str:
@@ -230,19 +222,19 @@ def _each(**aspects: Sequence[Any]) -> list[Convention]:
 
 def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convention]:
     """Return readings with a penalty of 1 for each less usual convention; ``world``: the usual."""
-    weighed = []
-    for reading in readings:
-        attitude, frames = reading.attitude, reading.frames
-        less_usual = (
-            attitude.order != "wxyz",
-            attitude.euler == "xyz",
-            bool(attitude.signs),
-            attitude.sense != SENSES[0],
-            frames.map_world != world,
-            frames.unusual,
+    return [
+        replace(
+            r,
+            unlikely=r.unlikely
+            + (r.attitude.order != "wxyz")
+            + (r.attitude.euler == "xyz")
+            + bool(r.attitude.signs)
+            + (r.attitude.sense != SENSES[0])
+            + (r.frames.map_world != world)
+            + r.frames.unusual,
         )
-        weighed.append(replace(reading, unlikely=reading.unlikely + sum(less_usual)))
-    return weighed
+        for r in readings
+    ]
 
 
 ROTOR_READINGS = [  # two departures at once are as unlikely as both
@@ -284,9 +276,8 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
     angles = [
         Attitude((), unit, euler=e, signs=signs, sense=sense) for e, unit, signs, sense in ways
     ]
-    attitudes = _quaternions(orders) or angles
     lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    readings = _each(attitude=attitudes, frames=MAP_FRAMES, length=lengths)
+    readings = _each(attitude=_quaternions(orders) or angles, frames=MAP_FRAMES, length=lengths)
     named = [
         replace(r, unlikely=OTHER * (length in lengths and r.length != length)) for r in readings
     ]
@@ -323,7 +314,7 @@ def as_written(columns: Array, attitude: Attitude) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     good = finite_rows(columns)
     if not attitude.euler:
-        good &= np.linalg.norm(np.nan_to_num(columns), axis=1) > 0.5
+        good &= np.isclose(np.linalg.norm(columns, axis=1), 1.0, atol=0.5)
     turns = quaternions(attitude, scaled(attitude, columns[good]))
     rotation = Rotation.from_quat(turns, scalar_first=True)
     return good, rotation if attitude.sense == SENSES[0] else rotation.inv()

@@ -19,40 +19,21 @@ import numpy as np
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from ..motion.inertial_signals import inertial_pieces, reads_imu
+from ..motion.inertial_signals import imu_rows, inertial_pieces, reads_imu
 from ..motion.signals import SHORTEST_PIECE, pose_pieces
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of, turn_between
 from .evidence import remedies
-from .flight_log import MOTOR_RATES, FlightLog
+from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, serves
 from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
-from .magnitudes import MAGNITUDES, interpolated, motor_doubts, rotor_doubt, time_doubt, within
+from .magnitudes import DOUBTFUL, interpolated, motor_doubts, rotor_doubt, time_doubt, within
 from .table import Array, Mask, Names, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
-_SLACK = 1.1  # of a period: jitter
-_AT_REST = 0.003  # of the weight: thrust below is no turning rotor, in whatever unit
 _LEAST_IMU_HZ = 45.0  # without a pose: a quadrotor turns within a tenth of a second
-_UNEVEN = 0.4, 2.5  # of the median step: a step outside is uneven
-_UNEVEN_SHARE, _UNEVEN_NOTE = 0.25, 0.05
-_LEAP = 0.3, 20.0  # m, and m/s over the step: the farthest between two poses
-_TURN = 0.8, 60.0  # rad, and rad/s over the step
 _JUMP = 0.3  # s: a step so long without a move is a jump of the clock
-_MOVING = 0.3  # m/s
-_SAME = 0.25  # of the way at the vehicle's speed in half the step
-_LOST_SHARE = 0.1  # of the rows in flight: losing more is a note
-_MOST_LEAPS = 0.25  # of the poses: with more, the rest counts for nothing
-_HELD = 0.2  # s in flight of a repeated pose, at most: four of the slowest period
-_NEVER = 1.0  # s of log with at least two poses
-_STOPPED = 0.3  # s of one rotor at 0 while the others carry the vehicle
-_ABOVE_MOST = 1.5  # times the vehicle's fastest rotor speed: no rotor turns as fast
 _STILL = 0.5  # s of a still channel; a busy link repeats a few samples
-# changes of each sister meanwhile: among channels with equally frequent changes, the chance of none
-# in one is at most exp(-20)
-_SISTERS_CHANGE = 20
-_AT_LIMIT = 0.99  # share of the fastest rotor speed: a rotor at its limit stands still rightly
-_BEYOND = 20.0  # of the median rotor speed: the same where the vehicle states no fastest
 
 
 class _Refused(str):
@@ -146,7 +127,7 @@ def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
         return ""
     advice, mends = remedies(log, vehicle, by_imu)
     says = "; or ".join(dict.fromkeys(reading.says for reading in advice))
-    if all(reading.is_delay for reading in advice):
+    if all(reading.late and not replace(reading, late=0.0).says for reading in advice):
         return _Fault(says)
     whose = "motion contradicts the rotor speeds and gravity"
     if by_imu:
@@ -179,7 +160,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     most = np.quantile(thrust, 0.95)
     hover = f"rotor speeds in rad/s (about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
     zero = "is 0 while the other rotors turn{}; expected the rotor speeds of all four"
-    if most < _AT_REST:
+    # less of the weight is no turning rotor, in whatever unit
+    if most < 0.003:
         still = "omega1..omega4 are at rest all the time, so nothing flew"
         yield _Refused(f"{still}; expected {hover}")
     if not np.isfinite(most):
@@ -189,13 +171,13 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     ratio = usual_thrust(thrust)
     if doubt := rotor_doubt(ratio, vehicle):
         yield _Refused(doubt)
-    if not within(ratio, MAGNITUDES.doubtful):
+    if not within(ratio, DOUBTFUL):
         yield _Note(
             f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
             f"{vehicle.name}: is it this vehicle, and did it fly?"
         )
-    least = MOTOR_RATES.force_hz if log.commanded else MOTOR_RATES.torque_hz
-    if not MOTOR_RATES.serves(log.motor_rate, least):
+    least = FORCE_HZ if log.commanded else TORQUE_HZ
+    if not serves(log.motor_rate, least):
         what = "motor commands" if log.commanded else "rotor speeds"
         yield _Needed(
             f"{what} come {log.motor_rate:.3g} times a second; expected at least {least:g}: what "
@@ -206,7 +188,7 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
         yield _Refused(doubt)
     carried = carrying(np.square(speeds).max(axis=1))
     for i in range(4):
-        if stopped := _stretches((speeds[:, i] == 0.0) & carried, log.t, _STOPPED):
+        if stopped := _stretches((speeds[:, i] == 0.0) & carried, log.t, 0.3):
             yield _Fault(f"omega{i + 1} {zero.format(f', for {stopped}')}")
     fastest = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > fastest)).size:
@@ -222,7 +204,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
 def _most_rad_s(log: FlightLog, vehicle: Vehicle) -> float:
     """Return a rotor speed in rad/s beyond all rotors."""
     middle = float(np.median(log.rotor_speeds[log.rotor_speeds.max(axis=1) > 0.0]))
-    return min(_ABOVE_MOST * vehicle.omega_max, _BEYOND * max(middle, vehicle.hover_rate))
+    # no rotor turns as fast; the median counts where the vehicle states no fastest
+    return min(1.5 * vehicle.omega_max, 20.0 * max(middle, vehicle.hover_rate))
 
 
 def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
@@ -233,7 +216,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
     """
     assert log.gyro is not None
     assert log.accelerometer is not None
-    rows = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
+    rows = imu_rows(log)
     if len(rows) < LEAST_SAMPLES:
         yield _Refused(
             f"ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected them in "
@@ -263,17 +246,19 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
 def _new_poses(log: FlightLog, same: Mask) -> _Findings:
     """Check the rate of new poses; ``same`` (N,): the pose is the one before, to the last digit."""
     seen = np.flatnonzero(log.valid)
-    if np.ptp(log.t[seen]) > _NEVER and same[seen[1:]].all():
+    if np.ptp(log.t[seen]) > 1.0 and same[seen[1:]].all():
         yield _Refused("the pose never changes, to the last digit; expected the poses of a flight")
     fastest = np.square(log.rotor_speeds).max(axis=1)
-    if held := _stretches((same & carrying(fastest))[seen], log.t[seen], _HELD):
+    # 0.2 s: four of the slowest period
+    if held := _stretches((same & carrying(fastest))[seen], log.t[seen], 0.2):
         yield _Note(
             f"warning: the pose is frozen for {held}: it repeats to the last digit while the "
             "rotors turn. These rows count as without a pose"
         )
     times = log.t[log.valid & ~same]
     period = median_step(times) if len(times) > 1 else np.inf
-    if period * _LEAST_RATE_HZ > _SLACK:
+    # with 10 % of jitter
+    if period * _LEAST_RATE_HZ > 1.1:
         yield _Needed(
             f"{1 / period:.3g} new poses a second; expected at least {_LEAST_RATE_HZ:g}: "
             "accelerations come from differences of poses that are low-passed at 15 Hz, and a "
@@ -285,15 +270,15 @@ def _uneven_steps(log: FlightLog) -> _Findings:
     """Check for even steps of the clock."""
     step = np.diff(log.t)
     median = np.median(step)
-    uneven = np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median))
+    uneven = np.mean((step < 0.4 * median) | (step > 2.5 * median))
     words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
-    if uneven > _UNEVEN_SHARE:
+    if uneven > 0.25:
         yield _Refused(
             f"column t: time steps vary wildly, from {step.min():.3g} to {step.max():.3g} s, "
             f"{words}; expected the times at which the poses were taken, not those at which they "
             "arrived"
         )
-    if uneven > _UNEVEN_NOTE:
+    if uneven > 0.05:
         yield _Note(f"time steps are uneven: {words}")
 
 
@@ -304,13 +289,15 @@ def _steps(log: FlightLog) -> _Findings:
     step = np.diff(t)
     way = np.linalg.norm(np.diff(position, axis=0), axis=1)
     angle = np.linalg.norm(turn_between(q[:-1], q[1:]), axis=1)
-    far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
+    # m and rad, and m/s and rad/s over the step
+    far, turned = way > 0.3 + 20.0 * step, angle > 0.8 + 60.0 * step
     leaps = far | turned
     if leaps.any():
         first = np.argmax(leaps)
         what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
         units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
-        kind = _Refused if leaps.mean() > _MOST_LEAPS else _Fault
+        # with more leaps, the rest counts for nothing
+        kind = _Refused if leaps.mean() > 0.25 else _Fault
         yield kind(
             f"the pose leaps by {what} within {step[first]:.3g} s at t = {t[first + 1]:.6g} s, "
             f"which no quadrotor flies ({leaps.sum()} such step(s)){units}; expected poses of "
@@ -324,7 +311,8 @@ def _steps(log: FlightLog) -> _Findings:
         before, after = (position[ends] - position[begins]) / seconds[:, None]
         speed = min(np.linalg.norm(before), np.linalg.norm(after))
         is_alike = np.linalg.norm(after - before) < 0.15 * speed + 0.05 and angle[i] < 0.05
-        is_close = speed > _MOVING and way[i] < _SAME * speed * 0.5 * step[i]
+        # a quarter of the way at this speed in half the step
+        is_close = speed > 0.3 and way[i] < 0.125 * speed * step[i]
         if seconds.max() <= _JUMP and is_alike and is_close:
             yield _Fault(
                 f"column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from "
@@ -349,7 +337,7 @@ def _length(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
         words = f"the pose is lost in {runs} run(s), {lost} of {len(log.t)} rows; {words}"
     if not pieces or left < least - 1e-9:
         yield _Refused(f"{words}; expected at least {least:g} s")
-    if left < (1.0 - _LOST_SHARE) * whole:
+    if left < 0.9 * whole:
         yield _Note(words)
 
 
@@ -360,30 +348,31 @@ def stuck_channels(log: FlightLog, vehicle: Vehicle) -> _Findings:
     """
     rotors, seen = log.rotor_speeds, np.flatnonzero(log.valid)
     aloft = np.square(rotors) @ vehicle.k > 0.3 * vehicle.weight
-    turning = (rotors > 0.0) & (rotors < (_AT_LIMIT * vehicle.omega_max or np.inf))
-    place, turn, flown = log.position[seen], log.quaternion[seen], aloft[seen]
+    # a rotor at its limit stands still rightly
+    turning = (rotors > 0.0) & (rotors < (0.99 * vehicle.omega_max or np.inf))
+    place, flown = log.position[seen], aloft[seen]
     for i in range(4):
-        others = rotors[:, [i]], np.delete(rotors, i, axis=1), "the other rotor speeds"
-        yield from _still(f"omega{i + 1}", log.t, aloft & turning[:, i], *others)
+        rows, names = aloft & turning[:, i], "the other rotor speeds"
+        yield from _still(f"omega{i + 1}", log.t, rows, rotors, [i], names)
     for i, axis in enumerate("xyz"):
-        others = place[:, [i]], np.delete(place, i, axis=1), "the other coordinates"
-        yield from _still(f"p{axis}", log.t[seen], flown, *others)
-    yield from _still("the attitude", log.t[seen], flown, turn, place, "the coordinates")
+        yield from _still(f"p{axis}", log.t[seen], flown, place, [i], "the other coordinates")
+    pose, own = np.hstack([place, log.quaternion[seen]]), [3, 4, 5, 6]
+    yield from _still("the attitude", log.t[seen], flown, pose, own, "the coordinates")
     said = (f"warning: {doubt}" for doubt in motor_doubts(log))
     yield from (_Note(text) for text in said if text not in log.notes)
 
 
-def _still(
-    name: str, t: Array, rows: Mask, channel: Array, sisters: Array, names: str
-) -> _Findings:
-    """Note the stretches of rows (N,) with a still channel (N, k) and moving sisters (N, m), called
-    ``names``.
+def _still(name: str, t: Array, rows: Mask, x: Array, own: list[int], names: str) -> _Findings:
+    """Note the stretches of rows (N,) where a channel's ``own`` columns of x (N, k) stand still and
+    the other columns, called ``names``, move.
     """
-    still = rows & ~np.diff(channel, axis=0, prepend=np.nan).any(axis=1)
+    still = rows & ~np.diff(x[:, own], axis=0, prepend=np.nan).any(axis=1)
+    sisters = np.delete(x, own, axis=1)
     changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
     for first, end in runs_of(still):
         lasts = t[end - 1] - t[first] >= _STILL
-        if lasts and np.min(changes[end - 1] - changes[first]) < _SISTERS_CHANGE:
+        # of equally often changing channels, one without a change in 20 has a chance of exp(-20)
+        if lasts and np.min(changes[end - 1] - changes[first]) < 20:
             still[first:end] = False
     if stretches := _stretches(still, t, _STILL):
         wrong = "what depends on it there is wrong if its sensor hung"

@@ -1,11 +1,11 @@
 """A table of numbers in a file: its columns by name, and where a row stands."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
 
 Array = NDArray[np.float64]
+SomeArray = Array | None
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 Names = tuple[str, ...]  # of columns, logs or effects; sentences
@@ -24,6 +25,12 @@ ArrayMap = Mapping[str, Array]
 NamedNumbers = dict[str, float]
 ArrayPair = tuple[Array, Array]
 Data = dict[str, Any]  # plain values by name
+Texts = Sequence[str]
+Lines = list[str]
+Wanted = Collection[str]  # names of columns, or of topics
+Piece = int | None  # of a file, from 1; None: the longest
+_T = TypeVar("_T")
+Noted = tuple[_T, Lines]  # with notes
 
 WHAT = "a flight log"  # for errors
 SUFFIXES = (".csv", ".csv.gz", ".parquet")  # of the kit's own tables
@@ -42,7 +49,7 @@ class Table:
     path: Path
     header: Names
     rows: int
-    load: Callable[["Table", Sequence[str]], Iterable[Array]]  # gives columns (rows,) by names
+    load: Callable[["Table", Texts], Iterable[Array]]  # gives columns (rows,) by names
     first_line: int = 0  # line of the first row in a text; 0: rows have no lines
     blank_before: tuple[int, ...] = ()  # a row for each blank line before it, in their order
     units: Names = ()  # of a line of units behind the header
@@ -57,7 +64,7 @@ class Table:
                 f"{self.path}: no rows; expected a header and at least one row of numbers"
             )
 
-    def read(self, names: Sequence[str]) -> NamedArrays:
+    def read(self, names: Texts) -> NamedArrays:
         """Return columns (rows,) by their names, read-only; empty fields are NaN.
 
         Raises:
@@ -74,7 +81,7 @@ class Table:
         numbers = self.rows * (len(columns) + len(new))
         check_count(self.path, numbers, LIMITS.table_numbers, "numbers")
         for name, column in zip(new, self.load(self, new) if new else (), strict=True):
-            columns[name] = np.asarray(column, dtype=np.float64).view()
+            columns[name] = np.asarray(column, float).view()
             columns[name].flags.writeable = False
         return {name: columns[name] for name in names}
 
@@ -132,9 +139,5 @@ def file_kind(path: Path) -> str:
 
 
 def stem(path: Path) -> str:
-    """Return a table's name without its ending."""
-    name = path.name
-    for ending in (".gz", ".parquet", *ARRAY_SUFFIXES, *TEXT_SUFFIXES):
-        if name.lower().endswith(ending):
-            name = name[: -len(ending)]
-    return name
+    """Return a file's name without its ending, and without ``.gz`` behind the ending."""
+    return Path(path.name.removesuffix(".gz")).stem

@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from subprocess import PIPE
@@ -28,7 +28,7 @@ from ...runtime.page_files import write_text
 from ...runtime.regular_files import check_archive, check_regular, open_regular
 from ...runtime.threads import SINGLE_THREADED
 from ...runtime.whole_files import replaced
-from .table import WHAT, Array, ArrayMap, Data, Table, file_kind, one_line
+from .table import WHAT, Array, ArrayMap, Data, Table, Texts, file_kind, one_line
 
 _MEMORY = 7 * 2**27  # bytes of the process for MATLAB's files
 _SHOWN = 10  # arrays in a note
@@ -109,7 +109,7 @@ def open_arrays(path: Path) -> Table:
             other.append(name)
     note = f"arrays of other lengths than {rows} were left out: {', '.join(other[:_SHOWN])}"
 
-    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+    def load(_: Table, names: Texts) -> Iterator[Array]:
         return map(columns.__getitem__, names)
 
     return Table(path, tuple(columns), rows, load, notes=(note,) if other else ())
@@ -148,14 +148,14 @@ def open_parquet(path: Path) -> Table:
     from pyarrow import parquet
 
     check_regular(path, WHAT, LIMITS.table_text)
-    try:
+    with one_line(f"{path}: cannot be read as Parquet"):
         file = parquet.ParquetFile(
             path,
             buffer_size=_BUFFER,
             thrift_string_size_limit=LIMITS.parquet_footer,
             thrift_container_size_limit=LIMITS.parquet_footer,
         )
-        rows = int(file.metadata.num_rows)
+        rows = file.metadata.num_rows
         nested = [field.name for field in file.schema_arrow if pyarrow.types.is_nested(field.type)]
         _check_claims(path, file, nested, 8 * LIMITS.list_numbers, LIMITS.list_numbers, "of lists")
         columns = []  # names, and arrays of their own or the file's fields
@@ -167,10 +167,8 @@ def open_parquet(path: Path) -> Table:
                 held += rows * len(parts)
                 check_count(path, held, LIMITS.list_numbers, "numbers of lists")
             columns += parts
-    except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{path}: cannot be read as Parquet: {error}") from error
 
-    def load(_: Table, names: Sequence[str]) -> Iterator[Array]:
+    def load(_: Table, names: Texts) -> Iterator[Array]:
         for name in names:
             values = dict(columns)[name]
             if not _is_numeric(values.type):
@@ -193,9 +191,7 @@ def open_parquet(path: Path) -> Table:
     return Table(path, tuple(name for name, _ in columns), rows, load, numeric=numeric)
 
 
-def _check_claims(
-    path: Path, file: Any, names: Sequence[str], size: int, count: int, what: str
-) -> None:
+def _check_claims(path: Path, file: Any, names: Texts, size: int, count: int, what: str) -> None:
     """Raise InputError where columns unpack to more bytes or numbers, by the file's metadata."""
     groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
     claims = [
@@ -215,14 +211,8 @@ def _column(path: Path, file: Any, name: str) -> Any:
     Raises:
         InputError: the column is unreadable.
     """
-    import pyarrow
-
-    try:
+    with one_line(f"{path}: column {name} cannot be read", "numbers"):
         return file.read(columns=[name]).column(0).combine_chunks()
-    except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(
-            f"{path}: column {name} cannot be read: {error}; expected numbers"
-        ) from error
 
 
 def _within(path: Path, name: str, array: Any) -> Iterator[tuple[str, Any]]:
@@ -246,7 +236,7 @@ def _within(path: Path, name: str, array: Any) -> Iterator[tuple[str, Any]]:
                 f"{path}: column {name}: lists of {', '.join(map(str, sizes[:5]))} numbers; "
                 "expected one length"
             )
-        count = int(sizes[0]) if len(sizes) else 0
+        count = sizes.max(initial=0)
         check_count(path, len(array) * count, LIMITS.list_numbers, f"numbers in column {name}")
         values = np.full((count, len(array)), np.nan)
         if count:

@@ -12,14 +12,13 @@ numbers, else a block of lines at a time.
 import codecs
 import csv
 import gzip
-import math
 import re
-import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from itertools import chain, product, starmap
+from math import nan
 from pathlib import Path
 from statistics import mode
 from typing import Any, BinaryIO
@@ -31,7 +30,18 @@ from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS, check_count
 from ...runtime.regular_files import open_regular
 from .column_names import is_unit
-from .table import ARRAY_SUFFIXES, SUFFIXES, TEXT_SUFFIXES, WHAT, Array, Rows, Table
+from .table import (
+    ARRAY_SUFFIXES,
+    SUFFIXES,
+    TEXT_SUFFIXES,
+    WHAT,
+    Array,
+    Lines,
+    Rows,
+    Table,
+    Texts,
+    one_line,
+)
 from .tables import open_arrays, open_parquet
 
 # people's words for a missing value
@@ -39,7 +49,7 @@ MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
-_BUFFER = 2**18  # bytes read or unpacked at a time: less than a longest line
+_BUFFER = 2**16  # bytes read or unpacked at a time: within the cache of a core
 _UNUSED = 2**21  # packed bytes without a line yet
 
 _BLOCK = 200  # lines turned into numbers at a time; their texts stay in the cache of the processor
@@ -73,7 +83,7 @@ def _is_missing(field: str) -> bool:
     return not field or field.lower() in MISSING_WORDS
 
 
-def _items(field: str) -> list[str]:
+def _items(field: str) -> Lines:
     """Return the items of a list, between commas, semicolons or spaces."""
     return re.sub(r"[\[\](),;]", " ", field).split()
 
@@ -94,19 +104,22 @@ def _seconds(field: str) -> float | None:
     return days.total_seconds() + 3600.0 * hours + 60.0 * minutes + seconds
 
 
+_Lists = tuple[tuple[int, int], ...]  # fields (from 0) of lists, and their lengths
+
+
 @dataclass(frozen=True)
 class _TextLayout:
     """How the lines of a text table are written."""
 
     separator: str = ","  # " ": any white space
     decimal: str = "."  # or ","
-    lists: tuple[tuple[int, int], ...] = ()  # fields (from 0) of lists, and their lengths
+    lists: _Lists = ()
 
-    def fields(self, line: str) -> list[str]:
+    def fields(self, line: str) -> Lines:
         """Return the fields of a line without the space around them, as ``split``."""
         return list(map(str.strip, self.split(line)))
 
-    def split(self, line: str) -> list[str]:
+    def split(self, line: str) -> Lines:
         """Return the fields of a line, an item of a list each; empty for quotation marks against
         CSV.
         """
@@ -127,7 +140,7 @@ class _TextLayout:
                 fields[i : i + 1] = _items(fields[i]) or [""] * count
         return fields
 
-    def names(self, line: str) -> list[str]:
+    def names(self, line: str) -> Lines:
         """Return the columns' names of a header; a separator behind the last name, and the mark of
         a comment before the first, belong to none.
         """
@@ -141,7 +154,7 @@ class _TextLayout:
         None: something else.
         """
         if _is_missing(field):
-            return math.nan
+            return nan
         if self.decimal == ",":
             field = field.translate(_POINTS)
         try:
@@ -188,7 +201,7 @@ def open_text(path: Path) -> Table:
     Raises:
         InputError: unreadable, no text, no table, or more than ``FileLimits`` allows.
     """
-    written: list[str] = []
+    written: Lines = []
     for line in chain.from_iterable(map(_text_lines, _blocks(path))):
         written.append(line)
         if len(written) == _LINES or sum(map(len, written)) > _LOOKED_AT:
@@ -223,7 +236,7 @@ def open_text(path: Path) -> Table:
     blank: list[int] = []
     last = 0, ""  # rows up to the last line that the core does not read, and the line
 
-    def note(lines: Sequence[str], row: int) -> int:
+    def note(lines: Texts, row: int) -> int:
         nonlocal last
         for line in lines:
             if layout.is_blank(line):
@@ -238,11 +251,11 @@ def open_text(path: Path) -> Table:
         rows -= 1
         notes.append("the last line was cut off, and left out")
 
-    def load(table: Table, wanted: Sequence[str]) -> Array:
+    def load(table: Table, wanted: Texts) -> Array:
         columns = np.empty((len(wanted), rows))
         slots = np.array([wanted.index(name) if name in wanted else -1 for name in names])
 
-        def fill(lines: Sequence[str], row: int) -> int:
+        def fill(lines: Texts, row: int) -> int:
             lines = [line for line in lines if not layout.is_blank(line)][: rows - row]
             if lines:
                 _fill(table, layout, lines, row, wanted, columns[:, row : row + len(lines)])
@@ -260,11 +273,12 @@ def open_text(path: Path) -> Table:
         for name, fields in zip(names, columns_seen, strict=False)
         if None not in map(layout.number, fields)
     )
-    lines = first + 1, tuple(blank)
-    return Table(path, tuple(names), rows, load, *lines, units, tuple(notes), numeric)
+    return Table(
+        path, tuple(names), rows, load, first + 1, tuple(blank), units, tuple(notes), numeric
+    )
 
 
-def _lists(layout: _TextLayout, lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
+def _lists(layout: _TextLayout, lines: Texts) -> _Lists:
     """Return the fields (from 0) of lists, and the length of each field's first list with items."""
     lengths: dict[int, int] = {}
     for line in lines if layout.separator != " " else ():
@@ -283,14 +297,16 @@ def _latin(error: UnicodeError) -> tuple[str, int]:
 codecs.register_error(_LATIN, _latin)
 
 
+@dataclass
 class _Packed:
     """The bytes of a gzip file; no more are read than characters were unpacked: a million empty
     parts would take as long as a table.
     """
 
-    def __init__(self, file: BinaryIO, path: Path) -> None:
-        self._file, self._path, self._size = file, path, 0
-        self.unpacked = 0  # characters so far
+    file: BinaryIO
+    path: Path
+    size: int = 0
+    unpacked: int = 0  # characters so far
 
     def read(self, size: int) -> bytes:
         """Return the next bytes.
@@ -298,11 +314,11 @@ class _Packed:
         Raises:
             InputError: they are more than they unpack to.
         """
-        piece = self._file.read(size)
-        self._size += len(piece)
-        if self._size > self.unpacked + _UNUSED:
+        piece = self.file.read(size)
+        self.size += len(piece)
+        if self.size > self.unpacked + _UNUSED:
             raise InputError(
-                f"{self._path}: {self._size} packed bytes unpack to {self.unpacked}; expected a "
+                f"{self.path}: {self.size} packed bytes unpack to {self.unpacked}; expected a "
                 "packed table"
             )
         return piece
@@ -316,34 +332,29 @@ def _blocks(path: Path) -> Iterator[bytes]:
             as it comes.
     """
     size, number, rest = 0, 0, b""
-    try:
-        with open_regular(path, WHAT) as file:
-            packed: Any = _Packed(file, path)
-            source = gzip.GzipFile(fileobj=packed) if path.name.lower().endswith(".gz") else file
-            while piece := source.read(_BUFFER):
-                piece += source.read(1) if piece.endswith(b"\r") else b""
-                piece = piece.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-                if b"\0" in piece:
-                    raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
-                block = rest + (piece if size else piece.removeprefix(codecs.BOM_UTF8))
-                size += len(piece)
-                packed.unpacked = size
-                check_count(path, size, LIMITS.table_text, "characters of text")
-                length = block.find(b"\n") if b"\n" in piece else len(block)
-                check_count(path, length, LIMITS.table_line, f"in line {number + 1}")
-                number += piece.count(b"\n")
-                check_count(path, number - _LINES, LIMITS.table_rows, "rows")
-                end = block.rfind(b"\n") + 1
-                rest = block[end:]
-                yield block[:end]
-            yield rest
-    except (OSError, EOFError, zlib.error) as error:
-        cut = "the packed data ends before its end is marked"
-        why = cut if isinstance(error, EOFError) else error
-        raise InputError(f"{path}: cannot be read as {WHAT}: {why}") from error
+    with one_line(f"{path}: cannot be read as {WHAT}"), open_regular(path, WHAT) as file:
+        packed: Any = _Packed(file, path)
+        source = gzip.GzipFile(fileobj=packed) if path.name.lower().endswith(".gz") else file
+        while piece := source.read(_BUFFER):
+            piece += source.read(1) if piece.endswith(b"\r") else b""
+            piece = piece.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+            if b"\0" in piece:
+                raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
+            block = rest + (piece if size else piece.removeprefix(codecs.BOM_UTF8))
+            size += len(piece)
+            packed.unpacked = size
+            check_count(path, size, LIMITS.table_text, "characters of text")
+            length = block.find(b"\n") if b"\n" in piece else len(block)
+            check_count(path, length, LIMITS.table_line, f"in line {number + 1}")
+            number += piece.count(b"\n")
+            check_count(path, number - _LINES, LIMITS.table_rows, "rows")
+            end = block.rfind(b"\n") + 1
+            rest = block[end:]
+            yield block[:end]
+        yield rest
 
 
-def _text_lines(block: bytes) -> list[str]:
+def _text_lines(block: bytes) -> Lines:
     """Return the lines of a block, without their ends."""
     return block.decode("utf-8", _LATIN).removesuffix("\n").split("\n") if block else []
 
@@ -354,7 +365,7 @@ def _walk(
     first: int,
     slots: Rows,
     columns: Array,
-    other: Callable[[Sequence[str], int], int],
+    other: Callable[[Texts, int], int],
 ) -> int:
     """Read the rows of a text from line ``first``, counted from 0, on; return their number.
 
@@ -384,7 +395,7 @@ def _walk(
     return row
 
 
-def _layout(path: Path, head: list[str]) -> tuple[_TextLayout, int]:
+def _layout(path: Path, head: Lines) -> tuple[_TextLayout, int]:
     """Return the layout with the most numbers in the first lines, and the line (from 0) of the
     first row full of numbers.
 
@@ -408,7 +419,7 @@ def _layout(path: Path, head: list[str]) -> tuple[_TextLayout, int]:
     )
 
 
-def _score(head: list[str], layout: _TextLayout) -> tuple[float, int]:
+def _score(head: Lines, layout: _TextLayout) -> tuple[float, int]:
     """Return how many numbers a line has in a layout, and the line of the first row of them."""
     rows = []
     for i, line in enumerate(head):
@@ -427,14 +438,14 @@ def _score(head: list[str], layout: _TextLayout) -> tuple[float, int]:
     return sum(counts) / whole, start
 
 
-def _counts(layout: _TextLayout, fields: Sequence[str]) -> tuple[int, int]:
+def _counts(layout: _TextLayout, fields: Texts) -> tuple[int, int]:
     """Return how many fields are empty, and how many hold a number (``nan`` among them)."""
     empty = sum(map(_is_missing, fields))
     others = sum(number is None for number in map(layout.number, fields))
     return empty, len(fields) - others - empty
 
 
-def _header(path: Path, head: list[str], layout: _TextLayout, full: int) -> tuple[int | None, int]:
+def _header(path: Path, head: Lines, layout: _TextLayout, full: int) -> tuple[int | None, int]:
     """Return the lines (from 0) of the header, if any, and of the first row.
 
     The header is the nearest line before the first row with a name for nearly every column. Rows
@@ -470,9 +481,9 @@ def _header(path: Path, head: list[str], layout: _TextLayout, full: int) -> tupl
 def _fill(
     table: Table,
     layout: _TextLayout,
-    lines: Sequence[str],
+    lines: Texts,
     first: int,
-    wanted: Sequence[str],
+    wanted: Texts,
     out: Array,
 ) -> None:
     """Put the numbers in the columns ``wanted`` of rows into ``out`` (len(wanted), n).
@@ -494,7 +505,7 @@ def _fill(
     is_plain = "_" not in "".join(lines)  # Python's numbers may hold underscores
     columns = dict(zip(table.header, zip(*rows, strict=True), strict=True))
     for column, values in zip(wanted, out, strict=True):
-        texts: Sequence[str] = columns[column]
+        texts: Texts = columns[column]
         if layout.decimal == ",":
             texts = "\n".join(texts).translate(_POINTS).split("\n")
         with suppress(ValueError):

@@ -19,28 +19,15 @@ from ...runtime.errors import InputError, unknown_name
 from .column_names import WORDS
 from .table import ArrayMap, Names, Pair, Table, finite_rows
 
-Order = tuple[int, int, int, int]
+Order = tuple[int, ...]  # four
 
 PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of rotors 1 to 4
 
 ORDERS: dict[str, Order] = {name: tuple(order) for name, order in WORDS["rotor_orders"].items()}
 
 QUADROTOR = "a quadrotor"
-_ROTORS = {
-    QUADROTOR: 4,
-    "a tricopter": 3,
-    "a hexarotor": 6,
-    "an octorotor": 8,
-    "a decarotor": 10,
-    "a dodecarotor": 12,
-}
 # motors 1 to 4 of PX4's and ArduPilot's plus: right, left, front, rear; x forward, y left
 PLUS = ((0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
-_QUADRANTS = np.radians([45.0, 135.0, 225.0, 315.0])  # of rotors 1 to 4, from forward to the left
-_APART = np.radians(30.0)  # between a motor and its rotor, at most
-# of a further rotor's column: share of variance unexplained by the four, and its median by theirs
-_LEFT, _SIZES = 0.5, (0.5, 2.0)
-_FEWEST = 30  # rows for a decision
 
 
 def rotor_order(value: object) -> Order:
@@ -57,7 +44,7 @@ def rotor_order(value: object) -> Order:
             raise unknown_name("rotor order", value, ORDERS)
         return ORDERS[value]
     if isinstance(value, list | tuple) and sorted(map(str, value)) == ["1", "2", "3", "4"]:
-        return tuple(np.array(value, dtype=int).tolist())
+        return tuple(map(int, value))
     raise InputError(
         f"{value!r}; expected one of {', '.join(ORDERS)}, or the numbers of the motors "
         f"at the {', '.join(PLACES)}, such as [3, 2, 4, 1]"
@@ -70,7 +57,7 @@ def order_words(order: Order, named: Names = PLACES) -> str:
     return f"motors {', '.join(f'{motor} {place}' for motor, place in places)}"
 
 
-def order_names(order: tuple[int, ...]) -> list[str]:
+def order_names(order: Order) -> list[str]:
     """Return the names of an order, if any."""
     return [name for name, known in ORDERS.items() if known == order]
 
@@ -90,7 +77,7 @@ class WhatFlew:
         Raises:
             InputError: the log states another vehicle.
         """
-        count = _ROTORS.get(self.airframe) if self.rotors is None else self.rotors
+        count = WORDS["airframes"].get(self.airframe) if self.rotors is None else self.rotors
         with_rotors = "" if count in (None, 4) else f" with {count} rotors"
         if self.airframe not in ("", QUADROTOR) or with_rotors:
             what = f"{self.airframe or 'a vehicle'}{with_rotors}"
@@ -129,14 +116,15 @@ def more_rotors(columns: Names, source: Table | ArrayMap, are_speeds: bool = Fal
         rows = np.column_stack([data[column] for column in (*columns, name)])
         rows = rows[finite_rows(rows)]
         four, fifth = rows[:, :4], rows[:, 4]
-        if len(rows) < _FEWEST or np.ptp(fifth) == 0.0:
+        if len(rows) < 30 or np.ptp(fifth) == 0.0:
             continue
         size = abs(np.median(fifth) / max(np.median(np.abs(four)), 1e-12))
         moves = fifth - fifth.mean()
         left = np.linalg.lstsq(four - four.mean(axis=0), moves)[1]
-        share = left.sum() / np.sum(moves**2)  # no residual: of columns that depend on each other
         is_motor = are_speeds or re.search(WORDS["motor_words"], name.lower())
-        if (is_motor or share < _LEFT) and _SIZES[0] <= size <= _SIZES[1]:
+        # the four explain half of its variance, and its median is like theirs. Without a residual,
+        # columns depend on each other
+        if (is_motor or left.sum() / np.sum(moves**2) < 0.5) and 0.5 <= size <= 2.0:
             turning.append(name)
     if len(turning) == len(columns):
         return ""
@@ -172,9 +160,12 @@ def order_by_places(places: Sequence[Pair], vehicle: Vehicle | None = None) -> O
         vehicle: with rotors wherever its file has them; None: one in each quadrant.
     """
     motors = np.arctan2(*np.transpose(places)[::-1])
-    wanted = _QUADRANTS if vehicle is None else np.arctan2(*vehicle.positions.T[1::-1])
+    # from forward to the left
+    wanted = np.radians([45.0, 135.0, 225.0, 315.0])
+    if vehicle is not None:
+        wanted = np.arctan2(*vehicle.positions.T[1::-1])
     off = np.abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
     nearest = 1 + np.argmin(off, axis=1)
-    if off.min(axis=1).max() > _APART or len({*nearest}) < len(nearest):
+    if np.degrees(off.min(axis=1).max()) > 30.0 or len({*nearest}) < len(nearest):
         return None
     return tuple(nearest.tolist())

@@ -21,24 +21,9 @@ from ...runtime.arrays import Array, Index
 from ..logs.table import ArrayPair
 from .smoothing import resampled, second_difference
 
-KNOT = 0.02  # s from state to state; between them the IMU is integrated
-# m/s, standard deviation of an unmeasured velocity, and s between two independent ones. A steady
-# velocity besides does not change an IMU's readings
-VELOCITY_STD = 2.0
-VELOCITY_EVERY = 3.0
-STEADY_VELOCITY_STD = 5.0  # m/s, of the steady one, which stays unknown
-POSITION_STD = 10.0  # m, at the start, if not measured
-TILT_STD = 0.3  # rad, at the start, from the mean specific force
-HEADING_STD = 0.3  # rad, if shown by positions; exact without any reference
-# of MEMS sensors, from one switching-on to the next: rad/s and m/s2, and their walk in a second
-BIAS_STD = 0.03, 0.2
-BIAS_WALK = 3e-4, 3e-3
-LEAST_NOISE = 0.001, 0.01  # least credible noise of one sample: rad/s and m/s2
+STEADY_VELOCITY_STD = 5.0  # m/s: a steady velocity does not change an IMU's readings
 LEVELLING = 5.0  # s, time constant of the first guess, which takes gravity for up
-ITERATIONS = 6
-SETTLED = 1e-4  # rad, largest change of attitude in the last iteration
-# attitude (body), velocity, position (world), gyro bias, accelerometer bias: three each
-N = 15
+# attitude (body), velocity, position (world), gyro bias, accelerometer bias: three each, 15 in all
 ATTITUDE, VELOCITY, POSITION = 0, 3, 6  # the first of their three
 
 
@@ -98,7 +83,7 @@ def _steps(
     turn = moved[0] * Rotation.from_rotvec(-T * b)
     way, move = moved[1] - a * T, moved[2] - 0.5 * T * T * a
     R, one = before.as_matrix(), np.eye(3)
-    F = np.tile(np.eye(N), (len(R), 1, 1))
+    F = np.tile(np.eye(15), (len(R), 1, 1))
     F[:, 0:3, 0:3] = turn.inv().as_matrix()
     F[:, 0:3, 9:12], F[:, 6:9, 3:6] = -T * one, T * one
     F[:, 3:6, 0:3], F[:, 6:9, 0:3] = (np.cross(x[:, None], R) for x in (way, move))
@@ -120,36 +105,39 @@ def fuse(
         positions: measured beside it, world.
         attitudes: likewise. Without positions and attitudes the heading is zero at the start.
     """
-    dt = float((imu.t[-1] - imu.t[0]) / (len(imu.t) - 1))
-    stride = max(1, round(KNOT / dt))
+    dt = (imu.t[-1] - imu.t[0]) / (len(imu.t) - 1)
+    stride = max(1, round(0.02 / dt))  # 20 ms from state to state, of the integrated IMU
     count = (len(imu.t) - 1) // stride
     T, end = stride * dt, count * stride + 1
     moved = _integrate(imu.gyro[:end], imu.force[:end], dt, stride)
     times = imu.t[0] + T * np.arange(count + 1)
-    rates, forces = (np.ascontiguousarray(x[:end:stride]) for x in (imu.gyro, imu.force))
-    at_knots = imu._replace(t=times, gyro=rates, force=forces)
+    rates = imu.gyro[:end:stride]
+    at_knots = imu._replace(t=times, gyro=rates, force=imu.force[:end:stride])
     rotation, heading_std = _first_guess(at_knots, positions, attitudes)
     linear = np.zeros((count + 1, 12))
     if positions is None:
-        bound = np.arange(times[0], times[-1], VELOCITY_EVERY)
-        readings = {VELOCITY: Readings(bound, np.zeros((len(bound), 3)), VELOCITY_STD)}
+        # an unmeasured velocity has 2 m/s, and is another one after 3 s
+        bound = np.arange(times[0], times[-1], 3.0)
+        readings = {VELOCITY: Readings(bound, np.zeros((len(bound), 3)), 2.0)}
     else:
         linear[:, 3:6] = resampled(times, positions.t, positions.values)
         readings = {POSITION: positions}
     if attitudes is not None:
         readings[ATTITUDE] = attitudes
-    gyro_noise, force_noise = np.maximum(imu.noise, LEAST_NOISE) ** 2 * dt * T
-    walks = np.square(BIAS_WALK) * T
+    # least credible noise of one sample, and the walk of a bias in a second: rad/s and m/s2
+    gyro_noise, force_noise = np.maximum(imu.noise, (0.001, 0.01)) ** 2 * dt * T
+    walks = np.square((3e-4, 3e-3)) * T
     spread = np.repeat([gyro_noise, force_noise, force_noise * T**2 / 3.0, *walks], 3)
     started = rotation[0]
     # a heading is a turn about the world's vertical, in body axes
     up = np.abs(started.as_matrix()[2])
-    angles = np.sqrt((TILT_STD * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
-    priors = np.repeat([STEADY_VELOCITY_STD, POSITION_STD, *BIAS_STD], 3)
+    angles = np.sqrt((0.3 * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
+    # m/s, m, and biases of MEMS sensors from one switching-on to the next: rad/s and m/s2
+    priors = np.repeat([STEADY_VELOCITY_STD, 10.0, 0.03, 0.2], 3)
     prior_std = np.append(angles + 1e-4, priors)
     begun = linear[0].copy()
-    change, std = np.zeros((2, count + 1, N))
-    for _ in range(ITERATIONS):
+    change, std = np.zeros((2, count + 1, 15))
+    for _ in range(6):
         change[0, :3] = (rotation[0].inv() * started).as_rotvec()
         change[0, 3:], std[0] = begun - linear[0], prior_std
         measured = _measured(times, rates, rotation, linear, readings)
@@ -159,7 +147,7 @@ def fuse(
         turn = Rotation.from_rotvec(change[:, :3])
         rotation = rotation * turn
         linear += change[:, 3:]
-        if turn.magnitude().max() < SETTLED:
+        if turn.magnitude().max() < 1e-4:
             break
     if positions is None:
         std[:, 3:6] = np.hypot(std[:, 3:6], STEADY_VELOCITY_STD)
@@ -172,12 +160,12 @@ def _first_guess(
     """Return an attitude (m) to linearise about, and the standard deviation (rad) of its
     heading at the start.
     """
-    dt = float(imu.t[1] - imu.t[0])
+    dt = imu.t[1] - imu.t[0]
     quaternions = np.empty((len(imu.t), 4))
     # roll and pitch return to their start: their mean rate is the bias
     rates = imu.gyro - np.append(imu.gyro.mean(axis=0)[:2], 0.0)
     first = imu.force[: max(1, round(LEVELLING / dt))].mean(axis=0)
-    size = float(np.linalg.norm(first))
+    size = np.linalg.norm(first)
     up = first / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
     ahead = np.eye(3)[0 if abs(up[0]) < 1.0 - 1e-9 else 1]
     level, _ = Rotation.align_vectors(np.eye(3)[[2, 0]], [up, ahead], weights=[np.inf, 1.0])
@@ -191,7 +179,7 @@ def _first_guess(
         heading = _heading(imu, out[0], positions)
     else:
         return out, 0.0
-    return Rotation.from_euler("z", heading) * out, HEADING_STD
+    return Rotation.from_euler("z", heading) * out, 0.3
 
 
 def _heading(imu: ImuPiece, start: Rotation, positions: Readings) -> float:
@@ -227,8 +215,7 @@ def _measured(
         late = r.t - times[knots]
         if first == ATTITUDE:
             turn = Rotation.from_rotvec(rates[knots] * late[:, None])
-            seen = Rotation.from_matrix(r.values)
-            off = ((rotation[knots] * turn).inv() * seen).as_rotvec()
+            off = ((rotation[knots] * turn).inv() * Rotation.from_matrix(r.values)).as_rotvec()
         else:
             off = r.values - linear[knots, first - 3 : first]
             if first == POSITION:

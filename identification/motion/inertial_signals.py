@@ -10,8 +10,6 @@ states.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
-from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
@@ -22,25 +20,15 @@ from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body
 from .smoothing import (
     CUTOFFS,
     derivative,
+    even_times,
     high_pass,
     low_pass,
     mean_square,
     resampled,
     robust_std,
+    running_integral,
     unbroken,
 )
-
-# poses a second, from which the pose alone shows the motion; with fewer the IMU is needed
-LEAST_POSE_HZ = 45.0
-MOST_HZ = 250.0  # of the signals; faster IMUs are low-passed and thinned out
-# m and rad, standard deviations of a measured pose's axis: first guess, and least credible
-FIRST_POSITION_STD = 0.02
-LEAST_POSITION_STD = 0.0005
-FIRST_ATTITUDE_STD = 0.01
-LEAST_ATTITUDE_STD = 0.001
-# standard deviations from which a position or an attitude is a leap and is left out
-OUTLIER = 10.0
-DRIFT_TIME = 3.0  # s, over which the fusion's errors drift, in a sample of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,14 +41,15 @@ class InertialSignals(Signals):
 
 def pose_rate(log: FlightLog) -> float:
     """Return the number of new poses a second in a log; 0 without any."""
-    rows = np.flatnonzero(finite_rows(log.position))
-    times = log.t[_changed(rows, log.position)]
+    times = log.t[_changed(np.flatnonzero(finite_rows(log.position)), log.position)]
     return 1.0 / median_step(times) if len(times) > 1 else 0.0
 
 
 def reads_imu(log: FlightLog) -> bool:
-    """Return whether a log's motion is of its IMU: the log has one, and no pose fast enough."""
-    return log.gyro is not None and log.accelerometer is not None and pose_rate(log) < LEAST_POSE_HZ
+    """Return whether a log's motion is of its IMU: the log has one, and no pose fast enough (45 a
+    second) to show the motion alone.
+    """
+    return log.gyro is not None and log.accelerometer is not None and pose_rate(log) < 45.0
 
 
 def imu_noise(log: FlightLog) -> Pair:
@@ -71,18 +60,21 @@ def imu_noise(log: FlightLog) -> Pair:
 
 
 def _level(x: Array | None) -> float:
-    read = np.empty((0, 3)) if x is None else x[finite_rows(x)]
-    if len(read) < 50:
+    if x is None or len(read := x[finite_rows(x)]) < 50:
         return 0.0
     return robust_std(high_pass(read, CUTOFFS.noise_share_of_rate))
 
 
+def imu_rows(log: FlightLog) -> Rows:
+    """Return the rows with readings of both gyro and accelerometer."""
+    if log.gyro is None or log.accelerometer is None:
+        return np.flatnonzero([])
+    return np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
+
+
 def inertial_pieces(log: FlightLog) -> list[Rows]:
     """Return the rows of each unbroken run of IMU readings of sufficient length."""
-    if log.gyro is None or log.accelerometer is None:
-        return []
-    read = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
-    return unbroken(log.t, read, LONGEST_GAP, 50, SHORTEST_PIECE)
+    return unbroken(log.t, imu_rows(log), LONGEST_GAP, 50, SHORTEST_PIECE)
 
 
 def inertial_signals(log: FlightLog, gravity: float) -> list[InertialSignals]:
@@ -111,10 +103,10 @@ def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Array) -> Inertial
     assert log.accelerometer is not None
     imu_times = log.t[rows]
     fine = median_step(imu_times)
-    thin = max(1, int(np.ceil(1.0 / (MOST_HZ * fine) - 1e-6)))
+    # readings beyond 250 Hz are low-passed and thinned out
+    thin = max(1, int(np.ceil(1.0 / (250.0 * fine) - 1e-6)))
     period = thin * fine
-    even = np.arange(imu_times[0], imu_times[-1] + 0.5 * fine, fine)
-    even = even[even <= imu_times[-1]]
+    even = even_times(imu_times, fine)
 
     def sampled(times: Array, x: Array) -> Array:
         even_x = resampled(even, times, x)
@@ -151,18 +143,20 @@ def _fused(log: FlightLog, imu: ImuPiece) -> FusedMotion:
     placed = _measured(log, finite_rows(log.position), imu.t)
     turned = _measured(log, finite_rows(log.quaternion) & log.valid, imu.t)
     positions = attitudes = None
+    # first guesses of a measured axis' standard deviation in m and rad
     if len(placed) > 3:
-        positions = Readings(log.t[placed], log.position[placed], FIRST_POSITION_STD)
+        positions = Readings(log.t[placed], log.position[placed], 0.02)
     if len(turned) > 3:
         matrices = Rotation.from_quat(log.quaternion[turned], scalar_first=True).as_matrix()
-        attitudes = Readings(log.t[turned], matrices, FIRST_ATTITUDE_STD)
+        attitudes = Readings(log.t[turned], matrices, 0.01)
     fused = fuse(imu, positions, attitudes)
     if positions is None:
         return fused
     off = positions.values - resampled(positions.t, fused.t, fused.linear[:, 3:6])
     off -= np.median(off, axis=0)
-    std = max(1.3 * robust_std(off), LEAST_POSITION_STD)  # a smoother leaves less than noise
-    kept = np.linalg.norm(off, axis=1) < OUTLIER * std
+    # a smoother leaves less than noise; below 0.5 mm and 1 mrad no noise is credible
+    std = max(1.3 * robust_std(off), 0.0005)
+    kept = np.linalg.norm(off, axis=1) < 10.0 * std  # others are leaps
     positions = Readings(positions.t[kept], positions.values[kept], std)
     if attitudes is not None:
         knot = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)
@@ -170,7 +164,7 @@ def _fused(log: FlightLog, imu: ImuPiece) -> FusedMotion:
         if near.sum() > 20:
             seen = Rotation.from_matrix(attitudes.values[near])
             off = (fused.rotation[knot[near]].inv() * seen).as_rotvec()
-            std = max(1.3 * robust_std(off - np.median(off, axis=0)), LEAST_ATTITUDE_STD)
+            std = max(1.3 * robust_std(off - np.median(off, axis=0)), 0.001)
             attitudes = attitudes._replace(std=std)
     return fuse(imu, positions, attitudes)
 
@@ -185,15 +179,14 @@ def _measured(log: FlightLog, there: Mask, t: Array) -> Rows:
 
 def _changed(rows: Rows, values: Array) -> Rows:
     """Return the rows whose values (N, k) differ from the row before among them."""
-    new = np.any(np.diff(values[rows], axis=0, prepend=np.inf) != 0.0, axis=1)
-    return rows[new]
+    return rows[np.diff(values[rows], axis=0, prepend=np.inf).any(axis=1)]
 
 
 def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:
     """Return the attitude (n, 3, 3) at all samples: from the knot before, by the gyro."""
     knot = np.searchsorted(fused.t, t + 1e-9, side="right") - 1
     first = np.searchsorted(t, fused.t - 1e-9)[knot]
-    turned = cumulative_trapezoid(gyro, dx=float(t[1] - t[0]), axis=0, initial=0)
+    turned = running_integral(gyro, t)
     since = Rotation.from_rotvec(turned - turned[first])
     return np.asarray((fused.rotation[knot] * since).as_matrix())
 
@@ -202,7 +195,9 @@ def with_drift(s: InertialSignals, rng: np.random.Generator, gravity: float) -> 
     """Return signals with other errors of the fusion, drawn from its standard deviations: slow
     drifts of attitude, velocity and position.
     """
-    slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), DRIFT_TIME / s.period, axis=0)
+    from scipy.ndimage import gaussian_filter1d  # needed without a pose alone
+
+    slow = gaussian_filter1d(rng.standard_normal((len(s.t), 9)), 3.0 / s.period, axis=0)
     slow /= np.sqrt(mean_square(slow)) + 1e-30
     slow *= s.std
     turn = Rotation.from_rotvec(slow[:, :3]).as_matrix()

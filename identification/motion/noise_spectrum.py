@@ -19,24 +19,15 @@ from .smoothing import turned, unbroken
 # shares of half the sampling rate between which the slope is read: above a vehicle's motion, below
 # the last bins, which rounding and jitter of the clock fill
 BAND = (0.5, 0.95)
-GAP = 2.5  # median time steps, from which a piece ends; a single lost sample is none
 SEGMENT = 128  # samples of a spectrum's segment
-LEAST_SEGMENTS = 8  # half overlapping; with fewer the slope's own error is above 0.2
 # power of 1/f by which the amplitude falls over the band. White noise has 0, unfiltered poses of
 # cameras and onboard attitudes up to 1.0 (vibration), a first-order low-pass 1
 MOST_SLOPE = 1.2
-# more of it in rotor speeds: a rotor with a lag is a first-order low-pass itself, and its speed is
-# no sensor's noise. Recordings of the presets have up to 1.9
-MORE_OF_ROTORS = 1.0
 # for fast logs: ratio of the level between these shares of half the sampling rate to the level at
 # the top of the band. White noise has 1; a first-order filter, like an estimator's own, has 2, at a
 # slope no larger than a vibrating camera's
 LOWER_BAND = (0.2, 0.35)
-LEAST_LOWER_HZ = 20.0  # start of the lower band: a vehicle's motion ends below
-TOP_FROM = 0.8  # share of half the sampling rate, start of the top of the band
-MOST_FALL = 1.5
 _SHARES = np.arange(1, SEGMENT // 2 + 1) / (SEGMENT // 2)  # of half the sampling rate
-DIFFERENCES = 2  # taken before the spectrum, against leakage of slow motion
 
 
 class _ChannelNoise(NamedTuple):
@@ -52,13 +43,14 @@ class _ChannelNoise(NamedTuple):
     @property
     def filtered(self) -> bool:
         """Whether it falls faster than an unfiltered sensor's noise."""
-        most = MOST_SLOPE + (self.channel == ROTORS) * MORE_OF_ROTORS
-        return self.slope > most or (self.fall > MOST_FALL and self.channel in POSE_CHANNELS)
+        # a rotor with a lag is a first-order low-pass itself, and its speed is no sensor's noise.
+        # Recordings of the presets have slopes up to 1.9
+        most = MOST_SLOPE + (self.channel == ROTORS)
+        return self.slope > most or (self.fall > 1.5 and self.channel in POSE_CHANNELS)
 
 
 POSE_CHANNELS = ("position", "attitude")
 ROTORS = "rotor speeds"
-_MEASURED = 0.9  # measurements a row, below which the reader interpolated the channel
 
 
 @lru_cache(maxsize=1)  # a diagnosis asks three times
@@ -88,16 +80,14 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         ("accelerometer", log.accelerometer),
         (ROTORS, None if log.commanded else log.rotor_speeds),
     ):
-        rows = np.flatnonzero([] if x is None else finite_rows(x))
-        if x is None or len(rows) <= SEGMENT:
+        if x is None or len(rows := np.flatnonzero(finite_rows(x))) <= SEGMENT:
             continue
         period = median_step(log.t[rows])
         rate = log.rates.get("rotors" if name == ROTORS else name, np.inf)
-        if name not in POSE_CHANNELS and rate * period < _MEASURED:
+        if name not in POSE_CHANNELS and rate * period < 0.9:
             continue
-        pieces = unbroken(log.t, rows, GAP * period, SEGMENT)
-        turning = name == "attitude"
-        yield name, [turned(quaternion[r]) if turning else x[r] for r in pieces], period
+        pieces = unbroken(log.t, rows, 2.5 * period, SEGMENT)  # a lost sample is no gap
+        yield name, [turned(quaternion[r]) if name == "attitude" else x[r] for r in pieces], period
 
 
 def _amplitudes(pieces: Sequence[Array]) -> Array | None:
@@ -107,23 +97,23 @@ def _amplitudes(pieces: Sequence[Array]) -> Array | None:
     ground, spoils some of them.
     """
     n = SEGMENT
-    rough = [np.diff(piece, DIFFERENCES, axis=0) for piece in pieces]
+    # second differences, against leakage of slow motion
+    rough = [np.diff(piece, 2, axis=0) for piece in pieces]
     segments = [x[a : a + n] for x in rough for a in range(0, len(x) - n + 1, n // 2)]
-    if len(segments) < LEAST_SEGMENTS:
+    if len(segments) < 8:  # the slope's own error is above 0.2
         return None
     spectra = np.fft.rfft(np.hanning(n)[:, None] * np.array(segments), axis=1)[:, 1:]
     power = np.median(np.square(np.abs(spectra)), axis=0)
     moving = power.max(axis=0) > 0.0
     if not moving.any():
         return None
-    undone = (2.0 * np.sin(0.5 * np.pi * _SHARES)) ** (2 * DIFFERENCES)
+    undone = (2.0 * np.sin(0.5 * np.pi * _SHARES)) ** 4
     return np.asarray(0.5 * np.log(np.maximum(power[:, moving] / undone[:, None], 1e-300)))
 
 
 def _within(low: float, high: float) -> Mask:
     """Return the frequencies (f,) between two shares of half the sampling rate."""
-    share = _SHARES
-    return (share >= low) & (share <= high)
+    return (low <= _SHARES) & (high >= _SHARES)
 
 
 def _slope(amplitude: Array) -> float:
@@ -138,9 +128,9 @@ def _fall(amplitude: Array, nyquist: float) -> float:
     """Return the amplitude in the lower band over the amplitude at the top; NaN if motion may be in
     the lower band.
     """
-    if LOWER_BAND[0] * nyquist < LEAST_LOWER_HZ:
-        return float("nan")
-    lower, top = amplitude[_within(*LOWER_BAND)], amplitude[_within(TOP_FROM, BAND[1])]
+    if LOWER_BAND[0] * nyquist < 20.0:  # a vehicle's motion ends below
+        return np.nan
+    lower, top = amplitude[_within(*LOWER_BAND)], amplitude[_within(0.8, BAND[1])]
     return float(np.exp(np.median(lower.mean(axis=0) - top.mean(axis=0))))
 
 
@@ -158,17 +148,10 @@ def _sentence(group: Sequence[_ChannelNoise]) -> str:
     """Return the sentence on channels of one kind; the clearest of them is the evidence."""
     clearest = max(group, key=lambda noise: (noise.slope, noise.fall))
     low, high = clearest.band_hz
-    if clearest.slope > MOST_SLOPE:
-        known = (
-            f"between {low:.3g} and {high:.3g} Hz, above a vehicle's motion, the amplitude of the "
-            f"{clearest.channel} falls with the power {clearest.slope:.1f} of the frequency"
-        )
-    else:
-        first, last = (share * high / BAND[1] for share in LOWER_BAND)
-        known = (
-            f"between {first:.3g} and {last:.3g} Hz, above a vehicle's motion, the amplitude of "
-            f"the {clearest.channel} is {clearest.fall:.1f} times that near {high:.3g} Hz"
-        )
+    how = f"falls with the power {clearest.slope:.1f} of the frequency"
+    if clearest.slope <= MOST_SLOPE:
+        how = f"is {clearest.fall:.1f} times that near {high:.3g} Hz"
+        low, high = (share * high / BAND[1] for share in LOWER_BAND)
     means = (
         "The log does not show how large the sensors' noise is, so the noise floor is a lower bound"
         if clearest.channel in POSE_CHANNELS
@@ -178,7 +161,8 @@ def _sentence(group: Sequence[_ChannelNoise]) -> str:
     were = "were" if len(group) > 1 or what.endswith("s") else "was"
     return (
         f"the {what} {were} filtered before the log was written, by a low-pass, an estimator or a "
-        f"resampling: {known}, where a sensor's own noise is level. {means}"
+        f"resampling: between {low:.3g} and {high:.3g} Hz, above a vehicle's motion, the amplitude "
+        f"of the {clearest.channel} {how}, where a sensor's own noise is level. {means}"
     )
 
 

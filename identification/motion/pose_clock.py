@@ -12,8 +12,6 @@ import numpy as np
 from ..logs.flight_log import FlightLog, with_rows
 from ..logs.table import Array, Rows, median_step
 
-_RARE = 1.5  # rows a pose, from which a log is thinned
-
 
 def on_pose_clock(log: FlightLog) -> FlightLog:
     """Return a log with one row a pose, or the log itself where poses stand in every row.
@@ -22,7 +20,7 @@ def on_pose_clock(log: FlightLog) -> FlightLog:
     the interval that ends at the pose. Gyro and accelerometer are means around the pose.
     """
     rows = np.flatnonzero(log.valid)
-    if len(rows) < 2 or median_step(log.t[rows]) < _RARE * log.period:
+    if len(rows) < 2 or median_step(log.t[rows]) < 1.5 * log.period:
         return log
     begins = np.append(rows[0], rows[:-1] + 1)
     middles = np.append(0, (rows[1:] + rows[:-1]) // 2 + 1)

@@ -15,8 +15,6 @@ from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array
 from .signals import Signals
 
-_MODEL = np.dtype(MODEL_FIELDS)
-
 
 def acting_wrench(
     signals: Signals, vehicle: Vehicle, body: Vehicle | None = None
@@ -30,10 +28,20 @@ def acting_wrench(
     models, own = loaded_model(vehicle)
     body, models = body or own, models.copy()
     out = np.empty((len(signals.t), 6))
-    turning = np.ascontiguousarray(signals.angular_acceleration)
-    inertia = np.ascontiguousarray(body.inertia)
-    flown = (*signals.columns(), turning)
-    _core.acting_wrench(models.ctypes.data, signals.period, *flown, body.mass, inertia, out)
+    _core.acting_wrench(
+        models.ctypes.data,
+        signals.period,
+        signals.rotor_speeds,
+        np.zeros(len(signals.t)) if signals.voltage is None else signals.voltage,
+        signals.position,
+        signals.rotation,
+        signals.velocity,
+        signals.angular_velocity,
+        signals.angular_acceleration,
+        body.mass,
+        body.inertia,
+        out,
+    )
     raise_errors()
     return out, body
 
@@ -43,7 +51,7 @@ def loaded_model(vehicle: Vehicle) -> tuple[np.ndarray, Vehicle]:
     """Return the record (1,) of a vehicle's model, to be copied, and the vehicle with its body
     effects applied.
     """
-    models = np.zeros(1, dtype=_MODEL)
+    models = np.zeros(1, dtype=np.dtype(MODEL_FIELDS))
     return models, load_model(models[0], vehicle)
 
 
@@ -59,11 +67,3 @@ def needed_wrench(signals: Signals, body: Vehicle) -> Array:
             signals.angular_acceleration @ body.inertia.T,
         ]
     )
-
-
-def residual_wrench(signals: Signals, vehicle: Vehicle) -> Array:
-    """Return the residual (n, 6): force in the world frame (N), torque about the centre of mass in
-    the body frame (Nm).
-    """
-    acting, body = acting_wrench(signals, vehicle)
-    return needed_wrench(signals, body) - acting

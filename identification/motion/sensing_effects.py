@@ -41,8 +41,7 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
         return log
     samples = np.column_stack([log.rotor_speeds, log.position, log.quaternion])
     models = loaded_model(vehicle)[0].copy()
-    t, seen = np.ascontiguousarray(log.t), np.ascontiguousarray(log.valid)
-    _core.undo_sensing(models.ctypes.data, t, seen, samples)
+    _core.undo_sensing(models.ctypes.data, log.t, log.valid, samples)
     raise_errors()
     delay = delay_of(vehicle)
     valid = log.valid & _settled(log, delay)

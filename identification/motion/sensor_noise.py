@@ -20,7 +20,7 @@ class _SensorNoise:
 
     position: float  # m
     attitude: float  # rad
-    rotor_speed: float  # rad/s
+    rounding: float  # rad/s, step of the rotor speeds
     gyro: float = 0.0  # rad/s, where the motion is read from an IMU
     accelerometer: float = 0.0  # m/s2, likewise
 
@@ -34,15 +34,13 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> _SensorNoise:
     step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
     if reads_imu(log):  # the few poses beside it show no noise of their own
         mocap = vehicle.mocap if pose_rate(log) > 0.0 else Mocap(0.0, 0.0, 0.0)
-        return _SensorNoise(
-            mocap.sigma_pos_m, mocap.sigma_att_rad, step / np.sqrt(12.0), *imu_noise(log)
-        )
+        return _SensorNoise(mocap.sigma_pos_m, mocap.sigma_att_rad, step, *imu_noise(log))
     seen = np.flatnonzero(log.valid)
     steps = np.diff(log.t[seen])
     whole = np.flatnonzero(steps < 1.5 * np.median(steps))
     position = high_pass(log.position[seen], CUTOFFS.noise_share_of_rate)[whole]
     angle = high_pass(turned(log.quaternion[seen]), CUTOFFS.noise_share_of_rate)
-    return _SensorNoise(robust_std(position), robust_std(angle), step / np.sqrt(12.0))
+    return _SensorNoise(robust_std(position), robust_std(angle), step)
 
 
 def with_noise(log: FlightLog, noise: _SensorNoise, rng: np.random.Generator) -> FlightLog:
@@ -62,8 +60,7 @@ def with_noise(log: FlightLog, noise: _SensorNoise, rng: np.random.Generator) ->
         log,
         position=log.position + noise.position * rng.standard_normal((n, 3)),
         quaternion=quaternion,
-        rotor_speeds=log.rotor_speeds
-        + noise.rotor_speed * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5),
+        rotor_speeds=log.rotor_speeds + noise.rounding * (rng.random((n, 4)) - 0.5),
         gyro=noisier(log.gyro, noise.gyro),
         accelerometer=noisier(log.accelerometer, noise.accelerometer),
     )

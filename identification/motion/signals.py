@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.table import Array, Data, Rows
-from .smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, turning, unbroken
+from .smoothing import (
+    CUTOFFS,
+    continuous,
+    derivative,
+    even_times,
+    low_pass,
+    resampled,
+    turning,
+    unbroken,
+)
 
 SHORTEST_PIECE = 3.0  # s of unbroken pose; a shorter one is all edge to the filters
 LONGEST_GAP = 0.1  # s without a pose, or a reading of an IMU; nothing is interpolated over more
@@ -45,15 +54,6 @@ class Signals:
             if isinstance(x, np.ndarray) and len(x) == len(self.t)
         }
         return replace(self, **sampled)
-
-    def columns(self) -> tuple[Array, Array, Array, Array, Array, Array]:
-        """Return rotor speeds, voltage (0 where unknown), position, rotation, velocity and angular
-        velocity, contiguous, as the core takes them.
-        """
-        voltage = np.zeros(len(self.t)) if self.voltage is None else self.voltage
-        moving = (self.position, self.rotation, self.velocity, self.angular_velocity)
-        speeds, volts, *motion = map(np.ascontiguousarray, (self.rotor_speeds, voltage, *moving))
-        return speeds, volts, motion[0], motion[1], motion[2], motion[3]
 
 
 def in_body(x: Array, rotation: Array) -> Array:
@@ -98,8 +98,7 @@ def longest_step(log: FlightLog) -> float:
 
 def _piece(log: FlightLog, rows: Rows, wide_hz: float) -> Signals:
     period = log.period
-    t = np.arange(log.t[rows[0]], log.t[rows[-1]] + 0.5 * period, period)
-    t = t[t <= log.t[rows[-1]]]
+    t = even_times(log.t[rows], period)
     q = resampled(t, log.t[rows], continuous(log.quaternion[rows]))
     rotation, angular_velocity = turning(low_pass(q, wide_hz, period), period)
     position = low_pass(resampled(t, log.t[rows], log.position[rows]), wide_hz, period)

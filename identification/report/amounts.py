@@ -13,9 +13,9 @@ import numpy as np
 
 from ...dynamics import effects as library
 from ...dynamics.vehicle import Vehicle
-from ..findings import CHANNELS, Diagnosis, NamedEffect
-from ..logs.table import Array, Pair
-from .words import SPACE, coefficient_meaning, effect_summary, in_words, scale_of, with_std
+from ..findings import CHANNELS, NamedEffect
+from ..logs.table import Array
+from .words import coefficient_meaning, effect_summary, in_unit, in_words, scale_of, with_std
 
 _ROTORS = 4.0
 _SMALL = 0.5
@@ -36,7 +36,6 @@ _RELATIVE = {"1": (100.0, "%"), "1/s": (6000.0, "% a minute")}
 _PLACE = re.compile(r"(along|about) (body|world) ([xyz])|(rotor \d)$")
 _SIDES = {"x": ("forward", "backward"), "y": ("left", "right"), "z": ("up", "down")}
 _KNOWN = 2.0  # least standard deviations of a coefficient in the sentence
-_MOST = 2  # coefficients of an effect in the sentence
 _BESIDE = 0.38  # share of a wind's speed, sin(22.5 degrees): least part along a named axis
 _BLOCK = 3.0  # s: longer than the correlation of a residual
 _LEAST_BLOCKS = 4
@@ -62,7 +61,9 @@ class _Amount(NamedTuple):
 
     def __str__(self) -> str:
         """Return ``0.31 ± 0.01 N along x``."""
-        number = f"{with_std(self.value, self.std)}{SPACE}{self.unit}".removesuffix(SPACE)
+        number = f"{with_std(self.value, self.std)}\N{NO-BREAK SPACE}{self.unit}".removesuffix(
+            "\N{NO-BREAK SPACE}"
+        )
         return f"{number} {self.where}".rstrip()
 
 
@@ -108,19 +109,18 @@ def known(effect: NamedEffect) -> list[str]:
 
 def with_amounts(effect: NamedEffect, vehicle: Vehicle) -> str:
     """Return an effect's plain name with its amount: the speed and direction of a wind; else the
-    known coefficients in the first one's unit, or of more than two the largest.
+    largest known coefficient of the first one's unit.
     """
     if effect.name in library.names() and library.get(effect.name).sets_wind:
         return f"{title(effect.name)} {_wind(effect)}"
     names = known(effect) or list(effect.coefficients)[:1]
+    if not (told := amount(effect, names[0], vehicle)).unit:
+        meaning = coefficient_meaning(effect.name, names[0]).partition(";")[0] or names[0]
+        return f"{title(effect.name)}, {meaning} {told}"
     names = [name for name in names if effect.units.get(name) == effect.units.get(names[0])]
-    first, most = amount(effect, names[0], vehicle), ""
-    if not first.unit:
-        return f"{title(effect.name)} {names[0]} = {first}"
-    if len(names) > _MOST:
-        most, names = "up to ", [max(names, key=lambda name: abs(effect.coefficients[name]))]
-    told = ", ".join(str(amount(effect, name, vehicle)) for name in names)
-    return f"{title(effect.name)} {most}{told} {first.when}".rstrip()
+    largest = max(names, key=lambda name: abs(effect.coefficients[name]))
+    told, most = amount(effect, largest, vehicle), "up to " if len(names) > 1 else ""
+    return f"{title(effect.name)} {most}{told} {told.when}".rstrip()
 
 
 def _wind(effect: NamedEffect) -> _Amount:
@@ -138,40 +138,30 @@ def _wind(effect: NamedEffect) -> _Amount:
     return _Amount(speed, spread, "m/s", f"from {' '.join(sides)}", "")
 
 
-def steady_wrench(pieces: Sequence[Array], periods: Sequence[float], floors: Pair) -> str:
+def steady_wrench(pieces: Sequence[tuple[Array, float]], force: float, torque: float) -> str:
     """Return the mean force and torque, each if beyond chance and its floor; else nothing.
 
     The mean of a block of 3 s is one number; all blocks together say how sure their mean is.
 
     Args:
-        pieces: (n, 6) N and Nm, NaN where not known.
-        periods: s, of each piece.
-        floors: least mean force, N, and torque, Nm.
+        pieces: (n, 6) N and Nm, NaN where not known, and the period, s, of each.
+        force: least mean, N.
+        torque: least mean, Nm.
     """
-    counts = (max(1, round(len(x) * dt / _BLOCK)) for x, dt in zip(pieces, periods, strict=True))
-    blocks = [part.mean(axis=0) for parts in map(np.array_split, pieces, counts) for part in parts]
+    blocks = [
+        part.mean(axis=0)
+        for x, period in pieces
+        for part in np.array_split(x, max(1, round(len(x) * period / _BLOCK)))
+    ]
     if len(blocks) < _LEAST_BLOCKS:
         return ""
     mean = np.mean(blocks, axis=0)
     error = np.std(blocks, axis=0, ddof=1) / math.sqrt(len(blocks))
+    sure = np.abs(mean) > np.maximum(_STEADY * error, np.nan_to_num(np.repeat([force, torque], 3)))
     told = []
-    for what, unit, way, first, floor in (
-        ("force", "N", "along", 0, floors[0]),
-        ("torque", "Nm", "about", 3, floors[1]),
-    ):
-        i = first + np.argmax(np.abs(mean[first : first + 3]))
-        if abs(mean[i]) > _STEADY * error[i] and not abs(mean[i]) < floor:
-            factor, small = scale_of([mean[i]], unit)
-            size = with_std(factor * mean[i], factor * error[i])
-            told.append(f"a {what} of {size}{SPACE}{small} {way} {CHANNELS[i][-1]}")
+    for kind, unit, first in (("force", "N", 0), ("torque", "Nm", 3)):
+        i = first + int(np.argmax(np.abs(mean[first : first + 3])))
+        if sure[i]:
+            way = "about" if first else "along"
+            told.append(f"{kind} {in_unit(float(mean[i]), unit, 3)} {way} {CHANNELS[i][-1]}")
     return in_words(told)
-
-
-def steady_residual(diagnosis: Diagnosis) -> str:
-    """Return the mean force and torque that the named effects leave, in words, or nothing."""
-    traces = diagnosis.traces
-    return steady_wrench(
-        [x.after for x in traces],
-        [x.period for x in traces],
-        (diagnosis.floor_force_rms, diagnosis.floor_torque_rms),
-    )

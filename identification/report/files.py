@@ -5,7 +5,6 @@
 import json
 import shlex
 from dataclasses import asdict
-from importlib import resources
 from pathlib import Path
 
 from ... import __version__
@@ -15,16 +14,25 @@ from ...runtime.plain_values import as_text, plain
 from ..findings import Diagnosis, Errors
 from ..logs.table import Data, NamedNumbers
 from .headline import headline
-from .page import report_page
+from .page import page_file, report_page
 
 # MAJOR.MINOR of ``report.json`` (see ``report.schema.json`` beside this file): a new key is a new
 # minor version, a removed key or a new meaning a new major one
-SCHEMA_VERSION = "1.2"
+SCHEMA_VERSION = "1.3"
 # attributes of a diagnosis under their own names in ``report.json``
 _AS_FOUND = (
-    *("advice", "notes", "needs_pose", "candidates", "structure", "rotor_faults"),
-    *("logs", "test_logs", "seconds", "cutoff_hz"),
+    "advice",
+    "notes",
+    "needs_pose",
+    "candidates",
+    "structure",
+    "rotor_faults",
+    "logs",
+    "test_logs",
+    "seconds",
+    "cutoff_hz",
 )
+_STATED = ("name", "coefficients", "std", "units", "evidence")  # of an effect not needed
 
 
 def write_report(
@@ -46,7 +54,9 @@ def write_report(
         InputError: a file cannot be written.
     """
     folder = Path(folder)
-    command = command or _command(diagnosis, folder)
+    tests = [word for log in diagnosis.test_logs for word in ("--test", log)]
+    given = [*diagnosis.logs, *tests, "--vehicle", diagnosis.declared.name, "--out", str(folder)]
+    command = command or shlex.join(["windwrench", "diagnose", *given])
     data = json.dumps(report_data(diagnosis), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     page = as_text(report_page(diagnosis, command))
     numbers, html, vehicle = folder / "report.json", folder / "report.html", folder / "vehicle.yaml"
@@ -82,6 +92,7 @@ def report_data(diagnosis: Diagnosis) -> Data:
         "unknown": stated.unknown,
         "error": error,
         **{name: getattr(diagnosis, name) for name in _AS_FOUND},
+        "not_needed": [{key: getattr(x, key) for key in _STATED} for x in diagnosis.not_needed],
         "headline": headline(diagnosis),
         "floor_is_lower_bound": diagnosis.floor_is_bound,
         "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],
@@ -99,8 +110,7 @@ def report_data(diagnosis: Diagnosis) -> Data:
 
 def report_schema() -> Data:
     """Return the JSON Schema (draft 2020-12) of ``report.json``."""
-    text = resources.files(__package__).joinpath("report.schema.json").read_text(encoding="utf-8")
-    schema: Data = json.loads(text)
+    schema: Data = json.loads(page_file("report.schema.json"))
     return schema
 
 
@@ -111,9 +121,3 @@ def _errors(errors: Errors) -> NamedNumbers:
         "nis_without_wrench_state": errors.nis_without_wrench_state,
         "rollout_1s_position_rms_m": errors.rollout_1s_position_rms,
     }
-
-
-def _command(diagnosis: Diagnosis, folder: Path) -> str:
-    tests = [word for log in diagnosis.test_logs for word in ("--test", log)]
-    given = [*diagnosis.logs, *tests, "--vehicle", diagnosis.declared.name, "--out", str(folder)]
-    return shlex.join(["windwrench", "diagnose", *given])

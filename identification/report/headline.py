@@ -1,5 +1,5 @@
-"""First sentences: causes missing in a model, by the energy of each, and the mean of an estimated
-wrench.
+"""First sentences: a doubt about the log, then the causes missing in a model by the energy of each,
+or the mean of an estimated wrench. Two sentences at most.
 """
 
 import math
@@ -9,82 +9,73 @@ import numpy as np
 from ..findings import Diagnosis, NamedEffect
 from ..logs.table import finite_rows, median_step
 from ..wrench_series import WrenchSeries
-from .amounts import known, steady_residual, steady_wrench, title, with_amounts
+from .amounts import known, steady_wrench, title, with_amounts
 from .words import (
     by_energy,
     chance,
     disturbance_at,
-    doubts,
-    error_amounts,
+    disturbances,
+    energy,
+    error_sentences,
+    first_doubt,
     in_unit,
     in_words,
     is_outside,
-    percent,
     tried,
-    without_warning,
+    warnings_in,
 )
 
-_NAMED = 4  # effects in the sentence; the table has the others
-_UNDECIDED = 0.1  # share of its energy by which an undecided effect is ordered
+_MOST_OF_IT = 0.5  # share of the energy, from which a tentative effect stands before gusts
+_NAMED = 3  # effects in the sentence; the table has the others
 
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in plain words: a cause outside the library where one is likeliest, else
-    the effects by the energy that each explains, undecided ones last.
+    the effects by the energy that each explains, else the disturbance.
     """
-    error = next(error_amounts(diagnosis))
+    doubt = first_doubt(warnings_in(diagnosis.notes))
+    return " ".join([*doubt, _verdict(diagnosis), *error_sentences(diagnosis)][:2])
+
+
+def _verdict(diagnosis: Diagnosis) -> str:
+    """Return the sentence on causes, or on a disturbance."""
     if diagnosis.verdict == "nothing to explain":
-        return f"The model explains these logs; {error}."
-    lacking = _lacking(diagnosis)
+        return "The model explains these logs."
     if is_outside(diagnosis):
-        hidden = ", or hidden in these logs," if diagnosis.needs_pose else ""
-        rest = f"H{error[1:]}"
-        if lacking:
-            rest = f"Effects of the library that imitate the cause, no findings: {lacking}"
-        return (
-            f"A cause outside the library{hidden} acts "
-            f"(probability {chance(diagnosis.probabilities.unknown)}){_sign(diagnosis)}. {rest}."
-        )
-    if lacking:
-        perhaps = "perhaps " if all(e.tentative for e in diagnosis.effects) else ""
-        return f"The model {perhaps}lacks {lacking}."
-    looks = "looks random" if diagnosis.remainder == "random" else "has structure"
-    if steady := steady_residual(diagnosis):
-        steady = f"On average {steady} acts that the model lacks. "
-    return (
-        f"{steady}H{error[1:]}; the residual {looks}, and no effect {tried(diagnosis)} explains it."
-    )
+        hidden = " (or hidden in these logs)" if diagnosis.needs_pose else ""
+        sign = disturbance_at(diagnosis) if diagnosis.pushes else ""
+        if diagnosis.structure:
+            sign = f"in {diagnosis.structure[0].where}"
+        told = f"; its clearest sign is {sign}" if sign else ""
+        likely = chance(diagnosis.probabilities.unknown)
+        return f"A cause outside the library{hidden} acts (probability {likely}){told}."
+    gusts, library = disturbances(diagnosis), f"o effect {tried(diagnosis)}"
+    if diagnosis.effects:
+        sure = [e for e in diagnosis.effects if not e.tentative or energy(e) > _MOST_OF_IT]
+        rest = "" if sure or not gusts else f"he residual looks random{gusts}; t"
+        return f"T{rest}he model {_lacks(diagnosis)}."
+    pieces = [(trace.after, trace.period) for trace in diagnosis.traces]
+    if steady := steady_wrench(pieces, diagnosis.floor_force_rms, diagnosis.floor_torque_rms):
+        return f"Unmodelled {steady} on average; n{library} explains it."
+    if diagnosis.pushes:
+        clearest = disturbance_at(diagnosis)
+        return f"Transient disturbances act, the clearest {clearest}; n{library} explains them."
+    if gusts:
+        return f"N{library} is needed; the residual looks random{gusts}."
+    return f"The residual looks random; n{library} explains it."
 
 
-def _sign(diagnosis: Diagnosis) -> str:
-    """Return the clearest sign of a cause outside the library: a doubtful log, a variable, or a
-    transient disturbance.
+def _lacks(diagnosis: Diagnosis) -> str:
+    """Return the missing effects with their amounts, the largest energy first. Effects of unknown
+    amounts are counted alone.
     """
-    if suspects := [text for text in doubts(diagnosis) if without_warning(text) != text]:
-        return f". First suspect: {without_warning(suspects[0])}"
-    if diagnosis.structure:
-        clearest = diagnosis.structure[0]
-        return (
-            f"; its clearest sign is in {clearest.where}, {percent(clearest.gain)} of the residual"
-        )
-    return f"; its clearest sign is {disturbance_at(diagnosis)}" if diagnosis.pushes else ""
-
-
-def _lacking(diagnosis: Diagnosis) -> str:
-    """Return the effects with their amounts: the largest energy first, undecided ones after decided
-    ones with a tenth of their energy, and unknown amounts last.
-    """
-
-    def place(effect: NamedEffect) -> tuple[bool, float]:
-        share = _UNDECIDED if effect.indistinguishable_from else 1.0
-        return not known(effect), -share * effect.evidence.get("energy_explained", 0.0)
-
-    largest = by_energy(diagnosis)[:_NAMED]
-    all_perhaps = is_outside(diagnosis) or all(e.tentative for e in diagnosis.effects)
-    told = [_told(e, diagnosis, all_perhaps) for e in sorted(largest, key=place)]
-    if more := len(diagnosis.effects) - len(told):
-        told.append(f"and {more} smaller")
-    return "; ".join(told)
+    order = by_energy(diagnosis)
+    named = [effect for effect in order if known(effect)][:_NAMED] or order[:1]
+    perhaps = all(effect.tentative for effect in named)
+    told = [_told(effect, diagnosis, perhaps) for effect in named]
+    if more := len(order) - len(named):
+        told.append(f"and {more} more")
+    return f"{'perhaps ' * perhaps}lacks {'; '.join(told)}"
 
 
 def _told(effect: NamedEffect, diagnosis: Diagnosis, all_perhaps: bool) -> str:
@@ -93,9 +84,8 @@ def _told(effect: NamedEffect, diagnosis: Diagnosis, all_perhaps: bool) -> str:
     told = with_amounts(effect, diagnosis.declared)
     if effect.coefficients.keys() <= declared.get(effect.name, set()):
         told = f"the right {told}"
-    if rivals := [title(name) for name in effect.indistinguishable_from]:
-        told = f"one of {in_words([told, *rivals], 'or')}"
-    return f"perhaps {told}" if effect.tentative and not all_perhaps else told
+    told = in_words([told, *map(title, effect.indistinguishable_from)], "or")
+    return f"{told} (perhaps)" if effect.tentative and not all_perhaps else told
 
 
 def wrench_headline(series: WrenchSeries) -> str:
@@ -104,15 +94,12 @@ def wrench_headline(series: WrenchSeries) -> str:
     """
     rows = finite_rows(series.force)
     wrench = np.nan_to_num(np.hstack([series.force, series.torque])[rows])
-    stated = np.hstack([series.std_force, series.std_torque])[rows]
-    std = np.median(np.nan_to_num(stated), axis=0)
-    floors = std[:3].max(), std[3:].max()
-    told = (
-        steady_wrench([wrench], [median_step(series.t)], floors)
-        or f"no steady force above {in_unit(floors[0], 'N')}"
+    force, torque = (
+        float(np.median(np.nan_to_num(std[rows]), axis=0).max())
+        for std in (series.std_force, series.std_torque)
     )
+    told = steady_wrench([(wrench, median_step(series.t))], force, torque)
+    mean = f"Unmodelled {told}" if told else f"No unmodelled force above {in_unit(force, 'N')}"
     spread = in_unit(math.sqrt(wrench[:, :3].var(axis=0).sum()), "N")
-    return (
-        f"Beside the model of {series.vehicle.name}, on average {told} acts; the force is {spread} "
-        "rms about its mean."
-    )
+    doubt = first_doubt(warnings_in(series.notes))
+    return " ".join([*doubt, f"{mean} on average; the force varies by {spread} rms."])

@@ -66,10 +66,24 @@ def log_channels(log: FlightLog) -> list[Channel]:
             drawn, title = axis[rows, :2], "thrust axis (x, y of 1)"
         steps, step = np.diff(t), median_step(t)
         rate = min(log.rates.get(section) or np.inf, 1.0 / step)
-        gaps, longest = int(np.sum(steps > _GAP * step)), max(float(steps.max()), 1.0 / rate)
-        numbers = (len(rows), rate, gaps, longest, low, high)
+        gaps, longest = int((steps > _GAP * step).sum()), max(float(steps.max()), 1.0 / rate)
         shown = telling_samples(drawn, _BINS)
-        out.append(Channel(name, unit, *numbers, t[shown], drawn[shown], title, series))
+        out.append(
+            Channel(
+                name,
+                unit,
+                len(rows),
+                rate,
+                gaps,
+                longest,
+                low,
+                high,
+                t[shown],
+                drawn[shown],
+                title,
+                series,
+            )
+        )
     return out
 
 

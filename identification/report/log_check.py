@@ -11,18 +11,18 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, UnreadLogError
 from ..diagnosis.settings import DIAGNOSIS
-from ..logs.flight_log import FlightLog, flown_vehicle
+from ..logs.flight_log import FlightLog, excerpt, flown_vehicle
 from ..logs.flight_phases import flew
 from ..logs.log_map import MAPS, map_names
 from ..logs.map_guess import Guess, guess_map
 from ..logs.map_text import map_yaml
 from ..logs.mapped_log import map_table
-from ..logs.reading import finished, read_log, unknown_table
+from ..logs.reading import finished, opened, read_log, reader_by_columns
 from ..logs.screening import LEAST_SECONDS, convention_doubt, screen_log
 from ..logs.table import Data, Names, Table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
-from .words import without_warning
+from .words import first_doubt, warnings_in, without_warning
 
 _SAID = ("unit", "samples", "rate_hz", "gaps", "longest_gap_s")  # attributes of each channel
 
@@ -42,15 +42,15 @@ class _LogCheck:
     def headline(self) -> str:
         """Return the gravest doubt, and what flew how long and how far."""
         answer, by = flew(self.log)
-        what = self.log.vehicle or self.log.flown.airframe or "a vehicle of four rotors"
-        told = [f"Doubt: {doubt}." for doubt in self.doubts[:1]]
+        what = self.log.vehicle or self.log.flown.airframe
+        told = first_doubt(self.doubts)
         if answer.startswith("yes"):
-            told.append(f"Flight of {answer[5:]} by {what}: {by}.")
+            told.append(f"Flight of {answer[5:]}{f' by {what}' if what else ''}: {by}.")
         elif answer == "unknown":
-            told.append(f"Nothing shows whether {what} flew: {by}.")
+            told.append(f"Nothing shows a flight: {by}.")
         return " ".join(told)
 
-    def what_flew(self) -> list[tuple[str, str, str]]:
+    def what_flew(self) -> list[Names]:
         """Return facts of the vehicle and its flight: name, value, source."""
         return [*self.log.flown.rows(), ("flew", *flew(self.log))]
 
@@ -100,21 +100,22 @@ def check_log(
         UnreadLogError: the guessed map, in the error, cannot read the log yet.
     """
     guess, text = None, ""
+    table = None if reader or log_map else opened(path)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
         if log_map is not None:
             log = read_log(path, reader, vehicle, log_map, piece)
             shipped = MAPS / f"{log_map}.yaml" if log_map in map_names() else Path(log_map)
             read_by, text = f"the map {log_map}", shipped.read_text(encoding="utf-8-sig")
-        elif reader is None and (table := unknown_table(path)) is not None:
+        elif table is not None and reader_by_columns(path, table.header) is None:
             log, guess = _guessed(table, vehicle, piece)
             read_by, text = "a map that was guessed", map_yaml(guess)
         else:
-            log = read_log(path, reader, vehicle, piece=piece)
+            log = read_log(table or path, reader, vehicle, piece=piece)
             named = re.search(r"\(reader ([^()]+)\)$", log.source)
             read_by = f"the reader {named[1]}" if named else "this kit's own format"
     guessed = [
-        f"guessed: {f'{r.section} {r.field}'.rstrip()}: {r.why}"
+        f"{f'{r.section} {r.field}'.rstrip()} guessed: {r.why}"
         for r in (guess.doubts if guess else ())
     ]
     vehicle = flown_vehicle(vehicle, log.vehicle)
@@ -123,7 +124,7 @@ def check_log(
         f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
         f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "
         "how large it was"
-        for c in noise_spectra(log)
+        for c in noise_spectra(excerpt(log))
         if c.filtered
     ]
     if vehicle is None:
@@ -152,15 +153,15 @@ def _doubts(log: FlightLog, guessed: Sequence[str], vehicle: Vehicle | None) -> 
     answer, by = flew(log)
     grounded = [f"the log does not show a flight: {by}"] if answer in ("no", "not shown") else []
     doubts = [*grounded, *guessed]
-    told = [note for note in log.notes if note.startswith("warning")]
+    told = warnings_in(log.notes)
     if vehicle is None:
         told += filter(None, [convention_doubt(log, None)])
     else:
         least = DIAGNOSIS.least_seconds_each if log.commanded else LEAST_SECONDS
         try:
-            told += screen_log(log, vehicle, least)[1]
+            told += map(without_warning, screen_log(log, vehicle, least)[1])
         except InputError as error:
             refusal = str(error).removeprefix(f"{log.source}: ")
             doubts.append(f"diagnose refuses this log: {refusal}")
-            told = [text for text in told if without_warning(text) != refusal]
-    return tuple(dict.fromkeys([*doubts, *map(without_warning, told)]))
+            told = [text for text in told if text != refusal]
+    return tuple(dict.fromkeys([*doubts, *told]))

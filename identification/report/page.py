@@ -8,8 +8,6 @@ nothing from elsewhere.
 import base64
 import hashlib
 import json
-import math
-from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 
@@ -20,6 +18,7 @@ from . import amounts, words
 from .headline import headline
 from .plot_numbers import candidate_bars, page_plots
 
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 _TONES = {
     "explained": "good",
     "nothing to explain": "good",
@@ -34,24 +33,34 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     """
     plots, bars = page_plots(diagnosis), candidate_bars(diagnosis)
     data = plots.data
-    library, script = _library(), _page_file("page.js")
+    licence, code = (
+        page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
+    )
+    # the library with its mandatory licence
+    library, script = f"/*\n{licence}\n*/\n{code}", page_file("page.js")
     shown = {bar.name for bar in bars}
+    # the page's content security policy: these scripts, and nothing from outside
+    hashes = (
+        f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+        for text in (library, script)
+    )
+    allowed = " ".join(hashes) if data else "'none'"
     return page_template(__package__, "page.html.j2").render(
         found=diagnosis,
         words=words,
         amounts=amounts,
         headline=headline(diagnosis),
         tone=_TONES[diagnosis.verdict],
-        table=error_table(diagnosis),
+        table=words.error_table(diagnosis),
         plots=plots,
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
-        policy=_policy((library, script) if data else ()),
+        policy=f"{_POLICY}; script-src {allowed}",
         # escaped for a page's script element: no tag can begin inside
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c") if data else "",
         library=library,
-        shared_style=_page_file("page.css"),
-        library_style=_page_file("uplot/uPlot.min.css"),
+        shared_style=page_file("page.css"),
+        library_style=page_file("uplot/uPlot.min.css"),
         script=script,
         command=command,
         version=__version__,
@@ -59,49 +68,6 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
 
 
 @cache
-def _page_file(name: str) -> str:
+def page_file(name: str) -> str:
     """Return a text beside this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
-@cache
-def _library() -> str:
-    """Return the plotting library with its mandatory licence."""
-    licence, code = (
-        _page_file(f"uplot/{name}").strip() for name in ("LICENSE", "uPlot.iife.min.js")
-    )
-    return f"/*\n{licence}\n*/\n{code}"
-
-
-def _policy(scripts: Iterable[str]) -> str:
-    """Return the page's content security policy: these scripts, and nothing from outside."""
-    hashes = (
-        f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'"
-        for s in scripts
-    )
-    allowed = " ".join(hashes) or "'none'"
-    return f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}"
-
-
-def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the rows of the error table: name, unit, and three rounded numbers (before, after,
-    floor).
-    """
-    floors = {
-        "force_rms": ("Force, rms", "N", diagnosis.floor_force_rms),
-        "torque_rms": ("Torque, rms", "Nm", diagnosis.floor_torque_rms),
-        "rollout_1s_position_rms": ("Position after 1 s of prediction, rms", "m", math.nan),
-        "nis_without_wrench_state": ("NIS of a filter without wrench states, mean", "", 6.0),
-    }
-    table = []
-    for name, (what, unit, floor) in floors.items():
-        before, after = (getattr(side, name) for side in (diagnosis.before, diagnosis.after))
-        factor, unit = words.scale_of((before, after, floor), unit) if unit else (1.0, "")
-        # zero before and after: these logs cannot tell this error
-        told = before or after
-        old, new, least = (
-            words.rounded(factor * x) if told else words.MISSING for x in (before, after, floor)
-        )
-        least = (least if unit else "6") if told and math.isfinite(floor) else ""
-        table.append({"what": what, "unit": unit, "before": old, "after": new, "floor": least})
-    return table

@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import welch
 
 from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
 from ..logs.table import Array, ArrayPair, Data, Names, Pair, Rows, finite_rows
-from ..motion.smoothing import runs_of
+from ..motion.smoothing import power_spectrum, runs_of
 from .words import percent, rounded, scale_of
 
 # all series over time together, packed: beside library and text a page of 60 s of flight stays
@@ -147,9 +146,9 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
     ``products`` are mean products of ``after`` and the effects' parts: the mean square of
     ``after`` with any choice of parts added is a sum of them.
     """
-    group = slice(0, 3) if i < 3 else slice(3, 6)  # with the same axis
+    _, group, unit = _GROUPS[i // 3]  # with the same axis
     largest = np.abs([joined.before[:, group], joined.after[:, group]]).max()
-    factor, unit = scale_of([largest], "N" if i < 3 else "Nm")
+    factor, unit = scale_of([largest], unit)
     before, after, *parts = (
         factor * x[:, i] for x in (joined.before, joined.after, *joined.parts.values())
     )
@@ -171,7 +170,7 @@ def _plot_over_time(joined: _Joined, i: int) -> Plot:
             "before": _packed_series(before[rows]),
             "after": _packed_series(after[rows]),
             "parts": [_packed_series(part[rows]) for part in parts],
-            "products": [[np.mean(x * y) for y in (after, *parts)] for x in (after, *parts)],
+            "products": [[(x * y).mean() for y in (after, *parts)] for x in (after, *parts)],
             "rms": _rms(before),
         },
         _table_over_time(joined.traces, i, factor, unit),
@@ -219,9 +218,8 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
     """
     powers = []
     for trace in traces:
-        x, rate = getattr(trace, side)[:, group], 1.0 / trace.period
-        longest = min(len(x), round(_SPECTRUM_SECONDS * rate))
-        f, power = welch(x, rate, nperseg=longest, axis=0)
+        x, period = getattr(trace, side)[:, group], trace.period
+        f, power = power_spectrum(x, period, round(_SPECTRUM_SECONDS / period))
         powers.append(np.interp(grid, f, power.sum(axis=1)))
     spectrum: Array = np.sqrt(np.average(powers, 0, [len(x.t) * x.period for x in traces]))
     return spectrum
@@ -307,8 +305,7 @@ def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) 
             rows.append((str(number), time, held, *sides))
     if len(traces) == 1:
         head, rows = head[1:], [row[1:] for row in rows]
-    more = f", the first {_MOST_PIECES} of {len(traces)} pieces"
-    more = more if len(traces) > _MOST_PIECES else ""
+    more = f", the first {_MOST_PIECES} of {len(traces)} pieces" * (len(traces) > _MOST_PIECES)
     return _PlotTable(f"Residual {_SYMBOLS[i]}, rms ({unit}){more}", head, rows)
 
 
@@ -353,7 +350,7 @@ def _packed_series(x: Array) -> Data | None:
 
 
 def _rms(x: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(x))))
+    return float(np.sqrt(np.square(x).mean()))
 
 
 def _base64(x: Array, kind: str) -> str:

@@ -1,16 +1,14 @@
 """A diagnosis in words and rounded numbers, as its report gives them to a reader."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 from ...dynamics import effects as library
-from ..findings import CHANNELS, Diagnosis, NamedEffect
+from ..findings import Diagnosis, NamedEffect
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
-SPACE = "\N{NO-BREAK SPACE}"
 _CERTAIN = 0.001  # probability; closer to 0 or 1 no digit is meant
-_TELLING = 1.3  # times the floor: least error in the first sentence
 _LIKELIER = 0.5  # probability of a cause outside the library, from which this comes first
 _MILLI = 0.8  # N or Nm, below which an error is in thousandths
 _WARNING = "warning: "  # marks a note on a doubtful log
@@ -59,33 +57,28 @@ def in_words(names: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
-def in_unit(value: float, unit: str) -> str:
+def in_unit(value: float, unit: str, digits: int = 2) -> str:
     """Return a number with its unit, plain or milli."""
     factor, unit = scale_of([value], unit)
-    return f"{rounded(factor * value, 2)}{SPACE}{unit}"
+    return f"{rounded(factor * value, digits)}\N{NO-BREAK SPACE}{unit}"
 
 
 def percent(share: float) -> str:
-    """Return a share in per cent, with a digit behind the point below 10 %."""
+    """Return a share in per cent, with a digit behind the point below 10 % and above 99 %."""
     if not math.isfinite(share):
         return MISSING
-    decimals = 1 if 0.0005 <= abs(share) < 0.0995 else 0
-    return f"{100.0 * share:z.{decimals}f}{SPACE}%".replace("-", "−")
+    near = min(abs(share), 10.0 * abs(1.0 - abs(share)))
+    decimals = 1 if 0.0005 <= near < 0.0995 else 0
+    return f"{100.0 * share:z.{decimals}f}\N{NO-BREAK SPACE}%".replace("-", "−")
 
 
 def chance(probability: float) -> str:
     """Return a probability in per cent; close to 0 or 1, a bound."""
     if not _CERTAIN < probability < 1.0 - _CERTAIN:
-        return f"above 99.9{SPACE}%" if probability > 0.5 else f"below 0.1{SPACE}%"
+        return (
+            "above 99.9\N{NO-BREAK SPACE}%" if probability > 0.5 else "below 0.1\N{NO-BREAK SPACE}%"
+        )
     return percent(probability)
-
-
-def duration(seconds: float) -> str:
-    """Return a length of time in minutes and seconds."""
-    if seconds < 99.5:
-        return f"{seconds:.3g}{SPACE}s"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes}{SPACE}min" + (f" {rest}{SPACE}s" if rest else "")
 
 
 def effect_summary(name: str) -> str:
@@ -116,100 +109,113 @@ def without_warning(text: str) -> str:
     return text.rpartition(_WARNING)[2]
 
 
+def warnings_in(notes: Iterable[str]) -> list[str]:
+    """Return the warnings among notes, without their logs' names and mark."""
+    return [without_warning(text) for text in notes if _WARNING in text]
+
+
+def first_doubt(doubts: Sequence[str]) -> list[str]:
+    """Return the first sentence of the first doubt, if any."""
+    return [f"Doubt: {doubt.split('. ')[0].removesuffix('.')}." for doubt in doubts[:1]]
+
+
+def energy(effect: NamedEffect) -> float:
+    """Return an effect's share of the residual's energy."""
+    return effect.evidence.get("energy_explained", 0.0)
+
+
 def by_energy(diagnosis: Diagnosis) -> list[NamedEffect]:
-    """Return the named effects by their share of the residual's energy, the largest first."""
-    return sorted(diagnosis.effects, key=lambda e: -e.evidence.get("energy_explained", 0.0))
+    """Return the named effects by their energy, the largest first."""
+    return sorted(diagnosis.effects, key=energy, reverse=True)
 
 
 def doubts(diagnosis: Diagnosis) -> list[str]:
-    """Return the reasons to doubt the logs, and then the names."""
-    doubted = (
-        text
-        for text in diagnosis.notes
-        if _WARNING in text or any(text in some for some in diagnosis.doubts.values())
-    )
-    return sorted(doubted, key=lambda text: _WARNING not in text)
+    """Return the reasons to doubt the logs, and then the names; a likely cause outside the library
+    stands in the headline.
+    """
+    checks = diagnosis.doubts
+    of_names = [text for name in checks if name != "unknown" for text in checks[name]]
+    said = [text for text in diagnosis.notes if _WARNING in text or text in of_names]
+    return sorted(said, key=lambda text: _WARNING not in text)
 
 
-def error_amounts(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield the error on held-out data in words: force and torque well above the noise floor."""
-    before, after = diagnosis.before, diagnosis.after
-    rows = (
-        ("force", before.force_rms, after.force_rms, diagnosis.floor_force_rms, "N"),
-        ("torque", before.torque_rms, after.torque_rms, diagnosis.floor_torque_rms, "Nm"),
-    )
-    known = [row for row in rows if math.isfinite(row[1] + row[2])]
-    if not known:
-        yield "held-out error: not known"
-    for what, old, new, floor, unit in [x for x in known if x[1] > _TELLING * x[3]] or known[:1]:
-        factor, unit = scale_of((old, new, floor), unit, _MILLI)
-        start, end, least = (f"{rounded(factor * x, 2)}{SPACE}{unit}" for x in (old, new, floor))
-        change = f"{start} before, {end} after" if diagnosis.effects and start != end else start
-        bound = "not known, at least " if diagnosis.floor_is_bound else ""
-        noise = f" (noise floor {bound}{least})" if math.isfinite(floor) else ""
-        yield f"held-out {what} error: {change}{noise}"
+def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    """Return the rows of the error table: name, unit, and three rounded numbers (before, after,
+    floor).
+    """
+    floors = {
+        "force_rms": ("Force, rms", "N", diagnosis.floor_force_rms),
+        "torque_rms": ("Torque, rms", "Nm", diagnosis.floor_torque_rms),
+        "rollout_1s_position_rms": ("Position after 1 s of prediction, rms", "m", math.nan),
+        "nis_without_wrench_state": ("NIS of a filter without wrench states, mean", "", 6.0),
+    }
+    table = []
+    for name, (what, unit, floor) in floors.items():
+        before, after = (getattr(side, name) for side in (diagnosis.before, diagnosis.after))
+        factor, unit = scale_of((before, after, floor), unit, _MILLI) if unit else (1.0, "")
+        # zero before and after: these logs cannot tell this error
+        told = before or after
+        old, new, least = (rounded(factor * x) if told else MISSING for x in (before, after, floor))
+        least = (least if unit else "6") if told and math.isfinite(floor) else ""
+        table.append({"what": what, "unit": unit, "before": old, "after": new, "floor": least})
+    return table
 
 
 def error_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return the error on held-out data, before and after, as sentences."""
-    return [f"H{text[1:]}." for text in error_amounts(diagnosis)]
+    """Return the known errors of force and torque on held-out data, before and after, as
+    sentences.
+    """
+    bound = "at least " if diagnosis.floor_is_bound else ""
+    said = []
+    for row in error_table(diagnosis)[:2]:
+        before, after, floor = (
+            f"{row[x]}\N{NO-BREAK SPACE}{row['unit']}" for x in ("before", "after", "floor")
+        )
+        if MISSING not in before + after:
+            change = f"{before} before, {after} after" if diagnosis.effects else after
+            kind = row["what"].partition(",")[0].lower()
+            said.append(f"Held-out {kind} error: {change} (noise floor {bound}{floor}).")
+    return said
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
     """Return the sentence on the residual."""
     if diagnosis.remainder == "none":
-        return f"The residual is at the sensors' noise floor{_disturbances(diagnosis)}."
-    if diagnosis.remainder == "random":
-        if diagnosis.pushes:
-            return (
-                "The residual holds transient disturbances; the clearest is "
-                f"{disturbance_at(diagnosis)}. No test found other structure in it."
-            )
-        return (
-            f"The residual looks random, as turbulence does{_disturbances(diagnosis)}: "
-            "no test found structure in it."
+        return f"The residual is at the sensors' noise floor{disturbances(diagnosis)}."
+    if diagnosis.remainder == "structured":
+        strongest = "".join(
+            f"; the strongest is in {found.where} ({chance(found.gain)} of the residual)"
+            for found in diagnosis.structure[:1]
         )
-    strongest = "".join(
-        f"; the strongest is in {found.where} ({percent(found.gain)} of the residual)"
-        for found in diagnosis.structure[:1]
-    )
-    return f"The residual has structure that no effect {tried(diagnosis)} explains{strongest}."
+        return f"The residual has structure that no effect {tried(diagnosis)} explains{strongest}."
+    told = disturbances(diagnosis)
+    if diagnosis.pushes:
+        told = f", with transient disturbances, the clearest {disturbance_at(diagnosis)}"
+    return f"The residual looks random{told}; no test found structure in it."
 
 
-def _disturbances(diagnosis: Diagnosis) -> str:
+def disturbances(diagnosis: Diagnosis) -> str:
     """Return the strongest random disturbances, of a force and of a torque, as an insertion."""
-    stated = []
-    for unit, channels in (("N", CHANNELS[:3]), ("Nm", CHANNELS[3:])):
-        own = [gusts for gusts in diagnosis.gusts if gusts.channel in channels]
-        if own:
-            largest = max(own, key=lambda gusts: gusts.rms)
-            stated.append(
-                f"{in_unit(largest.rms, unit)} rms "
-                f"(correlation time {rounded(largest.time, 2)}{SPACE}s)"
-            )
-    return f", with disturbances of up to {in_words(stated)}" if stated else ""
+    by_size = sorted(diagnosis.gusts, key=lambda gusts: -gusts.rms)
+    stated = [
+        f"{in_unit(gusts.rms, unit)} rms "
+        f"(correlation time {rounded(gusts.time, 2)}\N{NO-BREAK SPACE}s)"
+        for unit in ("N", "Nm")
+        for gusts in [x for x in by_size if _unit_of(x.channel) == unit][:1]
+    ]
+    return f", with gusts of {in_words(stated)}" if stated else ""
+
+
+def _unit_of(channel: str) -> str:
+    return "Nm" if channel.startswith("tau") else "N"
 
 
 def disturbance_at(diagnosis: Diagnosis) -> str:
     """Return the size and time of the clearest transient disturbance."""
     largest = diagnosis.pushes[0]
-    size = in_unit(largest.peak, "Nm" if largest.channel.startswith("tau") else "N")
+    size = in_unit(largest.peak, _unit_of(largest.channel))
     where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
-    return f"{size} in {largest.channel} at {rounded(largest.t)}{SPACE}s{where}"
-
-
-def name_in_words(effect: NamedEffect) -> str:
-    """Return an effect's name with its alternatives, and a mark of a tentative one."""
-    others = in_words(effect.indistinguishable_from, "or")
-    tentative = " (tentative)" if effect.tentative else ""
-    return f"{effect.name}{f' (or {others})' if others else ''}{tentative}"
-
-
-def held_out_sum(diagnosis: Diagnosis) -> str:
-    """Return how many blocks were held out, and how long they are together."""
-    count = len(diagnosis.held_out_segments)
-    total = sum(end - start for _, start, end in diagnosis.held_out_segments)
-    return f"{count} {'block' if count == 1 else 'blocks'}, {duration(total)}"
+    return f"{size} in {largest.channel} at {rounded(largest.t)}\N{NO-BREAK SPACE}s{where}"
 
 
 def next_step(diagnosis: Diagnosis) -> str:
@@ -223,6 +229,6 @@ def next_step(diagnosis: Diagnosis) -> str:
         return f"{use}, and confirm it on another flight (--test)."
     if diagnosis.advice:
         return diagnosis.advice[0]
-    better = diagnosis.effects and "held out" not in diagnosis.doubts and not is_outside(diagnosis)
+    better = diagnosis.effects and not is_outside(diagnosis)
     use = "Use vehicle.yaml, which holds the named effects. " if better else ""
     return f"{use}To see whether the rest is wind, fly again in still air."

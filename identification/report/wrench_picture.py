@@ -48,15 +48,15 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: Path) -> Path:
     figure.suptitle(f"External wrench: {log.name}, {vehicle.name}", parse_math=False)
 
     height.plot(series.t, series.position[:, 2], color=BLACK, lw=1.2)
-    height.set_ylabel("height (m)")
+    height.set_ylabel("height (m)" if known else "height (not known)")
     if not known:
-        height.set(ylabel="height (not known)", yticks=[])
+        height.set_yticks([])
     backdrop = _draw_thrust(height, series.t, log, vehicle)
     scale, unit = scale_of([np.percentile(np.abs(series.torque), 99)], "Nm")
     truth = None if log.torque is None else scale * log.torque
     mean, std = scale * series.torque, scale * series.std_torque
-    _draw_vectors(force, series.t, series.force, series.std_force, log.force, ("f", "N"))
-    _draw_vectors(torque, series.t, mean, std, truth, ("τ", unit))
+    _draw_vectors(force, series.t, series.force, series.std_force, log.force, "f", "N")
+    _draw_vectors(torque, series.t, mean, std, truth, "τ", unit)
     force.set_ylabel("external force (N)")
     torque.set(ylabel=f"external torque ({unit})", xlabel="time (s)")
     if GROUND in {phase.name for phase in phases}:
@@ -96,7 +96,7 @@ def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "
 
 
 def _draw_vectors(
-    panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, what: tuple[str, str]
+    panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, symbol: str, unit: str
 ) -> None:
     """Draw three components (N, 3) of a symbol and unit with their 2-sigma bands, or say there are
     none. The truth is dashed, with its RMSE in the legend.
@@ -111,7 +111,6 @@ def _draw_vectors(
         )
         panel.set_yticks([])
         return
-    symbol, unit = what
     low, high = mean - 2 * std, mean + 2 * std
     true: Iterable[Array | None] = [None] * 3 if truth is None else truth.T
     for axis, colour, x, least, most, real in zip(
@@ -121,7 +120,7 @@ def _draw_vectors(
         panel.fill_between(t, least, most, color=colour, alpha=0.18, lw=0)
         (line,) = panel.plot(t, x, color=colour, lw=1.1, label=name)
         if real is not None:
-            rmse = np.sqrt(np.mean(np.square(x - real)))
+            rmse = np.sqrt(np.square(x - real).mean())
             line.set_label(f"{name} (RMSE {rmse:.3g} {unit})")
             panel.plot(t, real, color=colour, lw=1.0, ls="--", label=f"true {name}")
     # the wide band of the filter's first moments must not set the scale

@@ -1,7 +1,6 @@
 """The vehicle made of estimates, and the flights to add for missing ones."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,15 +31,14 @@ def vehicle_of(
     have the lag behind them already: then no effect of the model has one.
     """
     arm, reach = estimates["arm_l"].value, estimates["p/k"].value
-    effects = list(_effects(estimates))
+    effects = _effects(estimates)
     curve = None
     if fit.drive.commands:
         thrust = np.zeros(max(fit.drive.exponents) + 1)
-        thrust[list(fit.drive.exponents)] = [
-            fit.values[f"a{j}"] for j in range(len(fit.drive.exponents))
-        ]
-        exponent = estimates["voltage_exponent"]
-        known = exponent.value if exponent.status == IDENTIFIED else 0.0
+        for j, exponent in enumerate(fit.drive.exponents):
+            thrust[exponent] = fit.values[f"a{j}"]
+        voltage = estimates["voltage_exponent"]
+        known = voltage.value if voltage.status == IDENTIFIED else 0.0
         curve = MotorCurve(tuple(thrust.tolist()), known)
         k = fit.model.weight / (4.0 * USUAL.hover_speed**2)
     else:
@@ -52,15 +50,14 @@ def vehicle_of(
     if late:
         value = estimates[of_lag].value
         effects.append(EffectSetting(of_lag, {get(of_lag).coefficients[0].name: value}))
-    moments = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
-    products = {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
-    com = np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"])
+    inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
+    inertia |= {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
     size = np.abs(geometry.positions[:, :2])
     uneven = geometry.known and (np.ptp(size) > 1e-9 or np.any(geometry.positions[:, 2] != 0.0))
     vehicle = Vehicle(
         name=name,
         mass=fit.model.mass,
-        inertia=inertia_of({**moments, **products}),
+        inertia=inertia_of(inertia),
         arm_l=arm,
         k=np.full(4, k),
         p=np.full(4, reach * k),
@@ -70,7 +67,7 @@ def vehicle_of(
         voltage_ref=fit.drive.voltage_ref,
         spin=fit.drive.spin.copy(),
         rotor_positions=geometry.positions if uneven else None,
-        com=com,
+        com=np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"]),
         effects=tuple(effects),
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),
@@ -113,8 +110,8 @@ def _shown(estimate: Estimate | None) -> float:
     return estimate.value
 
 
-def _effects(estimates: Estimated) -> Sequence[EffectSetting]:
-    out = []
+def _effects(estimates: Estimated) -> list[EffectSetting]:
+    out = {}
     for role in dict.fromkeys(further.role for further in FURTHER.values() if further.role):
         effect = effect_of(role)
         coefficients = {}
@@ -123,11 +120,11 @@ def _effects(estimates: Estimated) -> Sequence[EffectSetting]:
             if known is not None and ((value := _shown(known)) > 0.0 or c.minimum < 0.0):
                 coefficients[c.name] = value
         if any(coefficients.values()):
-            out.append(EffectSetting(effect, coefficients))
+            out[role] = EffectSetting(effect, coefficients)
     # a drag at the rotors damps by itself
-    if any(get(e.name).role == Role.ROTOR_DRAG for e in out):
-        out = [e for e in out if get(e.name).role != Role.RATE_DAMPING]
-    return out
+    if Role.ROTOR_DRAG in out:
+        out.pop(Role.RATE_DAMPING, None)
+    return list(out.values())
 
 
 def advice_of(estimates: Estimated) -> list[str]:
@@ -161,5 +158,5 @@ def advice_of(estimates: Estimated) -> list[str]:
     if estimates["arm_l"].status == ASSUMED:  # and inertia with it
         for name in ("Jxx", "Jyy", "Jzz"):
             del advice[name]
-    open_ones = [n for n in advice if n in estimates and estimates[n].status in (ASSUMED, NOTHING)]
-    return list(dict.fromkeys(advice[n] for n in open_ones))
+    open_ones = {e.name for e in estimates.values() if e.status in (ASSUMED, NOTHING)}
+    return list(dict.fromkeys(text for name, text in advice.items() if name in open_ones))

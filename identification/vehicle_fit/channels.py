@@ -7,18 +7,26 @@ Rotors come as measured speeds, or as motor commands.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
-from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
-from ..logs.flight_log import MOTOR_RATES, FlightLog, Logs
+from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
+from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
-from ..motion.signals import log_signals
-from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
+from ..motion.signals import Signals, log_signals
+from ..motion.smoothing import (
+    derivative,
+    low_pass,
+    power_spectrum,
+    resampled,
+    runs_of,
+    unbroken,
+)
 from .geometry import GRAVITY
 
 _SHORTEST_PIECE = 3.0  # s; shorter ones have no frequency low enough to tell a bias
@@ -28,8 +36,6 @@ _GAP = 0.1  # s without a sample: a piece ends
 _PRODUCT_HZ = 8.0
 # Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
 _FASTEST_HZ = 200.0
-# share of the hover thrust's command: a vehicle below it stands on the ground
-_FLYING_SHARE = 0.3
 # share of different values among all: rotor speeds below it are rounded
 _FEW_VALUES = 0.2
 
@@ -64,9 +70,8 @@ class MotionPiece:
 
     def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
         """Return the piece with each of its series changed."""
-        series = {f.name: getattr(self, f.name) for f in fields(self)}
-        changed: Data = {name: change(x) for name, x in series.items() if isinstance(x, np.ndarray)}
-        return replace(self, **changed)
+        series: Data = {n: change(x) for n, x in vars(self).items() if isinstance(x, np.ndarray)}
+        return replace(self, **series)
 
 
 Pieces = list[MotionPiece]
@@ -95,17 +100,24 @@ def _sources_of(logs: Logs) -> Sources:
                 f"{log.source or log.name}: has neither a pose nor a gyro (gx, gy, gz); expected "
                 "one of them"
             )
-    commands = [log.command is not None and _is_fast(log, "commands") for log in logs]
+    # each channel of the rotors must be quick enough to tell their torque
+    commands = [
+        log.command is not None and serves(log.rates.get("commands", np.inf), TORQUE_HZ)
+        for log in logs
+    ]
     speeds = [
-        log.has_rotor_speeds and not log.commanded and _is_fast(log, "rotors") for log in logs
+        log.has_rotor_speeds
+        and not log.commanded
+        and serves(log.rates.get("rotors", np.inf), TORQUE_HZ)
+        for log in logs
     ]
     if not all(speeds) and not all(commands):
         log = logs[speeds.index(False)]
-        rates = [f"{x} {log.rates[x]:.3g}" for x in ("rotors", "commands") if x in log.rates]
+        rates = [f"{x} {log.rates[x]:.3g} Hz" for x in ("rotors", "commands") if x in log.rates]
         raise InputError(
             f"{log.source or logs[0].name}: expected rotor speeds (omega1..omega4) in every log, "
             "or motor commands (cmd1..cmd4) in every log, "
-            f"{MOTOR_RATES.torque_hz:g} times a second; found {' and '.join(rates) or 'neither'}"
+            f"{TORQUE_HZ:g} times a second; found {' and '.join(rates) or 'neither'}"
         )
     accelerometer = all(log.accelerometer is not None for log in logs)
     gyro = all(log.gyro is not None for log in logs)
@@ -123,30 +135,23 @@ def _sources_of(logs: Logs) -> Sources:
     )
 
 
-def _is_fast(log: FlightLog, channel: str) -> bool:
-    """Return whether a channel of the rotors was measured often enough to tell their torque."""
-    return MOTOR_RATES.serves(log.rates.get(channel, np.inf), MOTOR_RATES.torque_hz)
-
-
 def rounding_step(logs: Logs) -> float:
     """Return the step (rad/s) of rounded rotor speeds, from the numbers themselves; 0 where
     rounding does not matter.
     """
     values = np.concatenate([log.rotor_speeds.ravel() for log in logs])
-    kept = np.unique(np.round(values, 6))
-    if len(kept) < 3 or len(kept) > _FEW_VALUES * len(values):
-        return 0.0
-    return median_step(kept)
+    kept = np.unique(values.round(6))
+    return median_step(kept) if 3 <= len(kept) <= _FEW_VALUES * len(values) else 0.0
 
 
-def speed_noise(pieces: Sequence[MotionPiece]) -> float:
+def speed_noise(pieces: Pieces) -> float:
     """Return the standard deviation (rad/s) of the white noise of rotor speeds with their rounding,
     from the highest quarter of their spectrum: no rotor follows its command there.
     """
     powers = []
     for piece in pieces:
         if piece.rotor_speeds is not None:
-            _, power = welch(piece.rotor_speeds, 1.0 / piece.period, nperseg=256, axis=0)
+            _, power = power_spectrum(piece.rotor_speeds, piece.period, 256)
             powers.append(power[-len(power) // 4 :].mean(axis=0) / (2.0 * piece.period))
     return math.sqrt(float(np.median(powers))) if powers else 0.0
 
@@ -164,12 +169,13 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     sources = _sources_of(logs)
     pieces = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
+        log = _without_bias(log)
         motion = _posed if "pose" in (sources.rate, sources.force) else _inertial
         for moved in motion(log, number, sources):
             piece = _piece(log, moved, sources)
             inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
             for part in _cut(piece, inside):
-                pieces += _cut(part, _flying(part))
+                pieces += _cut(part, carried(part.rotors, part.period))
     moving = [piece for piece in pieces if piece.velocity is not None]
     pieces, sources = moving or pieces, replace(sources, velocity=bool(moving))
     if not pieces:
@@ -178,6 +184,29 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
             "there; expected a longer flight, or another --from and --to"
         )
     return pieces, sources
+
+
+def _without_bias(log: FlightLog) -> FlightLog:
+    """Return a log whose accelerometer agrees with the pose on the mean of each axis: over a flight
+    the mean force carries the weight, however the sensor is calibrated.
+    """
+    if log.accelerometer is None or not log.has_pose:
+        return log
+    weight = np.array([0.0, 0.0, GRAVITY])
+    off = [
+        _sensor(log, log.accelerometer, s.t)
+        - Rotation.from_matrix(s.rotation).inv().apply(s.acceleration + weight)
+        for s in _posed_pieces(log)
+    ]
+    return (
+        replace(log, accelerometer=log.accelerometer - np.vstack(off).mean(axis=0)) if off else log
+    )
+
+
+def _posed_pieces(log: FlightLog) -> Iterator[Signals]:
+    """Yield the signals of a pose, if a stretch is long enough."""
+    with suppress(InputError):
+        yield from log_signals(log)
 
 
 def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
@@ -207,7 +236,11 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
         piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
         moving = []
         if sources.velocity:
-            velocity = _velocity(log, t)
+            velocity = np.full((len(t), 3), np.nan)  # in gaps of the pose
+            for s in _posed_pieces(log):
+                inside = (t >= s.t[0]) & (t <= s.t[-1])
+                body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
+                velocity[inside] = resampled(t[inside], s.t, body)
             moving = _cut(replace(piece, velocity=velocity), np.isfinite(velocity[:, 0]))
         yield from moving or [piece]
 
@@ -233,11 +266,10 @@ def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
 
         piece = replace(piece.mapped(thinned), t=thin, period=period)
 
-    def smooth(x: Array) -> Array:
-        return low_pass(x, _PRODUCT_HZ, period)
-
-    moving = None if piece.velocity is None else smooth(piece.velocity)
-    return replace(piece, angular_velocity=smooth(piece.angular_velocity), velocity=moving)
+    rate, velocity = low_pass(piece.angular_velocity, _PRODUCT_HZ, period), piece.velocity
+    if velocity is not None:
+        velocity = low_pass(velocity, _PRODUCT_HZ, period)
+    return replace(piece, angular_velocity=rate, velocity=velocity)
 
 
 def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
@@ -245,30 +277,10 @@ def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
     return resampled(t, log.t[read], values[read])
 
 
-def _velocity(log: FlightLog, t: Array) -> Array:
-    """Return the velocity (n, 3) in body axes at times, NaN in gaps of the pose."""
-    out = np.full((len(t), 3), np.nan)
-    with suppress(InputError):  # no stretch of pose is long enough
-        for s in log_signals(log):
-            inside = (t >= s.t[0]) & (t <= s.t[-1])
-            body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
-            out[inside] = resampled(t[inside], s.t, body)
-    return out
-
-
-def _flying(piece: MotionPiece) -> Mask:
-    """Return where the rotors carry the vehicle, without take-off and landing."""
-    load = low_pass(np.mean(np.square(piece.rotors), axis=1), 1.0, piece.period)
-    usual = float(np.median(load[load > 0.1 * np.quantile(load, 0.95)]))
-    return load > _FLYING_SHARE * usual
-
-
 def _cut(piece: MotionPiece, keep: Mask) -> Pieces:
     """Return the kept runs of samples that are long enough."""
-    if keep.all():
-        return [piece]
     return [
-        piece.mapped(lambda x, a=a, b=b: x[a:b])  # type: ignore[misc]
+        piece.mapped(itemgetter(slice(a, b)))
         for a, b in runs_of(keep)
         if (b - a) * piece.period >= _SHORTEST_PIECE
     ]

@@ -1,12 +1,13 @@
 """The flight loop's reaction, fitted to predictions of half a second.
 
-The loss is the mean distance of prediction and flight in ``QUANTITIES``, each against the distance
-where nothing changes. Gauss-Newton minimises the mean norm, with norms weighted by their inverse in
-turn.
+The loss is the mean distance of prediction and flight in ``QUANTITIES``, each against the flight's
+own distance where nothing changes: a brisk flight counts as much as a calm one. Gauss-Newton
+minimises the mean norm, with norms weighted by their inverse in turn.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import astuple, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +40,7 @@ _LEAST = 1e-6  # of the errors where nothing changes: smaller ones count as this
 _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 
-@dataclass(frozen=True, eq=False)
-class LoopFit:
+class LoopFit(NamedTuple):
     """The likeliest coefficients, and the normal equations of g groups of starts and the prior.
 
     Attributes:
@@ -93,17 +93,23 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
         vehicle: with the force, inertia and rotors that stay.
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
-    thin = [part.those(slice(None, None, every)) for part in starts]
+    thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
     group = np.concatenate([*(numbers[::every] for numbers in groups), [-1]])
-    still = _compared(thin, lambda part: part.unchanged)
-    sizes: Array = np.linalg.norm(still[:, -1], axis=-1).mean(axis=0)[:, None]
+    # mean distances (n, 1, 4, 1) of a flight at the horizon's end if nothing changes
+    scales = []
+    for part in thin:
+        far = np.linalg.norm(_compared([part], [part.unchanged])[:, -1], axis=-1)
+        scales.append(np.repeat([np.maximum(far.mean(axis=0), _LEAST)], len(far), axis=0))
+    sizes: Array = np.concatenate(scales)[:, None, :, None]
 
     def off(theta: Array) -> Array:
         model = replace(vehicle, closed_loop=_loop(theta))
-        return _compared(thin, lambda part: part.flown(model)) / sizes
+        return _compared(thin, [part.flown(model) for part in thin]) / sizes
 
     begin = np.array(astuple(_BEGIN))
-    begin[list(UNITS).index("unmeasured")] = _turning(thin, vehicle)
+    speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
+    turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
+    begin[list(UNITS).index("unmeasured")] = np.sqrt(np.square(turning).mean())
     theta, e, damping = begin, off(begin), 1e-3
     for _ in range(_ROUNDS):
         norms = np.linalg.norm(e, axis=-1)
@@ -113,7 +119,7 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
         changes = [(root * (off(theta + move) - e)).reshape(len(e), -1) for move in moves]
         slopes = np.stack(changes, axis=1) / (_STEP * _SIZES)[:, None]  # (n, 9, ..)
         residual = (root * e).reshape(len(e), -1, 1)
-        strength = _PRIOR * np.sum(np.square(residual)) / np.square(3.0 * _SIZES)
+        strength = _PRIOR * np.square(residual).sum() / np.square(3.0 * _SIZES)
         grams = np.concatenate([slopes @ np.swapaxes(slopes, 1, 2), np.diag(strength)[None]])
         gradients = np.vstack([(slopes @ residual)[..., 0], strength * (theta - begin)])
         before = loss = _loss(e, theta - begin)
@@ -134,22 +140,14 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
 
 def _loss(e: Array, away: Array) -> float:
     """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (9,)."""
-    prior = 1.0 + _PRIOR * np.sum(np.square(away / (3.0 * _SIZES)))
+    prior = 1.0 + _PRIOR * np.square(away / (3.0 * _SIZES)).sum()
     return float(prior * np.linalg.norm(e, axis=-1).mean())
 
 
-def _turning(starts: Sequence[LoggedStarts], vehicle: Vehicle) -> float:
-    """Return the model's angular acceleration (rad/s2) about x and y, RMS at the starts."""
-    speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in starts])
-    torque = vehicle.rotor_wrench(speeds)[:, 1:3]
-    return float(np.sqrt(np.mean(np.square(torque / np.diag(vehicle.inertia)[:2]))))
-
-
-def _compared(starts: Sequence[LoggedStarts], path_of: Callable[[LoggedStarts], Array]) -> Array:
-    """Return the differences (n, _TIMES, 4, 3) of paths (.., m, STATE) from the flight."""
+def _compared(starts: Sequence[LoggedStarts], paths: Sequence[Array]) -> Array:
+    """Return the differences (n, _TIMES, 4, 3) of paths (.., m, STATE) from the flights."""
     parts = []
-    for part in starts:
-        path = path_of(part)
+    for part, path in zip(starts, paths, strict=True):
         at = np.rint(np.arange(1, _TIMES + 1) / _TIMES * path.shape[1]).astype(int) - 1
         parts.append(offsets(path[:, at], part.seen[:, at]))
     return np.concatenate(parts)

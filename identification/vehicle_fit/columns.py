@@ -9,10 +9,11 @@ gyroscopic one behind ``Jz``.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.arrays import Array, Mask
+from ...runtime.arrays import Array
 from ..logs.table import NamedArrays, Names
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece, Pieces
@@ -49,8 +50,7 @@ class Drive:
         return {"T": np.ones(4), "X": y, "Y": -x, "Z": -self.spin}
 
 
-@dataclass(frozen=True, eq=False)
-class BalanceSpectra:
+class BalanceSpectra(NamedTuple):
     """All pieces' transforms: the measured six first, then the columns, then their derivatives by
     the nonlinear parameters.
     """
@@ -81,12 +81,26 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
                 parts.append((np.column_stack([*moved.values()]) - base) / _STEP[name])
         stacked = low_pass(np.column_stack(parts), drive.band, piece.period)
         late = np.array([name in here for name in every])
-        segments += [
-            _with_delay(s, drive, nonlinear, late, slow)
-            for s in segments_of(stacked, piece.period, piece.log, drive.band)
-        ]
+        for s in segments_of(stacked, piece.period, piece.log, drive.band):
+            # late columns are delayed; blocks are in the order of ``nonlinear``, each with the
+            # slow part of its torques behind it
+            turn = -2j * np.pi * s.frequency[:, None] * late
+            measured, *blocks = np.split(s.columns, range(6, s.columns.shape[2], len(late)), axis=2)
+            first, *others = (block * np.exp(turn * drive.delay) for block in blocks)
+            rest = iter(others)
+            ordered = [turn * first if name == "delay" else next(rest) for name in nonlinear]
+            share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[:, None]
+            every_block = (x for b in (first, *ordered) for x in (b, share * b[:, :, slow]))
+            joined = np.concatenate([measured, *every_block], axis=2)
+            segments.append(s._replace(columns=joined))
     seconds = np.array([len(p.t) * p.period for p in pieces])
-    noise = _rotor_noise(pieces, drive, names, seconds)
+    # white noise of each rotor's speed in a column: standard deviation times the root of the period
+    noise = np.zeros((4, len(names)))
+    if drive.speed_noise > 0.0 and drive.lag <= 0.0:
+        squares = [p.period * (4.0 * np.square(p.rotors)).mean(axis=0) for p in pieces]
+        size = drive.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
+        for letter, share in drive.shares.items():
+            noise[:, names.index(f"{letter}0")] = size * share
     return BalanceSpectra(drive, names, nonlinear, tuple(segments), float(seconds.sum()), noise)
 
 
@@ -108,9 +122,9 @@ def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
         along = np.moveaxis(drag, 2, 0)
         for axis, force in zip("xyz", along, strict=True):
             out[f"rotor drag {axis}"] = force.sum(axis=1)
-        for axis, force in zip("xy", along[:2], strict=True):
-            out[f"moment of rotor drag {axis}"] = -force @ shares[axis.upper()]
-            out[f"moment {axis} of rotor drag z"] = along[2] @ shares[axis.upper()]
+        for axis, force, arm in zip("xy", along[:2], (shares["X"], shares["Y"]), strict=True):
+            out[f"moment of rotor drag {axis}"] = -force @ arm
+            out[f"moment {axis} of rotor drag z"] = along[2] @ arm
     return out
 
 
@@ -122,8 +136,8 @@ def _local(piece: MotionPiece, velocity: Array, drive: Drive) -> Array:
 
 def air_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
     """Return the columns (n,) without rotor speeds."""
-    w, period = piece.angular_velocity, piece.period
-    dw = derivative(w, period)
+    w = piece.angular_velocity
+    dw = derivative(w, piece.period)
     out = {"1": np.ones(len(piece.t))}
     for i, a in enumerate("xyz"):
         out[f"w{a}"], out[f"dw{a}"] = w[:, i], dw[:, i]
@@ -135,43 +149,8 @@ def air_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:
             out[f"linear drag {a}"] = -v
             out[f"quadratic drag {a}"] = -speed * v
         across = _local(piece, piece.velocity, drive)[:, :, :2]
-        lift = 0.25 * np.sum(across**2, axis=2)
+        lift = 0.25 * np.square(across).sum(axis=2)
         out["lift"] = lift.sum(axis=1)
         for a in "xy":
             out[f"moment {a} of lift"] = lift @ drive.shares[a.upper()]
-    return out
-
-
-def _with_delay(
-    s: Segment,
-    drive: Drive,
-    nonlinear: Names,
-    late: Mask,
-    torques: list[int],
-) -> Segment:
-    """Return a segment with its ``late`` columns delayed and their derivative by the delay.
-
-    Blocks are in the order of ``nonlinear``, each with the slow part of ``torques`` behind it.
-    """
-    turn = -2j * np.pi * s.frequency[:, None] * late
-    ends = range(6, s.columns.shape[2], len(late))
-    measured, *blocks = np.split(s.columns, ends, axis=2)
-    first, *others = (block * np.exp(turn * drive.delay) for block in blocks)
-    rest = iter(others)
-    ordered = [turn * first if name == "delay" else next(rest) for name in nonlinear]
-    share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[:, None]
-    every = [x for block in (first, *ordered) for x in (block, share * block[:, :, torques])]
-    return replace(s, columns=np.concatenate([measured, *every], axis=2))
-
-
-def _rotor_noise(pieces: Pieces, drive: Drive, names: Names, seconds: Array) -> Array:
-    """Return the white noise of each rotor's speed in each column (4, c), as the root of a
-    spectrum: standard deviation of the column times the root of the period.
-    """
-    out = np.zeros((4, len(names)))
-    if drive.speed_noise > 0.0 and drive.lag <= 0.0:
-        squares = [p.period * np.mean(4.0 * np.square(p.rotors), axis=0) for p in pieces]
-        size = drive.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
-        for letter, share in drive.shares.items():
-            out[:, names.index(f"{letter}0")] = size * share
     return out

@@ -5,18 +5,19 @@ of quantities missing from the flight.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq
 
 from ...dynamics.effects import Role, get
 from ...runtime.errors import InputError
-from ..logs.table import Values
-from .channels import MotionPiece, Sources
+from ..logs.table import Pair, Values
+from .channels import Pieces, Sources
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry, Interval
 from .parameters import FURTHER
-from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
+from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Estimated, told
 from .solve import Function, VehicleFit
 
 UNKNOWN: Interval = (math.nan, math.nan, math.nan)
@@ -42,18 +43,18 @@ class Estimates:
     kept: Mapping[str, str]  # visible further effects, each with the reason to doubt it, or empty
     hidden: Interval | None  # an invisible moment of velocity: value, deviation, least visible
     doubt: str  # reason to believe no estimate of torque; empty without one
-    said: dict[str, Estimate] = field(default_factory=dict)
+    said: Estimated = field(default_factory=dict)
     arm: float = 1.0  # m for each unit of the rotors' positions
-    arm_range: tuple[float, float] = (1.0, 1.0)  # shares of it
+    arm_range: Pair = (1.0, 1.0)  # shares of it
 
-    def say_all(self, pieces: Sequence[MotionPiece]) -> dict[str, Estimate]:
+    def say_all(self, pieces: Pieces) -> Estimated:
         """Return the estimate of every quantity.
 
         Raises:
             InputError: neither turning nor an arm says how large the vehicle is.
         """
-        sources = self.sources
-        vertical = f"{sources.force} along body z against {sources.rotors}, with the mass given"
+        of = self.sources
+        vertical = f"{of.force} along body z against {of.rotors}, with the mass given"
         if self.fit.drive.commands:
             self._say_curve(pieces, vertical)
         else:
@@ -91,23 +92,23 @@ class Estimates:
         corners = [end * share for end in ends for share in self.arm_range]
         return value, min(corners), max(corners)
 
-    def _say_curve(self, pieces: Sequence[MotionPiece], how: str) -> None:
-        exponents = self.fit.drive.exponents
+    def _say_curve(self, pieces: Pieces, how: str) -> None:
+        fit, exponents = self.fit, self.fit.drive.exponents
         for j, e in enumerate(exponents):
-            self._say(f"thrust u^{e}", self.fit.interval(f"a{j}", False), "N", how)
+            self._say(f"thrust u^{e}", fit.interval(f"a{j}", False), "N", how)
         flown = np.concatenate([p.rotors for p in pieces])
         low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
         beyond = f"continues the curve beyond the commands flown, {low:.2f} to {high:.2f}"
         for u in (0.25, 0.5, 0.75, 1.0):
             self._say_positive(
                 f"thrust({u:g})",
-                lambda v, u=u: thrust_of(v, exponents, u),  # type: ignore[misc]
+                partial(thrust_of, exponents=exponents, u=u),
                 "N",
                 *((how, IDENTIFIED) if low <= u <= high else (beyond, ASSUMED)),
             )
 
         def hover(values: Values, share: float = 1.0) -> float:
-            weight = self.fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
+            weight = fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
 
             def excess(u: float) -> float:
                 return 4.0 * thrust_of(values, exponents, u) - weight
@@ -117,24 +118,23 @@ class Estimates:
             return float(brentq(excess, 0.0, 2.0)) if low < 0.0 < high else 2.0 * (low < 0.0)
 
         self._say_positive("hover command", hover, "1", how)
-        if "gamma" not in self.fit.model.free:
+        if "gamma" not in fit.model.free:
             logged = all(p.voltage is not None for p in pieces)
             why = "the voltage hardly changes" if logged else "no voltage is logged"
             why += ": the curve holds for the voltage of these flights"
             self._say("voltage_exponent", UNKNOWN, "1", how, doubt=why)
             return
-        known, how = self.fit.interval("gamma", False), f"{how} and voltage"
+        known, how = fit.interval("gamma", False), f"{how} and voltage"
         why = "command and voltage change together: what the voltage does, the curve may do"
         wide = known[2] - known[1] > USUAL.voltage_exponents
         self._say("voltage_exponent", known, "1", how, doubt=why if wide else "")
         flown = np.concatenate([p.voltage for p in pieces if p.voltage is not None])
         for volts in () if wide else np.quantile(flown, [0.05, 0.95]).tolist():
-            share = volts / self.fit.drive.voltage_ref
-            name = f"hover command at {volts:.2f} V"
-            self._say_positive(name, lambda v, s=share: hover(v, s), "1", how)  # type: ignore[misc]
+            at_voltage = partial(hover, share=volts / fit.drive.voltage_ref)
+            self._say_positive(f"hover command at {volts:.2f} V", at_voltage, "1", how)
 
     def _say_arm_and_inertia(self) -> None:
-        fit, usual, values = self.fit, USUAL, self.fit.values
+        fit, values = self.fit, self.fit.values
         known_arm, mass = self.geometry.known, self.fit.model.mass
         flat = values["Jz"] / (values["Jx"] + values["Jy"])
         missing = {
@@ -159,17 +159,16 @@ class Estimates:
             # with rotors at unit distance the fit's inertia is inertia over arm: gyration * mass *
             # arm at a usual radius of gyration
             mean = 0.5 * (values["Jx"] + values["Jy"])
-            value, high, low = (mean / mass / g for g in usual.gyration)
+            value, high, low = (mean / mass / g for g in USUAL.gyration)
             how = (
                 "turning shows arm over inertia alone; with {:g} mass arm^2 for the inertia, "
                 "{:g} to {:g}"
-            ).format(*usual.gyration)
+            ).format(*USUAL.gyration)
             self._say("arm_l", (value, low, high), "m", how, ASSUMED)
             self.arm, self.arm_range = value, (low / value, high / value)
         status, given = (IDENTIFIED, "given") if known_arm else (ASSUMED, "assumed")
         rate, rotors = self.sources.rate, f"against {self.sources.rotors}"
         motions = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}
-        known: Interval
         for axis, motion in motions.items():
             name = axis + axis[1]
             if axis not in why:
@@ -178,16 +177,16 @@ class Estimates:
                 continue
             if axis == "Jz":
                 x, y = self.said["Jxx"], self.said["Jyy"]
-                flat, low, high = usual.flat
+                flat, low, high = USUAL.flat
                 known = flat * (x.value + y.value), low * (x.low + y.low), high * (x.high + y.high)
                 how = f"{flat:g} of Jxx + Jyy, {low:g} to 1"
             else:
-                known = _times(mass * self.geometry.arm**2, usual.gyration)
-                how = f"{usual.gyration[0]:g} mass arm^2"
+                known = _times(mass * self.geometry.arm**2, USUAL.gyration)
+                how = f"{USUAL.gyration[0]:g} mass arm^2"
             self._say(name, known, "kg m2", f"{why[axis]}; {how}", ASSUMED)
         for axis, across in (("Jx", 1), ("Jy", 0)):
             if axis not in why:
-                length = float(np.mean(np.abs(fit.drive.positions[:, across])))
+                length = float(np.abs(fit.drive.positions[:, across]).mean())
                 value, low, high = (length / x for x in fit.interval(axis))
                 how = f"{rate} {rotors}: needs no arm"
                 self._say(f"l/{axis}{axis[1]}", (value, high, low), "1/(kg m)", how)
@@ -219,7 +218,7 @@ class Estimates:
             self._say("p", known, "Nm/(rad/s)^2", how, status)
 
     def _say_lag(self) -> None:
-        name, doubt, known = effect_of(Role.LAG), "", UNKNOWN
+        doubt, known = "", UNKNOWN
         how = f"force and turning against {self.sources.rotors}"
         if "lag" in self.fit.model.free:
             if not self.fit.drive.commands:
@@ -232,7 +231,7 @@ class Estimates:
                 "force follows the logged rotor speeds at once: they are measured, and no command "
                 "is logged beside them"
             )
-        self._say(name, known, "s", how, doubt=doubt)
+        self._say(effect_of(Role.LAG), known, "s", how, doubt=doubt)
         offset = self.fit.interval("delay", False)
         self._say("time_offset", offset, "s", "of the motion behind the rotors")
 

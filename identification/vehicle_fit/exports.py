@@ -26,6 +26,7 @@ import numpy as np
 
 from ...dynamics.effects import Role
 from ...runtime.page_files import page_template
+from ..logs.table import NamedNumbers, Names
 from .effect_settings import coefficient_of, effect_of, linear_drag
 from .result import ASSUMED, IDENTIFIED, Identified
 
@@ -34,9 +35,7 @@ _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
 _CRAZYFLIE = [3, 2, 1, 0]  # front-right, rear-right, rear-left, front-left
 
 
-def _autopilot(
-    name: str, parameters: tuple[str, ...], most_ballistic: float, identified: Identified
-) -> str:
+def _autopilot(name: str, parameters: Names, most_ballistic: float, identified: Identified) -> str:
     """Return an autopilot's parameters: momentum drag (1/s), ballistic coefficients along x and y
     (kg/m2), hover thrust (share of the full one), and the square's share in the curve.
     """
@@ -44,20 +43,20 @@ def _autopilot(
     linear = [drag / vehicle.mass for drag in linear_drag(vehicle)[:2]]
     quadratic = [coefficient_of(vehicle, Role.BODY_DRAG, 3 + i) for i in range(2)]
     momentum, *ballistic, hover, bend = parameters
-    values: dict[str, float] = {}
+    values: NamedNumbers = {}
     if max(*linear, *quadratic) > 0.0:
-        values[momentum] = max(float(np.mean(linear)), 0.0)
+        values[momentum] = max(0.5 * sum(linear), 0.0)
         for p, c in zip(ballistic, quadratic, strict=True):
             # both autopilots leave the part of 0 out
             values[p] = 0.5 * AIR_DENSITY * vehicle.mass / c if c > 0.0 else 0.0
     if vehicle.motor_curve is not None:
         u = np.linspace(0.0, 1.0, 41)
         thrust = np.polynomial.polynomial.polyval(u, vehicle.motor_curve.thrust)
-        values[hover] = float(vehicle.weight / (4.0 * thrust[-1]))
+        values[hover] = vehicle.weight / (4.0 * thrust[-1])
         # least squares of T - u = f (u^2 - u)
         bent = u**2 - u
         share = bent @ (thrust / thrust[-1] - u) / (bent @ bent)
-        values[bend] = float(np.clip(share, 0.0, 1.0))
+        values[bend] = np.clip(share, 0.0, 1.0)
     missing = [p for p in parameters if p not in values]
     doubts = [f"# not known from these logs: {', '.join(missing)}"] if missing else []
     limits = {momentum: 1.0, **dict.fromkeys(ballistic, most_ballistic)}  # as both state
@@ -107,8 +106,11 @@ def _simulator(name: str, identified: Identified) -> str:
 
 _PX4 = ("EKF2_MCOEF", "EKF2_BCOEF_X", "EKF2_BCOEF_Y", "MPC_THR_HOVER", "THR_MDL_FAC")
 _ARDUPILOT = (
-    *("EK3_DRAG_MCOEF", "EK3_DRAG_BCOEF_X", "EK3_DRAG_BCOEF_Y"),
-    *("MOT_THST_HOVER", "MOT_THST_EXPO"),
+    "EK3_DRAG_MCOEF",
+    "EK3_DRAG_BCOEF_X",
+    "EK3_DRAG_BCOEF_Y",
+    "MOT_THST_HOVER",
+    "MOT_THST_EXPO",
 )
 EXPORTS: dict[str, Callable[[Identified], str]] = {
     "px4": partial(_autopilot, "px4", _PX4, 200.0),

@@ -1,6 +1,7 @@
 """The rotors' positions as a user gives them, and usual ratios of quadrotors."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +14,7 @@ SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
 GRAVITY = 9.81  # m/s2
 
 
-@dataclass(frozen=True)
-class _Usual:
+class _Usual(NamedTuple):
     """Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Behind
     the value stands a range, low and high, claimed in place of an interval.
     """
@@ -49,7 +49,7 @@ class Geometry:
     @property
     def arm(self) -> float:
         """Mean distance of the rotors from the body x and y axes, m."""
-        return float(np.mean(np.abs(self.positions[:, :2])))
+        return float(np.abs(self.positions[:, :2]).mean())
 
 
 def parse_geometry(text: str | None) -> Geometry:
@@ -63,7 +63,7 @@ def parse_geometry(text: str | None) -> Geometry:
         "x,y in m with semicolons between them, front-left, rear-left, rear-right, front-right"
     )
     if text is None:
-        return Geometry(QUADRANT.copy(), known=False)
+        return Geometry(QUADRANT, known=False)
     try:
         rows = [[float(x) for x in row.split(",")] for row in text.split(";")]
     except ValueError as error:
@@ -73,7 +73,8 @@ def parse_geometry(text: str | None) -> Geometry:
     if len(rows) != 4 or any(len(row) not in (2, 3) for row in rows):
         raise InputError(f"--geometry {text}: {expected}")
     positions = np.array([[*row, 0.0][:3] for row in rows])
-    if not np.all(np.isfinite(positions)) or np.any(positions[:, :2] * QUADRANT[:, :2] <= 0.0):
+    inside = positions[:, :2] * QUADRANT[:, :2] > 0.0
+    if not (np.isfinite(positions).all() and inside.all()):
         raise InputError(
             f"--geometry {text}: the rotors do not stand one in each quadrant, front-left, "
             f"rear-left, rear-right, front-right; {expected}"

@@ -12,22 +12,32 @@ off by the spread between days to either side. One flight tells no reaction: on 
 a racer the body rate was off by 3 times the error of no change.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import LoopReaction, ModelStatus, Standing, Vehicle
-from ...runtime.arrays import Array, Index, Mask
+from ...runtime.arrays import Index, Mask
 from ..logs.flight_log import Logs
-from ..prediction import QUANTITIES, LoggedStarts, PredictionErrors, errors_at, logged_starts
-from .channels import MotionPiece
+from ..logs.table import ArrayPair
+from ..prediction import (
+    QUANTITIES,
+    ErrorsByPart,
+    LoggedStarts,
+    PredictionErrors,
+    errors_at,
+    logged_starts,
+)
+from .channels import Pieces
 from .closed_loop import LoopFit, fit_loop
 from .geometry import USUAL
 from .model import coefficients
 from .solve import VehicleFit, refitted
-from .spectra import Segment, edges_of
+from .spectra import Segment, Spectra, edges_of
 
 FOLDS = 3  # every third segment is held out at a time
 LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
@@ -37,11 +47,11 @@ _HORIZON = 0.5  # s
 OTHER_FLIGHTS = "flights_left_out"
 NO_CHANGE, SIMPLEST, WHOLE = "no change", "thrust and drag", "force and torque"
 # each model's errors of the parts held out, by where they are
-Errors = Mapping[str, Mapping[str, Sequence[PredictionErrors]]]
+Errors = dict[str, dict[str, list[PredictionErrors]]]
+Models = dict[str, Vehicle]  # by name
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOut:
+class HeldOut(NamedTuple):
     """What predictions of held-out data say.
 
     Attributes:
@@ -52,15 +62,14 @@ class HeldOut:
         why: figures of a refuted torque; else empty.
     """
 
-    errors: Mapping[str, PredictionErrors]
-    simplest: Mapping[str, PredictionErrors]
+    errors: ErrorsByPart
+    simplest: ErrorsByPart
     stands: str
     loop: LoopFit | None = None
     why: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class _HeldParts:
+class _HeldParts(NamedTuple):
     """Starts in the segments of a fit, and the parts held out in turn."""
 
     starts: list[LoggedStarts]  # of each log
@@ -68,9 +77,9 @@ class _HeldParts:
     refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
     spreads: tuple[float, ...]  # factors of the thrust
 
-    def errors(self, models: Callable[[VehicleFit, Index], Mapping[str, Vehicle]]) -> Errors:
+    def errors(self, models: Callable[[VehicleFit, Index], Models]) -> Errors:
         """Return the errors of models made of each refit and the numbers of its segments."""
-        errors: dict[str, dict[str, list[PredictionErrors]]] = {}
+        errors: Errors = {}
         for where, kept, part in self.refits:
             each = zip(self.starts, self.segment, strict=True)
             starts = [of.those(~kept[numbers]) for of, numbers in each]
@@ -84,9 +93,7 @@ class _HeldParts:
         return errors
 
 
-def _held_parts(
-    pieces: Sequence[MotionPiece], logs: Logs, fit: VehicleFit, vehicle: Vehicle
-) -> _HeldParts:
+def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -> _HeldParts:
     """Return the starts in the segments of a fit.
 
     Raises:
@@ -123,7 +130,7 @@ def _with_thrust(vehicle: Vehicle, share: float) -> Vehicle:
 
 
 def held_out(
-    pieces: Sequence[MotionPiece],
+    pieces: Pieces,
     logs: Logs,
     fit: VehicleFit,
     vehicle_of: Callable[[VehicleFit, str], Vehicle],
@@ -164,7 +171,7 @@ def held_out(
     return HeldOut(pooled[stands], pooled[SIMPLEST], stands, loop, why)
 
 
-def models_of(vehicle: Vehicle) -> dict[str, Vehicle]:
+def models_of(vehicle: Vehicle) -> Models:
     """Return models without a loop's reaction by their names, the simplest ones first."""
 
     def of(force: Standing, torque: Standing) -> Vehicle:
@@ -173,25 +180,20 @@ def models_of(vehicle: Vehicle) -> dict[str, Vehicle]:
     force = of("identified", "refuted")
     return {
         NO_CHANGE: of("refuted", "refuted"),
-        SIMPLEST: _without_further(force),
+        SIMPLEST: force.with_effects(*(e for e in vehicle.effects if get(e.name).role in _DRAGS)),
         "force": force,
         "torque": of("refuted", "identified"),
         WHOLE: of("identified", "identified"),
     }
 
 
-def loops_of(vehicle: Vehicle, loop: LoopReaction) -> dict[str, Vehicle]:
+def loops_of(vehicle: Vehicle, loop: LoopReaction) -> Models:
     """Return the models with a loop's reaction in place of the torque, and the reaction alone."""
     models = models_of(vehicle)
     return {
         f"{name}, closed loop": replace(models[name], closed_loop=loop)
         for name in (NO_CHANGE, SIMPLEST, "force")
     }
-
-
-def _without_further(vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle without effects beside drag and lag."""
-    return vehicle.with_effects(*(e for e in vehicle.effects if get(e.name).role in _DRAGS))
 
 
 def standing(errors: Errors) -> str:
@@ -217,11 +219,13 @@ def _reason(errors: Errors) -> str:
     said = []
     for where, each in errors.items():
         whole, simple = (PredictionErrors.pooled(each[name]) for name in (WHOLE, SIMPLEST))
-        ends = (of[:, -1] for of in (whole.model, whole.still, simple.model))
-        for (what, unit), end, still, least in zip(QUANTITIES.items(), *ends, strict=True):
-            best, other = min((still, "no change"), (least, "thrust and drag alone"))
-            figures = f"{what} of {where.replace('_', ' ')} worse than {other} "
-            figures += f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
+        least = np.minimum(whole.still, simple.model)
+        ends = whole.model[:, -1], least[:, -1]
+        for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True):
+            figures = (
+                f"{what} of {where.replace('_', ' ')} worse than the simplest guess "
+                f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
+            )
             said.append((end / best, figures))
     return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"
 
@@ -235,12 +239,12 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
     kept = [fold != held for held in np.unique(fold)]
     left, total = np.sum(
         [
-            powers(part, [segments[i] for i in np.flatnonzero(~keep)])
+            powers(part, list(compress(segments, ~keep)))
             for keep, part in zip(kept, refitted(fit, kept), strict=True)
         ],
         axis=0,
     )
-    force, turning = left[2] > total[2], np.sum(left[3:]) / np.sum(total[3:])
+    force, turning = left[2] > total[2], left[3:].sum() / total[3:].sum()
     why = (
         "not identifiable: torques leave more of the turning of held-out blocks than no model "
         f"({turning:.2f} times its power)"
@@ -251,8 +255,8 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
 
 
 def powers(
-    fit: VehicleFit, segments: Sequence[Segment], spectra: Sequence[Array] | None = None
-) -> tuple[Array, Array]:
+    fit: VehicleFit, segments: Sequence[Segment], spectra: Spectra | None = None
+) -> ArrayPair:
     """Return the power (6,) that a fit leaves of specific force and turning, and all of it, from
     ``LEAST_HZ`` on; ``spectra`` divide it, frequency by frequency.
     """
@@ -264,8 +268,8 @@ def powers(
         unit = 1.0 if spectra is None else spectra[i][inside]
         measured = s.columns[:, inside, :6]
         residual = measured - s.columns[:, inside, 6 : 6 + count] @ model.T
-        left += np.sum(np.abs(residual) ** 2 / unit, axis=(0, 1))
-        total += np.sum(np.abs(measured) ** 2 / unit, axis=(0, 1))
+        left += (np.abs(residual) ** 2 / unit).sum(axis=(0, 1))
+        total += (np.abs(measured) ** 2 / unit).sum(axis=(0, 1))
     return left, total
 
 

@@ -21,7 +21,7 @@ from ..logs.flight_log import Logs
 from ..logs.magnitudes import motor_doubts
 from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
-from .channels import MotionPiece, Pieces, Sources, pieces_of, rounding_step, speed_noise
+from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .closed_loop import UNITS
 from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
@@ -29,9 +29,9 @@ from .estimates import Estimates, thrust_of
 from .geometry import SPIN, Geometry, Interval
 from .held_out import HeldOut, held_out, loops_of, models_of, warnings_of
 from .motors import motor_response
-from .parameters import FORCE_BIAS, FURTHER, first_model
+from .parameters import BIASES, FORCE_BIAS, FURTHER, POSED_BIAS, first_model
 from .plausible import check_thrust
-from .result import ASSUMED, IDENTIFIED, NOTHING, REFUTED, Estimate, Identified, told
+from .result import ASSUMED, IDENTIFIED, NOTHING, REFUTED, Estimate, Estimated, Identified, told
 from .solve import VehicleFit, nearest_body, score_tests, solve
 from .spectra import BAND
 
@@ -74,7 +74,7 @@ def identify(
     Raises:
         InputError: the logs lack a channel, or contradict the rotors' order.
     """
-    if not (math.isfinite(mass) and mass > 0.0):
+    if not 0.0 < mass < math.inf:
         raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
@@ -101,6 +101,9 @@ def identify(
             "logs do that were smoothed before they were written, or whose rotor speeds are noisy: "
             "only what is slower was used"
         )
+    if sources.force == "accelerometer" and sources.velocity:
+        prior = {**fit.model.prior, **dict.fromkeys(BIASES, POSED_BIAS)}
+        fit = solve(pieces, fit.drive, replace(fit.model, prior=prior), fit.theta)
     report(0.5, "asking what else shows")
     fit, kept, hidden = _with_optional(pieces, fit, sources)
     if "answered torque" in kept:
@@ -116,14 +119,14 @@ def identify(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
             "above): the opposite ones were taken"
         )
-    if sources.force == "accelerometer":
+    if sources.force == "accelerometer" and not sources.velocity:
         notes.append(
             "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
             "thrust"
         )
     motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
 
-    def described(part: VehicleFit, why: str) -> tuple[dict[str, Estimate], Vehicle]:
+    def described(part: VehicleFit, why: str) -> tuple[Estimated, Vehicle]:
         part, _ = nearest_body(part)
         named = Estimates(part, sources, geometry, kept, hidden, doubt or why).say_all(pieces)
         return named, vehicle_of(name, part, named, geometry, logs, step, motors)
@@ -144,14 +147,16 @@ def identify(
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:
-        lag, left = effect_of(Role.LAG), f"{100 * motors.left:.0f} % of their variation left over"
-        how = f"rotor speeds against commands, {left}"
+        lag = effect_of(Role.LAG)
+        how = (
+            f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
+        )
         named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
     return Identified(
         vehicle,
         named,
         sources,
-        tuple(pieces),
+        pieces,
         fit,
         tuple(notes),
         tuple(advice_of(named)),
@@ -160,7 +165,7 @@ def identify(
     )
 
 
-def _with_status(vehicle: Vehicle, named: dict[str, Estimate], tested: HeldOut) -> Vehicle:
+def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle:
     """Return the vehicle that stands, with its status; mark what is refuted in ``named``, and add
     the loop's coefficients.
     """
@@ -171,8 +176,8 @@ def _with_status(vehicle: Vehicle, named: dict[str, Estimate], tested: HeldOut) 
         for size, (c, unit), value in zip(
             tested.loop.deviations, UNITS.items(), tested.loop.theta, strict=True
         ):
-            known = value, value - 1.96 * size, value + 1.96 * size
-            named[f"closed_loop {c}"] = Estimate(f"closed_loop {c}", *known, unit, stands, LOOP)
+            name, wide = f"closed_loop {c}", 1.96 * size
+            named[name] = Estimate(name, value, value - wide, value + wide, unit, stands, LOOP)
     if not tested.stands:
         for name, e in named.items():
             if e.status == IDENTIFIED:
@@ -188,9 +193,10 @@ def _with_status(vehicle: Vehicle, named: dict[str, Estimate], tested: HeldOut) 
 
 def _lag_alone(pieces: Pieces, fit: VehicleFit) -> Estimate:
     """Return the lag of a model without a time offset: the offset is then part of the lag."""
-    place = fit.model.free.index("delay")
-    model = replace(fit.model, free=(*fit.model.free[:place], *fit.model.free[place + 1 :]))
-    alone = solve(pieces, replace(fit.drive, delay=0.0), model, np.delete(fit.theta, place))
+    free = fit.model.free
+    model = replace(fit.model, free=tuple(name for name in free if name != "delay"))
+    start = np.delete(fit.theta, free.index("delay"))
+    alone = solve(pieces, replace(fit.drive, delay=0.0), model, start)
     known = alone.interval("lag")
     how = "of a model without a time offset: what other tools call the lag"
     return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
@@ -209,12 +215,12 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
     return pieces, sources
 
 
-def _voltage(pieces: Sequence[MotionPiece]) -> float:
+def _voltage(pieces: Pieces) -> float:
     voltages = [p.voltage for p in pieces if p.voltage is not None]
     if len(voltages) < len(pieces):
         return 0.0
-    low, middle, high = np.quantile(np.concatenate(voltages), [0.05, 0.5, 0.95]).tolist()
-    return float(middle) if high - low > _LEAST_VOLTAGE_RANGE * middle > 0.0 else 0.0
+    low, middle, high = np.quantile(np.concatenate(voltages), [0.05, 0.5, 0.95])
+    return middle if high - low > _LEAST_VOLTAGE_RANGE * middle > 0.0 else 0.0
 
 
 def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> VehicleFit:

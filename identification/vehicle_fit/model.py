@@ -68,7 +68,8 @@ def coefficients(model: Model, p: Values, names: Names) -> Array:
     mass = model.mass
     place = {name: i for i, name in enumerate(names)}
     inertia, lever = inertia_of(p), np.array([p["rx"], p["ry"], p["rz"]])
-    out, moment = np.zeros((6, len(names))), np.zeros((3, len(names)))  # moment: about the centre
+    out = np.zeros((6, len(names)))
+    moment = out[3:]  # about the centre of mass
 
     def add(rows: Array, i: int, column: str, parameter: str, size: float = 1.0) -> None:
         if parameter in p:
@@ -78,8 +79,8 @@ def coefficients(model: Model, p: Values, names: Names) -> Array:
         a, thrust = p[f"a{j}"], place[f"T{j}"]
         out[:3, thrust] += np.array([p["tilt x"], p["tilt y"], 1.0]) * a / mass
         moment[:2, thrust] += a * np.array([-p["cy"], p["cx"]])
-        for i, lever_arm in enumerate((1.0, 1.0, p["reach"])):
-            moment[i, place[f"{'XYZ'[i]}{j}"]] += a * lever_arm
+        for i, letter in enumerate("XYZ"):
+            moment[i, place[f"{letter}{j}"]] += a * (p["reach"] if letter == "Z" else 1.0)
     for i, axis in enumerate(_AXES):
         out[:3, place[f"dw{axis}"]] = _CROSS[:, i] @ lever
         for j, other in enumerate(_AXES[i:], i):
@@ -105,8 +106,8 @@ def coefficients(model: Model, p: Values, names: Names) -> Array:
         if name.startswith("slow "):
             i, answering = "XYZ".index(name[5]), place[name.removeprefix("slow ")]
             add(moment, i, name, f"answered {_AXES[i]}", -moment[i, answering])
-    out[3:] = np.linalg.solve(inertia, moment)
-    out[3:, place["1"]] += [p[f"turn bias {axis}"] for axis in _AXES]
+    moment[:] = np.linalg.solve(inertia, moment)
+    moment[:, place["1"]] += [p[f"turn bias {axis}"] for axis in _AXES]
     return out
 
 

@@ -2,13 +2,15 @@
 behind a first-order lag.
 """
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
 from ...runtime.arrays import Array
+from ..logs.table import ArrayPair
 from ..motion.smoothing import lagged
 from .channels import Pieces
 from .geometry import Interval
@@ -18,8 +20,7 @@ _SEGMENT = 5.0  # s: errors further apart are taken as independent
 _POWERS = 3  # speed against u^0, u^1, u^2
 
 
-@dataclass(frozen=True, eq=False)
-class MotorResponse:
+class MotorResponse(NamedTuple):
     """Rotor speed in rad/s against command, and its lag."""
 
     speed: Array  # (3,) coefficients of u^0, u^1, u^2
@@ -29,31 +30,33 @@ class MotorResponse:
 
 def motor_response(pieces: Pieces) -> MotorResponse | None:
     """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
-    if any(p.command is None or p.rotor_speeds is None for p in pieces):
+    both = [p for p in pieces if p.rotor_speeds is not None]
+    known = [(p.command, p.period) for p in both if p.command is not None]
+    if len(known) < len(pieces):
         return None
     speeds = np.concatenate([p.rotors for p in pieces])
-    commands = np.concatenate([p.command for p in pieces if p.command is not None])
-    if np.std(commands) < 1e-3 or np.std(speeds) == 0.0:
+    commands = np.concatenate([command for command, _ in known])
+    if commands.std() < 1e-3 or speeds.std() == 0.0:
         return None
 
     def columns(lag: float) -> Array:
-        u = [lagged(p.command, lag, p.period).ravel() for p in pieces if p.command is not None]
+        u = [lagged(command, lag, period).ravel() for command, period in known]
         return np.vander(np.concatenate(u), _POWERS, increasing=True)
 
     target = speeds.ravel()
 
-    def fitted(lag: float) -> tuple[Array, Array]:
+    def fitted(lag: float) -> ArrayPair:
         x = columns(lag)
         best = np.linalg.lstsq(x, target, rcond=None)[0]
         return best, target - x @ best
 
     likeliest = minimize_scalar(
-        lambda log_lag: np.sum(np.square(fitted(float(np.exp(log_lag)))[1])),
-        bounds=tuple(np.log(_LAGS)),
+        lambda log_lag: np.square(fitted(math.exp(log_lag))[1]).sum(),
+        bounds=np.log(_LAGS),
         method="bounded",
         options={"xatol": 1e-3},
     )
-    lag = float(np.exp(likeliest.x))
+    lag = math.exp(likeliest.x)
     best, residual = fitted(lag)
     step = 0.01 * lag
     slope = (columns(lag + step) - columns(lag - step)) @ best / (2.0 * step)
@@ -65,7 +68,7 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     # errors go on within a segment: a sandwich over segments
     scores = np.array([moves[block == b].T @ residual[block == b] for b in range(count)])
     meat = scores.T @ scores * (count / max(count - 1, 1))
-    size = float(np.sqrt((inverse @ meat @ inverse)[-1, -1]))
+    size = math.sqrt((inverse @ meat @ inverse)[-1, -1])
     width = float(student.ppf(0.975, max(count - 1, 3))) * size
-    known = (lag, max(lag - width, 0.0), lag + width)
-    return MotorResponse(best, known, float(np.std(residual) / np.std(target)))
+    interval = (lag, max(lag - width, 0.0), lag + width)
+    return MotorResponse(best, interval, float(residual.std() / target.std()))

@@ -2,8 +2,8 @@
 by axis, with every coefficient linear.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -21,6 +21,8 @@ from .spectra import BAND
 # accelerometer with its factory's calibration alone, m/s2 and rad: 20 mg, as in data sheets of such
 # sensors
 FORCE_BIAS = 0.2
+# m/s2, beside a pose: what a sensor a centimetre off the centre of mass feels on the mean
+POSED_BIAS = 0.03
 TILT = 0.02
 # s, offset between the motion's clock and the rotors': sensors' own filters, transport
 DELAY = 0.02
@@ -33,14 +35,26 @@ _OPPOSED = 0.15
 _SWING_HZ = (0.5, 8.0)
 
 BASE = (
-    *("Jx", "Jy", "Jz", "reach", "cx", "cy", "Jr", "tilt x", "tilt y", "rx", "ry", "rz"),
-    *("turn bias x", "turn bias y", "turn bias z"),
+    "Jx",
+    "Jy",
+    "Jz",
+    "reach",
+    "cx",
+    "cy",
+    "Jr",
+    "tilt x",
+    "tilt y",
+    "rx",
+    "ry",
+    "rz",
+    "turn bias x",
+    "turn bias y",
+    "turn bias z",
 )
 BIASES = ("force bias x", "force bias y", "force bias z")
 
 
-@dataclass(frozen=True)
-class Further:
+class Further(NamedTuple):
     """An effect for logs that get much likelier by it."""
 
     parameters: Names
@@ -76,7 +90,7 @@ def first_model(
     sources: Sources,
     drive: Drive,
     mass: float,
-    nonlinear: Sequence[str],
+    nonlinear: Names,
 ) -> tuple[Model, Array, Drive]:
     """Return the model, its start, and the drive with the turning senses that yaw shows;
     ``nonlinear`` parameters start at the drive's values.
@@ -87,8 +101,8 @@ def first_model(
     columns = [rotor_columns(piece, drive) for piece in pieces]
     # each basis function's coefficient if it alone carried the weight
     totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(len(drive.exponents))]
-    each = [mass * GRAVITY / max(float(np.mean(total)), 1e-12) for total in totals]
-    share = 1.0 / len(each)
+    each = [mass * GRAVITY / max(total.mean(), 1e-12) for total in totals]
+    share, thrust = 1.0 / len(each), [f"a{j}" for j in range(len(each))]
     shares = [share * a for a in each]
     gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
     # a loop that answers a swinging load opposes its own slow torque, and no quick one
@@ -104,9 +118,19 @@ def first_model(
     usual = USUAL.gyration[0] * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
     flat = USUAL.flat[0] * inertia.sum()
-    speed = max(float(np.mean(np.concatenate([p.rotors for p in pieces]))), 1e-6)
+    speed = max(np.concatenate([p.rotors for p in pieces]).mean(), 1e-6)
+    along = {
+        "tilt": 0.01,
+        "turn bias": 0.1,
+        "force bias": 0.1,
+        "rotor drag": 0.05 * mass / speed,
+        "linear drag": 0.1 * mass,
+        "quadratic drag": 0.03 * mass,
+        "damping": inertia[0],
+        "answered": 0.3,
+    }
     size = {
-        **{f"a{j}": a for j, a in enumerate(each)},
+        **dict(zip(thrust, each, strict=True)),
         "Jx": inertia[0],
         "Jy": inertia[1],
         "Jz": flat,
@@ -114,22 +138,17 @@ def first_model(
         "reach": float(np.clip(abs(gains[2]) * flat, 1e-3 * arm, 10.0 * arm)),
         **dict.fromkeys(("cx", "cy"), 0.01 * arm),
         "Jr": 0.01 * inertia[0] / speed * np.sqrt(GRAVITY / arm),
-        **dict.fromkeys(("tilt x", "tilt y", "rx", "ry", "rz"), 0.01),
-        **dict.fromkeys(("turn bias x", "turn bias y", "turn bias z", *BIASES), 0.1),
-        **{f"rotor drag {a}": 0.05 * mass / speed for a in "xyz"},
-        **{f"linear drag {a}": 0.1 * mass for a in "xyz"},
-        **{f"quadratic drag {a}": 0.03 * mass for a in "xyz"},
+        **dict.fromkeys(("rx", "ry", "rz"), 0.01),
         "lift": 0.03 * mass,
-        **{f"damping {a}": inertia[0] for a in "xyz"},
         "flapping": 0.05 * mass / speed * 0.03 * arm,
-        **{f"answered {a}": 0.3 for a in "xyz"},
+        **{f"{name} {a}": x for name, x in along.items() for a in "xyz"},
     }
-    free = (*(f"a{j}" for j in range(len(each))), *BASE)
+    free = (*thrust, *BASE)
     prior = {"delay": DELAY}
     if sources.force == "accelerometer":
         free = (*free, *BIASES)
         prior |= {**dict.fromkeys(BIASES, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
-    known = {**{f"a{j}": share for j in range(len(each))}, "reach": 1.0}
+    known = dict.fromkeys(thrust, share) | {"reach": 1.0}
     known |= {name: getattr(drive, name) for name in nonlinear}
     model = Model(mass, len(each), (*free, *nonlinear), size, prior)
     if gains[2] < 0.0:

@@ -1,13 +1,12 @@
 """The result of an identification."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Names
-from ..prediction import PredictionErrors
-from .channels import MotionPiece, Sources
+from ..prediction import ErrorsByPart
+from .channels import Pieces, Sources
 from .geometry import Interval
 from .solve import VehicleFit
 
@@ -39,7 +38,7 @@ class Estimate:
     how: str  # channels, assumption, or reason not to know
 
 
-Estimated = Mapping[str, Estimate]  # by name
+Estimated = dict[str, Estimate]  # by name
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +48,12 @@ class Identified:
     vehicle: Vehicle
     estimates: Estimated  # keys: names
     sources: Sources
-    pieces: tuple[MotionPiece, ...]
+    pieces: Pieces
     fit: VehicleFit
     notes: Names
     advice: Names
     # errors on data outside the fit: held_out_blocks, flights_left_out (each in turn, of several),
     # and prediction, of further flights
-    predicted: Mapping[str, PredictionErrors]
+    predicted: ErrorsByPart
     # the same of thrust and drag with an unchanged body rate
-    simplest: Mapping[str, PredictionErrors]
+    simplest: ErrorsByPart

@@ -9,19 +9,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
-from ..logs.table import Values
+from ..logs.table import Data, NamedNumbers, Values
 from .channels import Pieces
 from .columns import BalanceSpectra, Drive, balance
 from .geometry import Interval
 from .model import Model, jacobian
-from .spectra import LOSS, TAPERS, residual_spectra
+from .spectra import LOSS, TAPERS, Spectra, residual_spectra
 
 Function = Callable[[Values], float]
 
@@ -46,7 +45,7 @@ class VehicleFit:
     scores: Array  # (s, p): each segment's gradient
     loss: float  # twice the negative log-likelihood, up to a constant
     balance: BalanceSpectra
-    spectra: list[Array]  # (m, 6) a segment
+    spectra: Spectra  # (m, 6) a segment
 
     @property
     def drive(self) -> Drive:
@@ -71,7 +70,7 @@ class VehicleFit:
         return np.asarray(inverse * np.outer(grow, grow))
 
     @property
-    def values(self) -> dict[str, float]:
+    def values(self) -> NamedNumbers:
         """All parameters in SI units."""
         return self.model.values(self.theta)
 
@@ -102,11 +101,11 @@ def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFi
     theta = start.copy()
 
     def linear() -> BalanceSpectra:
-        here: dict[str, Any] = {n: float(theta[model.free.index(n)]) for n in model.nonlinear}
+        here: Data = {name: model.values(theta)[name] for name in model.nonlinear}
         return balance(pieces, replace(drive, **here), model.nonlinear)
 
     made = linear()
-    powers = [np.mean(np.abs(s.columns[:, :, :6]) ** 2, axis=0) for s in made.segments]
+    powers = [(np.abs(s.columns[:, :, :6]) ** 2).mean(axis=0) for s in made.segments]
     spectra = residual_spectra(made.segments, powers)
     for number in range(_ROUNDS):
         total = np.sum(_grams(made, spectra), axis=0)
@@ -121,7 +120,7 @@ def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFi
     scores = np.array([np.einsum("iac,acd,ad->i", slopes, g, v, optimize=True) for g in grams])
     # twice the negative log-likelihood of noise with the residual's spectrum
     logs = (
-        np.sum(s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p)))
+        (s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p))).sum()
         for s, p in zip(made.segments, spectra, strict=True)
     )
     loss = TAPERS * sum(logs)
@@ -141,8 +140,7 @@ def refitted(fit: VehicleFit, kept: Sequence[Mask]) -> list[VehicleFit]:
             raise InputError("the flight is too short; expected more than 5 s without a break")
         total = grams[keep].sum(axis=0)
         theta, information, _ = _moved(fit.balance, total, fit.model, fit.theta, _ROUNDS)
-        again = replace(fit, theta=theta, information=information, scores=fit.scores[keep])
-        out.append(again)
+        out.append(replace(fit, theta=theta, information=information, scores=fit.scores[keep]))
     return out
 
 
@@ -164,7 +162,7 @@ def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
             slope = np.zeros(len(fit.theta))
             slope[at] = share  # of logarithms
             move = fit.covariance @ slope
-            variance = float(slope @ move)
+            variance = slope @ move
             size = max(size, share.sum() / math.sqrt(variance))
             fit = replace(fit, theta=fit.theta - move * (share.sum() / variance))
     return fit, size
@@ -202,36 +200,40 @@ def _moved(
     made: BalanceSpectra, total: Array, model: Model, theta: Array, steps: int
 ) -> tuple[Array, Array, float]:
     """Return the parameters (p,) after some steps, the information (p, p) before the last, and the
-    longest step in standard deviations.
+    longest step in standard deviations. Nonlinear parameters stay in their range and near the
+    drive's.
     """
     moved = 0.0
     for _ in range(steps):
         step, information, *_ = _newton(made, total, model, theta)
-        theta = _bounded(theta + np.clip(step, -1.0, 1.0), model, made.drive)
+        theta = theta + np.clip(step, -1.0, 1.0)
+        for name in model.nonlinear:
+            i, here, (low, high) = model.free.index(name), getattr(made.drive, name), _RANGES[name]
+            low, high = max(low, here - _MOST_CHANGE), min(high, here + _MOST_CHANGE)
+            theta[i] = np.clip(theta[i], low, high)
         size = np.abs(step) * np.sqrt(np.maximum(np.diag(information), 0.0))
-        moved = max(moved, float(size.max()))
+        moved = max(moved, size.max())
     return theta, information, moved
 
 
-def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
+def _grams(made: BalanceSpectra, spectra: Spectra) -> Spectra:
     """Return each segment's weighted Gram matrices (6, 1 + c + nc, ...), axis by axis: the axis'
     measurement with all columns, less the rotors' noise.
     """
     noise, c = made.noise.T @ made.noise, len(made.names)
     grams = []
     for s, spectrum in zip(made.segments, spectra, strict=True):
-        columns = s.columns[:, :, 6:]
-        gram = np.empty((6, 1 + columns.shape[2], 1 + columns.shape[2]))
+        columns, gram = s.columns[:, :, 6:], []
         gain = 1.0 / (1.0 + (s.frequency / made.drive.band) ** 4) ** 2
         for axis in range(6):
             weight = s.weight / spectrum[:, axis]
             both = np.concatenate([s.columns[:, :, axis : axis + 1], columns], axis=2)
-            scaled = (both * np.sqrt(weight)[None, :, None]).reshape(-1, both.shape[2])
+            scaled = (both * np.sqrt(weight)[:, None]).reshape(-1, both.shape[2])
             parts = np.concatenate([scaled.real, scaled.imag])
-            gram[axis] = parts.T @ parts
-            added = noise * np.sum(weight * gain) * TAPERS
-            gram[axis, 1 : 1 + c, 1 : 1 + c] -= added
-        grams.append(gram)
+            products = parts.T @ parts
+            products[1 : 1 + c, 1 : 1 + c] -= noise * (weight * gain).sum() * TAPERS
+            gram.append(products)
+        grams.append(np.array(gram))
     return grams
 
 
@@ -264,19 +266,9 @@ def _newton(
     return np.linalg.solve(information, -gradient), information, rows, v
 
 
-def _bounded(theta: Array, model: Model, drive: Drive) -> Array:
-    """Return the parameters, the nonlinear ones bounded by their range and near the drive's."""
-    bounded = theta.copy()
-    for name in model.nonlinear:
-        i, here = model.free.index(name), getattr(drive, name)
-        near = np.clip(theta[i], here - _MOST_CHANGE, here + _MOST_CHANGE)
-        bounded[i] = np.clip(near, *_RANGES[name])
-    return bounded
-
-
 def _powers(
-    made: BalanceSpectra, spectra: Sequence[Array], model: Model, theta: Array, information: Array
-) -> list[Array]:
+    made: BalanceSpectra, spectra: Spectra, model: Model, theta: Array, information: Array
+) -> Spectra:
     """Return the residual's power (m, 6) in each segment, before the parameters took their share:
     parameters told by few frequencies follow the noise most.
     """
@@ -292,7 +284,7 @@ def _powers(
             moves[model.free.index(name)] = np.moveaxis(late, 2, 0)
         moves = moves.reshape(len(information), -1)
         share = np.einsum("ix,ij,jx->x", moves.conj(), inverse, moves, optimize=True).real
-        leverage = np.mean(share.reshape(6, *residual.shape[:2]), axis=1).T / spectrum
-        power = np.mean(np.abs(residual) ** 2, axis=0)
+        leverage = share.reshape(6, *residual.shape[:2]).mean(axis=1).T / spectrum
+        power = (np.abs(residual) ** 2).mean(axis=0)
         out.append(power / (1.0 - np.minimum(leverage, _MOST_LEVERAGE)))
     return out

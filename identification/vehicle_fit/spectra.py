@@ -9,7 +9,7 @@ section 13.4).
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,9 +25,10 @@ BAND = 15.0
 _SMOOTHING = 0.35  # spectrum's smoothing: width as a share of the frequency,
 _NARROWEST = 0.4  # and at least so many Hz
 
+Spectra = list[Array]  # of each segment
 
-@dataclass(frozen=True, eq=False)
-class Segment:
+
+class Segment(NamedTuple):
     """One segment's transforms."""
 
     log: int
@@ -61,7 +62,7 @@ def segments_of(columns: Array, period: float, log: int, band: float) -> list[Se
     return out
 
 
-def residual_spectra(segments: Sequence[Segment], powers: Sequence[Array]) -> list[Array]:
+def residual_spectra(segments: Sequence[Segment], powers: Spectra) -> Spectra:
     """Return, for each segment, the spectrum (m, 6) of residuals with given powers (m, 6): smoothed
     over the segments of a log and over frequency, infinite at no power. Segments of a log stand
     together.

@@ -24,7 +24,8 @@ from ...dynamics.vehicle import Vehicle
 from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
 from ...estimator.filter_record import FILTER, fields_between
 from ...estimator.ukf import default_covariance
-from ...runtime.errors import InputError
+from ...runtime.errors import InputError, unknown_name
+from .flights import CONTROLLERS, flight_of
 from .numbers import PRECISIONS, filters
 from .policies import policy_numbers
 
@@ -62,6 +63,7 @@ def export_c(
     policy: Mapping[str, Any] | None = None,
     command: str = "windwrench export-c",
     precision: str = "single",
+    controller: str | None = None,
 ) -> Exported:
     """Return the files of a vehicle's filter for a flight controller.
 
@@ -75,6 +77,7 @@ def export_c(
         command: the command line, for the files' heads.
         precision: one of ``PRECISIONS`` for every number: single (float), or double, for
             processors as fast with double numbers.
+        controller: one of ``CONTROLLERS``, designed for the vehicle, in the flight loop; or None.
 
     Raises:
         InputError: a setting is out of range, an effect is a user's own, or single precision does
@@ -93,14 +96,20 @@ def export_c(
     tuning = UKFTuning.for_vehicle(vehicle, period, rise_time)
     kind, title, header = _FILTERS[estimator]
     made = kind(vehicle, tuning, period, gate, Recovery())
-    flown = None if policy is None else policy_numbers(policy, vehicle, tuning, period)
+    if controller not in (None, *CONTROLLERS):
+        raise unknown_name("controller", str(controller), CONTROLLERS, "--controller")
+    learned = (policy or {}).get("policy")
+    flown = policy_numbers(policy, vehicle, tuning, period) if policy and not learned else None
+    flight = flight_of(vehicle, period, controller, learned) if controller or learned else None
     f = made.record[0]
     names = sorted({str(effect.model) for kind in effects.values() for effect in kind})
     headers = [f"core/{header}.hpp", *(f"core/effects/{name}.hpp" for name in names)]
-    if names:
-        headers.append("core/effects/called.hpp")
-    if flown is not None and flown["kind"] == "tracker":
-        headers.append("core/tracker.hpp")
+    needed = {
+        "effects/called": names,
+        "tracker": flown and flown["kind"] == "tracker",
+        "flight_loop": flight,
+    }
+    headers += [f"core/{name}.hpp" for name, whether in needed.items() if whether]
     room = _room(effects)
     context: dict[str, Any] = {
         "version": __version__,
@@ -112,10 +121,8 @@ def export_c(
         "rate": rate,
         "f": f,
         "filter": made,
-        "body": f["body"],
         "settings": f[list(fields_between("gated", "period"))],
         "first_variances": np.diag(default_covariance(vehicle, tuning)),
-        "hover_speed": f["last_speeds"][0],
         "full_battery": vehicle.voltage_ref,
         "headers": headers,
         "effects": effects,
@@ -124,6 +131,7 @@ def export_c(
         "size": _size(room, PRECISIONS[precision], estimator),
         "steady": _STEADY,
         "policy": flown,
+        "flight": flight,
     }
     environment = Environment(
         loader=PackageLoader("windwrench.live.export_c", "templates"),
@@ -138,6 +146,8 @@ def export_c(
     files["windwrench.cpp"] = _source("live/export_c/source/windwrench.cpp")
     if flown is not None:
         files["policy.hpp"] = _source(f"live/export_c/source/{flown['kind']}.hpp")
+    if flight is not None:
+        files["flight.hpp"] = _source("live/export_c/source/flight.hpp")
     for path in headers:
         _add_header(path, files)
     return Exported(files, made, tuple(e.name for e in vehicle.effects), precision)

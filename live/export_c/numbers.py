@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +13,7 @@ PRECISIONS = {"single": "float", "double": "double"}  # and the type of a number
 _WIDTH = 96  # columns
 
 
-def literal(value: float, precision: str, what: str = "a number") -> str:
+def _literal(value: float, what: str = "a number", precision: str = "single") -> str:
     """Return a number as a literal that reads back exactly, in a precision.
 
     Raises:
@@ -29,29 +30,26 @@ def literal(value: float, precision: str, what: str = "a number") -> str:
     return f"{text}f" if precision == "single" else text
 
 
-def table(values: ArrayLike, precision: str, what: str = "a number") -> str:
+def table(values: ArrayLike, what: str = "a number", precision: str = "single") -> str:
     """Return a number or an array as an initialiser; whole numbers stay whole."""
     array = np.asarray(values)
     if array.dtype.kind in "iu" and array.ndim == 0:
         return str(int(array))
     if array.ndim == 0:
-        return literal(float(array), precision, what)
-    items = [table(item, precision, what) for item in array]
+        return _literal(float(array), what, precision)
+    items = [table(item, what, precision) for item in array]
     if array.ndim > 1:
         return "{" + ",\n    ".join(items) + "}"
     lines = textwrap.wrap(", ".join(items), _WIDTH, break_long_words=False, break_on_hyphens=False)
     return "{" + "\n     ".join(lines) + "}"
 
 
-def shape(values: ArrayLike) -> str:
-    """Return the sizes of an array as a declaration has them."""
-    return "".join(f"[{n}]" for n in np.shape(values))
-
-
-def filters(precision: str) -> dict[str, Callable[..., str]]:
+def filters(precision: str) -> dict[str, Callable[..., object]]:
     """Return the templates' filters for numbers in a precision."""
     return {
-        "literal": lambda value, what="a number": literal(value, precision, what),
-        "table": lambda values, what="a number": table(values, precision, what),
-        "shape": shape,
+        "literal": partial(_literal, precision=precision),
+        "table": partial(table, precision=precision),
+        # as a declaration has them
+        "shape": lambda values: "".join(f"[{n}]" for n in np.shape(values)),
+        "ravelled": np.ravel,
     }

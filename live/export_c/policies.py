@@ -15,7 +15,7 @@ from ...controllers.observation import DECISION_PERIOD, MAX_COMMAND
 from ...controllers.registry import shipped_policies
 from ...controllers.sensor_model import SETTLED, sensor_model
 from ...controllers.tracker import FEW, STOP, TURN, Tracker, nominal
-from ...controllers.trained_policy import TrainedPolicy, cell_of, layers_of, load_policy
+from ...controllers.trained_policy import TrainedPolicy, cell_of, load_policy
 from ...controllers.wrench_lag import ORDER
 from ...dynamics.vehicle import Vehicle
 from ...estimator import UKFTuning
@@ -54,48 +54,34 @@ def exportable_policy(name: str) -> Mapping[str, Any]:
     path = trained.get(name, Path(name))
     policy = load_policy(path)
     if not isinstance(policy, TrainedPolicy):
-        raise InputError(f"--policy {name}: is of {policy.task}; expected one of FanTracking")
+        return {"kind": "flight", "policy": policy}  # the rest is in ``flights``
     if cell_of(policy.weights) is not None:
         raise InputError(
             f"--policy {name}: is recurrent; only policies of dense layers can be exported"
         )
     features = policy.features
-    weights = policy.weights
-    card = policy.card
     summed = next((quantity for quantity in features.frame if QUANTITIES[quantity].summed), None)
     if summed is not None:
         raise InputError(
             f"--policy {name}: sees {summed}, which is not in an estimate by itself; such a policy "
             "cannot be exported"
         )
-    layers = layers_of(weights)
-    matrices = [weights[f"weight{i}"] for i in range(layers)]
-    widths = [features.size, *(len(matrix) for matrix in matrices)]
-    frame = len(features.frame)
     columns = [QUANTITIES[quantity].column for quantity in features.frame]
     return {
         "kind": "dense",
         "title": f"The policy {path.stem}, trained with "
-        f"{card.get('algorithm', 'an unknown algorithm')}.",
+        f"{policy.card.get('algorithm', 'an unknown algorithm')}.",
         "integers": [
-            ("REPEAT", int(card["repeat"]), "decisions that a command is held for"),
+            ("REPEAT", int(policy.card["repeat"]), "decisions that a command is held for"),
             ("HISTORY", features.history, "frames"),
-            ("FRAME", frame, "numbers of a frame"),
-            ("LAYERS", layers, ""),
-            ("WIDEST", max(widths), "layer"),
-            ("RELU", int(card["activation"] == "relu"), "else the hyperbolic tangent"),
-            ("SQUASH", int(card["squash"]), "by a hyperbolic tangent at the end"),
+            ("FRAME", len(columns), "numbers of a frame"),
         ],
-        "lists": [
-            ("PLACES", columns, "of a frame's numbers in an observation"),
-            ("WIDTHS", widths, "of the layers, the input's first"),
-        ],
+        "lists": [("PLACES", columns, "of a frame's numbers in an observation")],
         "numbers": [
             ("SCALES", np.array(features.scale, dtype=float), "of a frame's numbers"),
-            ("WEIGHTS", np.concatenate([m.ravel() for m in matrices]), "row by row"),
-            ("OFFSETS", np.concatenate([weights[f"bias{i}"] for i in range(layers)]), ""),
         ],
-        "size": (1, features.history * frame + 1),
+        "layers": policy,
+        "size": (1, features.history * len(columns) + 1),
     }
 
 

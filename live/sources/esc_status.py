@@ -26,27 +26,16 @@ def add_esc_status(dialect: Any) -> Any:
         msgname = "ESC_STATUS"
         name = "ESC_STATUS"
         fieldnames = ("index", "time_usec", "rpm", "voltage", "current")
-        ordered_fieldnames = ("time_usec", "rpm", "voltage", "current", "index")
         orders = (4, 0, 1, 2, 3)
         lengths = (1, 4, 4, 4, 1)
-        array_lengths = (0, 4, 4, 4, 0)
         crc_extra = CHECKSUM
         unpacker = struct.Struct(_LAYOUT)
-        instance_field = None
-        instance_offset = -1
 
-        def __init__(
-            self, index: int, time_usec: int, rpm: Any, voltage: Any, current: Any
-        ) -> None:
-            super().__init__(NUMBER, "ESC_STATUS")
+        def __init__(self, *values: Any) -> None:
+            super().__init__(NUMBER, self.name)
             self._fieldnames = self.fieldnames
-            self._instance_field = self.instance_field
-            self._instance_offset = self.instance_offset
-            self.index = index
-            self.time_usec = time_usec
-            self.rpm = rpm
-            self.voltage = voltage
-            self.current = current
+            for name, value in zip(self.fieldnames, values, strict=True):
+                setattr(self, name, value)
 
         def pack(self, mav: Any, force_mavlink1: bool = False) -> Any:
             """Return the message's bytes."""

@@ -132,7 +132,7 @@ class Datagrams(Link):
             self.opened.sendto(data, self.peer)
 
 
-class SerialPort(Link):
+class _SerialPort(Link):
     """A link by a serial port, opened with pyserial."""
 
     def __init__(self, address: Address, baud: int) -> None:
@@ -184,4 +184,4 @@ def make_link(address: Address, baud: int) -> Link:
         )
     if not os.path.exists(address.path):
         raise InputError(f"{address.text}: no such port {address.path}")
-    return SerialPort(address, baud)
+    return _SerialPort(address, baud)

@@ -35,20 +35,19 @@ def send_wrench(mav: Any, output: Output, vehicle: Vehicle, plotted: bool) -> No
     force, torque = output.wrench.reshape(2, 3) * HALF_TURN
     microseconds = max(round(1e6 * output.t), 0)
     data = [*force, *torque, *output.std, output.estimate.nis, output.estimate.status_code]
-    padded = [float(x) for x in data] + [0.0] * (58 - len(data))
-    mav.debug_float_array_send(microseconds, b"wrench", 1, padded)
+    mav.debug_float_array_send(microseconds, b"wrench", 1, data + [0.0] * (58 - len(data)))
     if not plotted:
         return
     milliseconds = (microseconds // 1000) % WRAP
     for name, values in (("force", force), ("torque", torque)):
         for axis, value in zip("ned", values, strict=True):
-            mav.named_value_float_send(milliseconds, f"{name}_{axis}".encode(), float(value))
+            mav.named_value_float_send(milliseconds, f"{name}_{axis}".encode(), value)
     wind = _wind(vehicle, output)
     if wind is not None:
         velocity, std = wind
         north, east = (velocity * HALF_TURN[:2]).tolist()
-        horizontal = float(math.hypot(*std) / math.sqrt(2.0))
-        height = float(output.estimate.position[2])
+        horizontal = math.hypot(*std) / math.sqrt(2.0)
+        height = output.estimate.position[2]
         mav.wind_cov_send(microseconds, north, east, -0.0, horizontal, 0.0, height, horizontal, 0.0)
 
 
@@ -61,15 +60,13 @@ def _wind(vehicle: Vehicle, output: Output) -> tuple[Array, Array] | None:
     if not np.all(still[:2] > 0.0):
         return None
     R = matrix_of(output.estimate.quaternion)
-    total = float(np.sum(output.row.rotor_speeds))
+    total = np.sum(output.row.rotor_speeds)
     drag = (total * (R * still) @ R.T)[:2, :2]
-    level = total * float(np.min(still[:2]))
-    if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
+    level = total * np.min(still[:2])
+    if not level > 0.0 or np.linalg.eigvalsh(drag)[0] < _TILTED * level:
         return None
     inverse = np.linalg.inv(drag)
-    noise = output.estimate.covariance[
-        15:17, 15:17
-    ]  # the force's noise; the vehicle's uncertainty comes on top
-    force = noise + np.diag(output.std[:2] ** 2 - np.diag(noise))
+    force = output.estimate.covariance[15:17, 15:17].copy()
+    np.fill_diagonal(force, output.std[:2] ** 2)  # noise and the vehicle's uncertainty
     covariance = inverse @ force @ inverse.T
     return inverse @ output.estimate.force[:2], np.sqrt(np.diagonal(covariance))

@@ -97,13 +97,12 @@ class MessageReader:
         """Take a pose in north, east, down, if its kind is read."""
         if not self._chosen(sample.kind, sample.arrival):
             return False
-        turn = np.array(quaternion, dtype=np.float64)
+        turn = np.array(quaternion)
         length = float(np.linalg.norm(turn))
         if not abs(length - 1.0) <= NORM_TOLERANCE:
             raise Malformed("no quaternion")
-        position = np.array((m.x, m.y, m.z), dtype=np.float64)
         # world and body each turn about their own x axis: a quaternion's vector like a position
-        sample.position = position * HALF_TURN
+        sample.position = np.array([m.x, m.y, m.z]) * HALF_TURN
         sample.quaternion = turn / length * np.append(1.0, HALF_TURN)
         return True
 
@@ -128,8 +127,8 @@ class MessageReader:
 
     def _take_attitude(self, m: Any, sample: Measurement) -> bool:
         """Keep an attitude for positions without one."""
-        quaternion = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
-        rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
+        quaternion = np.array([m.q1, m.q2, m.q3, m.q4])
+        rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed])
         good = abs(float(np.linalg.norm(quaternion)) - 1.0) <= NORM_TOLERANCE
         if not (good and np.isfinite(rates).all()):
             raise Malformed("no attitude")
@@ -139,9 +138,9 @@ class MessageReader:
 
     def _imu(self, m: Any, sample: Measurement) -> bool:
         if m.fields_updated & _GYRO:
-            sample.gyro = np.array([m.xgyro, m.ygyro, m.zgyro], dtype=np.float64) * HALF_TURN
+            sample.gyro = np.array([m.xgyro, m.ygyro, m.zgyro]) * HALF_TURN
         if m.fields_updated & _ACCELEROMETER:
-            sample.accelerometer = np.array([m.xacc, m.yacc, m.zacc], dtype=np.float64) * HALF_TURN
+            sample.accelerometer = np.array([m.xacc, m.yacc, m.zacc]) * HALF_TURN
         return True
 
     def _rpm(self, m: Any, sample: Measurement) -> bool:
@@ -161,7 +160,7 @@ class MessageReader:
         raw = _motors(values)
         curve = self._vehicle.motor_curve
         low, high = (0.0, 1.0) if curve is None else curve.command
-        if high <= _LARGEST_SHARE < float(np.max(raw)):
+        if high <= _LARGEST_SHARE < np.max(raw):
             low, high = _PULSES
         sample.command = np.clip((raw - low) / (high - low), 0.0, 1.0)
         return True
@@ -178,4 +177,4 @@ class MessageReader:
 
 def _motors(values: Any) -> Array:
     """Return the values of motors 1 to 4 in the order of the kit's rotors."""
-    return np.abs(np.array([values[i] for i in _ORDER], dtype=np.float64))
+    return np.abs([values[i] for i in _ORDER])

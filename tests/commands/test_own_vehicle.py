@@ -1,5 +1,5 @@
-"""A vehicle file that ``identify`` writes from measured flights, through every command that takes a
-vehicle.
+"""A vehicle file that ``identify`` writes from measured flights, through commands that take a
+vehicle; ``train`` and ``export-c`` take one in ``test_examples``.
 """
 
 import json
@@ -14,14 +14,6 @@ from tests.support.data_paths import excerpt
 from windwrench.dynamics import load_vehicle
 
 FLIGHTS = ("B2_circle_fast_rep3", "B5_helix_fast_rep2")
-TASK = """
-from windwrench.envs import WindHoverEnv
-
-class Mine(WindHoverEnv):
-    vehicle, action, observation = "mine.yaml", "rates", "wrench"
-"""
-STEPS = 64  # of a training: one batch
-
 pytestmark = pytest.mark.measured
 
 
@@ -74,17 +66,3 @@ def test_it_flies_every_task(mine, call):
     words = ("--vehicle", mine, "--task", "WindHover", "--controller", "lqg")
     code, _, err = call("fly", *words, "--out", "flight")
     assert code == 0, err
-
-
-def test_it_is_trained(mine, call, tmp_path):
-    pytest.importorskip("stable_baselines3", reason="torch and SB3 are an extra")
-    (tmp_path / "mine.py").write_text(TASK)
-    words = ("--task", "mine.py:Mine", "--steps", STEPS, "--out", "trained")
-    code, _, err = call("train", "ppo", *words)
-    assert code == 0, err
-
-
-def test_it_is_exported(mine, call, tmp_path):
-    code, _, err = call("export-c", "--vehicle", mine, "--out", "c")
-    assert code == 0, err
-    assert (tmp_path / "c" / "windwrench_numbers.hpp").exists()

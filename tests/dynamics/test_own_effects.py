@@ -37,13 +37,6 @@ from windwrench.identification.wrench_series import estimate_log
 HEADERS = Path(effects.__file__).parents[2] / "core/effects"
 
 
-def body_drag(c, vehicle, state, wrench):
-    u = (state.velocity - state.wind) @ state.rotation
-    force = -(c[:3] + c[3:6] * np.linalg.norm(u)) * u
-    wrench.force += state.rotation @ force
-    wrench.torque -= np.cross(vehicle.com, force)
-
-
 def motor_lag(c, vehicle, rotors, memory):
     started = memory[0] > 0.0
     memory[1:5] += (1.0 - math.exp(-rotors.step / c[0]) if started else 1.0) * (
@@ -87,7 +80,6 @@ def advance(c, vehicle, state, rotors):
 
 
 CALLS = {  # the arrays after coefficients and vehicle, and the effect's own Python functions
-    "body_drag": (STATE_SIZE, 6, body_drag, None),
     "motor_lag": (ROTORS_SIZE, MEMORY, motor_lag, None),
     "marker_offset": (SAMPLE_SIZE, MEMORY, marker_offset, None),
     "slung_payload": (STATE_SIZE, 6, slung_payload, advance),

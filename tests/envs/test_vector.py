@@ -12,14 +12,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
-from tests.support.vector_flights import fly, make
+from tests.support.vector_flights import TASKS, fly, make
 from windwrench import _core
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names
-from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.dynamics.vehicle import EffectSetting, Uncertainty
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import SUBSTEPS, TICK, PlantSettings, load_world
-from windwrench.envs.scenarios import SCENARIOS
+from windwrench.envs.scenarios import SCENARIOS, draw_vehicle
 
 WIDTH = _core.LoopBlocks.lanes
 
@@ -228,6 +228,21 @@ def test_every_effect_flies_in_lanes_as_in_mujoco(name):
         fly(envs, 4)
     ours, theirs = (envs.state.rows for envs in states)
     assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_true_vehicle_is_drawn_anew_by_its_uncertainty(task):
+    known = replace(
+        load_vehicle("ardrone2"), uncertainty=Uncertainty(0.1, 0.1, 0.02, 0.1, 0.1, 0.1)
+    )
+    given = {"task": task, "vehicle": known, "randomise": "vehicle", "max_episode_steps": 2}
+    lanes, mujoco = (make(2, plant, **given) for plant in ("lanes", "mujoco"))
+    assert_allclose(fly(lanes, 5), fly(mujoco, 5), rtol=1e-7, atol=1e-7)
+    assert len({known.mass, *(loop.true.mass for loop in mujoco.loops)}) == 3
+    drawn = [np.log(draw_vehicle(known, default_rng(seed)).k) for seed in range(300)]
+    assert_allclose(np.std(drawn, axis=0), np.hypot(0.1, 0.02), rtol=0.1)
+    with refused("an uncertainty in the vehicle's file"):
+        make(1, task=task, vehicle=replace(known, uncertainty=Uncertainty()), randomise="vehicle")
 
 
 def test_lanes_refuse_effects_in_python_and_other_precisions(tmp_path):

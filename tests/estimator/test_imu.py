@@ -83,34 +83,28 @@ def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(vehicl
     record, address = f.record[0], f.record.ctypes.data
     point = np.zeros(20)
     start = x[KIT_ORDER]
-    out = np.zeros((2, 6))
-    H = np.zeros((6, 24))
-    columns = 1e-6 * np.eye(18)
-    for j in range(18):
-        for s, sign in enumerate((1.0, -1.0)):
-            point[KIT_ORDER] = displaced(start, sign * columns[j])
-            _core.expected_imu(address, point, out[s])
-        H[:, j] = (out[0] - out[1]) / 2e-6
-    H[:, 18:] = np.eye(6)
-    _core.expected_imu(address, x, out[0])
+
+    def expected_at(error):
+        out = np.zeros(6)
+        point[KIT_ORDER] = displaced(start, error)
+        _core.expected_imu(address, point, out)
+        return out
+
+    slopes = [(expected_at(e) - expected_at(-e)) / 2e-6 for e in 1e-6 * np.eye(18)]
+    H = np.vstack([*slopes, np.eye(6)]).T
     # the noise of a step: torque n_m and thrust n_c in body axes, through centre of mass and mass
-    R = record["centre_rotation"].copy()
-    com = vehicle.com
-    GQ = np.zeros((24, 6))
-    DQ = np.zeros((6, 6))
-    for n in range(3):
-        alpha = inv(vehicle.inertia)[:, n] * tuning.motor_torque_noise
-        centre = np.cross(com, alpha)
-        GQ[3:6, n] = period * alpha
-        DQ[3:6, n] = centre
-        GQ[9:12, n], GQ[6:9, n] = period * R @ centre, period**2 / 2 * R @ centre
-        push = np.eye(3)[n] * tuning.thrust_noise / vehicle.mass
-        GQ[9:12, 3 + n], GQ[6:9, 3 + n] = period * R @ push, period**2 / 2 * R @ push
-        DQ[3:6, 3 + n] = push
+    alpha = tuning.motor_torque_noise * inv(vehicle.inertia)
+    push = tuning.thrust_noise / vehicle.mass * np.eye(3)
+    felt = np.hstack([np.cross(vehicle.com, alpha.T).T, push])
+    moved = period * record["centre_rotation"] @ felt
+    none = np.zeros((3, 6))
+    turned = np.hstack([period * alpha, np.zeros((3, 3))])
+    GQ = np.vstack([none, turned, period / 2 * moved, moved, np.zeros((12, 6))])
+    DQ = np.vstack([none, felt])
     noise = np.repeat([tuning.gyro_noise**2, tuning.accelerometer_noise**2], 3)
     cross = P @ H.T + GQ @ DQ.T
-    S = H @ P @ H.T + H @ GQ @ DQ.T + (H @ GQ @ DQ.T).T + DQ @ DQ.T + np.diag(noise)
-    innovation = z - out[0] - b
+    S = H @ cross + DQ @ (H @ GQ + DQ).T + np.diag(noise)
+    innovation = z - expected_at(np.zeros(18)) - b
     expected = cross @ solve(S, innovation)
 
     after = f.correct_imu(flight.gyro[40], flight.accelerometer[40])

@@ -13,9 +13,9 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c.hostile import KINDS, befall
+from tests.support.flown import noisy
 from tests.support.parameters import mostly_slow
 from tests.support.sizes import rms
-from windwrench import _core
 from windwrench.dynamics import load_vehicle
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 
@@ -67,23 +67,15 @@ class Flight:
     def feed(self, speeds, position, quaternion, dt):
         """Step the estimator and check what it says."""
         self.estimator.predict(speeds, dt)
-        if self.noise > 0.0:
-            position, quaternion = self.noisy(position, quaternion)
+        if self.noise > 0.0 and np.isfinite(quaternion).all():
+            given = self.rng, position, quaternion, self.noise, self.noise
+            position, quaternion = noisy(self.vehicle.mocap, *given)
         estimate = self.estimator.correct(position, quaternion)
         if self.imu:
             gravity = [0.0, 0.0, self.vehicle.gravity]
             estimate = self.estimator.correct_imu([0.0, 0.0, 0.0], gravity)
         self.check(estimate)
         return estimate
-
-    def noisy(self, position, quaternion):
-        """Return a pose with noise."""
-        mocap = self.vehicle.mocap
-        moved, turned = self.noise * self.rng.standard_normal((2, 3))
-        turn = np.array([1.0, *(0.5 * mocap.sigma_att_rad * turned)])
-        seen = np.empty(4)
-        _core.multiply(turn, np.array(quaternion), seen)
-        return position + mocap.sigma_pos_m * moved, seen / norm(seen)
 
     def check(self, estimate):
         """Numbers are finite and the covariance is one."""
@@ -363,9 +355,8 @@ def test_rates_do_not_run_away_where_positions_alone_are_measured():
     vehicle = VEHICLES["crazyflie"]
     for seed in range(5):
         rng = default_rng(seed)
-        position = [0.0, 0.0, HEIGHT] + 0.001 * rng.standard_normal((177, 3))
-        turns = np.column_stack([np.ones(177), 0.0025 * rng.standard_normal((177, 3))])
-        turns /= norm(turns, axis=1, keepdims=True)
+        rows = np.tile([0.0, 0.0, HEIGHT], (177, 1)), np.tile(STILL, (177, 1))
+        position, turns = noisy(vehicle.mocap, rng, *rows, 2.0)
         poses = [
             (x, q if k < 127 else None)
             for k, (x, q) in enumerate(zip(position, turns, strict=True))
@@ -413,14 +404,11 @@ def noisy_hover(kind, vehicle, dt, gate, noise, seconds, lost=(0.0, 0.0), seed=0
     """
     vehicle = VEHICLES[vehicle]
     rng = default_rng(seed)
-    mocap = vehicle.mocap
     estimator = FILTERS[kind](vehicle, period=dt, gate=gate)
     estimator.reset([0.0, 0.0, HEIGHT], STILL)
     for k in range(round(seconds / dt)):
-        position = [0.0, 0.0, HEIGHT] + noise[1] * mocap.sigma_pos_m * rng.standard_normal(3)
-        turn = 0.5 * noise[0] * mocap.sigma_att_rad * rng.standard_normal(3)
-        q = np.array([1.0, *turn]) / np.sqrt(1.0 + turn @ turn)
-        pose = (None, None) if lost[0] <= k * dt < lost[1] else (position, q)
+        pose = noisy(vehicle.mocap, rng, [0.0, 0.0, HEIGHT], STILL, *noise[::-1])
+        pose = (None, None) if lost[0] <= k * dt < lost[1] else pose
         yield estimator.step(np.full(4, vehicle.hover_rate), *pose)
 
 

@@ -111,14 +111,6 @@ def test_asynchronous_measurements_agree_with_regular_ones():
     assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
 
 
-def one_step(record, x, speeds):
-    """Return the state (20,) a step after ``x`` and the Jacobian (12, 18)."""
-    after, A = np.zeros(20), np.zeros((12, 18))
-    _core.drive(record.ctypes.data, speeds, PERIOD, 11.1)
-    _core.move(record.ctypes.data, x, PERIOD, after, A)
-    return after, A
-
-
 @pytest.mark.parametrize(
     "vehicle",
     [
@@ -142,20 +134,21 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
     x[7:10], x[10:13] = rng.standard_normal(3), rate * rng.standard_normal(3)
     x[13:16], x[16:19] = 0.05 * rng.standard_normal(3), rng.standard_normal(3)
     speeds = np.array([350.0, 380.0, 360.0, 400.0])
-    numeric = np.empty((18, 18))
-    size = 1e-5
     start = x[KIT_ORDER]
 
     def stepped(error):
+        after, A = np.zeros(20), np.zeros((12, 18))
         x[KIT_ORDER] = displaced(start, error)
-        after, A = one_step(record, x, speeds)
+        _core.drive(record.ctypes.data, speeds, PERIOD, 11.1)
+        _core.move(record.ctypes.data, x, PERIOD, after, A)
         return after[KIT_ORDER], A
 
     centre, A = stepped(np.zeros(18))
     F = np.eye(18)
     F[:12] += A
-    for n in range(18):
-        high, low = (stepped(s * size * np.eye(18)[n])[0] for s in (1.0, -1.0))
-        numeric[:, n] = (difference(high, centre) - difference(low, centre)) / (2 * size)
+    moved = [
+        difference(stepped(e)[0], centre) - difference(stepped(-e)[0], centre)
+        for e in 1e-5 * np.eye(18)
+    ]
     assert np.abs(A).max() > 1
-    assert np.allclose(F, numeric, rtol=0, atol=1e-8)
+    assert np.allclose(F, np.transpose(moved) / 2e-5, rtol=0, atol=1e-8)

@@ -63,11 +63,13 @@ def test_a_figure_without_a_source_and_a_wrong_one_are_seen():
 
 
 def test_a_quote_of_a_row_that_is_not_there_is_refused(tmp_path):
-    value = {"from": "docs/results/leaderboard.json", "where": {"controller": "none"}, "key": "x"}
-    listed = {
-        "quotes": {"README.md": [{"says": "{}", "values": [value]}]},
-        "not results": {},
+    value = {
+        "from": "docs/results/tasks/felt_wrench.json",
+        "where_in": "rows",
+        "where": {"kind": "none"},
+        "key": "x",
     }
+    listed = {"quotes": {"README.md": [{"says": "{}", "values": [value]}]}, "not results": {}}
     path = tmp_path / "quotes.yaml"
     path.write_text(json.dumps(listed), encoding="utf-8")
     with pytest.raises(LookupError, match="0 rows with"):

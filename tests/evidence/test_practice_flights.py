@@ -13,9 +13,9 @@ from tests.support.sizes import rms
 from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import check_setting, get, names
+from windwrench.evidence.residual_wrench import residual_wrench
 from windwrench.evidence.trials.outsiders import HELD_BACK, OUTSIDERS
 from windwrench.evidence.trials.practice_flights import SIZES, draw_effect, fly_practice
-from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
 

@@ -1,6 +1,6 @@
 """The benchmark measures what it says; how fast the kit is belongs to benchmarks, not to tests."""
 
-from windwrench.evidence.speed import BEGIN, END, SECONDS, Contender, filters, rows, study
+from windwrench.evidence.speed import BEGIN, END, HEADER, SECONDS, Contender, filters, rows, study
 
 
 def test_medians_and_ratios_are_taken_round_by_round():
@@ -17,7 +17,8 @@ def test_a_page_gets_the_table_anew(tmp_path):
     page.write_text(f"before\n{BEGIN}old\n{END}\nafter\n", encoding="utf-8")
     study(["filters"], 1, page)
     text = page.read_text(encoding="utf-8")
-    assert text.startswith(f"before\n{BEGIN}Made by `python -m evidence.speed filters --rounds 1`")
+    assert text.startswith(f"before\n{BEGIN}{HEADER}\n")
+    assert "\nMade by `python -m evidence.speed filters --rounds 1`" in text
     assert text.endswith(f"\n{END}\nafter\n")
     assert all(f"| {one.name} | " in text for one in filters())
     assert "old" not in text

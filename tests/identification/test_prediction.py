@@ -16,16 +16,15 @@ from tests.support.outcomes import refused
 from tests.support.sizes import rms
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.plant import PlantSettings
+from windwrench.evidence.residual_wrench import residual_wrench
 from windwrench.identification import predict
 from windwrench.identification.causal_states import causal_states
-from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
 from windwrench.identification.prediction import (
     errors_of_models,
     nis_without_wrench_state,
-    prediction_errors,
     rollout_error,
 )
 
@@ -234,10 +233,10 @@ def test_only_whole_predictions_inside_a_segment_count(clean):
 def test_errors_of_predictions_are_those_of_the_motion():
     """In hover 0.04 kg too little is g dm / m of acceleration, and nothing changes."""
     log = fly("hover", 12.0, mass={"dm": 0.04})
-    found = prediction_errors([log, log], VEHICLE, 0.5, [[(2.0, 11.0)], [(2.0, math.inf)]])
+    (found,) = errors_of_models([log, log], [VEHICLE], 0.5, [[(2.0, 11.0)], [(2.0, 99.0)]])
     fall = VEHICLE.gravity * 0.04 / VEHICLE.mass
     assert found.horizon[[0, -1]] == pytest.approx([0.005, 0.5])
-    assert found.starts == 35 + 38  # up to 10.5 s, and to 0.6 s before the end
+    assert found.starts == 73  # 35 and 38, up to 10.5 s, and to 0.6 s before the end
     position, velocity, attitude, _ = found.model
     assert velocity[-1] == pytest.approx(0.5 * fall, rel=0.1)
     assert position[-1] == pytest.approx(0.125 * fall, rel=0.1)
@@ -251,11 +250,11 @@ def test_a_turn_at_one_rate_is_no_change():
     half = 0.4 * t
     turned = np.column_stack([np.cos(half), 0.0 * t, 0.0 * t, np.sin(half)])
     log = resting(t, position=np.outer(t, [1.0, -0.5, 0.2]), quaternion=turned)
-    found = prediction_errors([log], VEHICLE)
+    (found,) = errors_of_models([log], [VEHICLE])
     assert (found.still < 2e-3).all()
     assert (found.model < 2e-3).all()
     with refused(r"flight: expected a pose, unbroken for 4 s"):
-        prediction_errors([replace(log, name="flight")], VEHICLE, 3.0, [[(0.0, 2.0)]])
+        errors_of_models([replace(log, name="flight")], [VEHICLE], 3.0, [[(0.0, 2.0)]])
 
 
 def test_models_are_compared_from_the_same_starts(clean):

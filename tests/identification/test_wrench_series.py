@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from tests.support.flown import without_pose
+from tests.support.flown import noisy, without_pose
 from tests.support.imu_flights import imu_flight, pose_removed
 from tests.support.outcomes import refused
 from tests.support.vehicles import VEHICLE
@@ -49,9 +49,8 @@ def held_flight(t, lift=0.3, lost=None):
     rng = default_rng(0)
     count = len(t)
     speed = VEHICLE.hover_rate * np.sqrt(1 - lift / VEHICLE.weight)
-    position = np.array([0.5, -0.5, 1.0]) + VEHICLE.mocap.sigma_pos_m * rng.normal(size=(count, 3))
-    turn = 0.5 * VEHICLE.mocap.sigma_att_rad * rng.normal(size=(count, 3))
-    quaternion = np.column_stack([np.sqrt(1 - np.sum(turn**2, axis=1)), turn])
+    pose = np.tile([0.5, -0.5, 1.0], (count, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    position, quaternion = noisy(VEHICLE.mocap, rng, *pose)
     valid = np.ones(count, dtype=bool)
     if lost is not None:
         valid[lost] = False

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from ctypes import create_string_buffer
 from dataclasses import replace
 
 import numpy as np
@@ -26,19 +27,26 @@ from tests.support.exported_c.compiled import (
 )
 from tests.support.exported_c.flights import flight, vehicle_of
 from tests.support.exported_c.hostile import PERIOD, hostile
+from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
 from tests.support.paths import ROOT
 from tests.support.synthetic_wrench import TICKS, observations
 from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Tracker
+from windwrench.controllers.lqg import LQG
 from windwrench.controllers.observation import FORCE_X, TORQUE_Z, VELOCITY_Y
-from windwrench.controllers.trained_policy import load_policy
+from windwrench.controllers.trained_policy import TaskPolicy, load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names, parse_setting
+from windwrench.envs.closed_loop import Stage
+from windwrench.envs.vector import SETTLE_TICKS
+from windwrench.envs.wind_tasks import WindTrajectoryEnv
 from windwrench.estimator import UKFTuning
+from windwrench.evaluation.episodes import fly_episode
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.policies import PARTICLES, briefing_of
 from windwrench.runtime.errors import InputError
+from windwrench.training.run import flight_of
 
 LARGEST = 0.01  # of a standard deviation
 TURNING = "ardrone2, turning"
@@ -210,6 +218,59 @@ def test_the_law_with_lead(tmp_path):
     x = torque / np.maximum(force, 0.183)
     wanted = np.clip(-(11.35 * x + 2.79 * np.diff(x, prepend=x[0]) / 0.08), -1.0, 1.0)
     assert_allclose(commands(c, seen), wanted, rtol=0, atol=1e-5)
+
+
+class Rates(WindTrajectoryEnv):
+    action, observation, normalize = "rates", "all", True
+
+
+def test_laws_in_c_command_the_rotors_as_in_the_simulator(tmp_path):
+    """Beside the simulator's own flight loop, by whose commands the vehicle flies."""
+    vehicle = declaring(load_vehicle("crazyflie"), "motor_lag", "rotor_drag")
+    rates = Rates(vehicle=vehicle)
+    ones = np.ones(len(rates.kept))
+    card = {"task": "", "activation": "tanh", "squash": False, "scale": ones, "largest": 1.0}
+    weights = {"weight0": 0.1 * np.sin(np.arange(4)[:, None] + ones.cumsum()), "bias0": np.zeros(4)}
+    policy = TaskPolicy(card | {"flight": flight_of(rates)}, weights)
+    given = {"kind": "flight", "policy": policy}
+    exported = export_c(
+        rates.declared, "ukf", 200.0, 0.45, None, given, precision="double", controller="lqg"
+    )
+    c, apart, noise = CompiledFilter(exported, tmp_path), [], np.zeros(3)
+    pilot_memory = create_string_buffer(1 << 14)
+
+    def begin_flight(loop):
+        if loop.ticks == -SETTLE_TICKS:
+            c.reset(loop.sample[4:7], loop.sample[7:])
+            c.c.ww_flight_init(pilot_memory)
+
+    def compared(loop):
+        c.predict(loop.sample[:4], 0.005)
+        c.correct(loop.sample[4:7], loop.sample[7:])
+        record = loop.record[0]
+        felt = record["plant"]["rotation"].T @ loop.world.xfrc[:3] / vehicle.mass
+        felt += record["accelerometer_bias"] + record["accelerometer_sigma"] * noise
+        noise[:] = loop.noise[loop.row, -3:]  # of this tick: the next step tells of it
+        reference = env.many.episodes.references[0, max(loop.ticks, 0)]
+        now, out = (loop.ticks >= 0) * (1 + (env.action == "rates")), c._array(np.zeros(4))
+        given = c._array(reference), c._array(felt), out
+        assert c.c.ww_fly(pilot_memory, c.memory, now, *given) == 0
+        apart.append(abs(np.array(out) - loop.command).max())
+
+    stages = [Stage("begin", begin_flight, "sense"), Stage("compared", compared, "actuate")]
+    for kind, pilot in ((WindTrajectoryEnv, LQG(vehicle=vehicle)), (Rates, policy)):
+        env = kind(vehicle=vehicle, stages=stages)
+        fly_episode(env, pilot, 3, decisions=20)
+        assert max(apart) < 0.01  # rad/s: actions are of single precision there
+        assert len(apart) == SETTLE_TICKS + 20 * 8
+        apart.clear()
+
+
+def test_policies_that_no_flight_loop_knows_are_refused():
+    with refused("expected one of FanTracking, or one of dense"):
+        export_c(
+            VEHICLE, policy=exportable_policy(str(POLICY.parent / "tasks/WindHover-gru-0.npz"))
+        )
 
 
 def test_the_example_finds_the_force_that_it_is_given(tmp_path):

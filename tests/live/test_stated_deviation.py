@@ -1,20 +1,19 @@
-"""One stated deviation wherever an estimate is told: filters, batches, logs, streams and C.
+"""The stated deviation of filters and of the smoother holds for vehicles that are drawn from their
+stated uncertainty, and a stream says that of a log.
 
-It holds for vehicles that are drawn from their stated uncertainty.
+``test_ukf_batch.py`` holds a batch to the filter, ``test_export_c.py`` C, and
+``test_wrench_series.py`` a log.
 """
-
-from functools import partial
 
 import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
-from tests.support.exported_c.compiled import CompiledFilter, begin, needs, take
+from tests.support.exported_c.compiled import begin, take
 from tests.support.model_flights import drawn
 from tests.support.vehicles import VEHICLE
 from windwrench.envs.recording import record_flight
-from windwrench.estimator import WrenchUKFBatch
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.live.export_c import ESTIMATORS, export_c
@@ -54,16 +53,7 @@ def by_filter(one, flown):
     return out
 
 
-def by_batch(flights):
-    batch = WrenchUKFBatch(VEHICLE, COUNT, gate=0.9999)
-    samples = [np.stack([flown[name] for flown in flights], axis=1) for name in SAMPLE]
-    batch.reset(samples[1][0], samples[2][0])
-    out = [told(batch.estimate)]
-    out += [told(batch.step(*(part[k] for part in samples))) for k in range(1, STEPS)]
-    return np.stack(out, axis=1)
-
-
-def by_stream(flown, commanded=False):
+def by_stream(flown, commanded):
     live = LiveFilter(VEHICLE, Tallies())
     rows = (
         Row(flown["t"][k], 0, commanded=commanded, **{name: flown[name][k] for name in SAMPLE})
@@ -73,38 +63,20 @@ def by_stream(flown, commanded=False):
     return np.array([[*np.roll(o.wrench, 3), *np.roll(o.std, 3)] for o in outputs])
 
 
-def by_log(flown, smooth):
+def log_of(flown, **fields):
     columns = {name: flown[name][:STEPS] for name in ("t", *SAMPLE)}
-    log = FlightLog(**columns, name="flight", source="flight")
-    return told(estimate_log(log, VEHICLE, smooth=smooth))
+    return FlightLog(**columns, name="flight", source="flight", **fields)
 
 
-def of_each(way):
-    return lambda flights: [way(flown) for flown in flights]
-
-
-def of_filter(kind, compiled, folder):
-    exported = export_c(VEHICLE, kind)
-    one = CompiledFilter(exported, folder) if compiled else exported.filter
-    return of_each(partial(by_filter, one))
-
-
-WAYS = {
-    **{kind: partial(of_filter, kind, False) for kind in ESTIMATORS},
-    **{f"{kind} in C": partial(of_filter, kind, True) for kind in ESTIMATORS},
-    "batch": lambda folder: by_batch,
-    "stream": lambda folder: of_each(by_stream),
-    "log": lambda folder: of_each(partial(by_log, smooth=False)),
-    "smoothed": lambda folder: of_each(partial(by_log, smooth=True)),
-}
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_errors_of_drawn_vehicles_are_as_large_as_it_says(way, flights, tmp_path):
+@pytest.mark.parametrize("way", [*ESTIMATORS, "smoothed"])
+def test_errors_of_drawn_vehicles_are_as_large_as_it_says(way, flights):
     """Turbulence is no random walk: of 80 vehicles the mean squares are 0.55 and 0.63, not 1."""
-    if way.endswith("in C"):
-        needs("gcc")
-    found = np.array(WAYS[way](tmp_path)(flights))[:, LOOKED_AT]
+    if way == "smoothed":
+        found = [told(estimate_log(log_of(flown), VEHICLE, smooth=True)) for flown in flights]
+    else:
+        one = export_c(VEHICLE, way).filter
+        found = [by_filter(one, flown) for flown in flights]
+    found = np.array(found)[:, LOOKED_AT]
     true = np.array([np.hstack([flown[name] for name in WRENCH])[LOOKED_AT] for flown in flights])
     z = (found[..., :6] - true) / found[..., 6:]
     torque = np.mean(z[..., :3] ** 2)
@@ -118,8 +90,7 @@ def test_errors_of_drawn_vehicles_are_as_large_as_it_says(way, flights, tmp_path
 @pytest.mark.parametrize("commanded", [False, True])
 def test_a_stream_says_what_a_log_says(flights, commanded):
     """Rotor speeds of commands are known less well."""
-    columns = {name: flights[0][name][:STEPS] for name in ("t", *SAMPLE)}
-    log = FlightLog(**columns, name="flight", source="flight", commanded=commanded)
+    log = log_of(flights[0], commanded=commanded)
     stream = by_stream(flights[0], commanded)
     assert_allclose(stream[1:], told(estimate_log(log, VEHICLE))[1:], rtol=1e-9)
     assert (stream[-1, 11] > 0.1 * VEHICLE.weight) == commanded

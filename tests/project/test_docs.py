@@ -29,7 +29,7 @@ from windwrench.cli import app
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 DRY_RUN = "<!-- dry run -->"
 NOT_CODE = {"", "text", "yaml"}
-QUICK = {"effects.md", "estimator.md", "index.md", "own-task.md"}  # the others fly for long
+QUICK = {"effects.md", "estimator.md", "index.md", "tasks.md"}  # the others fly for long
 
 
 def blocks(page):
@@ -92,12 +92,11 @@ def run_shell(content, environment, dry, where):
 
 def prepare(page, folder):
     """Put there what a page takes for given: logs of others, and a law of the reader's."""
-    if page.name in ("cite.md", "leaderboard.md"):
+    if page.name == "leaderboard.md":
         law = "class MyLaw:\n    def __call__(self, observation, info):\n        return [0.0] * 3\n"
         (folder / "my_law.py").write_text(law)
     if page.name == "diagnose.md":
         from tests.support.converted_flights import write_bag, write_ulog
-        from windwrench.cli import app
         from windwrench.identification.logs.reading import read_log
 
         drag = ("--effect", "rotor_drag:kdx=1.2e-4,kdy=1.2e-4", "--seconds", "40", "--seed", "1")
@@ -112,7 +111,9 @@ def prepare(page, folder):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             kept = ROOT / "training" / "policies" / f"sac-0{ending}"
             shutil.copy(kept, folder / f"{name}{ending}")
-    for name in re.findall(r"\bB\d\w+\.csv\b", page.read_text(encoding="utf-8")):
+    if page.name == "own-vehicle.md":
+        shutil.copytree(ROOT / "examples", folder, dirs_exist_ok=True)
+    for name in {*re.findall(r"\b(?:B\d\w+\.csv|log1\d)\b", page.read_text(encoding="utf-8"))}:
         found = next(iter(DATA.rglob(name)), None)
         if found is None:
             pytest.skip(f"{page.name} reads the measured flight {name}, which is not here")

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from tests.live.stream import flight, standard_input
+from tests.support.data_paths import data_file
+from tests.support.exported_c.compiled import needs
 from tests.support.fake_vehicles import install_cflib, install_rclpy
 from tests.support.own_effects import joined
 from tests.support.paths import ROOT
@@ -51,6 +53,16 @@ def test_stable_baselines3_trains_on_the_plain_environment(example):
     found = example("sb3_ten_lines").main(steps=60, episodes=1)
     assert all(0.0 < reward <= 250.0 for reward in found.values())
     assert found["learned"] != found["hover"]
+
+
+@pytest.mark.measured
+def test_a_log_becomes_a_vehicle_and_two_controllers_in_c(example):
+    pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
+    needs("g++")
+    logs, parts = data_file("crazyflie_imu/log15").parent, "log15:20-40,log16:15.1-21.1"
+    found = example("own_vehicle").main(logs, 64, episodes=1, aboard=1, parts=parts)
+    assert found["lqg in C"] < 0.3
+    assert found["policy in C"] == pytest.approx(found["policy"], rel=0.1)
 
 
 def test_fans_on_paths_of_ones_own_are_followed_and_drawn(example, tmp_path):

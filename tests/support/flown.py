@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import EffectSetting
@@ -34,6 +35,14 @@ def resting(t, **columns):
         "rotor_speeds": np.full((n, 4), VEHICLE.hover_rate),
     }
     return FlightLog(t, **{**own, **columns})
+
+
+def noisy(mocap, rng, position, quaternion, place=1.0, turn=1.0):
+    """Return poses (..., 3) and (..., 4) with so many times the noise that is declared."""
+    moved, turned = rng.standard_normal((2, *np.shape(position)))
+    turns = Rotation.from_rotvec(turn * mocap.sigma_att_rad * turned)
+    seen = turns * Rotation.from_quat(quaternion, scalar_first=True)
+    return position + place * mocap.sigma_pos_m * moved, seen.as_quat(scalar_first=True)
 
 
 def without_pose(log, rows):

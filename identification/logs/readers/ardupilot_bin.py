@@ -19,11 +19,11 @@ at once: any file costs a bounded time. Ground stations turn such a log into tex
 message a line, its type's name first, FMT among them, and numbers in whole units.
 """
 
-import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +32,14 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from .... import _core
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
-from ..channels import ChannelGroup, Stream, in_order
-from ..flight_log import FlightLog
+from ..channels import ChannelGroup, Groups, in_order
+from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import LogMap, shipped_map, stated
-from ..mapped_log import MOST_VOLTS, log_of
-from ..table import Array, NamedNumbers, Values
+from ..mapped_log import MOST_VOLTS, flight_log, sections_of
+from ..table import Array, Lines, NamedNumbers, Noted, Piece, Values, Wanted
 from ..what_flew import (
     ORDERS,
     PLUS,
@@ -64,6 +63,8 @@ Rows = NDArray[Any]
 Layout = np.dtype[Any]
 Messages = dict[str, Rows]  # (N,) of one type: columns by name, numbers or bytes of texts
 
+ByType = dict[str, Messages]
+
 _AS_TEXT = b"FMT, 128, 89, FMT,"  # stands in a log as text
 BEGINS = b"\xa3\x95|(?s:.*)" + _AS_TEXT
 WHAT = "an ArduPilot log (DataFlash .BIN)"
@@ -80,7 +81,7 @@ _TYPES |= {"c": "<h", "C": "<H", "e": "<i", "E": "<I", "L": "<i"}
 _UNITS = dict.fromkeys("cCeE", 0.01) | {"L": 1e-7}
 
 
-def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
+def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> FlightLog:
     """Read a DataFlash log.
 
     Raises:
@@ -97,7 +98,7 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
     stated = messages.pop("PARM", {})
     pairs = zip(_texts(stated, "Name"), stated.get("Value", np.empty(0)).tolist(), strict=False)
     # as the log first states them
-    parameters = {name: x for name, x in reversed(list(pairs)) if math.isfinite(x)}
+    parameters = {name: x for name, x in reversed(list(pairs)) if isfinite(x)}
     flown = _what_flew(parameters, messages.pop("MSG", {}))
     flown.check(path)
     pulses = messages.get("RCOU", {})
@@ -120,7 +121,8 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
     recorded = [_samples(name, rows, columns) for name, rows in messages.items()]
     groups = [samples for samples in (*recorded, *telemetry) if len(samples.t) > 1]
-    return log_of(path, groups, log_map, "ardupilot_bin", notes, vehicle, piece, flown)
+    sections = sections_of(path, groups, log_map, "ardupilot_bin", notes, piece, flown)
+    return flight_log(path, "ardupilot_bin", sections, vehicle, flown)
 
 
 def _times(messages: Messages) -> Array:
@@ -147,7 +149,7 @@ def _samples(name: str, messages: Messages, columns: set[str]) -> ChannelGroup:
     return ChannelGroup(_times(messages), kept, name)
 
 
-def _texts(messages: Messages, column: str) -> list[str]:
+def _texts(messages: Messages, column: str) -> Lines:
     return [x.decode("ascii", "replace").strip("\0 ") for x in messages.get(column, ())]
 
 
@@ -175,7 +177,7 @@ def _functions(parameters: Values) -> list[int]:
     return [int(parameters.get(f"SERVO{i}_FUNCTION", 0)) for i in range(1, _CHANNELS + 1)]
 
 
-def _order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Order, str]:
+def _order(path: Path, parameters: Values, vehicle: SomeVehicle) -> tuple[Order, str]:
     """Return the motor of each of the vehicle's rotors, and a note on the source.
 
     Raises:
@@ -203,8 +205,8 @@ def _order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Ord
 
 
 def _with_parameters(
-    path: Path, log_map: LogMap, parameters: Values, vehicle: Vehicle | None
-) -> tuple[LogMap, list[str]]:
+    path: Path, log_map: LogMap, parameters: Values, vehicle: SomeVehicle
+) -> Noted[LogMap]:
     """Return the map with the order of the motors, and with their outputs, range and thrust curve;
     and notes.
 
@@ -212,17 +214,18 @@ def _with_parameters(
         InputError: the frame is no quad x, or the pulses' range is none.
     """
     order, note = _order(path, parameters, vehicle)
-    low, high = parameters.get("MOT_PWM_MIN", 0.0), parameters.get("MOT_PWM_MAX", 0.0)
+    given = parameters.get
+    low, high = given("MOT_PWM_MIN", 0.0), given("MOT_PWM_MAX", 0.0)
     whence = "MOT_PWM_MIN and MAX"
     if low <= 0.0 or high <= 0.0:
-        low, high = parameters.get("RC3_MIN", 1000.0), parameters.get("RC3_MAX", 2000.0)
+        low, high = given("RC3_MIN", 1000.0), given("RC3_MAX", 2000.0)
         whence = "RC3_MIN and MAX" if "RC3_MIN" in parameters else "an assumption"
     if not low < high:
         raise InputError(
             f"{path}: parameters {whence} are {low:g} and {high:g} us; expected MIN below MAX"
         )
-    expo = float(np.clip(parameters.get("MOT_THST_EXPO", 0.65), 0.0, 1.0))
-    least, most = parameters.get("MOT_SPIN_MIN", 0.15), parameters.get("MOT_SPIN_MAX", 0.95)
+    expo = min(max(given("MOT_THST_EXPO", 0.65), 0.0), 1.0)
+    least, most = given("MOT_SPIN_MIN", 0.15), given("MOT_SPIN_MAX", 0.95)
     if not 0.0 <= least < most:
         least, most = 0.0, 1.0
     slots = slots_of_motors(_functions(parameters), _MOTOR1) or list(range(4))
@@ -241,28 +244,28 @@ def _with_parameters(
     return replace(log_map, commands=commands).with_order(order), [*log_map.notes, note]
 
 
-def _telemetry(messages: Messages, parameters: Values) -> tuple[list[ChannelGroup], list[str]]:
+def _telemetry(messages: Messages, parameters: Values) -> Noted[Groups]:
     """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC, and notes."""
     if not {"Instance", "RPM", "TimeUS"} <= set(messages):
         return [], []
     slots, which = slots_of_motors(_functions(parameters), _MOTOR1), messages["Instance"]
     if not slots or not np.isin(slots, which).all():
         slots = list(range(4))
-    each = []
+    each, known = [], np.isfinite(messages["RPM"])
     for slot in slots:
-        times, rpm = (x[which == slot] for x in (_times(messages), messages["RPM"]))
-        if len(rpm) < 2 or not np.any(rpm > 0.0):
+        times, rpm = (x[known & (which == slot)] for x in (_times(messages), messages["RPM"]))
+        if len(rpm) < 2 or not (rpm > 0.0).any():
             return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
         rows, _ = in_order(times)
-        each.append(Stream("ESC", times[rows], rpm[rows, None]))
-    t = each[0].t
-    columns = {f"RPM {motor}": stream.at(t)[:, 0] for motor, stream in enumerate(each, 1)}
+        each.append((times[rows], rpm[rows]))
+    t = each[0][0]
+    columns = {f"RPM {motor}": np.interp(t, *one) for motor, one in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)
     told = f"measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took them"
     return [ChannelGroup(t, columns, "ESC")], [f"rotor speeds: {told}"]
 
 
-def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messages], int]:
+def read_dataflash(path: Path, wanted: Wanted) -> tuple[ByType, int]:
     """Return the messages of the wanted types, by type, and the number of bytes outside messages.
 
     Raises:
@@ -288,19 +291,19 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> tuple[dict[str, Messa
             rows = _rows(data, of_kind, layout)
             with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
                 by_type[name] = {
-                    column: x if x.dtype.kind == "S" else x.astype(np.float64) * unit
+                    column: x if x.dtype.kind == "S" else x.astype(float) * unit
                     for column, unit in units.items()
                     if (x := rows[column]).ndim == 1  # no list of numbers
                 }
     return by_type, len(data) - int(used)
 
 
-def _of_text(path: Path, content: bytes, wanted: Collection[str]) -> dict[str, Messages]:
+def _of_text(path: Path, content: bytes, wanted: Wanted) -> ByType:
     """Return the messages of the wanted types, of a log as text. The lines before the first FMT
     count as MSG: old logs name the vehicle there. Cut lines are left out.
     """
     before, _, lines = content.partition(b"FMT,")
-    names: dict[str, list[str]] = {}
+    names: dict[str, Lines] = {}
     rows: dict[str, list[list[bytes]]] = {}
     for line in (b"FMT," + lines).splitlines():
         kind, _, rest = line.partition(b",")
@@ -339,7 +342,7 @@ def _rows(data: Bytes, places: NDArray[np.int32], layout: Layout) -> Rows:
     return sliding_window_view(data[_HEAD:], layout.itemsize)[places].view(layout)[:, 0]
 
 
-def _layouts(formats: Rows, wanted: Collection[str]) -> dict[int, tuple[str, Layout, NamedNumbers]]:
+def _layouts(formats: Rows, wanted: Wanted) -> dict[int, tuple[str, Layout, NamedNumbers]]:
     """Return name, layout and units of the wanted types, by number; types with a wrong length are
     left out.
     """

@@ -31,15 +31,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .... import _core
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup, check_piece
-from ..flight_log import FlightLog
+from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import shipped_map
-from ..mapped_log import MOST_VOLTS, log_of, motors_left_out
-from ..table import Array, NamedArrays, Table
+from ..mapped_log import MOST_VOLTS, flight_log, motors_left_out, sections_of
+from ..table import Array, Lines, NamedArrays, Piece, Table
 
 Ints = NDArray[np.int64]
 
@@ -66,7 +65,7 @@ _FRAMES = "IPSGH"
 
 
 def read(
-    path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+    path: Path, vehicle: SomeVehicle = None, option: str = "", piece: Piece = None
 ) -> FlightLog:
     """Read a blackbox: the longest log in the file, or number ``piece``, from 1; ``option``: number
     of the motors' magnet poles, for eRPM.
@@ -84,7 +83,7 @@ def read(
     edges = [*(match.start() for match in re.finditer(BEGINS, data)), len(data)]
     logs = len(edges) - 1
     check_piece(path, piece, logs)
-    chosen = int(np.argmax(np.diff(edges))) if piece is None else piece - 1
+    chosen = int(np.diff(edges).argmax()) if piece is None else piece - 1
     start, end = edges[chosen : chosen + 2]
     begin = next(_HEADERS.finditer(data, start, end)).end()
     if data[begin : begin + 2] == b"H ":
@@ -111,8 +110,10 @@ def read(
         raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
     notes = [f"blackbox of {headers.get('Firmware revision', 'an unknown firmware')[:60]}"]
     if logs > 1:
-        longest = "" if piece else ", the longest; --piece reads another"
-        notes.append(f"the file holds {logs} logs; number {chosen + 1} was read{longest}")
+        notes.append(
+            f"the file holds {logs} logs; number {chosen + 1} was read (default: the longest; "
+            "--piece reads another)"
+        )
     if lost:
         notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
     notes += motors_left_out(names, wanted)
@@ -121,7 +122,7 @@ def read(
 
 
 def read_table(
-    table: Table, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+    table: Table, vehicle: SomeVehicle = None, option: str = "", piece: Piece = None
 ) -> FlightLog:
     """Read a table of blackbox_decode; ``option``: number of the motors' magnet poles, for eRPM.
 
@@ -151,9 +152,9 @@ def _log(
     stated: set[str],
     headers: Headers,
     option: str,
-    vehicle: Vehicle | None,
-    notes: list[str],
-    piece: int | None = None,
+    vehicle: SomeVehicle,
+    notes: Lines,
+    piece: Piece = None,
 ) -> FlightLog:
     """Return the log of a blackbox's fields (N,); the ``stated`` ones are in the map's units.
 
@@ -168,13 +169,14 @@ def _log(
     }
     said = [*notes, *log_map.notes]
     scales = {"gyro": _gyro_scale(headers), "vbat": 0.01}
-    low = 0.0
     if groups["motor"]:
         low, high, whence = _range(path, [fields[name] for name in groups["motor"]], headers)
         scales["motor"] = 1.0 / (high - low)
+        for name in groups["motor"]:
+            fields[name] -= low
         said.append(f"commands: {low:g} to {high:g} ({whence}) taken as 0 to 1")
     poles, whence = _magnet_poles(path, option, headers["motor_poles"])
-    if any(np.any(fields[name] > 0.0) for name in groups["eRPM"]):
+    if any((fields[name] > 0.0).any() for name in groups["eRPM"]):
         scales["eRPM"] = 200.0 / poles
         said.append(f"eRPM: {poles} magnet poles ({whence})")
     if groups["acc"]:
@@ -183,15 +185,16 @@ def _log(
         said.append(words)
     for kind, scale in scales.items():
         for name in groups[kind]:
-            fields[name] = (fields[name] - (low if kind == "motor" else 0.0)) * scale
+            fields[name] *= scale
     for name in ("vbatLatest", "vbat"):
         if name in stated and (volts := np.median(fields[name])) > MOST_VOLTS:
-            fields[name] = 0.1 * fields[name]
+            fields[name] *= 0.1
             said.append(
                 f"{name}: {volts:.4g} V is more than a vehicle's battery has: taken as a tenth, as "
                 "blackbox_decode writes logs of Betaflight before 4.3"
             )
-    return log_of(path, [ChannelGroup(t, fields)], log_map, reader, said, vehicle, piece)
+    sections = sections_of(path, [ChannelGroup(t, fields)], log_map, reader, said, piece)
+    return flight_log(path, reader, sections, vehicle)
 
 
 def _gyro_scale(headers: Headers) -> float:
@@ -228,9 +231,9 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
     names = ("minthrottle", "maxthrottle")
     least, most = (_whole_number(headers[name], 1, 10**9) for name in names)
     if 0 < least < most:
-        return float(least), float(most), "minthrottle and maxthrottle of the header"
+        return least, most, "minthrottle and maxthrottle of the header"
     low, high = _PWM
-    if any(np.any((x > high) | ((x < low) & (x > 0.0))) for x in motors):
+    if any(((x > high) | ((x < low) & (x > 0.0))).any() for x in motors):
         return *_DSHOT, "assumed: DShot, no header says it"
     return low, high, "assumed: pulses in us, no header says it"
 
@@ -257,7 +260,7 @@ def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
 def _one_g(t: Array, force: list[Array], headers: Headers) -> tuple[float, str]:
     """Return the accelerometer's counts of 1 g, and words on whence they are known."""
     if stated := _whole_number(headers["acc_1G"], 1, 10**6):
-        return float(stated), f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
+        return stated, f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
     length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
     middle = np.nanmedian(length) if np.isfinite(length).any() else 0.0
     counts = 2.0 ** float(np.clip(np.rint(np.log2(max(middle, 1.0))), *_ONE_G))
@@ -273,7 +276,7 @@ def _whole_number(text: str, least: int, most: int, default: int = 0) -> int:
     return int(text) if is_whole and least <= int(text) <= most else default
 
 
-def _layout(path: Path, headers: Headers, names: list[str]) -> list[Ints]:
+def _layout(path: Path, headers: Headers, names: Lines) -> list[Ints]:
     """Return the frames' layout from the headers, as the core takes it: the encodings (6, F) of I,
     P, S, G and H frames and none; their predictors (6, F); the number of fields (5,) of each; the
     intervals (3,) of I frames, and numerator and denominator of P frames, in loops; the constants

@@ -17,7 +17,6 @@ The map ``cflib`` states the variables' meaning.
 
 import re
 import zlib
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,20 +24,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import read_bytes
 from ..channels import ChannelGroup
-from ..flight_log import FlightLog
+from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import load_map
-from ..mapped_log import chosen, log_of
+from ..mapped_log import chosen, flight_log, sections_of
+from ..table import Piece
 
 _FIRST = b"tick(I),"  # first column of a log before 2021
 BEGINS = rb"\xbc[\x01\x02]\0|[\x02-\xff]tick\(I\),"
 
 Rows = NDArray[Any]  # events of one type
 Layout = np.dtype[Any]  # an event's number, time and variables
+
+Layouts = dict[int, Layout]  # by the events' numbers
 
 WHAT = "a Crazyflie's SD-card log"
 _START = re.compile(rb"\xbc([\x01\x02])\0(..)", re.DOTALL)
@@ -50,7 +51,7 @@ _RUN = 4096  # events looked at together
 _TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
 
 
-def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
+def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> FlightLog:
     """Read an SD-card log; ``vehicle`` turns motor set points into rotor speeds.
 
     Raises:
@@ -90,10 +91,11 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
             "no pose, no gyro and no accelerometer in the log: it shows how the rotors share the "
             "work, and nothing else"
         )
-    return log_of(path, events, log_map, "crazyflie_sd", notes, vehicle, piece)
+    sections = sections_of(path, events, log_map, "crazyflie_sd", notes, piece)
+    return flight_log(path, "crazyflie_sd", sections, vehicle)
 
 
-def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
+def _header(path: Path, data: bytes) -> tuple[int, Layouts, int]:
     """Return the version, the layouts of the types of events by number, and where the events begin.
 
     Raises:
@@ -101,7 +103,7 @@ def _header(path: Path, data: bytes) -> tuple[int, dict[int, Layout], int]:
     """
     start = _part(path, data, 0, _START, "bc, the version 1 or 2, and the number of events")
     version, place = start[1][0], start.end()
-    kinds: dict[int, Layout] = {}
+    kinds: Layouts = {}
     for _ in range(int.from_bytes(start[2], "little")):
         event = _part(path, data, place, _EVENT, "an event's number, name and variables")
         number, many = (int.from_bytes(event[i], "little") for i in (1, 3))
@@ -167,9 +169,7 @@ def _rows(path: Path, data: bytes) -> tuple[Rows, int]:
     return np.frombuffer(b"".join(blocks), layout), end
 
 
-def _events(
-    path: Path, data: bytes, kinds: Mapping[int, Layout], begin: int
-) -> tuple[list[Rows], int]:
+def _events(path: Path, data: bytes, kinds: Layouts, begin: int) -> tuple[list[Rows], int]:
     """Return the events of each type, and the place of the first byte behind."""
     runs: dict[int, list[Rows]] = {number: [] for number in kinds}
     place, count, numbers = begin, 0, 0

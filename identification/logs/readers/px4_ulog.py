@@ -19,7 +19,7 @@ import io
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
@@ -27,16 +27,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ..channels import ChannelGroup
-from ..flight_log import FlightLog
+from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import shipped_map, stated
 from ..mapped_log import Sections, flight_log, sections_of
-from ..table import Array, ArrayMap, NamedArrays, NamedNumbers, Values, one_line
+from ..table import (
+    Array,
+    ArrayMap,
+    Data,
+    NamedArrays,
+    NamedNumbers,
+    Piece,
+    SomeArray,
+    Values,
+    one_line,
+)
 from ..what_flew import ORDERS, PLUS, QUADROTOR, Order, WhatFlew, order_by_places, slots_of_motors
 
 BEGINS = rb"ULog\x01\x12\x35"
@@ -66,6 +75,9 @@ _LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed 
 _ABOVE_PULSES = 1.1  # times the longest pulse: no pulse is longer
 
 
+_Topics = dict[str, list[ArrayMap]]  # columns of each instance
+
+
 class Outputs(NamedTuple):
     """The outputs of motors 1 to 4, and their values for commands 0 and 1."""
 
@@ -75,7 +87,7 @@ class Outputs(NamedTuple):
     words: str  # protocol and range
 
 
-def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -> FlightLog:
+def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> FlightLog:
     """Read a ULog.
 
     Raises:
@@ -88,9 +100,9 @@ def read(path: Path, vehicle: Vehicle | None = None, piece: int | None = None) -
 
 def channels(
     path: Path,
-    vehicle: Vehicle | None = None,
+    vehicle: SomeVehicle = None,
     has_ranges: bool = True,
-    piece: int | None = None,
+    piece: Piece = None,
 ) -> tuple[Sections, WhatFlew]:
     """Return a ULog's channels, each at its own rate, and its statements on its vehicle.
 
@@ -118,7 +130,7 @@ def channels(
         note = f"{rotors.note}, in rad/s, as PX4 in Gazebo (SIM_GZ_EN = 1) writes them"
         log_map = log_map.with_ways({"rotors": [replace(rotors, unit="rad/s", note=note)]})
     motors, sent = log_map.ways("commands")
-    factor = float(np.clip(parameters.get("THR_MDL_FAC", 0.0), 0.0, 1.0))
+    factor = min(max(parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
     note = (
         f"commands: actuator_outputs, x = 0 to 1 ({outputs.words}), gives relative thrust "
         f"f x^2 + (1 - f) x with THR_MDL_FAC f = {factor:g}; motors 1 to 4 at outputs "
@@ -149,7 +161,7 @@ def channels(
     return sections, flown
 
 
-def _read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, bool]:
+def _read_ulog(path: Path) -> tuple[_Topics, NamedNumbers, bool]:
     """Return the topics of the map, the parameters at the log's start, and whether the file is
     damaged. A topic's instances are mappings from field to column.
 
@@ -171,7 +183,7 @@ def _read_ulog(path: Path) -> tuple[dict[str, list[ArrayMap]], NamedNumbers, boo
                 file.seek(place)
                 place += _MESSAGE + int.from_bytes(file.read(2), "little")
         is_damaged = bool(parsed.file_corruption) or place != size
-    topics: dict[str, list[ArrayMap]] = {}
+    topics: _Topics = {}
     for data in (one for one in parsed.data_list if "timestamp" in one.data):
         count = len(data.data["timestamp"])
         check_count(f"{path}: topic {data.name}", count, LIMITS.table_rows, "messages")
@@ -192,7 +204,7 @@ def _samples(topic: str, fields: ArrayMap, outputs: Outputs) -> Iterator[Channel
     """
     published = fields["timestamp"]
     sampled = fields.get("timestamp_sample", published)
-    plausible = np.all((sampled > 0.0) & (np.abs(published - sampled) < 1e6))
+    plausible = ((sampled > 0.0) & (np.abs(published - sampled) < 1e6)).all()
     t = _MICROSECOND * (sampled if plausible else published)
     if topic in ("sensor_combined", "vehicle_imu"):
         yield from (_sensor(topic, t, fields, *names) for names in _SENSORS)
@@ -215,7 +227,7 @@ def unified(topic: str, fields: ArrayMap) -> NamedArrays:
         return {f"esc[{i}].esc_rpm": columns[name] for i, name in enumerate(reported)}
     if topic == "actuator_motors":
         # NaN: a motor is off
-        columns = {n: np.clip(np.nan_to_num(x), 0.0, 1.0) for n, x in columns.items()}
+        columns = {n: np.nan_to_num(x).clip(0.0, 1.0) for n, x in columns.items()}
         is_used = any(np.any(columns.get(f"control[{i}]", 0.0) > 0.0) for i in range(4))
         return columns if is_used else {}
     for name, flag in _FLAGS.get(topic, {}).items():
@@ -244,7 +256,7 @@ def _sensor(topic: str, t: Array, fields: ArrayMap, field: str, gained: str) -> 
         axes = {n: column / np.where(span > 0.0, span, np.nan) for n, column in axes.items()}
         t = t - 0.5 * span
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
-    if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
+    if field == "accelerometer_m_s2" and (np.abs(late) < 1e6).all():
         t = t + _MICROSECOND * late
     return ChannelGroup(t, axes, topic)
 
@@ -263,7 +275,7 @@ def counting(parser: Any) -> Any:
             raise _TooMuchError(f"more than {most} {what}")
 
     class AddLogged(parser._MessageAddLogged):  # type: ignore[misc]
-        def _parse_format(self, message_formats: Mapping[str, Any]) -> None:
+        def _parse_format(self, message_formats: Data) -> None:
             # an empty one takes its place, too
             more = 1 + _fields(self.message_name, message_formats, {}, 0)
             count("fields of its topics", LIMITS.ulog_fields, more)
@@ -293,7 +305,7 @@ def counting(parser: Any) -> Any:
     return Counting
 
 
-def _fields(name: str, formats: Mapping[str, Any], known: dict[str, int], depth: int) -> int:
+def _fields(name: str, formats: Data, known: dict[str, int], depth: int) -> int:
     """Return the number of a topic's fields, with its arrays and inner topics written out."""
     if depth > _DEEPEST:
         raise _TooMuchError(f"topic {name[:100]!r} lies more than {_DEEPEST} deep in others")
@@ -330,7 +342,7 @@ def what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
     return WhatFlew(airframe, "parameter CA_ROTOR_COUNT" if count else by, count or None)
 
 
-def _motor_order(path: Path, parameters: Values, vehicle: Vehicle | None) -> tuple[Order, str]:
+def _motor_order(path: Path, parameters: Values, vehicle: SomeVehicle) -> tuple[Order, str]:
     """Return PX4's motor of each of the vehicle's rotors, and a note on the source: the positions
     CA_ROTORn_PX and PY, the airframe's, else PX4's quad x.
 
@@ -393,7 +405,7 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
     positive = {name: x for name, x in parameters.items() if x > 0.0}
     lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
     # with a bus for sensors alone the motors have pulses, long ones at rest, too
-    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and np.any(motors < _LEAST_PULSE)
+    has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and (motors < _LEAST_PULSE).any()
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
     is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
     if 0.0 < most <= _LARGEST_SHARE:
@@ -404,7 +416,7 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
     elif is_dshot or usual < _LEAST_PULSE:
         protocol, high, stated = "DShot", _DSHOT, is_dshot
     else:
-        if not np.all(highs > lows):
+        if not (highs > lows).all():
             raise InputError(
                 f"{path}: the PWM_{bank}_MIN and MAX parameters of the motors' outputs are "
                 f"{lows.tolist()} and {highs.tolist()}; expected MIN below MAX"
@@ -429,13 +441,13 @@ def _shares_of_outputs(columns: ArrayMap, outputs: Outputs) -> NamedArrays:
     low, high = (np.full(_OUTPUTS, end) for end in (outputs.low.min(), outputs.high.max()))
     low[outputs.slots], high[outputs.slots] = outputs.low, outputs.high
     return {
-        name: np.clip((np.nan_to_num(columns[name]) - low[i]) / (high[i] - low[i]), 0.0, 1.0)
+        name: ((np.nan_to_num(columns[name]) - low[i]) / (high[i] - low[i])).clip(0.0, 1.0)
         for i in range(_OUTPUTS)
         if (name := f"output[{i}]") in columns
     }
 
 
-def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> Array | None:
+def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> SomeArray:
     """Return the values of the motors' outputs (N, 4). None: one is missing or never changes, as of
     a servo, or of an unused bank.
     """

@@ -5,7 +5,7 @@ columns: numbers by the paths of their fields, such as ``pose.position.x``, ``da
 
 import re
 from array import array
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from itertools import islice
 from operator import attrgetter, itemgetter
@@ -15,9 +15,9 @@ import numpy as np
 
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
-from ..column_names import WORDS
 from ..log_map import LogMap, parse_map, stated
-from ..table import Array, Data, NamedArrays
+from ..mapped_log import MOTOR_NAMES
+from ..table import Array, Data, Lines, NamedArrays, Noted, Wanted
 from .px4_ulog import unified
 
 Types = Mapping[str, str]  # of messages, by topic
@@ -30,11 +30,10 @@ _SECOND = 10**9  # ns
 _MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
 _SHOWN = 30  # fields in an error
-_MOTORS = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])), re.IGNORECASE)
 _PX4 = "px4_msgs/msg/"
 
 
-def map_of(types: Types, given: Stated, source: str, where: str) -> tuple[LogMap, list[str]]:
+def map_of(types: Types, given: Stated, source: str, where: str) -> Noted[LogMap]:
     """Return the log map of topics, and notes.
 
     Args:
@@ -49,7 +48,7 @@ def map_of(types: Types, given: Stated, source: str, where: str) -> tuple[LogMap
     """
     sections: Data = {}
     refused: dict[str, str] = {}
-    notes: list[str] = []
+    notes: Lines = []
     for section in SECTIONS:
         said = given.get(section) or {}
         said = {"topic": said} if isinstance(said, str) else said
@@ -85,7 +84,9 @@ def map_of(types: Types, given: Stated, source: str, where: str) -> tuple[LogMap
     is_ned = types.get(_topic_of(sections.get("position"))) in stated("ros")["ned"]
     used = {_topic_of(section) for section in sections.values()}
     motors = {kind for name in MOTORS for kind in stated("ros")[name]}
-    named = {topic for topic in _of_types(types, stated("ros")["arrays"]) if _MOTORS.search(topic)}
+    named = {
+        topic for topic in _of_types(types, stated("ros")["arrays"]) if MOTOR_NAMES.search(topic)
+    }
     if left := sorted({*_of_types(types, motors), *named} - used):
         notes.append(f"topics that may hold motors were left out: {', '.join(left)}")
     clock: Data = {"time": {"column": "stamp", "unit": "ns"}}
@@ -102,7 +103,7 @@ def _topic_of(section: object) -> str:
     return str(section.get("topic") or "") if isinstance(section, Mapping) else ""
 
 
-def _of_types(types: Types, wanted: Collection[str]) -> list[str]:
+def _of_types(types: Types, wanted: Wanted) -> Lines:
     """Return the topics of some types of messages."""
     return sorted(topic for topic, kind in types.items() if kind in wanted)
 
@@ -140,7 +141,7 @@ def _chosen(types: Types, section: str, said: Stated, where: str) -> tuple[str, 
         InputError: several topics are possible.
     """
 
-    def named_by(words: str) -> list[str]:
+    def named_by(words: str) -> Lines:
         return [x for x in several if any(word in x.lower() for word in stated("ros")[words])]
 
     fitting = {*stated("ros")[section], *(stated("ros")["arrays"] if "unit" in said else ())}
@@ -204,6 +205,9 @@ def stamp(message: Any) -> int:
     return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
 
 
+_Getter = Callable[[Any], Any]  # of a number from a message
+
+
 class MessageFields:
     """The numbers of a map in a topic's messages; whole arrays. A field that a message lacks, such
     as a number of a shorter array, is NaN there.
@@ -214,10 +218,10 @@ class MessageFields:
         wanted: columns of the map.
     """
 
-    def __init__(self, where: str, kind: str, wanted: Collection[str]) -> None:
+    def __init__(self, where: str, kind: str, wanted: Wanted) -> None:
         self.where, self._kind, self._wanted = where, kind, dict.fromkeys(wanted)
         self._is_px4 = kind.startswith(_PX4)
-        self._getters: dict[str, Callable[[Any], Any]] = {}
+        self._getters: dict[str, _Getter] = {}
         self._numbers, self._count = array("d"), 0
 
     def take(self, message: Any) -> None:
@@ -255,7 +259,7 @@ class MessageFields:
         name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", self._kind.removeprefix(_PX4)).lower()
         return unified(name, columns_by_name)
 
-    def lack(self, columns: Collection[str]) -> InputError:
+    def lack(self, columns: Wanted) -> InputError:
         """Return the error for columns without some of the wanted ones."""
         missing = [name for name in self._wanted if name not in columns]
         return InputError(
@@ -283,7 +287,7 @@ def _paths(value: Any, path: str = "") -> Iterator[str]:
             yield from _paths(getattr(value, name), f"{path}.{name}" if path else name)
 
 
-def _getter(path: str) -> Callable[[Any], Any]:
+def _getter(path: str) -> _Getter:
     """Return a function that returns a field of a message."""
     if "[" not in path:
         return attrgetter(path)

@@ -34,6 +34,7 @@ import sqlite3
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -42,24 +43,24 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
 from ....runtime.extras import need
 from ....runtime.file_limits import LIMITS, check_count
 from ....runtime.regular_files import check_regular, open_regular
 from ....runtime.yaml_file import read_yaml
 from ..channels import ChannelGroup
-from ..flight_log import FlightLog
-from ..mapped_log import log_of
-from ..table import NamedArrays, one_line
-from .ros_topics import MessageFields, definitions, map_of, stamp
+from ..flight_log import FlightLog, SomeVehicle
+from ..mapped_log import flight_log, sections_of
+from ..table import NamedArrays, Piece, one_line
+from .ros_topics import MessageFields, Stated, Types, definitions, map_of, stamp
 
 WHAT = "a ROS bag (ROS 1, SQLite or MCAP)"
 SUFFIXES = (".bag", ".db3", ".mcap")
 _ROS1 = b"#ROSBAG V2.0"
 BEGINS = _ROS1 + rb"|\x89MCAP0\r\n|SQLite format 3\0"
 
-_Messages = Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at ns, message)
+_Received = Iterator[tuple[int, Any]]  # recorded at ns, and message
+_Messages = Callable[[str], _Received]  # by topic
 
 # times (N,) in ns, columns by name, and a topic, or a doubt on its time stamps
 _Decoded = tuple[NDArray[np.int64], NamedArrays, str]
@@ -74,7 +75,7 @@ _WHOLE = re.compile(r"compression_mode:\s*['\"]?(file|message)", re.IGNORECASE)
 
 
 def read(
-    path: Path, vehicle: Vehicle | None = None, option: str = "", piece: int | None = None
+    path: Path, vehicle: SomeVehicle = None, option: str = "", piece: Piece = None
 ) -> FlightLog:
     """Read a bag; ``option`` is the path of a map, by default ``NAME.topics.yaml`` beside the bag,
     if any.
@@ -120,7 +121,8 @@ def read(
         ChannelGroup(_NANOSECOND * (times - origin), columns, name)
         for times, columns, name in decoded
     ]
-    return log_of(path, recorded, log_map, "rosbag", notes, vehicle, piece)
+    sections = sections_of(path, recorded, log_map, "rosbag", notes, piece)
+    return flight_log(path, "rosbag", sections, vehicle)
 
 
 def _bag_in(path: Path) -> Path:
@@ -141,7 +143,7 @@ def _bag_in(path: Path) -> Path:
     return files[0]
 
 
-def given_map(file: Path) -> Mapping[str, Any]:
+def given_map(file: Path) -> Stated:
     """Return the content of a map file of topics.
 
     Raises:
@@ -157,7 +159,7 @@ def given_map(file: Path) -> Mapping[str, Any]:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
+def _opened(path: Path) -> Iterator[tuple[Types, _Messages]]:
     """Open a bag of either kind; give the types of its topics, and how to read the messages of one.
 
     Raises:
@@ -185,7 +187,7 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, str], _Messages]]:
     if not is_ros1:
         _check_bag_files(path)
 
-    def messages(topic: str) -> Iterator[tuple[int, Any]]:
+    def messages(topic: str) -> _Received:
         kind = types[topic]
         where = f"{path}: topic {topic}"
         with one_line(f"{where}: a message cannot be read", kind):
@@ -234,7 +236,7 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
             del stores[0]
 
 
-def _decoded_topic(fields: MessageFields, messages: Iterator[tuple[int, Any]]) -> _Decoded:
+def _decoded_topic(fields: MessageFields, messages: _Received) -> _Decoded:
     """Return times (N,) in ns and columns (N,) of a topic by name, and a doubt on its time stamps.
 
     Raises:
@@ -249,9 +251,9 @@ def _decoded_topic(fields: MessageFields, messages: Iterator[tuple[int, Any]]) -
     if not recorded:
         raise InputError(f"{fields.where} has no messages; expected at least two")
     received_at, sampled_at, doubt = np.array(recorded), np.array(stamped), ""
-    if not np.any(sampled_at):
+    if not sampled_at.any():
         doubt = "no time stamps"
-    elif np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK:
+    elif np.abs(sampled_at - received_at).max() > _SAME_CLOCK:
         doubt = "its time stamps are of another clock than the bag's"
     return received_at if doubt else sampled_at, fields.columns(), doubt
 
@@ -334,9 +336,11 @@ def _check_bag_files(path: Path) -> None:
             continue
         # a view or a computed column of a few bytes of SQL may give any number of rows of any size
         tables = []
-        with suppress(sqlite3.Error):  # the reader states the error
+        # the reader states the error, of any letters
+        with suppress(sqlite3.Error, UnicodeDecodeError):
             uri = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:
+                database.text_factory = partial(str, errors="replace")
                 query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
                 tables = database.execute(query).fetchmany(_TABLES)
         for name, kind, sql in tables:

@@ -19,19 +19,10 @@ struct Policy {
     bool first = count == 0;
     count = 1;
     look(e, first);
-    ww_number a[WIDEST], b[WIDEST], *in = a, *out = b;
-    const ww_number *weight = WEIGHTS, *bias = OFFSETS;
+    ww_number a[WIDEST], b[WIDEST];
     for (int k = 0; k < HISTORY; k++)
-      for (int i = 0; i < FRAME; i++) in[k * FRAME + i] = frames[k][i];
-    for (int layer = 0; layer < LAYERS; layer++) {
-      for (int i = 0; i < WIDTHS[layer + 1]; i++) {
-        out[i] = *bias++;
-        for (int j = 0; j < WIDTHS[layer]; j++) out[i] += *weight++ * in[j];
-        if (layer + 1 < LAYERS) out[i] = RELU ? larger(out[i], ww_number(0)) : std::tanh(out[i]);
-      }
-      std::swap(in, out);
-    }
-    command = SQUASH ? std::tanh(in[0]) : in[0];
+      for (int i = 0; i < FRAME; i++) a[k * FRAME + i] = frames[k][i];
+    command = through_layers(a, b)[0];
     return command;
   }
 

@@ -9,6 +9,9 @@
 #ifdef WW_POLICY_PERIOD
 #include "policy.hpp"
 #endif
+#ifdef WW_HOVER
+#include "flight.hpp"
+#endif
 
 #ifdef __FAST_MATH__
 #error "-ffast-math knows no NaN, which marks what was not measured"
@@ -186,6 +189,26 @@ void ww_policy_init(ww_policy_memory *memory) {
 S ww_policy(ww_policy_memory *memory, const ww_estimate *estimate) {
   S command = reinterpret_cast<Policy *>(memory)->decide(*estimate);
   return smaller(MAX_COMMAND, larger(-MAX_COMMAND, command));
+}
+#endif
+
+#ifdef WW_HOVER
+static_assert(sizeof(Pilot) <= sizeof(ww_flight), "ww_flight has room");
+
+void ww_flight_init(ww_flight *memory) {
+  memset(memory, 0, sizeof *memory);
+  begin_flight(reinterpret_cast<Pilot *>(memory)->loop);
+}
+
+int ww_fly(ww_flight *memory, ww_filter *filter, int law, const S *reference,
+           const S *accelerometer, S *rotor_speeds) {
+  if (law != WW_HOVER && !(LAWS >> law & 1)) return WW_NO_LAW;
+  if (!measured(reference, 10)) return WW_BAD_REFERENCE;
+  Pilot &pilot = *reinterpret_cast<Pilot *>(memory);
+  const S *felt = measured(accelerometer, 3) ? accelerometer : nullptr;
+  pilot.fly(flying(filter).filter, law, reference, felt);
+  copy(pilot.loop.command, rotor_speeds, 4);
+  return 0;
 }
 #endif
 

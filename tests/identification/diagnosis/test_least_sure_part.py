@@ -41,7 +41,7 @@ def test_a_factor_on_thrust_from_commands_alone_is_never_sure(name, value):
             note.startswith(f"{effect.name}: the log holds motor commands") for note in found.notes
         )
     assert found.verdict == "partly explained"
-    assert headline(found).startswith("The model perhaps lacks one of ")
+    assert headline(found).startswith("The model perhaps lacks ")
 
 
 @pytest.mark.parametrize(

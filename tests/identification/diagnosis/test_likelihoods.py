@@ -5,6 +5,7 @@ forces are known by construction.
 import math
 from dataclasses import replace
 from math import inf
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,8 +27,10 @@ from windwrench.identification.diagnosis.evidence import (
     set_evidence,
     tempering,
 )
+from windwrench.identification.diagnosis.left_out import LeftOut
+from windwrench.identification.diagnosis.priors import Base
 from windwrench.identification.diagnosis.regression import RegressedFlights
-from windwrench.identification.diagnosis.row_noise import RowNoise, fitted_noise
+from windwrench.identification.diagnosis.row_noise import fitted_noise
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
 
@@ -76,6 +79,28 @@ def test_the_mode_of_many_coefficients_is_the_best_within_bounds(seed):
     assert free.log_evidence == pytest.approx(gained)
 
 
+@pytest.mark.parametrize("blocks", [1, 5])
+def test_deviations_hold_a_coefficient_that_changes(blocks):
+    """The number changes from block to block, or from one flight of five blocks to the next."""
+    rng = default_rng(blocks)
+    flight = np.arange(40) // blocks
+    column = ("mass", "dm")
+    off = []
+    for _ in range(100):
+        x = rng.standard_normal((40, 50, 2))
+        x[:, :, 1] += 0.5 * rng.standard_normal(40)[flight, None] * x[:, :, 0]
+        sums = x.swapaxes(1, 2) @ x
+        one, none = np.ones(1), np.arange(0)
+        base = Base([column], one, -inf * one, inf * one, sums.sum(axis=0), sums, flight,
+                    np.arange(1), 0.0, frozenset(), none, one, [], {})  # fmt: skip
+        found = base.marginal([column], none).evidence([0])
+        wide = base.scatter([column], found.mode, 1.0)
+        off.append(found.mode / found.std / np.array([1.0, wide[0]]))
+    stated, widened = np.mean(np.abs(off) > 2.0, axis=0)
+    assert stated > 0.3
+    assert widened < 0.12
+
+
 def test_columns_that_no_prior_tells_apart_have_no_evidence():
     both = Marginal(np.full((2, 2), -2.0), np.ones(2), 0.0, 0.0)
     with pytest.raises(np.linalg.LinAlgError, match="tells columns of the set apart"):
@@ -95,6 +120,22 @@ def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
 
     assert power(x, noise) > 0.75
     assert power(slow, alike) < 0.1
+
+
+def test_a_coefficient_helps_where_blocks_agree_on_it():
+    rng = default_rng(6)
+    x = rng.standard_normal((12, 40, 3))
+    # one coefficient everywhere, and one whose sign each block draws
+    x[..., 2] += 0.4 * x[..., 0] + x[..., 1] * rng.choice([-0.4, 0.4], (12, 1))
+    blocks = np.einsum("bni,bnj->bij", x, x)
+    base = SimpleNamespace(
+        blocks=blocks, flight=np.arange(12) % 3, single=[0, 1], plain=[], at=lambda c: [0, 1]
+    )
+    base.low, base.high = np.array([[-inf], [inf]]) * np.ones(2)
+    left_out = LeftOut(base, [], 1.0)
+    (steady, std), (erratic, spread) = (left_out.gain(np.array([i])) for i in (1, 0))
+    assert steady > left_out.least * std
+    assert erratic < left_out.least * spread
 
 
 def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
@@ -131,12 +172,10 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     """A flight in which thrust and attitude are what the forces ask for; rotors by commands."""
     rng = default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)
-    rate = (0.9, 1.4, 0.5)
-    size = (1.2, 0.7, 0.4)
-    phase = (0.0, 0.6, 1.1)
-    angle = [np.outer(t, [w, 1.7 * w]) + p for w, p in zip(rate, phase, strict=True)]
-    place = [s * np.sin(a) @ [1.0, 0.5] for s, a in zip(size, angle, strict=True)]
-    place = np.column_stack(place) + np.array([0.0, 0.0, 2.0])
+    angle = np.outer(t, [0.9, 1.4, 0.5])
+    phase = [0.0, 0.6, 1.1]
+    place = [1.2, 0.7, 0.4] * (np.sin(angle + phase) + 0.5 * np.sin(1.7 * angle + phase))
+    place[:, 2] += 2.0
     speed = np.gradient(place, t, axis=0)
     gust = 3e-4 * VEHICLE.weight * np.cumsum(rng.standard_normal(place.shape), axis=0)
     gust -= np.linspace(0.0, 1.0, len(t))[:, None] * gust[-1]
@@ -166,12 +205,21 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     return replace(log, accelerometer=noisy, gyro=np.zeros_like(felt))
 
 
+def test_a_gust_in_step_with_the_flight_is_no_drag():
+    t = np.arange(0.0, 25.0, 0.01)
+    gusty = np.outer(1.8 * np.sin(0.9 * t + 1.6) - 6.0, [1.0, 0.0, 0.0])
+    found = diagnose([flown(wind=gusty)], VEHICLE)
+    (wind,) = (e for e in found.effects if e.name == "wind")
+    assert wind.coefficients["wx"] == pytest.approx(-6.0, abs=2.0 * wind.std["wx"])
+    assert wind.std["wx"] < 0.8
+    assert not {"body_drag", "rotor_drag", "constant_force"} & {e.name for e in found.effects}
+
+
 def test_a_wind_is_named_and_no_tilt():
     windy = diagnose([flown(wind=(-4.0, 1.0, 0.0))], VEHICLE)
     found = {e.name: e for e in windy.effects}
     assert "wind" in found
-    assert "world_tilt" not in found
-    assert "thrust_axis_tilt" not in found
+    assert not {"world_tilt", "thrust_axis_tilt"} & found.keys()
     wind = found["wind"]
     for name, true in (("wx", -4.0), ("wy", 1.0)):
         assert wind.coefficients[name] == pytest.approx(true, abs=3.0 * wind.std[name] + 0.1)
@@ -183,9 +231,8 @@ def test_a_wind_is_named_and_no_tilt():
 def test_in_still_air_nothing_is_sure():
     found = diagnose([flown()], VEHICLE)
     assert not [e.name for e in found.effects if not e.tentative]
-    winds = [e.coefficients for e in found.effects if e.name == "wind"]
-    assert all(abs(x) < 0.2 for wind in winds for x in (wind["wx"], wind["wy"], wind["wz"]))
-    assert found.after.force_rms < 1.2 * found.before.force_rms
+    assert "wind" not in found.probabilities.names
+    assert found.after.force_rms <= found.before.force_rms
 
 
 @pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 2, 3), marks=pytest.mark.slow)])
@@ -233,12 +280,6 @@ def test_the_noise_of_an_autoregression_is_found():
     assert_allclose(np.cov(found.white(x)[found.known].T), np.eye(2), atol=0.15)
     assert not found.known[:3].any()
     assert not found.known[5000:5003].any()
-
-
-def test_noise_without_memory_only_scales():
-    noise = RowNoise(np.zeros((0, 1, 1)), np.array([[4.0]]), np.array([True, False, False]))
-    assert_allclose(noise.white(np.array([[2.0], [4.0], [6.0]]))[:, 0], [1.0, 2.0, 3.0])
-    assert noise.known.all()
 
 
 def test_a_column_of_factors_is_their_product_a_part_at_a_time():

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded
 from windwrench.envs.plant import PlantSettings
-from windwrench.identification.diagnosis.likelihood import Likelihood, gyration
+from windwrench.identification.diagnosis.likelihood import Likelihood, _gyration
 from windwrench.identification.diagnosis.noise_search import NoiseSearch, _free
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.steady_filter import (
@@ -97,7 +97,7 @@ def test_the_search_follows_the_likelihood_where_a_vehicle_spins(monkeypatch):
 def test_gyroscopic_torques_grow_with_the_rate():
     J = np.array([[2.0, 0.1, 0.0], [0.1, 3.0, 0.2], [0.0, 0.2, 5.0]])
     rate = np.array([0.3, -0.7, 1.9])
-    found = gyration(replace(VEHICLE, inertia=J), rate[None])[0]
+    found = _gyration(replace(VEHICLE, inertia=J), rate[None])[0]
     for i, step in enumerate(1e-4 * np.eye(3)):
         there, here = (solve(J, np.cross(w, J @ w)) for w in (rate + step, rate - step))
         assert_allclose(found[:, i], (here - there) / 2e-4, atol=1e-9)

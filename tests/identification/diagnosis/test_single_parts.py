@@ -128,6 +128,14 @@ def test_a_declared_lag_is_no_part_of_the_delay():
     assert found[1] < 0.006
 
 
+def test_delays_of_two_flights_are_no_surer_than_they_agree():
+    model = load_vehicle("ardrone2")
+    early, late = (flown_signals(model, latency={"d": d}) for d in (0.02, 0.03))
+    seconds, std, _ = turning_delay([*early, *late], model)
+    assert 0.003 < std < 0.01
+    assert seconds == pytest.approx(0.025, abs=2.0 * std)
+
+
 def test_moments_of_another_flight_show_no_delay():
     model = load_vehicle("ardrone2")
     pieces = [

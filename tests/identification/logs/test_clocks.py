@@ -39,7 +39,6 @@ def stamped(changes):
     [
         {100: T[100] + 40.0},
         {100: 1e12},
-        {100: -1e12},
         {100: np.nan},
         {300: T[100] + 1e-3},
         {599: T[599] + 40.0},
@@ -87,11 +86,11 @@ def test_of_two_boots_the_longest_is_read_or_the_one_that_is_asked_for(tmp_path)
     path.write_bytes(boots())
     log = read_log(path)
     assert len(log.t) == 400
-    assert noted(log, "2 pieces of 3.98, 7.98 s; the longest, piece 2, was read")
+    assert noted(log, "2 pieces of 3.98, 7.98 s; piece 2 was read")
     first = read_log(path, piece=1)
     assert len(first.t) == 200
     assert first.command.mean() < log.command.mean() - 0.04
-    assert noted(first, "piece 1, was read")
+    assert noted(first, "piece 1 was read")
     with refused(r"two\.BIN: piece 3: it has 2; expected 1 to 2"):
         read_log(path, piece=3)
 

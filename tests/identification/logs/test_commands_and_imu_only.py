@@ -6,6 +6,7 @@ from math import nan, pi
 import numpy as np
 from numpy.testing import assert_allclose
 
+from tests.support.flown import resting
 from tests.support.outcomes import noted, refused
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
@@ -73,13 +74,7 @@ def test_the_scale_of_commands_counts_the_dips_between_high_thrusts():
     weights = 1.0 + 0.8 * np.sin(2.0 * pi * t)
     weights[t < 2.0] = 0.05  # on the ground, rotors idling
     command = np.tile(np.sqrt(weights / 4.0 * vehicle.weight / 3.0)[:, None], (1, 4))
-    log = FlightLog(
-        t,
-        np.zeros((len(t), 3)),
-        np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1)),
-        np.full((len(t), 4), nan),
-        command=command,
-    )
+    log = resting(t, rotor_speeds=np.full((len(t), 4), nan), command=command)
     read = with_commanded_speeds(log, vehicle)
     full = vehicle.k[0] * np.square(read.rotor_speeds[:, 0] / command[:, 0])
     assert_allclose(full, 3.0, rtol=0.01)  # N of a motor at full command

@@ -4,28 +4,25 @@ found in a short one."""
 import numpy as np
 import pytest
 
-from windwrench.identification.logs.excerpt import LONGEST, excerpt
-from windwrench.identification.logs.flight_log import FlightLog
+from tests.support.flown import resting
+from windwrench.identification.logs.flight_log import LONGEST, excerpt
 from windwrench.identification.motion.signals import log_signals
 
 
 def long_log(seconds, period=0.02):
     t = 5.0 + period * np.arange(round(seconds / period))
-    ones = np.ones((len(t), 4))
-    return FlightLog(
-        t, np.zeros((len(t), 3)), ones * [1.0, 0, 0, 0], 300.0 * ones, voltage=t, name="long"
-    )
+    return resting(t, voltage=t, name="long")
 
 
 def test_what_is_short_stays_whole():
     logs = [long_log(0.4 * LONGEST), long_log(0.5 * LONGEST)]
-    assert all(a is b for a, b in zip(excerpt(logs), logs, strict=True))
+    assert all(excerpt(log, 0.9 * LONGEST) is log for log in logs)
 
 
 @pytest.mark.parametrize("lengths", [[3600.0], [900.0, 2700.0, 30.0], [700.0, 100.0]])
 def test_windows_are_spread_over_long_flights(lengths):
     logs = [long_log(seconds) for seconds in lengths]
-    out = excerpt(logs)
+    out = [excerpt(log, sum(lengths)) for log in logs]
     pieces = [log_signals(log) for log in out]
     kept = [sum(p.t[-1] - p.t[0] for p in each) for each in pieces]
     assert 0.8 * LONGEST < sum(kept) < 1.2 * LONGEST + 30.0

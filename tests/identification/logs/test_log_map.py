@@ -9,13 +9,13 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.random import default_rng
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from tests.support.outcomes import noted, refused
 from tests.support.random_tables import flight, random_table, save
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis.commanded_rotors import thrust_is_assumed
-from windwrench.identification.logs.flight_log import with_rows, write_log
+from windwrench.identification.logs.flight_log import with_rows
 from windwrench.identification.logs.log_map import load_map, map_names, parse_map
 from windwrench.identification.logs.mapped_log import map_table
 from windwrench.identification.logs.reading import read_log
@@ -195,21 +195,6 @@ def test_commands_without_a_curve_say_what_is_assumed(tmp_path, tilt, needed):
 def test_commands_of_another_range_are_refused(tmp_path):
     with refused("expected motor commands from 1000 to 2000: state the"):
         mapped(table(tmp_path / "a.csv", {}), COMMANDED)
-
-
-def test_the_kits_own_columns_are_read_in_any_layout(tmp_path, flown):
-    """Semicolons, decimal commas and a comment, without a map."""
-    write_log(flown, tmp_path / "own.csv")
-    text = (tmp_path / "own.csv").read_text()
-    other = "# from a spreadsheet\n" + text.replace(",", ";").replace(".", ",")
-    (tmp_path / "other.csv").write_text(other)
-    (tmp_path / "other.txt").write_text(other)
-    own = read_log(tmp_path / "own.csv")
-    for name in ("other.csv", "other.txt"):
-        log = read_log(tmp_path / name)
-        assert_array_equal(log.t, own.t)
-        assert_allclose(log.rotor_speeds, own.rotor_speeds, rtol=1e-12)
-        assert_allclose(log.gyro, own.gyro, atol=1e-15)
 
 
 def test_rows_whose_times_were_rounded_are_even(tmp_path):

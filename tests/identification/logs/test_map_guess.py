@@ -86,7 +86,6 @@ _VICON = "/vicon/drone/transform"
     "names",
     [
         f"t n e d {_QUATERNION} {_SENSORS} w1 w2 w3 w4",
-        f"t pos_n pos_e pos_d {_QUATERNION} {_SENSORS} w1 w2 w3 w4",
         f"t x_ned y_ned z_ned {_QUATERNION} {_SENSORS} motor_0 motor_1 motor_2 motor_3",
         f"t px py pz {_QUATERNION} vx vy vz ax ay az angular_velocities_0 angular_velocities_1 "
         "angular_velocities_2 w1 w2 w3 w4",

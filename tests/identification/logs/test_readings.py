@@ -26,7 +26,7 @@ def test_the_advice_of_a_sentence_makes_the_pose_that_the_reading_means(first):
     rng = default_rng(first)
     for reading in POSES[first : first + 10]:
         position = rng.standard_normal(3)
-        quaternion = rng.standard_normal(4)
+        quaternion = Rotation.random(None, rng).as_quat()
         columns = dict(zip(("px", "py", "pz"), position, strict=True))
         assert_allclose(taken(reading, "position", columns), reading.frames.position @ position)
         columns = dict(zip(("qw", "qx", "qy", "qz"), quaternion, strict=True))

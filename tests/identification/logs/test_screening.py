@@ -12,10 +12,9 @@ import pytest
 from numpy.linalg import norm
 from numpy.random import default_rng
 from numpy.testing import assert_array_equal
-from scipy.spatial.transform import Rotation
 
 from tests.support.data_paths import crazyswarm2_file
-from tests.support.flown import VEHICLE, recorded, without_pose
+from tests.support.flown import VEHICLE, noisy, recorded, resting, without_pose
 from tests.support.hostile_conventions import permuted
 from tests.support.outcomes import refused
 from tests.support.parameters import mostly_slow
@@ -24,7 +23,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.evidence.trials.practice_flights import practise
 from windwrench.identification.logs.evidence import Evidence, log_ranking
-from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
+from windwrench.identification.logs.flight_log import with_rows, write_log
 from windwrench.identification.logs.magnitudes import without_broken_speeds
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
@@ -78,7 +77,6 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
     [
         ((2, 1, 0), (1, 1, 1), "px and pz are swapped"),
         ((1, 2, 0), (1, 1, 1), r"take \(pz, px, py\) as the position"),
-        ((2, 0, 1), (1, 1, 1), r"take \(py, pz, px\) as the position"),
         ((1, 0, 2), (-1, -1, 1), r"take \(-py, -px, pz\) as the position"),
         ((0, 1, 2), (1, 1, -1), r"position's z points down; expected .* take \(px, py, -pz\)"),
     ],
@@ -105,13 +103,9 @@ def test_a_quiet_hover_decides_nothing():
     """Without excitation no order of rotors explains more than another."""
     rng = default_rng(0)
     t = np.arange(0.0, 15.0, 0.005)
-    attitude = Rotation.from_rotvec(0.005 * rng.standard_normal((len(t), 3))).as_quat(
-        scalar_first=True
-    )
-    rotors = VEHICLE.hover_rate + rng.standard_normal((len(t), 4))
-    log = FlightLog(
-        t, np.array([0.0, 0.0, 1.0]) + 0.001 * rng.standard_normal((len(t), 3)), attitude, rotors
-    )
+    log = resting(t, rotor_speeds=VEHICLE.hover_rate + rng.standard_normal((len(t), 4)))
+    position, quaternion = noisy(VEHICLE.mocap, rng, log.position, log.quaternion)
+    log = replace(log, position=position, quaternion=quaternion)
     assert screen_log(log, VEHICLE)[1] == ()
     assert Evidence.of_log(log, VEHICLE).fit(DECLARED).torque > 0.5  # there is nothing to tell
 
@@ -157,10 +151,6 @@ TORN = {
         lambda log: with_rows(log, log.t < 6.0),
         r"6 of 6 s of flight lie in unbroken runs.*expected at least 10 s",
     ),
-    "very short": (
-        lambda log: with_rows(log, log.t < 2.0),
-        r"0 of 2 s of flight lie in unbroken runs",
-    ),
     "slow": (
         lambda log: with_rows(log, np.arange(len(log.t)) % 8 == 0),
         r"25 new poses a second; expected at least 50: acceler",
@@ -172,10 +162,6 @@ TORN = {
     "lost often": (
         lambda log: without_pose(log, log.t % 2.0 < 0.2),
         r"pose is lost in 8 run\(s\).*0 of .* s of flight lie in unbroken runs",
-    ),
-    "lost long": (
-        lambda log: without_pose(log, log.t > 8.0),
-        r"lost in 1 run\(s\).*8\.\d* of .* s of flight lie in unbroken runs",
     ),
     "no pose": (lambda log: without_pose(log, log.t > -1.0), "no row has a pose"),
     "uneven clock": (
@@ -205,7 +191,7 @@ TORN = {
 }
 
 
-ENOUGH = ("short", "very short", "slow", "held", "lost often", "lost long", "uneven clock")
+ENOUGH = ("short", "slow", "held", "lost often", "uneven clock")
 PARTS = ("clock jump", "rows cut out")
 
 

@@ -8,12 +8,12 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.dataflash_writer import dataflash, imu, parm
+from tests.support.flown import resting
 from tests.support.map_tables import table_text
 from tests.support.outcomes import noted, refused
 from tests.support.sd_card_writer import sd_card
 from tests.support.ulog_writer import sensor_combined, stamps, ulog_bytes
 from windwrench.dynamics import load_vehicle
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.flight_phases import flew
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.what_flew import order_by_places
@@ -225,13 +225,12 @@ def test_whether_anything_flew():
     t = 0.01 * np.arange(2000)
     hover = np.full((2000, 4), 390.0)
     still = np.zeros((2000, 3))
-    turned = np.tile([1.0, 0.0, 0.0, 0.0], (2000, 1))
     noise = default_rng(0).standard_normal((2000, 3))
     moving = 0.3 * np.sin(np.outer(t, [0.5, 0.7, 0.9]))
     way = still + np.outer(t, [0.3, 0.0, 0.0])
 
     def answer(position=still, speeds=hover, **sensors):
-        return flew(FlightLog(t, position, turned, speeds, **sensors))[0]
+        return flew(resting(t, position=position, rotor_speeds=speeds, **sensors))[0]
 
     assert answer(moving) == "yes, 20 s"
     assert answer(moving, 0.0 * hover) == "no"

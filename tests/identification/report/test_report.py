@@ -206,14 +206,14 @@ def test_the_page_stands_alone(reports):
 def test_the_page_says_it(reports):
     diagnosis, (_, path, _) = reports["plain"]
     page = Page(path.read_text("utf-8"))
-    before, after = (rounded(1e3 * e.force_rms, 2) for e in (diagnosis.before, diagnosis.after))
+    before, after = (rounded(1e3 * e.force_rms) for e in (diagnosis.before, diagnosis.after))
     assert (
-        f"Held-out force error: {before} mN before, {after} mN after (noise floor 12 mN)."
+        f"Held-out force error: {before} mN before, {after} mN after (noise floor 12.3 mN)."
         in page.text
     )
     kdx = with_std(diagnosis.effects[0].coefficients["kdx"], diagnosis.effects[0].std["kdx"])
     for words in (
-        "The model lacks rotor drag 0.3614",
+        "The model lacks rotor drag up to 0.3614",
         kdx,
         "per rotor, along body x",
         "looks random",

@@ -97,7 +97,6 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(commanded):
     assert (share[:2] < 0.1).all()
     assert list(found.predicted) == ["held_out_blocks", "flights_left_out"]
     for errors in found.predicted.values():
-        assert not errors.worse
         assert (errors.model[:, -1] < 0.3 * errors.still[:, -1]).all()
 
 
@@ -315,7 +314,7 @@ def test_an_inertia_that_no_body_has_moves_to_the_nearest(commanded):
     [
         ("same_motor_four_times.csv.gz", "motors 1 and 2 are equal in every row"),
         ("ardupilot_rpm_tenth.bin", r"speeds in flight are 39, 39.5, 39.3, 39.3 rad/s; .* 100"),
-        ("px4_one_esc_low.ulg", "rotor speeds in flight are 390, 395, 393, 70.7 rad/s"),
+        ("px4_one_esc_low.ulg", "are 390, 395, 393, 70.7 rad/s; expected a ratio of at most 2"),
     ],
 )
 def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):

@@ -6,6 +6,7 @@ not a cycle: divisions and roots take 14 on a real one, and flash may wait.
 """
 
 import re
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.support.exported_c.compiled import STRICT, run, write
+from tests.support.paths import ROOT
 from windwrench.live.export_c.numbers import table
 
 Array = NDArray[np.float64]
@@ -45,15 +47,15 @@ def fly(exported, flight, folder):
     columns = [np.atleast_2d(flight[name].T).T for name in _COLUMNS if name in flight]
     rows = np.concatenate(columns, axis=1)
     unmeasured = "12345.678"  # a number that no flight has, where nothing was measured
-    values = table(np.where(np.isfinite(rows), rows, float(unmeasured)), "single", "flight")
+    values = table(np.where(np.isfinite(rows), rows, float(unmeasured)), "flight")
     values = values.replace(f"{unmeasured}f", "NAN")
     (folder / "flight.h").write_text(
         f"#include <math.h>\n#define FLIGHT_STEPS {len(rows)}\n"
         + ("#define FLIGHT_IMU\n" if "gyro" in flight else "")
         + f"static const float flight[{len(rows)}][{rows.shape[1]}] = {values};\n"
     )
-    for name in ("bench.c", "mps2_an386.ld"):
-        (folder / name).write_text((_FOLDER / name).read_text(encoding="utf-8"), encoding="utf-8")
+    for path in (_FOLDER / "bench.c", ROOT / "examples" / "board" / "mps2_an386.ld"):
+        shutil.copy(path, folder)
     run(  # a C program: the filter needs no C++ library
         *(TOOLS[3], *options, "-std=c99", "-nostartfiles", "-I.", "bench.c", "filter.o"),
         *("-T", "mps2_an386.ld", "-o", "bench.elf", "-lm", "-lc", "-lgcc"),

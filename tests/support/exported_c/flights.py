@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.random import default_rng
-from scipy.spatial.transform import Rotation
 
 from tests.support.exported_c.hostile import befall
+from tests.support.flown import noisy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.recording import record_flight
@@ -59,7 +59,9 @@ def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
     n = len(position)
     period = every / 200.0
     if noise > 1.0:
-        _disturb(position, quaternion, model.mocap, noise, default_rng((seed, 1)))
+        more = math.sqrt(noise * noise - 1.0)
+        again = default_rng((seed, 1))
+        position, quaternion = noisy(model.mocap, again, position, quaternion, more, more)
     out = {
         "dt": period * (1.0 + 0.02 * rng.uniform(-1.0, 1.0, n)),
         "rotor_speeds": log["rotor_speeds"][rows],
@@ -81,15 +83,6 @@ def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
             k = rows.stop
         k += 1
     return {key: np.asarray(value, dtype=np.float32).astype(float) for key, value in out.items()}
-
-
-def _disturb(position, quaternion, mocap, noise, rng):
-    """Bring the noise of poses to so many times the declared deviation."""
-    more = math.sqrt(noise * noise - 1.0)
-    position += more * mocap.sigma_pos_m * rng.standard_normal(position.shape)
-    turns = Rotation.from_rotvec(more * mocap.sigma_att_rad * rng.standard_normal(position.shape))
-    seen = turns * Rotation.from_quat(quaternion, scalar_first=True)
-    quaternion[:] = seen.as_quat(scalar_first=True)
 
 
 def _saturate(rng, accelerometer):

@@ -1,0 +1,154 @@
+"""What is published of measured flights, beside what this project's commands make of the flights.
+
+* Force and torque on flights of a racer (NeuroBEM, Bauersfeld and others, RSS 2021): vector RMSE of
+  the published network and of estimators (NeuroMHE; TR-NeuroMHE).
+* Coefficients of a Crazyflie (Eschmann, Albani, Loianno, arXiv 2404.07837: sysid.tools), by the
+  same parts of the same logs.
+
+Flights are no part of the project: each table is left out without a folder with its data.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from windwrench import __version__
+from windwrench.dynamics.vehicle_file import load_vehicle
+from windwrench.evidence.kept_results import DOCS
+from windwrench.evidence.runner import start
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.text_table import open_table
+from windwrench.identification.motion.smoothing import derivative
+from windwrench.identification.vehicle_fit.geometry import parse_geometry
+from windwrench.identification.vehicle_fit.identify import identify
+from windwrench.identification.wrench_series import estimate_log, tune_to_log
+from windwrench.runtime.page_files import write_json
+from windwrench.runtime.provenance import commit
+
+Array = NDArray[np.float64]
+RESULTS = "results/published.json"  # below docs/
+
+RACES = ("c", "e", "g")
+_EDGE = 0.5  # s at either end, where the filter starts
+# vector RMSE as published, N and mNm
+PUBLISHED = {
+    "NeuroMHE, force": (0.079, 0.366, 0.068),
+    "TR-NeuroMHE, force": (0.078, 0.396, 0.067),
+    "NeuroBEM, torque": (5.9, 20.0, 3.4),
+    "TR-NeuroMHE, torque": (3.1, 15.9, 2.5),
+}
+# parts of the logs, s after their start, and the result of the notebook of sysid.tools. A motor's
+# thrust in N at a command u is 0.0212656 - 0.0111750 u + 0.1201299 u^2
+PARTS = {
+    "log10": [(8.67, 38.67)],
+    "log15": [(15.76, 50.76)],
+    "log16": [(15.1, 21.1), (28.1, 32.1)],
+}
+CRAZYFLIE_MASS, CRAZYFLIE_ARM = 0.027, 0.028  # kg, m
+OF_SYSID_TOOLS = {
+    "Jxx": 1.0286e-5,
+    "Jyy": 1.1052e-5,
+    "thrust(0.5)": 0.04571,
+    "thrust(0.75)": 0.08046,
+    "lag without offset": 0.072,
+}
+
+
+def race(data: Path, name: str) -> dict[str, list[float]]:
+    """Return the vector RMSE of force (N) and torque (mNm) on one flight, by the estimate from
+    poses and rotor speeds and by the published network.
+
+    Truth is mass times specific force, and inertia times the derivative of the angular velocity
+    with its gyroscopic part.
+    """
+    path = data / f"flight_{name}.csv.gz"
+    vehicle = load_vehicle(str(data / "vehicle.yaml"))
+    log = read_log(path, vehicle=vehicle)
+    assert log.accelerometer is not None
+    assert log.gyro is not None
+    turning = derivative(log.gyro, log.period)
+    momentum = log.gyro @ vehicle.inertia
+    truth = np.hstack(
+        [vehicle.mass * log.accelerometer, turning @ vehicle.inertia + np.cross(log.gyro, momentum)]
+    )
+    posed = replace(log, accelerometer=None, gyro=None)
+    tuning = tune_to_log(posed, vehicle).tuning
+    off = {}
+    for way, smooth in (("filter", False), ("smoothed", True)):
+        found = estimate_log(posed, vehicle, tuning, smooth=smooth)
+        inverse = Rotation.from_quat(log.quaternion, scalar_first=True).inv()
+        made = vehicle.rotor_wrench(log.rotor_speeds)
+        body = np.hstack([inverse.apply(found.force), inverse.apply(found.torque)])
+        body[:, 2:] += made
+        off[way] = body - truth
+    columns = [f"network_{kind}_{a}" for kind in ("force", "torque") for a in "xyz"]
+    table = open_table(path).read(["timestamp_s", *columns])
+    network = np.column_stack([table[column] for column in columns])
+    rows = np.searchsorted(table["timestamp_s"], log.t)
+    off["network"] = network[np.minimum(rows, len(network) - 1)] - truth
+    inner = (log.t > log.t[0] + _EDGE) & (log.t < log.t[-1] - _EDGE)
+    return {way: _sizes(x[inner]) for way, x in off.items()}
+
+
+def _sizes(off: Array) -> list[float]:
+    """Return the vector RMSE of force (N) and torque (mNm) of differences (N, 6)."""
+    squares = np.mean(np.square(off), axis=0).reshape(2, 3).sum(axis=1)
+    sizes: list[float] = (np.sqrt(squares) * [1.0, 1e3]).tolist()
+    return sizes
+
+
+def crazyflie(data: Path) -> dict[str, list[float]]:
+    """Return value and 95 % interval of coefficients by the parts of the logs."""
+    parts = [(data / name, window) for name, windows in PARTS.items() for window in windows]
+    logs = [read_log(path) for path, _ in parts]
+    found = identify(
+        logs, CRAZYFLIE_MASS, parse_geometry(str(CRAZYFLIE_ARM)), [window for _, window in parts]
+    )
+    named = {name: found.estimates[name] for name in OF_SYSID_TOOLS}
+    return {name: [e.value, e.low, e.high] for name, e in named.items()}
+
+
+def section(result: dict[str, Any]) -> str:
+    """Return the tables, as Markdown."""
+    lines = []
+    if races := result.get("races"):
+        lines += ["| flight | " + " | ".join(races) + " |", "| --- " * (1 + len(races)) + "|"]
+        for i, (kind, unit) in enumerate((("force", "N"), ("torque", "mNm"))):
+            for way in next(iter(races.values())):
+                cells = " | ".join(f"{of[way][i]:.3g}" for of in races.values())
+                lines.append(f"| {kind} ({unit}), {way} | {cells} |")
+        lines += [f"| {way} | " + " | ".join(map(str, of)) + " |" for way, of in PUBLISHED.items()]
+    if known := result.get("crazyflie"):
+        lines += ["", "| Crazyflie | found | 95 % interval | published |", "| --- " * 4 + "|"]
+        for name, (value, low, high) in known.items():
+            said = f"{OF_SYSID_TOOLS[name]:.4g}"
+            lines.append(f"| {name} | {value:.3g} | {low:.3g}–{high:.3g} | {said} |")
+    return "\n".join(lines)
+
+
+def study(
+    racer: Annotated[Path, typer.Option(help="Folder of flights c, e, g.")] = Path(
+        "../shared/data/racer"
+    ),
+    imu: Annotated[Path, typer.Option(help="Folder of a Crazyflie's logs.")] = Path(
+        "../shared/data/crazyflie_imu"
+    ),
+    out: Annotated[Path, typer.Option(help="Results file.")] = DOCS / RESULTS,
+) -> None:
+    """Compare with what is published. Tables without their flights are left out."""
+    result: dict[str, Any] = {"version": __version__, "commit": commit()}
+    if racer.is_dir():
+        result["races"] = {name: race(racer, name) for name in RACES}
+    if imu.is_dir():
+        result["crazyflie"] = crazyflie(imu)
+    write_json(result, out)
+    print(section(result))
+
+
+if __name__ == "__main__":
+    start(study)
