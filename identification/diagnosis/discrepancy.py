@@ -5,7 +5,8 @@ The columns are of the filter's predicted state: none holds the noise of the pos
 
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,38 +30,41 @@ SHARE_OF_EFFECT = 30.0
 CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
-@dataclass(frozen=True, eq=False)
-class Product:
+class Product(NamedTuple):
     """A column (n, 6), multiplied out a part at a time: ten minutes of 150 columns would take 0.9
     GB.
     """
 
     scale: float
     x: Array  # (n,)
-    y: Array | None  # (n, k); None: one
-    channels: slice | None = None  # k of six, the others zero; None: all six
+    y: Array  # (n, k)
+    first: int = 0  # channel of y's first column; the other channels are zero
 
-    def __getitem__(self, rows: slice) -> Array:
-        """Return some rows (m, 6)."""
-        part = self.scale * self.x[rows, None]
-        part = part if self.y is None else part * self.y[rows]
-        if self.channels is None:
-            return part
-        out = np.zeros((len(part), 6))
-        out[:, self.channels] = part
+    @staticmethod
+    def ones(*shape: int) -> Array:
+        """Return ones without memory of their own."""
+        return np.broadcast_to(1.0, shape)
+
+    def part(self, rows: slice) -> "Product":
+        """Return some rows."""
+        return Product(self.scale, self.x[rows], self.y[rows], self.first)
+
+    @property
+    def whole(self) -> Array:
+        """All of it (n, 6)."""
+        out = np.zeros((len(self.x), 6))
+        out[:, self.first : self.first + self.y.shape[1]] = self.scale * self.x[:, None] * self.y
         return out
 
 
-Columns = dict[Column, Array | Product]
+Columns = dict[Column, Product]
 
 
-def along_axis(axis: int, rotation: Array) -> tuple[Array | None, slice]:
+def along_axis(axis: int, rotation: Array) -> tuple[Array, int]:
     """Return the last two fields of a product along an axis of the body, three of force and three
     of torque.
     """
-    if axis < 3:
-        return rotation[:, :, axis], slice(3)
-    return None, slice(axis, axis + 1)
+    return (rotation[:, :, axis], 0) if axis < 3 else (Product.ones(len(rotation), 1), axis)
 
 
 def weight_and_torque(vehicle: Vehicle) -> Array:
@@ -97,7 +101,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     # from the sample before: later samples hold the poses' noise
     change = np.diff(rotors, axis=0, prepend=rotors[:1])
     size = weight_and_torque(flights.vehicle) / flights.inertias
-    one = np.ones(len(t))
+    one = Product.ones(len(t))
     torques = range(3, 6)
     out: Columns = {}
 
@@ -138,11 +142,11 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
         swing = _resonance(rotors[:, 1 + i], hertz, period, ends)
         add("resonance", f"a part that swings at {hertz:g} Hz", swing, (3 + i,))
     for i in range(6):
-        made = Product(size[i], one, None, slice(i, i + 1))
+        made = Product(size[i], one, one[:, None], i)
         out["", f"{UNKNOWN}constant: a constant in {i}"] = made
     for hertz in LOAD_HZ:
         swing = _resonance(whole.acceleration[:, :2], hertz, period, ends)
-        made = Product(size[0] / max(swing.std(), 1e-9), one, swing, slice(2))
+        made = Product(size[0] / max(swing.std(), 1e-9), one, swing)
         out["", f"{UNKNOWN}resonance: a load that swings at {hertz:g} Hz in 0"] = made
     return out
 

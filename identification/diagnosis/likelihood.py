@@ -21,7 +21,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
 from ..logs.flight_log import FlightLog, Logs
-from ..logs.table import Array, ArrayPair, Mask
+from ..logs.table import Array, Mask
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
@@ -74,6 +74,10 @@ STATES = (0, 1, 2)  # pose, rate and disturbance of an axis
 # rad of tilt for a rad/s2 of roll or pitch: the unit of gains of sideways states
 SIDEWAYS = 0.01
 FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, where the search for the noise begins
+# (6, 3, 4) whether an axis jumps by thrust, torque or turn, for each of thrust and torques
+DRIVES = np.zeros((6, 3, len(DRIVEN)))
+DRIVES[:3, 0, 0] = DRIVES[[3, 4, 5], 1, [1, 2, 3]] = 1.0
+NO_SHARES, NO_SLOPES = np.empty((6, 3, 0)), np.empty((6, 7, 0))
 # the state that jumps, by the gains of a pair on the rotors' innovations: thrust, torque, turn
 JUMP_STATE = np.tile(STATES, 3)
 
@@ -209,37 +213,34 @@ class Likelihood:
                 beside the model.
         """
         jumps = self._jumps()
+        own = np.einsum("ap,kl,s->akpls", OWN, np.eye(3), self._units).reshape(6, 3, -1)
 
-        def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
+        def see(steady: SteadyFilter, gains: Array) -> Array:
             self._run(steady, jumps, gains)
-            for i, (track, counts) in enumerate(zip(self.tracks, self._counts, strict=True)):
-                if explained is not None:
-                    pose, force = explained[i].swapaxes(0, 1)
-                    begun = np.zeros((6, 3, 1))
-                    rows = self._changes(track, steady, slice(None), begun, [force], [pose])
-                    left = (rows[:, :, 1] - rows[:, :, 0]) @ np.linalg.inv(steady.whitening).T
-                    track = replace(track, innovations=left)
-                if slopes is None:
-                    yield track.innovations[counts], track.innovations
-                    continue
-                state = np.zeros((6, 3, gains.size + slopes.shape[2]))
-                for at in self._blocks(track):
-                    each = jumps[i][at, :, None, :, None] * self._units
-                    own = (each * OWN[:, :, None, None]).reshape(-1, 6, gains.size)
-                    rows = self._changes(track, steady, at, state, (), (), own, slopes)
-                    if counts[at].any():
-                        yield track.innovations[at][counts[at]], rows[counts[at]]
+            if explained is not None:
+                back = np.linalg.inv(steady.whitening).T
+                for i, (track, change) in enumerate(zip(self.tracks, explained, strict=True)):
+                    every = np.ones(len(change), dtype=bool)
+                    one = [*map(_whole, change.swapaxes(0, 1))]
+                    parts = self._changes(track, steady, every, one[1:], one[:1])
+                    rows = np.concatenate([*parts])
+                    left = (rows[:, :, 1] - rows[:, :, 0]) @ back
+                    self.tracks[i] = replace(track, innovations=left)
+            parts = zip(self.tracks, self._counts, strict=True)
+            return np.concatenate([track.innovations[counts] for track, counts in parts])
+
+        def products(steady: SteadyFilter, slopes: Array) -> Array:
+            out = np.zeros((own.shape[2] + slopes.shape[2] + 1,) * 2)
+            for track, counts, x in zip(self.tracks, self._counts, jumps, strict=True):
+                for rows in self._changes(track, steady, counts, (), (), x, own, slopes):
+                    flat = rows.reshape(-1, len(out))
+                    out += flat.T @ flat
+            return out
 
         held = np.array(PRIORS.gains)[JUMP_STATE]
-        search = NoiseSearch(see, held, self.period, self.vehicle.gravity)
+        search = NoiseSearch(see, products, held, self.period, self.vehicle.gravity)
         self.noise, self.gains = search.likeliest(self.noise, self.gains)
         self._run(self.steady, jumps, self.gains)
-
-    def _blocks(self, track: Track) -> Iterator[slice]:
-        """Return the parts of a piece. One part's columns are in memory at a time."""
-        length = round(BLOCK / self.period)
-        n = len(track.t)
-        return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
 
     def _counted(self, piece: Poses) -> Mask:
         """Return the samples of a piece in the fit, like the rows of their block."""
@@ -272,9 +273,12 @@ class Likelihood:
         wrench[:, 3:] = wrench[:, 3:] @ np.linalg.inv(self.flights.vehicle.inertia).T
         return wrench
 
-    def _change(self, setting: Setting) -> Array:
-        """Return the change of the acceleration (n, 6) with another setting."""
-        return self._accelerations(setting, self.signals) - self._base
+    def _change(self, setting: Setting, units: float = 1.0) -> Array:
+        """Return the change of the acceleration (n, 6) with a setting so many units away."""
+        change = self._accelerations(setting, self.signals)
+        change -= self._base
+        change /= units
+        return change
 
     def _add(self, column: Column) -> None:
         """Add a coefficient's column, unless it is there already or no such vehicle is possible."""
@@ -285,7 +289,7 @@ class Likelihood:
             self._acting[column] = self._acting[ROTOR_TIME_OFFSET]
             return
         if effect and get(effect).kind == "sensing":
-            self._posed[column] = self._moved(column)
+            self._posed[column] = _whole(self._moved(column))
             return
         own = dict(self.flights.coefficients(self.setting, effect))
         if name.startswith(WHOLE_PREFIX):
@@ -294,10 +298,10 @@ class Likelihood:
         value, delta = self.flights.step(self.setting, (effect, name))
         there = {**self.setting, effect: {**own, name: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
-            change = self._change(there) / delta
+            change = self._change(there, delta)
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
-            self._acting[column] = _without_zeros(change)
+            self._acting[column] = _whole(change)
 
     def _moved(self, column: Column) -> Array:
         """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
@@ -333,7 +337,7 @@ class Likelihood:
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
-                acting[c] = _without_zeros(self._change({**self.setting, c[0]: dict(start)}))
+                acting[c] = _whole(self._change({**self.setting, c[0]: dict(start)}))
         for effect in library:
             for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
@@ -362,7 +366,7 @@ class Likelihood:
             # the speeds are of k + 1/2: nothing later than sample k + 1
             u = np.pad(np.diff(s.rotor_speeds, 2, axis=0), ((2, 0), (0, 0)))
             bent.append(replace(s, rotor_speeds=s.rotor_speeds + u))
-        self._acting["", BETWEEN] = self._accelerations(self.setting, bent) - self._base
+        self._acting["", BETWEEN] = _whole(self._accelerations(self.setting, bent) - self._base)
         self._add_model_errors()
         self._add_answers()
         moved = []
@@ -371,7 +375,7 @@ class Likelihood:
             rate = track.angular_velocity + 0.5 * self.period * track.acceleration[:, 3:]
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
             moved.append(np.column_stack([np.zeros_like(rate), -rate]))
-        self._posed[ATTITUDE_TIME_OFFSET] = np.concatenate(moved)
+        self._posed[ATTITUDE_TIME_OFFSET] = _whole(np.concatenate(moved))
 
     def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
         """Return the likelihood of the same columns, with the likeliest noise beside them all at
@@ -400,7 +404,7 @@ class Likelihood:
         for i, columns in enumerate((self._posed, self._acting)):
             for c, column in columns.items():
                 if c in coefficients:
-                    x[:, i] += coefficients[c] * column[:]
+                    x[:, i] += coefficients[c] * column.whole
         x[:, 1, :3] += whole.rotors[:, :1] * (
             x[:, 0, 4:5] * whole.rotation[:, :, 0] - x[:, 0, 3:4] * whole.rotation[:, :, 1]
         )
@@ -417,7 +421,8 @@ class Likelihood:
         change[:, :3] = 0.0
         axis = [c.name for c in get(column[0]).coefficients].index(column[1])
         (marker,) = playing(Role.MARKER)
-        self._posed[column] = -self._moved((marker, get(marker).coefficients[axis].name))
+        moved = -self._moved((marker, get(marker).coefficients[axis].name))
+        self._posed[column] = _whole(moved)
 
     def _add_model_errors(self) -> None:
         """Add the columns of slightly larger forces and torques, and of the torques expected from
@@ -500,106 +505,101 @@ class Likelihood:
         asked = (*(c for c in self._acting if c not in moved), *moved)
         # the gains on axes the rotors do not drive stay as fitted
         drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
-        names = (*asked, *drives)
-        first = 0
-        still = np.zeros_like(self._base)
-        most = sum(len([*self._blocks(track)]) for track in self.tracks)
-        products = np.empty((most, len(names) + 1, len(names) + 1))
-        flown: list[int] = []
-        for piece, track, jumps, counts in zip(
-            self.pieces, self.tracks, self._jumps(), self._counts, strict=True
-        ):
-            state = np.zeros((6, 3, len(names)))
-            for at in self._blocks(track):
-                rows = at.stop - at.start
-                here = slice(first + at.start, first + at.stop)
-                x = [self._acting.get(c, still)[here] for c in asked]
-                y = [column[here] for column in moved.values()]
-                driven = np.zeros((rows, 6, len(DRIVEN)))
-                driven[:, :3, 0] = jumps[at, :3, 0]
-                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1]
-                own = (driven[..., None] * self._units).reshape(rows, 6, -1)
-                out = self._changes(track, steady, at, state, x, y, own)
-                kept = out[counts[at]].reshape(-1, out.shape[2])
-                if len(kept):
-                    np.matmul(kept.T, kept, out=products[len(flown)])
-                    flown.append(piece.log)
-            first += len(track.position)
+        shares = (DRIVES[..., None] * self._units).reshape(6, 3, -1)
+        still = Product(0.0, Product.ones(len(self._base)), Product.ones(len(self._base), 1))
+
+        def blocks() -> Iterator[tuple[int, Array]]:
+            end = 0
+            for i, track in enumerate(self.tracks):
+                here = slice(end, end := end + len(track.t))
+                x = [self._acting.get(c, still).part(here) for c in asked]
+                y = [column.part(here) for column in moved.values()]
+                each = self._changes(track, steady, self._counts[i], x, y, jumps[i], shares)
+                for rows in each:
+                    flat = rows.reshape(-1, rows.shape[2])
+                    yield self.pieces[i].log, flat.T @ flat
+
+        jumps = self._jumps()
         samples = np.concatenate(self._counts).sum()
         penalty = float(samples * np.linalg.slogdet(steady.covariance)[1])
-        blocks = products[: len(flown)]
-        return in_prior_units(
-            self.flights, names, blocks, np.array(flown), penalty, self.setting, starts
-        )
+        names = (*asked, *drives)
+        return in_prior_units(self.flights, names, blocks(), penalty, self.setting, starts)
 
     def _changes(
         self,
         track: Track,
         steady: SteadyFilter,
-        at: slice,
-        state: Array,
-        acting: Sequence[Array] = (),
-        moved: Sequence[Array] = (),
+        counted: Mask,
+        acting: Sequence[Product] = (),
+        moved: Sequence[Product] = (),
         jumps: Array | None = None,
-        slopes: Array | None = None,
-    ) -> Array:
-        """Return the change of the predictions of a part of a piece with each of c columns, and the
-        innovations, whitened (n, 6, c + 1).
+        shares: Array = NO_SHARES,
+        slopes: Array = NO_SLOPES,
+    ) -> Iterator[Array]:
+        """Yield block by block the change of a piece's predictions with each of c columns, and the
+        innovations, whitened (m, 6, c + 1).
 
         Args:
             track: the piece.
             steady: the filter.
-            at: the part.
-            state: (6, 3, c) carried from one part to the next.
-            acting: acceleration of the model (n, 6) by a unit of each of the first columns.
-            moved: shift of the measured pose (n, 6) by a unit of the last of these.
-            jumps: (n, 6, e) jump of one state of each axis, of the states in turn, by a unit of
-                the next columns, before the pose of a sample is read; default: none.
+            counted: (n,) the samples of the answer; a block without any has none.
+            acting: acceleration of the model by a unit of each of the first columns.
+            moved: shift of the measured pose by a unit of the last of these.
+            jumps: (n, 6, 3) of each piece, as of ``_jumps``.
+            shares: (6, 3, e) of the jumps by a unit of the next columns, of the states in turn,
+                before the pose of a sample is read.
             slopes: (6, 7, m) change of the gains of each axis, in the order of
-                ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns; default:
-                none.
+                ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns.
         """
-        rate = track.angular_velocity[at]
-        jumps = np.empty((len(rate), 6, 0)) if jumps is None else jumps
-        slopes = np.empty((6, 7, 0)) if slopes is None else slopes
-        disturbance = track.disturbance[at].copy()
-        disturbance[:, 3:] = level(track.heading[at], disturbance[:, 3:])
-        out = np.empty((len(rate), 6, state.shape[2] + 1))
-        _core.sensitivities(
-            self.period,
-            steady.gain,
-            steady.keep,
-            track.heading[at],
-            track.rotors[at, :1, None] * track.rotation[at, :, 1::-1] * [-1.0, 1.0],
-            rate,
-            _gyration(self.vehicle, rate),
-            acting,
-            moved,
-            jumps,
-            np.resize(STATES, jumps.shape[2]),
-            slopes,
-            track.innovations[at],
-            disturbance,
-            steady.whitening,
-            state,
-            out,
-        )
-        return out
+        n = len(track.t)
+        jumps = np.zeros((n, 6, 3)) if jumps is None else jumps
+        count = len(acting) + shares.shape[2] + slopes.shape[2]
+        state = np.zeros((6, 3, count))
+        twist = _twist(self.vehicle)
+        length = round(BLOCK / self.period)
+        for begin in range(0, n, length):  # one block's columns are in memory at a time
+            at = slice(begin, begin + length)
+            out = np.empty((np.count_nonzero(counted[at]), 6, count + 1))
+            _core.sensitivities(
+                self.period,
+                steady.gain,
+                steady.keep,
+                track.heading[at],
+                track.rotation[at],
+                track.rotors[at],
+                track.angular_velocity[at],
+                twist,
+                [x.part(at) for x in acting],
+                [x.part(at) for x in moved],
+                jumps[at],
+                shares,
+                np.resize(STATES, shares.shape[2]),
+                slopes,
+                track.innovations[at],
+                track.disturbance[at],
+                steady.whitening,
+                counted[at],
+                state,
+                out,
+            )
+            if len(out):
+                yield out
 
 
-def _without_zeros(column: Array) -> Array | Product:
-    """Return a column (n, 6); without the torque's zeros, half of the memory, if a force alone."""
-    if column[:, 3:].any():
-        return column
-    return Product(1.0, np.broadcast_to(1.0, len(column)), column[:, :3].copy(), slice(3))
+def _whole(column: Array) -> Product:
+    """Return a column (n, 6); a force alone without the torque's zeros, half of the memory."""
+    if not column[:, 3:].any():
+        column = column[:, :3].copy()
+    return Product(1.0, Product.ones(len(column)), column)
 
 
-def _gyration(vehicle: Vehicle, rate: Array) -> Array:
-    """Return the derivative of the angular acceleration (n, 3, 3) by the angular velocity."""
+def _twist(vehicle: Vehicle) -> Array:
+    """Return the derivative (3, 3, 3) of the angular acceleration by the angular velocity, for a
+    velocity of one about each axis.
+    """
     # -u x J v over the inertia J, of all pairs of axes u and v
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)
-    both: Array = (twist + twist.swapaxes(0, 1)).swapaxes(1, 2)
-    return (rate @ both.reshape(3, 9)).reshape(-1, 3, 3)
+    return np.swapaxes(twist + twist.swapaxes(0, 1), 1, 2)
 
 
 def _read_poses(logs: Logs, at: int, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:

@@ -5,7 +5,7 @@ signals of the axis' states than the pose.
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -33,17 +33,19 @@ class NoiseSearch:
     """A search.
 
     Attributes:
-        see: returns the innovations (n, 6) of a flight's parts through a filter with gains (3, e)
-            of each pair. With slopes (6, 7, m) of the filter's gains and ``keep`` by a noise, also
-            the whitened changes (n, 6, 3 e + m + 1) of the predictions, behind the changes by the
-            gains of each pair in turn; the innovations last.
+        see: returns the innovations (n, 6) of the flights through a filter with gains (3, e) of
+            each pair.
+        products: returns the sums of products (c + 1, c + 1), for the filter of the last ``see``,
+            of the whitened changes of the predictions by the 3 e gains of each pair in turn, and by
+            slopes (6, 7, m) of the filter's gains and ``keep``; the innovations last.
         held: (e,) standard deviations of the gains' prior. Without it nearly predicted rotor speeds
             would have unlimited gains.
         period: s.
         gravity: m/s2.
     """
 
-    see: Callable[[SteadyFilter, Array, Array | None], Iterable[ArrayPair]]
+    see: Callable[[SteadyFilter, Array], Array]
+    products: Callable[[SteadyFilter, Array], Array]
     held: Array
     period: float
     gravity: float
@@ -65,18 +67,21 @@ class NoiseSearch:
         low = np.append(-none, low)
         high = np.append(none, high)
         at = np.clip(np.append(gains, x), low, high)
-        height, normal, right = self._slopes(at)
+        height, seen = self._height(at)
+        normal, right = self._slopes(at, seen)
         damping = DAMPING
         for _ in range(STEPS):
             damped = normal + np.diag(damping * np.diagonal(normal) + 1e-9)
             step = bounded_mode(damped, right, low - at, high - at)
             if 0.5 * right @ step < TOLERANCE:
                 break
-            better = self._height(at + step) < height
+            there, seen = self._height(at + step)
+            better = there < height
             damping *= 0.2 if better else 8.0
             if better:
                 at = at + step
-                height, normal, right = self._slopes(at)
+                height = there
+                normal, right = self._slopes(at, seen)
         return _noise(at), self._gains(at)
 
     def _gains(self, at: Array) -> Array:
@@ -85,31 +90,26 @@ class NoiseSearch:
     def _filter(self, at: Array) -> SteadyFilter:
         return steady_filter(_noise(at), self.period, self.gravity)
 
-    def _height(self, at: Array) -> float:
-        """Return minus the logarithm of the likelihood and the prior, up to a constant."""
-        steady = self._filter(at)
-        e = np.concatenate([e for e, _ in self.see(steady, self._gains(at), None)])
-        return self._deviance(e.T @ e, steady.covariance, at, len(e))
-
-    def _deviance(self, products: Array, covariance: Array, at: Array, n: int) -> float:
-        square = np.trace(np.linalg.solve(covariance, products))
-        square += np.square(self._gains(at) / self.held).sum()
-        return float(0.5 * (square + n * np.linalg.slogdet(covariance)[1]))
-
     @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
-    def _slopes(self, at: Array) -> tuple[float, Array, Array]:
-        """Return the height, Fisher's information (c, c), and minus the height's gradient (c,)."""
+    def _height(self, at: Array) -> tuple[float, Array]:
+        """Return minus the logarithm of the likelihood and the prior, up to a constant, and the
+        innovations (n, 6).
+        """
+        steady = self._filter(at)
+        seen = self.see(steady, self._gains(at))
+        square = np.trace(np.linalg.solve(steady.covariance, seen.T @ seen))
+        square += np.square(self._gains(at) / self.held).sum()
+        size = np.linalg.slogdet(steady.covariance)[1]
+        return float(0.5 * (square + len(seen) * size)), seen
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def _slopes(self, at: Array, seen: Array) -> ArrayPair:
+        """Return Fisher's information (c, c), and minus the height's gradient (c,), at the
+        innovations ``seen`` last.
+        """
         steady = self._filter(at)
         slopes, change = self._filter_slopes(at, steady)
-        size = len(at)
-        n = 0
-        whole = np.zeros((size + 1, size + 1))
-        own = np.zeros((6, 6))
-        for e, changes in self.see(steady, self._gains(at), slopes):
-            rows = changes.reshape(-1, size + 1)
-            whole += rows.T @ rows
-            own += e.T @ e
-            n += len(e)
+        whole = self.products(steady, slopes)
         normal = whole[:-1, :-1]
         right = whole[:-1, -1]
         held = np.tile(self.held, len(PAIRS))
@@ -118,10 +118,10 @@ class NoiseSearch:
         right[:count] -= at[:count] / held**2
         # by the innovations' covariance
         share = np.linalg.solve(steady.covariance, change)  # (m, 6, 6)
-        left = np.linalg.solve(steady.covariance, own) - n * np.eye(6)
-        normal[count:, count:] += 0.5 * n * np.einsum("mij,lji->ml", share, share)
+        left = np.linalg.solve(steady.covariance, seen.T @ seen) - len(seen) * np.eye(6)
+        normal[count:, count:] += 0.5 * len(seen) * np.einsum("mij,lji->ml", share, share)
         right[count:] += 0.5 * np.einsum("mij,ji->m", share, left)
-        return self._deviance(own, steady.covariance, at, n), normal, right
+        return normal, right
 
     def _filter_slopes(self, at: Array, here: SteadyFilter) -> ArrayPair:
         """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the

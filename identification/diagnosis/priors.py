@@ -270,8 +270,7 @@ def changed(column: Column, change: float, flights: RegressedFlights) -> float:
 def in_prior_units(
     flights: RegressedFlights,
     names: Sequence[Column],
-    blocks: Array,
-    flight: Index,
+    blocks: Iterable[tuple[int, Array]],
     penalty: float,
     setting: Setting,
     starts: Starts,
@@ -282,36 +281,39 @@ def in_prior_units(
     Args:
         flights: the vehicle's flights.
         names: (c,) columns.
-        blocks: (blocks, c + 1, c + 1) sums of products, of columns and of the residual at the
-            setting (last), whitened. They are changed in place: ten minutes take 0.2 GB.
-        flight: (blocks,) index of the log of each block.
+        blocks: of each block of flight the index of its log, and (c + 1, c + 1) sums of products,
+            of columns and of the residual at the setting (last), whitened.
         penalty: twice the sum over samples of the logarithm of the standard deviations.
         setting: the setting of effects.
         starts: columns of whole effects.
     """
     size = np.array([prior_size(c, flights) for c in names])
+    scale = np.append(size, 1.0)
     # about zero: the residual without all effects of the setting
     own = [*map(bare, names)]
     back = np.append([flights.value(setting, c) - declared(c, flights) for c in own], 1.0)
-    whole = blocks @ back
-    blocks[:, :, -1] = blocks[:, -1, :] = whole
-    blocks[:, -1, -1] = whole @ back
-    scale = np.append(size, 1.0)
-    blocks *= scale[:, None]
-    blocks *= scale
-    low, high = np.array([_bounds(c, flights) for c in names]).T / size
-    typical = np.array([typical_size(c, flights.vehicle) for c in own])
-    total = blocks.sum(axis=0)
     single = np.flatnonzero([not name.startswith(UNKNOWN) for _, name in names])
     held = np.append(single, len(names))
+    total = np.zeros((len(scale), len(scale)))
+    kept, flight = [], []
+    for log, products in blocks:
+        products[:, -1] = products[-1] = products @ back
+        products[-1, -1] = products[-1] @ back
+        products *= scale[:, None]
+        products *= scale
+        total += products
+        kept.append(products[np.ix_(held, held)])
+        flight.append(log)
+    low, high = np.array([_bounds(c, flights) for c in names]).T / size
+    typical = np.array([typical_size(c, flights.vehicle) for c in own])
     return Base(
         names,
         size,
         low,
         high,
         total + np.diag(1e-12 * np.diagonal(total)),
-        blocks[:, held[:, None], held],
-        flight,
+        np.array(kept),
+        np.array(flight),
         single,
         penalty,
         frozenset(k for k in setting if k),

@@ -186,10 +186,8 @@ class RowLikelihood:
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
         flight = flights.log[rows.at[self._use]][np.append(0, ends)]
         parts = (p.reshape(-1, x.shape[2]) for p in np.split(x, ends))
-        blocks = np.array([p.T @ p for p in parts])
-        return in_prior_units(
-            flights, list(columns), blocks, flight, len(x) * sizes, setting, starts
-        )
+        blocks = zip(flight.tolist(), (p.T @ p for p in parts), strict=True)
+        return in_prior_units(flights, list(columns), blocks, len(x) * sizes, setting, starts)
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns, changing coefficients among them."""
@@ -209,7 +207,7 @@ class RowLikelihood:
         whole, ends = joined(states)
         out = {}
         for column, made in discrepancy_columns(whole, ends, flights).items():
-            x = made[:]
+            x = made.whole
             if rows.with_torques or x[:, :3].any():
                 parts = zip(np.split(x, ends), pieces, strict=True)
                 out[column] = rows.from_world(np.concatenate([p.smooth(part) for part, p in parts]))
@@ -217,7 +215,8 @@ class RowLikelihood:
         own = {e: rows.residual(without(setting, e)) - here for e in setting}
         at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
         followed = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
-        return out | {column: x[:] for column, x in changing_columns(own, followed).items()}
+        changing = changing_columns(own, followed)
+        return out | {column: made.x[:, None] * made.y for column, made in changing.items()}
 
     # Fits
 
