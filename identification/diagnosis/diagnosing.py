@@ -39,10 +39,11 @@ from ..motion.smoothing import CUTOFFS, mean_square
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
 from .advice import FILTERED, advice, composites, inertial_notes, late_rotors, outside_the_fit
+from .column import Column, Part
 from .commanded_rotors import THRUST_FACTORS
 from .commands import what_commands_show
 from .log_offsets import delays_at_bound
-from .priors import NUISANCE, declared
+from .priors import declared
 from .ranking import LEAST_RIVAL, Report, rank, rank_by_rows
 from .regression import (
     CENTRAL,
@@ -251,14 +252,14 @@ class _Judged:
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
         if structured:  # the dictionary's best column beside the likeliest set
-            (_, name), _, gained = fitted.posterior.strangest()
-            group, what = name.removeprefix("unknown ").split(": ", 1)
-            column, _, channel = what.rpartition(" in ")
-            where = f"{CHANNELS[int(channel)]} with {column}" if column else f"the part of {what}"
-            self.structure = (Structure(group, where, gained / fitted.posterior.left()),)
+            c, _, gained = fitted.posterior.strangest()
+            where = f"{CHANNELS[c.number]} with {c.coefficient}"
+            if c.part == Part.CHANGING:
+                where = f"the part of {c.coefficient}"
+            self.structure = (Structure(c.group, where, gained / fitted.posterior.left()),)
         some = self.balance.noisy or is_beyond_calm(fitted.gusts, flights.vehicle) or self.pushes
         self.remainder = "structured" if structured else "random" if some else "none"
-        by_bias = fitted.posterior.shown([("", f"{NUISANCE}{name}") for _, name in flights.biases])
+        by_bias = fitted.posterior.shown([c._replace(part=Part.NUISANCE) for c in flights.biases])
         unseen = {e for e, x in fitted.posterior.shown().items() if x < LEAST_SHOWN}
         self.hidden = {e for e in unseen if by_bias[e] >= LEAST_SHOWN}
         self.unseen = unseen - self.hidden
@@ -287,7 +288,7 @@ class _Judged:
     def _of_any_flight(self, effect: str, values: Values, std: Values) -> NamedNumbers:
         """Return standard deviations of coefficients with the spread from flight to flight."""
         return {
-            name: math.hypot(x, between_flights((effect, name), values[name], self._flights))
+            name: math.hypot(x, between_flights(Column(effect, name), values[name], self._flights))
             for name, x in std.items()
         }
 
@@ -299,7 +300,7 @@ class _Judged:
         # these flights are late, however late others are
         delays = get(effect).role == Role.DELAY
         for name, std in (self._best.std[effect] if delays else self._std(effect)).items():
-            c = effect, name
+            c = Column(effect, name)
             off = abs(self._best.coefficients[effect][name] - declared(c, self._flights))
             if off > LEAST_SIZE * typical_size(c, self._flights.vehicle) and std:
                 apart.append(_apart(off, std))
@@ -370,7 +371,9 @@ class _Judged:
         uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
         if uncertain:
             std = {
-                name: math.hypot(x, flights.thrust_std * unit_of_change((effect, name), vehicle))
+                name: math.hypot(
+                    x, flights.thrust_std * unit_of_change(Column(effect, name), vehicle)
+                )
                 for name, x in std.items()
             }
         # shares of the residual's energy without it, each channel over its sensors' noise
@@ -392,7 +395,7 @@ class _Judged:
                 "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
                 "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
                 "largest_coefficient_in_typical_sizes": max(
-                    abs(x) / typical_size((effect, name), vehicle) * (name != CENTRAL)
+                    abs(x) / typical_size(Column(effect, name), vehicle) * (name != CENTRAL)
                     for name, x in values.items()
                 ),
                 "size_over_what_is_left": size,
@@ -408,7 +411,7 @@ class _Judged:
             name=effect,
             coefficients=values,
             std={name: std.get(name, 0.0) for name in values},
-            units={name: coefficient((effect, name)).unit for name in values},
+            units={name: coefficient(Column(effect, name)).unit for name in values},
             tentative=True,
             indistinguishable_from=(),
             evidence={"held_out_gain": gained, "held_out_gain_std": spread},

@@ -41,7 +41,8 @@ def balance(flights: RegressedFlights, setting: Setting) -> _Balance:
     """Return the residual with a setting of effects. A sensor's bias is no error of the model: the
     residual before is without it, too.
     """
-    sensors = {k: x for k, x in setting.get("", {}).items() if ("", k) in flights.biases}
+    biases = {c.coefficient for c in flights.biases}
+    sensors = {k: x for k, x in setting.get("", {}).items() if k in biases}
     before = flights.residual({"": sensors} if sensors else {})
     after = flights.residual(setting)
     held_out = ~flights.fit_rows
