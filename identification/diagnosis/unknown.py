@@ -12,7 +12,7 @@ MOST_STRUCTURE = 15.0  # nats, beyond which a Bayes factor counts no more
 
 
 @dataclass(frozen=True)
-class _UnknownSettings:
+class UnknownSettings:
     """The weights, in nats. ``tests/evidence/test_numbers.py`` fits them anew."""
 
     # log odds before the flight: one in ten. Stated, not fitted: 29 % of the kept flights have such
@@ -24,7 +24,7 @@ class _UnknownSettings:
     absorbed: float = 50.0
 
 
-UNKNOWN = _UnknownSettings()
+UNKNOWN = UnknownSettings()
 
 
 def signs(structure: float, push: bool) -> tuple[float, float, float]:
