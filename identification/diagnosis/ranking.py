@@ -48,7 +48,7 @@ MOST_STARTS = 2  # likeliest starts of an effect with nonlinear coefficients, fi
 
 
 @dataclass(frozen=True, eq=False)
-class _FittedPosterior:
+class FittedPosterior:
     """The posterior of flights, and the fit of the likeliest set."""
 
     posterior: Posterior
@@ -68,7 +68,7 @@ def rank(
     flights: RegressedFlights,
     library: Sequence[str],
     report: Report = lambda text: None,
-) -> _FittedPosterior:
+) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -154,7 +154,7 @@ def rank(
     ranking = posterior.ranking(quieter)
     gains = posterior.leave_out_needless(ranking.probability)
     late = {c.coefficient: x for c, x in posterior.nuisances().items() if c in flights.offsets}
-    return _FittedPosterior(
+    return FittedPosterior(
         posterior, ranking, *posterior.likeliest_setting(), gains, best.gusts(), late
     )
 
@@ -165,7 +165,7 @@ def rank_by_rows(
     first: Setting,
     fixed: Setting,
     report: Report = lambda text: None,
-) -> _FittedPosterior:
+) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -248,7 +248,7 @@ def rank_by_rows(
     gains = last.leave_out_needless(ranking.probability)
     setting, std = last.likeliest_setting()
     setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
-    return _FittedPosterior(
+    return FittedPosterior(
         last,
         ranking,
         setting,
