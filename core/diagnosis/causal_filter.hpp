@@ -186,9 +186,21 @@ struct ProductColumn {
 
   // write rows `begin` to `end` into one lane
   template <class T> void put(int64_t begin, int64_t end, T (*out)[6], int lane) const {
-    for (int64_t k = begin; k < end; k++) {
+    double *to = reinterpret_cast<double *>(out[0] + first) + lane;
+    if (width == 6) put_some<6>(begin, end, to, 6 * lanes_of<T>);
+    else if (width == 3) put_some<3>(begin, end, to, 6 * lanes_of<T>);
+    else
+      for (int i = 0; i < width; i++)
+        ProductColumn{scale, x, y + i * y_across, x_step, y_step, 0, 1, 0}.put_some<1>(
+            begin, end, to + i * lanes_of<T>, 6 * lanes_of<T>);
+  }
+
+ private:
+  template <int WIDTH> void put_some(int64_t begin, int64_t end, double *to, int step) const {
+    const int across = step / 6;
+    for (int64_t k = begin; k < end; k++, to += step) {
       const double by = scale * x[k * x_step], *row = y + k * y_step;
-      for (int i = 0; i < width; i++) out[k - begin][first + i][lane] = by * row[i * y_across];
+      for (int i = 0; i < WIDTH; i++) to[i * across] = by * row[i * y_across];
     }
   }
 };

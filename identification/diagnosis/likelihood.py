@@ -262,10 +262,8 @@ class Likelihood:
 
     def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> Array:
         """Return the accelerations (n, 6) of a setting along the pieces' signals."""
-        wrench = np.concatenate([self.flights.acting(s, setting) for s in signals])
-        wrench[:, :3] /= self.flights.vehicle.mass
-        wrench[:, 3:] = wrench[:, 3:] @ np.linalg.inv(self.flights.vehicle.inertia).T
-        return wrench
+        unit = replace(self.flights.vehicle, mass=1.0, inertia=np.eye(3))
+        return np.concatenate([self.flights.acting(s, setting, body=unit) for s in signals])
 
     def _change(self, setting: Setting, units: float = 1.0) -> Array:
         """Return the change of the acceleration (n, 6) with a setting so many units away."""
@@ -309,9 +307,12 @@ class Likelihood:
                 piece.t, track.predicted[:, :3], track.predicted[:, 3:], piece.rotor_speeds
             )
             undone = undo_log_sensing(log, vehicle)
-            turn = turn_between(track.predicted[:, 3:], undone.quaternion)
-            out.append(np.column_stack([undone.position - track.predicted[:, :3], turn]) / delta)
-        return np.concatenate(out)
+            moved = np.zeros((len(piece.t), 6))
+            moved[:, :3] = undone.position - log.position
+            if (undone.quaternion != log.quaternion).any():
+                moved[:, 3:] = turn_between(log.quaternion, undone.quaternion)
+            out.append(moved)
+        return np.concatenate(out) / delta
 
     def base(self, library: Iterable[str], starts: Starts, unknown: bool = False) -> Base:
         """Return the likelihood of the coefficients of effects, and of everything any flight may

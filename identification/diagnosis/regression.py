@@ -508,20 +508,23 @@ class RegressedFlights:
         # a fit asks several times for the residual at its setting
         return _kept(self._residuals, key, made, 16)
 
-    def acting(self, signals: Signals, setting: Setting, log: int = 0) -> Array:
+    def acting(
+        self, signals: Signals, setting: Setting, log: int = 0, body: Vehicle | None = None
+    ) -> Array:
         """Return these effects' force and torque (n, 6) on the vehicle along signals of a log.
 
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
-        like the residual.
+        like the residual, or by a body's.
         """
+        body = body or self.vehicle
         vehicle = self.amended(setting)
         offsets = setting.get("", {})
         s = with_time_offsets(signals, offsets)
         s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY.coefficient, 0.0))
-        wrench, _ = acting_wrench(s, vehicle, self.vehicle)
+        wrench, _ = acting_wrench(s, vehicle, body)
         off = np.array([offsets.get(bias_column(log, i).coefficient, 0.0) for i in range(3)])
         if off.any():
-            wrench[:, :3] += self.vehicle.mass * np.einsum("nij,j->ni", s.rotation, off)
+            wrench[:, :3] += body.mass * np.einsum("nij,j->ni", s.rotation, off)
         return wrench
 
     def felt(self, setting: Setting) -> Array | None:
