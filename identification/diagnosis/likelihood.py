@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -26,7 +27,7 @@ from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
 from ..motion.smoothing import continuous, filtered, turn_between
-from .causal_filter import Poses, Track, level, run
+from .causal_filter import FlightState, Poses, Track, level, run
 from .column import Column, Part
 from .discrepancy import (
     Columns,
@@ -140,6 +141,11 @@ class Likelihood:
             )
         else:
             self._add_what_any_flight_may_have()
+
+    @cached_property
+    def _state(self) -> tuple[FlightState, Array]:
+        """All pieces, one after the other, and their ends without the last."""
+        return joined(self.tracks)
 
     @property
     def _seen(self) -> list[tuple[Poses, Track]]:
@@ -327,7 +333,7 @@ class Likelihood:
         if playing(Role.LAG, among=self.setting):
             self._add(LAG_ASYMMETRY)
         if unknown and not any(c.is_unknown for c in acting):
-            acting |= discrepancy_columns(*joined(self.tracks), self.flights)
+            acting |= discrepancy_columns(*self._state, self.flights)
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
@@ -348,7 +354,7 @@ class Likelihood:
                 poses[effect] = np.sum(moved, axis=0)
             else:
                 parts[effect] = -self._change(without(self.setting, effect))
-        followed = variables(joined(self.tracks)[0])
+        followed = variables(self._state[0])
         self._acting |= changing_columns(parts, followed)
         self._posed |= changing_columns(poses, followed)
 
@@ -394,7 +400,7 @@ class Likelihood:
 
     def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
         """Return the change of the pose and of the acceleration (n, 2, 6) of each piece."""
-        whole, ends = joined(self.tracks)
+        whole, ends = self._state
         x = np.zeros((len(whole.t), 2, 6))
         for i, columns in enumerate((self._posed, self._acting)):
             for c, column in columns.items():
@@ -427,7 +433,7 @@ class Likelihood:
         a hover holds little torque, and rounding hides it.
         """
         rounded = 2.0 * np.square(self._rounding()[3:])
-        whole, _ = joined(self.tracks)
+        whole, _ = self._state
         expected = whole.rotors[:, 1:] - np.concatenate(self.answers)[:, 1:]
         share = rounded / np.maximum(expected.var(axis=0), rounded)
         scale = np.hypot(1.0, share / PRIORS.model_error)
@@ -450,7 +456,7 @@ class Likelihood:
         signals may have a share of the part, at most the disturbance's share of the variance.
         (Unknown linear feedback: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
         """
-        whole, _ = joined(self.tracks)
+        whole, _ = self._state
         rate = whole.angular_velocity
         body = in_body(whole.velocity, whole.rotation)
         tilt = whole.rotation[:, 2]
@@ -584,10 +590,10 @@ class Likelihood:
 
 
 def _whole(column: Array) -> Product:
-    """Return a column (n, 6); a force alone without the torque's zeros, half of the memory."""
-    if not column[:, 3:].any():
-        column = column[:, :3].copy()
-    return Product(1.0, Product.ones(len(column)), column)
+    """Return a column (n, 6), without channels of zeros before and after the others."""
+    used = np.flatnonzero(column.any(axis=0)).tolist() or [0]
+    some = column[:, used[0] : used[-1] + 1].copy()
+    return Product(1.0, Product.ones(len(column)), some, used[0])
 
 
 def _twist(vehicle: Vehicle) -> Array:

@@ -78,7 +78,8 @@ def rank(
     """
 
     def height(x: Setting, near: Likelihood) -> Height:
-        return linearised(flights, Likelihood(flights, x, near, same_noise=True).base(x, {}), x)
+        here = near if x is near.setting else Likelihood(flights, x, near, same_noise=True)
+        return linearised(flights, here.base(x, {}), x)
 
     def fitted(setting: Setting, near: Likelihood) -> Likelihood:
         report(f"trying {', '.join(setting)}")

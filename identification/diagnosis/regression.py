@@ -66,7 +66,7 @@ LEAST_STEPS_OF_ROTOR_SPEED = 1.4
 BLOCK = 3.0  # s of flight held out, or left out in cross-validation, in one piece
 SHORT_BLOCK = 1.0  # s, the same of commanded flights of fewer than eight blocks
 BLOCKS_PER_HELD_OUT = 4  # one of so many blocks is held out
-MEMORY = 2**28  # bytes of cached pieces
+MEMORY = 2**27  # bytes of cached pieces
 # not known where rotor speeds come from commands: torque is left out, the thrust curve is a guess,
 # and commands do not tell small differences between rotors
 NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
