@@ -6,12 +6,12 @@ innovations are white. Sums of products then give the log-likelihood of any set 
 the setting.
 """
 
+import functools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -142,7 +142,7 @@ class Likelihood:
         else:
             self._add_what_any_flight_may_have()
 
-    @cached_property
+    @functools.cached_property
     def _state(self) -> tuple[FlightState, Array]:
         """All pieces, one after the other, and their ends without the last."""
         return joined(self.tracks)
@@ -205,12 +205,11 @@ class Likelihood:
         wrench = np.sqrt(np.sum(np.square(wrenches[1:] - wrenches[0]), axis=0) / 2.0)
         return np.maximum(np.array([0.0, 0.0, *wrench]) / self.flights.inertias, 1e-9)
 
-    def _search_noise(self, explained: Sequence[Array] | None = None) -> None:
+    def _search_noise(self, explained: Array | None = None) -> None:
         """Take the likeliest noise, and the likeliest gains on the rotors' innovations.
 
         Args:
-            explained: (n, 2, 6) of each piece: known changes of the pose and of the acceleration
-                beside the model.
+            explained: (n, 2, 6) known changes of the pose and of the acceleration beside the model.
         """
         jumps = self._jumps()
         own = np.einsum("ap,kl,s->akpls", OWN, np.eye(3), self._units).reshape(6, 3, -1)
@@ -218,24 +217,18 @@ class Likelihood:
         def see(steady: SteadyFilter, gains: Array) -> Array:
             self._run(steady, jumps, gains)
             if explained is not None:
-                back = np.linalg.inv(steady.whitening).T
-                for i, (track, change) in enumerate(zip(self.tracks, explained, strict=True)):
-                    every = np.ones(len(change), dtype=bool)
-                    one = [*map(_whole, change.swapaxes(0, 1))]
-                    parts = self._changes(track, steady, every, one[1:], one[:1])
-                    rows = np.concatenate([*parts])
-                    left = (rows[:, :, 1] - rows[:, :, 0]) @ back
-                    self.tracks[i] = replace(track, innovations=left)
-            parts = zip(self.tracks, self._counts, strict=True)
-            return np.concatenate([track.innovations[counts] for track, counts in parts])
+                pose, force = map(_whole, explained.swapaxes(0, 1))
+                each = self._changes(steady, jumps, [force], [pose], every=True)
+                rows = np.concatenate([x for _, x in each])
+                left = (rows[:, 1] - rows[:, 0]).reshape(-1, 6) @ np.linalg.inv(steady.whitening).T
+                parts = zip(self.tracks, np.split(left, self._state[1]), strict=True)
+                self.tracks = [replace(track, innovations=x) for track, x in parts]
+            counted = np.concatenate(self._counts)
+            return np.concatenate([track.innovations for track in self.tracks])[counted]
 
         def products(steady: SteadyFilter, slopes: Array) -> Array:
-            out = np.zeros((own.shape[2] + slopes.shape[2] + 1,) * 2)
-            for track, counts, x in zip(self.tracks, self._counts, jumps, strict=True):
-                for rows in self._changes(track, steady, counts, (), (), x, own, slopes):
-                    flat = rows.reshape(-1, len(out))
-                    out += flat.T @ flat
-            return out
+            each = self._changes(steady, jumps, shares=own, slopes=slopes)
+            return functools.reduce(np.add, (x.T @ x for _, x in each))
 
         held = np.array(PRIORS.gains)[JUMP_STATE]
         search = NoiseSearch(see, products, held, self.period, self.vehicle.gravity)
@@ -398,9 +391,9 @@ class Likelihood:
         ]
         return out._products(starts)
 
-    def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
-        """Return the change of the pose and of the acceleration (n, 2, 6) of each piece."""
-        whole, ends = self._state
+    def _explained(self, coefficients: Mapping[Column, float]) -> Array:
+        """Return the change of the pose and of the acceleration (n, 2, 6)."""
+        whole, _ = self._state
         x = np.zeros((len(whole.t), 2, 6))
         for i, columns in enumerate((self._posed, self._acting)):
             for c, column in columns.items():
@@ -409,7 +402,7 @@ class Likelihood:
         x[:, 1, :3] += whole.rotors[:, :1] * (
             x[:, 0, 4:5] * whole.rotation[:, :, 0] - x[:, 0, 3:4] * whole.rotation[:, :, 1]
         )
-        return np.split(x, ends)
+        return x
 
     def _swing(self, column: Column, change: Array) -> None:
         """Have a centre of mass move the measured point like a marker as far on the other side; its
@@ -509,84 +502,78 @@ class Likelihood:
             Column("", f"axis {axis}", Part.GAIN, state) for axis in DRIVEN for state in STATES
         ]
         shares = (DRIVES[..., None] * self._units).reshape(6, 3, -1)
-        still = Product(0.0, Product.ones(len(self._base)), Product.ones(len(self._base), 1))
-
-        def blocks() -> Iterator[tuple[int, Array]]:
-            end = 0
-            for i, track in enumerate(self.tracks):
-                here = slice(end, end := end + len(track.t))
-                x = [self._acting.get(c, still).part(here) for c in asked]
-                y = [column.part(here) for column in moved.values()]
-                each = self._changes(track, steady, self._counts[i], x, y, jumps[i], shares)
-                for rows in each:
-                    flat = rows.reshape(-1, rows.shape[2])
-                    yield self.pieces[i].log, flat.T @ flat
-
-        jumps = self._jumps()
+        n = len(self._base)
+        still = Product(0.0, Product.ones(n), Product.ones(n, 1))
+        x = [self._acting.get(c, still) for c in asked]
+        each = self._changes(steady, self._jumps(), x, [*moved.values()], shares)
+        blocks = ((log, rows.T @ rows) for log, rows in each)
         samples = np.concatenate(self._counts).sum()
         penalty = float(samples * np.linalg.slogdet(steady.covariance)[1])
         names = (*asked, *drives)
-        return in_prior_units(self.flights, names, blocks(), penalty, self.setting, starts)
+        return in_prior_units(self.flights, names, blocks, penalty, self.setting, starts)
 
     def _changes(
         self,
-        track: Track,
         steady: SteadyFilter,
-        counted: Mask,
+        jumps: Sequence[Array],
         acting: Sequence[Product] = (),
         moved: Sequence[Product] = (),
-        jumps: Array | None = None,
         shares: Array = NO_SHARES,
         slopes: Array = NO_SLOPES,
-    ) -> Iterator[Array]:
-        """Yield block by block the change of a piece's predictions with each of c columns, and the
-        innovations, whitened (m, 6, c + 1).
+        every: bool = False,
+    ) -> Iterator[tuple[int, Array]]:
+        """Yield for each block of flight the index of its log, and the change of the predictions
+        with each of c columns and the innovations, whitened (6 m, c + 1), of its m samples in the
+        fit.
 
         Args:
-            track: the piece.
             steady: the filter.
-            counted: (n,) the samples of the answer; a block without any has none.
+            jumps: (n, 6, 3) of each piece, as of ``_jumps``.
             acting: acceleration of the model by a unit of each of the first columns.
             moved: shift of the measured pose by a unit of the last of these.
-            jumps: (n, 6, 3) of each piece, as of ``_jumps``.
             shares: (6, 3, e) of the jumps by a unit of the next columns, of the states in turn,
                 before the pose of a sample is read.
             slopes: (6, 7, m) change of the gains of each axis, in the order of
                 ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns.
+            every: all samples count.
         """
-        n = len(track.t)
-        jumps = np.zeros((n, 6, 3)) if jumps is None else jumps
         count = len(acting) + shares.shape[2] + slopes.shape[2]
-        state = np.zeros((6, 3, count))
-        twist = _twist(self.vehicle)
         length = round(BLOCK / self.period)
-        for begin in range(0, n, length):  # one block's columns are in memory at a time
-            at = slice(begin, begin + length)
-            out = np.empty((np.count_nonzero(counted[at]), 6, count + 1))
-            _core.sensitivities(
-                self.period,
-                steady.gain,
-                steady.keep,
-                track.heading[at],
-                track.rotation[at],
-                track.rotors[at],
-                track.angular_velocity[at],
-                twist,
-                [x.part(at) for x in acting],
-                [x.part(at) for x in moved],
-                jumps[at],
-                shares,
-                np.resize(STATES, shares.shape[2]),
-                slopes,
-                track.innovations[at],
-                track.disturbance[at],
-                steady.whitening,
-                counted[at],
-                state,
-                out,
-            )
-            if len(out):
-                yield out
+        end = 0
+        for piece, track, counts, jump in zip(
+            self.pieces, self.tracks, self._counts, jumps, strict=True
+        ):
+            counted = counts | every
+            state = np.zeros((6, 3, count))
+            begun, end = end, end + len(counts)
+            for begin in range(begun, end, length):  # one block's columns are in memory at a time
+                rows = slice(begin, min(begin + length, end))
+                at = slice(begin - begun, rows.stop - begun)
+                out = np.empty((np.count_nonzero(counted[at]), 6, count + 1))
+                _core.sensitivities(
+                    self.period,
+                    steady.gain,
+                    steady.keep,
+                    track.heading[at],
+                    track.rotation[at],
+                    track.rotors[at],
+                    track.angular_velocity[at],
+                    _twist(self.vehicle),
+                    [x.part(rows) for x in acting],
+                    [x.part(rows) for x in moved],
+                    jump[at],
+                    shares,
+                    np.resize(STATES, shares.shape[2]),
+                    slopes,
+                    track.innovations[at],
+                    track.disturbance[at],
+                    steady.whitening,
+                    counted[at],
+                    state,
+                    out,
+                )
+                if len(out):
+                    yield piece.log, out.reshape(-1, count + 1)
 
 
 def _whole(column: Array) -> Product:

@@ -220,18 +220,17 @@ class Evidence:
         total *= _G / max(np.median(total[self._compared]), 1e-300)
         return np.column_stack([self._band(thrusts).reshape(-1, 8), self._slow(total), total])
 
-    def _pushes(self, *delays: float) -> tuple[Array, Array, Array]:
+    def _pushes(self, *delays: float) -> ArrayPair:
         """Return whether the samples compared, less each delay (d, n), lie within their run (1, or
-        0), thrusts, and their sums of products (d, 9, 9). The thrusts (d, 9, n) are the first nine
-        of ``_driving``, less their means; zero elsewhere.
+        0), and thrusts. The thrusts (d, 9, n) are the first nine of ``_driving``, less their means;
+        zero elsewhere.
         """
         at = self._clock[self._compared] - np.array(delays)[:, None]
         begin, end = (x[self._compared] for x in self._ends)
         within = ((at >= begin) & (at <= end)).astype(float)
         thrusts = resampled(at.ravel(), self._clock, self._driving[:, :9]).reshape(*at.shape, 9)
         means = within[:, None] @ thrusts / np.maximum(within.sum(axis=1), 1.0)[:, None, None]
-        pushes = np.swapaxes(within[..., None] * (thrusts - means), 1, 2).copy()
-        return within, pushes, pushes @ np.swapaxes(pushes, 1, 2)
+        return within, np.swapaxes(within[..., None] * (thrusts - means), 1, 2)
 
     def _moving(self, attitude: Attitude) -> ArrayPair:
         """Return thrust and turns by one convention of the attitude. Thrust is specific, times the
@@ -320,11 +319,12 @@ class Evidence:
         rows[3:, 4:8] = -torques[2:] if reading.mirrored else torques[2:]
         horizontal, cost, needed = self._moved(*reading.moves)
         needed = needed[: len(rows)]
-        there, thrusts, products = self._delayed(*delays)
+        there, thrusts = self._delayed(*delays)
+        given = rows @ thrusts
         left = shares(  # (d, 1 + torques)
             there @ np.square(needed).T,
-            np.einsum("ri,dij,rj->dr", rows, products, rows),
-            np.einsum("ri,dir->dr", rows, thrusts @ needed.T),
+            (given * given).sum(axis=2),
+            (given * needed).sum(axis=2),
             np.transpose(self._gains[: len(rows)]),
         )
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
