@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -126,14 +127,13 @@ def rank(
     # the best effect first, alone: another set's columns are of the model with that effect
     if setting := posterior.best_setting(1):
         best = fitted(setting, best)
-        score = alone(best)
         starts, posterior = around(best)
         # a similar effect counts as a disturbance beside it: each is judged beside its own noise
-        rivals = {alone(x): x for x in (fitted(y, best) for y in posterior.rivals(setting))}
-        if max(rivals, default=score) > score:
-            best = rivals[max(rivals)]
+        # one after the other: each holds a tenth of a diagnosis' memory
+        each = (fitted(rival, best) for rival in posterior.rivals(setting))
+        best = max(chain([best], each), key=alone)
+        if best.setting.keys() != setting.keys():
             starts, posterior = around(best)
-        del rivals  # each holds a tenth of a diagnosis' memory
     for _ in range(ROUNDS):
         # the columns of the same set change with its coefficients, if these have moved far
         setting = posterior.best_setting()
