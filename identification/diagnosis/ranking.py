@@ -120,8 +120,8 @@ def rank(
     # made anew at the end if no set is likeliest: its columns of ten minutes take 0.5 GB
     best, starts, loud = first()
     everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
-    quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
-    posterior = Posterior(flights, library, (loud, quiet))
+    beside = {c: x for c, (x, _) in everything.items()}
+    posterior = Posterior(flights, library, (loud, best.quieter(beside, starts)))
     # settings as asked for: beside the end of a fit, a little of other effects moves the request
     tried: dict[Effects, Setting] = {frozenset(): {}}
     # the best effect first, alone: another set's columns are of the model with that effect

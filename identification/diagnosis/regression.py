@@ -66,7 +66,7 @@ LEAST_STEPS_OF_ROTOR_SPEED = 1.4
 BLOCK = 3.0  # s of flight held out, or left out in cross-validation, in one piece
 SHORT_BLOCK = 1.0  # s, the same of commanded flights of fewer than eight blocks
 BLOCKS_PER_HELD_OUT = 4  # one of so many blocks is held out
-MEMORY = 2**27  # bytes of cached pieces
+MEMORY = 2**26  # bytes of cached pieces
 # not known where rotor speeds come from commands: torque is left out, the thrust curve is a guess,
 # and commands do not tell small differences between rotors
 NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
@@ -384,8 +384,7 @@ class RegressedFlights:
         vehicle = self.amended(setting)
         sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in sensing_of(vehicle))
         size = 400 * max(sum(len(p.signals.t) for p in self._first), 1)  # bytes
-        most = min(max(MEMORY // size, 1), 40)
-        return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
+        return _kept(self._pieces, sensing, lambda: self._cut(vehicle), max(MEMORY // size, 1))
 
     def _cut(self, vehicle: Vehicle) -> list[_FlightPiece]:
         cut = [
