@@ -226,6 +226,8 @@ class RegressedFlights:
         """Clear all caches."""
         self._pieces: dict[tuple[object, ...], list[_FlightPiece]] = {}
         self._residuals: dict[tuple[object, ...], Array] = {}
+        # wrenches of starting points at some samples, by effect and coefficients
+        self.started: dict[str, Array] = {}
 
     def _noisier(self, hidden: bool = False) -> "RegressedFlights":
         """Return the same rows of louder logs; ``hidden``: with the noise hidden by a filter."""

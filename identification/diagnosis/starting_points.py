@@ -78,8 +78,12 @@ def starting_points(
     scale = 1.0 / np.maximum(np.sqrt(mean_square(target)), 1e-12)
 
     def acting(setting: Setting) -> Array:
-        parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
-        return np.asarray(np.concatenate(parts)[used] * scale)
+        # the same starts are tried beside several sets
+        key = str(setting) + effect
+        if key not in flights.started:
+            parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
+            flights.started[key] = np.concatenate(parts)[used]
+        return np.asarray(flights.started[key] * scale)
 
     # share of the residual along each start's wrench; the later one of equals, and none without a
     # wrench
