@@ -33,7 +33,7 @@ def diagnose(
     without: list[str] | None = None,
     out: Path = Path("results/diagnose"),
 ) -> dict[str, Any]:
-    """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
+    """Name effects that a vehicle's model lacks, from flight logs. Write report.json, report.html
     and vehicle.yaml.
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone

@@ -42,10 +42,10 @@ def identify(
     out: Path = Path("results/vehicle.yaml"),
 ) -> dict[str, Any]:
     """Identify a vehicle from its flight logs. Thrust and torque coefficients or the thrust curve,
-    inertia, motor lag, centre of mass and drag, each with a 95 % interval; what the flights do not
-    tell is said. Write the vehicle file, the intervals beside it and a picture.
+    inertia, motor lag, centre of mass and drag, each with a 95 % interval; quantities that the flights
+    do not determine are listed. Write the vehicle file, the intervals beside it and a picture.
 
-    With --test, say how well the vehicle predicts flights that it was not fitted to.
+    With --test, measure how well the vehicle predicts flights kept out of the fit.
 
     Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
     """

@@ -38,8 +38,8 @@ def live(
     rate: float | None = None,
     wait: float = 10.0,
 ) -> dict[str, Any]:
-    """Estimate the wrench while the vehicle flies. Show it, send it back, record the flight. Prints
-    a page on a terminal, else a line for each estimate, the columns of wrench.csv.
+    """Estimate the wrench while the vehicle flies. Show or send the estimate, and record the
+    flight. A terminal shows a live page; a pipe gets one line an estimate, as in wrench.csv.
 
     Example: windwrench live sim:base
     """

@@ -34,8 +34,8 @@ def look(
     no_open: bool = False,
     out: Path = Path("results/log"),
 ) -> dict[str, Any]:
-    """Say of a flight log all that it allows. What it holds, which force and torque act, and what
-    the vehicle's model lacks; write one page.
+    """Check a flight log, estimate the wrench and name missing effects. Do as much as the log
+    allows, and write one page.
 
     Example: windwrench look flight.csv --vehicle crazyflie
     """

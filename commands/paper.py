@@ -19,7 +19,7 @@ def reproduce(
 ) -> dict[str, Any]:
     """Reproduce the paper's figures. A repeated command resumes and keeps finished figures.
 
-    Each gives NAME.json (figures of merit), NAME.csv.gz (data), NAME.png and NAME.svg.
+    Each figure gives NAME.json (figures of merit), NAME.csv.gz (data), NAME.png and NAME.svg.
 
     Example: windwrench reproduce fig6 --out results/reproduction
     """
