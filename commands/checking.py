@@ -20,9 +20,9 @@ def check(
     write: Path | None = None,
     out: Path = Path("results/check"),
 ) -> dict[str, Any]:
-    """Check a flight log: channels, rates, gaps, units and conventions. Print how each was decided,
-    and draw the channels. For a table of unknown columns propose a map, with ? where you must
-    choose.
+    """Check the channels, units and conventions of a flight log. Print rates, gaps, doubts and the
+    reason of each choice, and draw the channels. For a table of unknown columns propose a map,
+    with ? where you must choose.
 
     Example: windwrench check theirs.csv --vehicle my_drone.yaml --write-map map.yaml
     """

@@ -112,9 +112,9 @@ def identify(
         console.print(line)
     for of, errors in identified.predicted.items():
         after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
-        console.print(f"{of.replace('_', ' ')}: {after}, by what was not fitted to them:")
+        console.print(f"{of.replace('_', ' ')}: {after}, by a fit without them:")
         show_table(
-            ("mean error", "of the vehicle", "thrust and drag", "if nothing changes", "unit"),
+            ("mean error", "this vehicle", "thrust and drag", "no change", "unit"),
             table_of(errors, identified.simplest[of]),
         )
     console.print(use_of(identified))

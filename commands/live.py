@@ -185,12 +185,12 @@ def _summary(session: "Session") -> dict[str, Any]:
         "torque_std_Nm": deviation[3:],
         "ended": session.ended,
     }
-    messages = ", ".join(f"{n} {kind}" for kind, n in sorted(result["messages"].items()))
-    lines = [f"{session.estimates} estimates over {session.seconds:.1f} s, of {messages}"]
+    messages = ", ".join(f"{kind} {n}" for kind, n in sorted(result["messages"].items()))
+    lines = [f"{session.estimates} estimates over {session.seconds:.1f} s; messages: {messages}"]
     if tallies.found:
         lines.append(f"counted: {counts_words(tallies.found)}")
     if restarts:
-        lines.append(f"the filter restarted {restarts} time(s): after gaps or jumps")
+        lines.append(f"restarts of the filter after gaps or jumps: {restarts}")
     if tallies.consistency.seconds:
         lines.append(f"tuning: {tuning_words(tallies.consistency)}")
     lines += session.watch.words

@@ -123,4 +123,4 @@ def test_no_command_is_proposed_that_refuses_the_log(call, log, tmp_path):
     told = "identify refuses this log: theirs: rotor speeds of motors 1 and 2 are equal"
     assert told in " ".join(out.split())
     page = Path("all/log.html").read_text(encoding="utf-8")
-    assert page.index("Doubt: rotor speeds of motors 1 and 2") < page.index("What the log holds")
+    assert page.index("Doubt: rotor speeds of motors 1 and 2") < page.index("The log")
