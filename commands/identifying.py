@@ -42,8 +42,9 @@ def identify(
     out: Path = Path("results/vehicle.yaml"),
 ) -> dict[str, Any]:
     """Identify a vehicle from its flight logs. Thrust and torque coefficients or the thrust curve,
-    inertia, motor lag, centre of mass and drag, each with a 95 % interval; quantities that the flights
-    do not determine are listed. Write the vehicle file, the intervals beside it and a picture.
+    inertia, motor lag, centre of mass and drag, each with a 95 % interval; quantities that the
+    flights do not determine are listed. Write the vehicle file, the intervals beside it and a
+    picture.
 
     With --test, measure how well the vehicle predicts flights kept out of the fit.
 
