@@ -32,7 +32,7 @@ BEGIN, END = "<!-- measured -->\n", "<!-- end of what was measured -->"  # of th
 ROW = "| {} | {:.3g} {} | {:.3g} - {:.3g} | {:.3g} ({:.3g} - {:.3g}) | {} |"
 HEADER = "| what | median | least - largest | ratio to the first of its kind | includes |"
 FIRST_STEP = """import gymnasium, windwrench
-env = gymnasium.make("windwrench/FanTracking-v0")
+env = gymnasium.make("windwrench/FanTracking-v1")
 env.reset(seed=0)
 env.step(env.action_space.sample())"""
 # task, scenario and s between decisions
@@ -126,7 +126,7 @@ def flights() -> list[Contender]:
     found = []
     for name, scenario, period in FLOWN:
         for gain in ("ukf", "constant-gain"):
-            env = gym.make(f"windwrench/{name}-v0", scenario=scenario, estimator=gain)
+            env = gym.make(f"windwrench/{name}-v1", scenario=scenario, estimator=gain)
             found.append(flight(f"{name}, {scenario}", gain, env.unwrapped, period, 1, 128))
     sides: tuple[tuple[str, int, dict[str, Any]], ...] = (
         ("mujoco", 2, {"plant": "mujoco"}),
@@ -135,7 +135,7 @@ def flights() -> list[Contender]:
     )
     for name, steps, how in sides:
         envs = gym.make_vec(
-            "windwrench/FanTracking-v0", 256, "vector_entry_point", scenario="static", **how
+            "windwrench/FanTracking-v1", 256, "vector_entry_point", scenario="static", **how
         )
         found.append(flight(f"256 FanTracking, {name}", "ukf", envs, 0.08, 256, steps))
     return [*found, flight("Ant-v5", "MuJoCo at 100 Hz", gym.make("Ant-v5"), 0.05, 1, 60)]
