@@ -94,12 +94,12 @@ def identify(
     seconds = identified.fit.balance.seconds
     console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {headline(identified)}.")
     show_table(
-        ("quantity", "value", "95 % interval", "unit", ""),
+        ("quantity", "value", "± (95 %)", "unit", ""),
         [
             (
                 e.name,
                 f"{e.value:.4g}" if math.isfinite(e.value) else "–",
-                f"{e.low:.4g} to {e.high:.4g}" if math.isfinite(e.low) else "",
+                f"{0.5 * (e.high - e.low):.2g}" if math.isfinite(e.low) else "",
                 e.unit,
                 e.status,
             )
