@@ -61,7 +61,7 @@ def test_the_example_is_diagnosed_beside_what_is_known(call):
     code, out, _ = call("diagnose", "--example", "--no-open", "--out", "example")
     assert code == 0
     assert "Known before the diagnosis:" in out
-    assert "rotor_drag or body_drag: known, and found" in out
+    assert "Known: rotor_drag or body_drag, found as" in out
     assert "page: file://" in out
     assert json.loads(Path("example/report.json").read_bytes())["effects"]
 
