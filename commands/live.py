@@ -185,7 +185,7 @@ def _summary(session: "Session") -> dict[str, Any]:
         "torque_std_Nm": deviation[3:],
         "ended": session.ended,
     }
-    messages = ", ".join(f"{kind} {n}" for kind, n in sorted(result["messages"].items()))
+    messages = counts_words(result["messages"])
     lines = [f"{session.estimates} estimates over {session.seconds:.1f} s; messages: {messages}"]
     if tallies.found:
         lines.append(f"counted: {counts_words(tallies.found)}")
