@@ -115,7 +115,7 @@ def identify(
         after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
         console.print(f"{of.replace('_', ' ')}: {after}, by a fit without them:")
         show_table(
-            ("mean error", "this vehicle", "thrust and drag", "no change", "unit"),
+            ("mean error", "of the vehicle", "thrust and drag", "if nothing changes", "unit"),
             table_of(errors, identified.simplest[of]),
         )
     console.print(use_of(identified))

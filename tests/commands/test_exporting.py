@@ -101,7 +101,7 @@ def test_the_vehicle_predicts_flights_that_it_was_not_fitted_to(call, log, tmp_p
     code, text, _ = call(*asked, "--test", "2.csv:2-11", "--out", "mine.yaml")
     assert code == 0
     assert "held out blocks" in text
-    assert "no change" in text
+    assert "if nothing changes" in text
     data = json.loads((tmp_path / "mine.identify.json").read_bytes())
     for errors in (data["held_out_blocks"], data["prediction"]):
         assert errors["starts"] > 20
