@@ -34,8 +34,8 @@ def look(
     no_open: bool = False,
     out: Path = Path("results/log"),
 ) -> dict[str, Any]:
-    """Say of a flight log all that it allows. What it holds, which force and torque act, and what
-    the vehicle's model lacks; write one page.
+    """Check a flight log, estimate the wrench and name missing effects. Do as much as the log
+    allows, and write one page.
 
     Example: windwrench look flight.csv --vehicle crazyflie
     """
@@ -64,7 +64,7 @@ def look(
     for text in checked["doubts"]:
         note(f"warning: {text}")
     drawn, said = folder / "check.png", _what_it_holds(checked)
-    steps = [Step("What the log holds", said, _typed("check", log, reading), drawn)]
+    steps = [Step("The log", said, _typed("check", log, reading), drawn)]
     _tell(steps[0])
     sentence, then = checked["headline"], ""
     if reading.vehicle is None and checked["vehicle"] in preset_names():
@@ -74,8 +74,8 @@ def look(
         then = _how_to_make_a_vehicle(log, reading)
     else:
         ways: tuple[tuple[str, str, Callable[..., Any], Any], ...] = (
-            ("estimate", "Which force and torque act", estimate, log),
-            ("diagnose", "What the model lacks", diagnose, [log]),
+            ("estimate", "The wrench", estimate, log),
+            ("diagnose", "Missing effects", diagnose, [log]),
         )
         for name, title, work, logs in ways:
             command = _typed(name, log, reading)

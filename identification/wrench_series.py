@@ -219,7 +219,7 @@ def counts(series: WrenchSeries) -> dict[str, int]:
 
 def uncertainty_note(series: WrenchSeries) -> str:
     """Return the accuracy of force and torque in words, with the largest part of it."""
-    force = f"Standard deviation an axis: force {_largest_part(series, slice(3, 6), 'N')}"
+    force = f"Standard deviation per axis: force {_largest_part(series, slice(3, 6), 'N')}"
     if not np.isfinite(series.std_torque).any():
         return force
     return f"{force}, torque {_largest_part(series, slice(3), 'Nm')}"
@@ -239,7 +239,7 @@ def _largest_part(series: WrenchSeries, axes: slice, unit: str) -> str:
     parts["the rotors between samples"] = total - sum(parts.values())
     name = max(parts, key=parts.__getitem__)
     share = f"{100.0 * parts[name] / total:.0f} % of the variance"
-    return f"{1e3 * np.sqrt(total):.2g} m{unit} ({share}: {name})"
+    return f"{1e3 * np.sqrt(total):.3g} m{unit} ({share}: {name})"
 
 
 def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[str]:

@@ -75,7 +75,7 @@ def test_gusts_are_found_back_and_a_walk_stays_one(fits):
     assert abs(np.log(times[0] / 0.2)) < 3.5 * fit.deviation[8]
     assert times[1] > 1.0
     assert abs(np.log(times[2] / 0.3)) < 3.5 * fit.deviation[10]
-    assert "Unseen, the force falls to 1/e in" in str(fit)
+    assert "Correlation time of the force: " in str(fit)
     assert fit.as_dict()["force_time"][0] == times[0]
     # the walk that fits best is half the true one, and twice as late
     assert fit_noise(VEHICLE, *flight(true)).tuning.force_walk[0] < 0.6 * 0.02

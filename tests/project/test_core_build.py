@@ -44,6 +44,7 @@ def test_an_edit_of_a_header_changes_the_next_run(tmp_path):
     text = text.replace("  m.doc()", '  m.attr("edited") = edited;\n  m.doc()')
     (checkout / "core/binding/module.cpp").write_text('#include "../edited.hpp"\n' + text)
     assert imported(checkout, "edited").stdout == "1\n"
+    assert len([*checkout.glob("_core/*.so")]) == 1  # this machine's set
     (nanobind,) = checkout.glob("build/core/*/nanobind/*.o")
     compiled = nanobind.stat()
     header.write_text(HEADER.format(2))
