@@ -33,6 +33,7 @@ from .rows import Rows
 GUST_STD = 0.2
 GUST_TIME = 2.0
 GUST_HZ = 0.4
+FREE = 30.0
 GUSTY_ROUNDS = 2  # fits of the noise beside gusts, each with a fit of the wind
 
 
@@ -76,7 +77,8 @@ class RowLikelihood:
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
             answers = _named(answered(rows, signals, y - explained))
-            X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
+            free = (FREE * x for x in answers.values())
+            X = np.stack([*own, *self.nuisances.values(), *free], axis=2)
             noise, z = self._noise_beside(y, X, X.shape[2] - len(answers), begun)
             explained = X[:, :, : len(own)] @ z[: len(own)]
         self.nuisances |= answers
