@@ -24,7 +24,7 @@ ROWS_PER_CUTOFF = 25.0 / 10.5  # rows in a period of the cut-off
 # simulator's log may have no noise
 LEAST = 1e-4
 BLOCK = 4.0  # s, of the sums for the likelihood's scatter
-BANDS_HZ = (3.5, 2.5, 1.8, 1.2, 0.8, 0.4)
+BANDS_HZ = (2.5, 1.2, 0.6)  # edges of the bands in which a flight loop has one gain and phase
 
 
 class Rows:
