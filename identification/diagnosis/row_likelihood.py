@@ -33,8 +33,8 @@ from .rows import Rows
 GUST_STD = 0.2
 GUST_TIME = 2.0
 GUST_HZ = 0.4
-# standard deviations of the prior of an answer, beside which the noise is fitted: a column shares
-# with disturbances all that any answer can hold
+# prior standard deviations of a rate loop's answers, beside which the noise is fitted: a column
+# shares with disturbances all that any answer can hold
 FREE = 30.0
 GUSTY_ROUNDS = 2  # fits of the noise beside gusts, each with a fit of the wind
 
@@ -143,7 +143,8 @@ class RowLikelihood:
             rng: of a draw from the posterior; none: its mode.
         """
         rows = self.rows
-        X = np.stack([*known, *(FREE * x for x in self._answers.values())], axis=2)
+        free = FREE if rows.with_torques else 1.0
+        X = np.stack([*known, *(free * x for x in self._answers.values())], axis=2)
         draw = 0.0 if rng is None else rng.standard_normal(X.shape[2])
         for _ in range(ROUNDS):
             use = rows.fit & noise.known

@@ -109,8 +109,10 @@ class Rows:
         return np.split(x, np.flatnonzero(self.begins)[1:])
 
     def bands(self, x: Array) -> list[Array]:
-        """Return rows ``x`` (n, ...) in bands of frequency, the highest first; their sum is x."""
-        out = []
+        """Return rows ``x`` (n, ...), and, with torques, their parts in bands of frequency."""
+        if not self.with_torques:
+            return [x]
+        out = [x]
         for edge in BANDS_HZ:
             slow = np.concatenate([low_pass(part, edge, self._period) for part in self.pieces(x)])
             out.append(x - slow)

@@ -18,7 +18,7 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.priors import NUISANCE
 from windwrench.identification.diagnosis.ranking import rank_by_rows
 from windwrench.identification.diagnosis.regression import RegressedFlights
-from windwrench.identification.diagnosis.row_nuisances import GAIN, answered, followers
+from windwrench.identification.diagnosis.row_nuisances import answered, followers
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.diagnosis.worth import worth
 
@@ -111,7 +111,7 @@ def test_a_bias_hides_steady_forces_along_the_body():
     biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
     shown = found.posterior.shown()
     known = found.posterior.shown(biases)
-    assert all(x > 13.0 for x in shown.values())
+    assert {e for e, x in shown.items() if x < 13.0} <= {"thrust_scale"}  # as a vertical gust does
     assert {e for e, x in shown.items() if x < 200.0 <= known[e]} == {
         "thrust_scale",
         "thrust_axis_tilt",
@@ -119,8 +119,8 @@ def test_a_bias_hides_steady_forces_along_the_body():
 
 
 def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
-    """All of the rotors' answers where disturbances are as large, and next to none where the flight
-    is far from one.
+    """All of the rotors' answers where disturbances are as large, and a tenth where disturbances
+    are a tenth.
     """
     rows = Rows(weak, {})
     ones = np.tile((-1.0) ** np.arange(len(rows.t))[:, None], rows.channels)  # deviation of one
@@ -132,7 +132,7 @@ def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
         )
         moved = signal - signal[rows.fit].mean()
         assert_allclose(rough[:, channels[0]], moved, rtol=0.05)
-        assert_allclose(calm, 0.01 * GAIN * rough, rtol=0.1)
+        assert_allclose(calm, 0.1 * rough, rtol=0.1)
 
 
 def test_a_disturbance_that_thrust_answers_by_its_change_counts_as_one(weak):
