@@ -434,7 +434,7 @@ class RegressedFlights:
         """Return the possible time offsets of the signals: none where commands stand for rotors."""
         if self.commanded:
             return {}
-        others = (ROTOR_SPREAD,) if self.inertial else (ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
+        others = ATTITUDE_TIME_OFFSET, ROTOR_SPREAD if self.inertial else VELOCITY_TIME_OFFSET
         rotors = BEHIND_A_FILTER if self.filtered else TIMINGS[ROTOR_TIME_OFFSET]
         return {ROTOR_TIME_OFFSET: rotors, **{c: TIMINGS[c] for c in others}}
 

@@ -33,6 +33,9 @@ from .rows import Rows
 GUST_STD = 0.2
 GUST_TIME = 2.0
 GUST_HZ = 0.4
+# prior standard deviations of a rate loop's answers, beside which the noise is fitted: a column
+# shares with disturbances all that any answer can hold
+FREE = 30.0
 GUSTY_ROUNDS = 2  # fits of the noise beside gusts, each with a fit of the wind
 
 
@@ -75,11 +78,9 @@ class RowLikelihood:
         begun = RowNoise(without_memory, np.diag(size), rows.begins)
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
-            answers = _named(answered(rows, signals, y - explained))
-            X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
-            noise, z = self._noise_beside(y, X, X.shape[2] - len(answers), begun)
-            explained = X[:, :, : len(own)] @ z[: len(own)]
-        self.nuisances |= answers
+            self._answers = _named(answered(rows, signals, y - explained))
+            noise, z = self._noise_beside(y, [*own, *self.nuisances.values()], begun)
+            explained = sum(map(np.multiply, own, z), np.zeros_like(y))
         self._own = own
         return noise
 
@@ -119,33 +120,39 @@ class RowLikelihood:
         Source: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82.
         """
         columns = self.nuisances | self._gusts(setting)
-        X = np.stack([*self._own, *columns.values()], axis=2)
-        count = X.shape[2]
-        draw = np.random.default_rng(0).standard_normal(count)
-        return self._noise_beside(self.rows.residual(setting), X, count, self.noise, draw)[0]
+        y = self.rows.residual(setting)
+        rng = np.random.default_rng(0)
+        return self._noise_beside(y, [*self._own, *columns.values()], self.noise, rng)[0]
 
     def _noise_beside(
-        self, y: Array, X: Array, known: int, noise: RowNoise, draw: Array | float = 0.0
+        self,
+        y: Array,
+        known: Sequence[Array],
+        noise: RowNoise,
+        rng: np.random.Generator | None = None,
     ) -> tuple[RowNoise, Array]:
         """Return the noise of the residual ``y`` (n, channels), and the coefficients beside it.
 
-        A signal that follows disturbances explains them without making them less: they stay noise.
+        A signal that follows disturbances explains them without making them less: they stay noise,
+        and so does all that a column shares with such signals.
 
         Args:
             y: with the given effects of every set.
-            X: (n, channels, c) columns, in standard deviations of their priors.
-            known: number of the first columns; the others follow disturbances.
+            known: (n, channels) each, columns in standard deviations of their priors.
             noise: at the start.
-            draw: (c,) standard deviations of the posterior from its mode.
+            rng: of a draw from the posterior; none: its mode.
         """
         rows = self.rows
+        free = FREE if rows.with_torques else 1.0
+        X = np.stack([*known, *(free * x for x in self._answers.values())], axis=2)
+        draw = 0.0 if rng is None else rng.standard_normal(X.shape[2])
         for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
             factor = np.linalg.cholesky(x.T @ x + np.eye(x.shape[1]))
             right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
             z = np.linalg.solve(factor.T, right + draw)
-            left = y - X[:, :, :known] @ z[:known]
+            left = y - X[:, :, : len(known)] @ z[: len(known)]
             noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
         return noise, z
 
@@ -170,7 +177,7 @@ class RowLikelihood:
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
         noise = self._gusty.get(frozenset(setting), self.noise)
-        columns = dict(self.nuisances)
+        columns = self.nuisances | self._answers
         if noise is not self.noise:
             columns |= self._gusts(setting)
         if not flights.commanded and playing(Role.LAG, among=list(setting)):

@@ -13,7 +13,7 @@ import numpy as np
 from ...runtime.arrays import Index
 from ..logs.table import Array, Mask
 from ..motion.signals import in_body
-from ..motion.smoothing import CUTOFFS
+from ..motion.smoothing import CUTOFFS, low_pass
 from .column import Column
 from .discrepancy import weight_and_torque
 from .regression import RegressedFlights, Setting, blocks
@@ -25,6 +25,7 @@ ROWS_PER_CUTOFF = 25.0 / 10.5  # rows in a period of the cut-off
 # simulator's log may have no noise
 LEAST = 1e-4
 BLOCK = 4.0  # s, of the sums for the likelihood's scatter
+BANDS_HZ = (2.5, 1.2, 0.6)  # edges of the bands in which a flight loop has one gain and phase
 
 
 class Rows:
@@ -59,6 +60,7 @@ class Rows:
             self._cutoff = COMMANDED_CUTOFF_HZ
         cutoff = min(self._cutoff, CUTOFFS.residual_hz)
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
+        self._period = step * flights.period
         self.flights = flights
         self.fixed = fixed
         self.at: Index = np.concatenate([rows[::step] for rows in flights.runs])
@@ -102,6 +104,21 @@ class Rows:
     def at_rows(self, x: Array) -> Array:
         """Return samples of ``flights`` at the rows (n, ...), low-passed."""
         return self.flights.low_passed(x, self._cutoff)[self.at]
+
+    def pieces(self, x: Array) -> list[Array]:
+        """Return the unbroken pieces of rows ``x`` (n, ...)."""
+        return np.split(x, np.flatnonzero(self.begins)[1:])
+
+    def bands(self, x: Array) -> list[Array]:
+        """Return rows ``x`` (n, ...), and, with torques, their parts in bands of frequency."""
+        if not self.with_torques:
+            return [x]
+        out = [x]
+        for edge in BANDS_HZ:
+            slow = np.concatenate([low_pass(part, edge, self._period) for part in self.pieces(x)])
+            out.append(x - slow)
+            x = slow
+        return [*out, x]
 
     def residual(self, setting: Setting) -> Array:
         """Return the residual (n, channels) with these effects.

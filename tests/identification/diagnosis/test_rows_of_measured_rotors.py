@@ -111,28 +111,28 @@ def test_a_bias_hides_steady_forces_along_the_body():
     biases = [c._replace(part=Part.NUISANCE) for c in flights.biases]
     shown = found.posterior.shown()
     known = found.posterior.shown(biases)
-    assert all(x > 13.0 for x in shown.values())
-    assert {e for e, x in shown.items() if x < 250.0 <= known[e]} == {
+    assert {e for e, x in shown.items() if x < 13.0} <= {"thrust_scale"}  # as a vertical gust does
+    assert {e for e, x in shown.items() if x < 200.0 <= known[e]} == {
         "thrust_scale",
         "thrust_axis_tilt",
     }
 
 
 def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
-    """All of the rotors' answers where disturbances are as large, and next to none where the flight
-    is far from one.
+    """All of the rotors' answers where disturbances are as large, and a tenth where disturbances
+    are a tenth.
     """
     rows = Rows(weak, {})
     ones = np.tile((-1.0) ** np.arange(len(rows.t))[:, None], rows.channels)  # deviation of one
     for name, (signal, channels) in followers(rows).items():
         spread = signal[rows.fit].std()
         calm, rough = (
-            answered(rows, {name: (signal, channels)}, x * spread * ones)[f"answer by {name}"]
+            answered(rows, {name: (signal, channels)}, x * spread * ones)[f"answer by {name} 0"]
             for x in (0.1, 1.0)
         )
         moved = signal - signal[rows.fit].mean()
         assert_allclose(rough[:, channels[0]], moved, rtol=0.05)
-        assert_allclose(calm, 0.01 * rough, rtol=0.1)
+        assert_allclose(calm, 0.1 * rough, rtol=0.1)
 
 
 def test_a_disturbance_that_thrust_answers_by_its_change_counts_as_one(weak):
