@@ -60,14 +60,12 @@ def differing_lines(name: str) -> list[str]:
 
 def missing_sources() -> list[str]:
     """Return the modules that pages name and that do not exist, each with its page. The
-    changelog and the release page's table of kept results name what has left.
+    changelog names what has left.
     """
     pages = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md")))
     missing = []
     for page in pages:
         text = page.read_text(encoding="utf-8")
-        if page.name == "release.md":
-            text = re.sub(r"(?m)^\|.*$", "", text)
         names = [name for name in _MODULE.findall(text) if not _is_file(name)]
         names += [module for module in _COMMAND.findall(text) if not _runs(module)]
         missing += [f"{page.name} names {name}" for name in sorted(set(names))]

@@ -49,7 +49,7 @@ def nanobench(result: Any) -> Rows:
     left = ", ".join(f"{x:.3f}" for x in after)
     return [
         Row(
-            f"NanoBench: unexplained acceleration of a flight left out, x, y, z (m/s2, {len(folds)} fits)",
+            f"NanoBench, {len(folds)} fits: acceleration left on an unseen flight, x, y, z (m/s2)",
             left,
             "constant thrust " + ", ".join(f"{x:.3f}" for x in constant),
         ),
@@ -69,9 +69,7 @@ def slung_payload(result: Any) -> Rows:
             f"{1e3 * e['coefficients']['m']:.1f} ± {1e3 * e['std']['m']:.1f} g" for e in masses
         )
         result_ = share(len(masses), len(sets))
-        rows.append(
-            Row(f"Slung payload, {words}: load named", f"{result_}: {found}" if found else result_)
-        )
+        rows.append(Row(f"Payload named, {words}", f"{result_}: {found}" if found else result_))
     return rows
 
 
@@ -92,7 +90,7 @@ def fan_wall(result: Any) -> Rows:
     return rows
 
 
-def crazypad(result: Any, words: str = "CrazyPAD, one or two normal flights") -> Rows:
+def crazypad(result: Any, words: str = "CrazyPAD, few normal flights") -> Rows:
     """Return how often the changed place is right."""
     flights = result["flights"]
     changed = [x for x in flights if x["truth"] != NOWHERE]
@@ -102,17 +100,17 @@ def crazypad(result: Any, words: str = "CrazyPAD, one or two normal flights") ->
     return [
         Row(f"{words}: weight or cut missed", count(missed, "missed")),
         Row(
-            "… likeliest place right; sure and right",
+            f"{words}: likeliest place right; sure and right",
             f"{count(changed, 'right')}; {count(sure, 'right')}",
         ),
-        Row("… sure and wrong", count(flights, "sure_and_wrong")),
-        Row("… normal flight: nothing likeliest", count(same, "right")),
+        Row(f"{words}: sure and wrong", count(flights, "sure_and_wrong")),
+        Row(f"{words}: nothing likeliest on a normal flight", count(same, "right")),
     ]
 
 
 def crazypad_e8(result: Any) -> Rows:
     """Return how often the changed place is right on vehicle E8."""
-    return crazypad(result, "CrazyPAD's E8, all other normal flights")
+    return crazypad(result, "CrazyPAD E8")
 
 
 def motor_faults(result: Any) -> Rows:
@@ -127,7 +125,7 @@ def motor_faults(result: Any) -> Rows:
     ]
     return [
         Row(
-            "PX4 logs, a motor fails: motor right; onset's interval meets the command",
+            "A motor fails (PX4): motor right; onset holds",
             f"{count(flights, 'right')}; {count(flights, 'held')}",
         )
     ]
@@ -136,20 +134,23 @@ def motor_faults(result: Any) -> Rows:
 def nanodrone(result: Any) -> Rows:
     """Return errors of prediction of paths left out."""
     rows = [row for path in result["paths"].values() for row in path]
-    units = ", ".join(f"{name} {unit}" for name, unit in QUANTITIES.items())
 
     def told(kind: str, way: str) -> str:
         return ", ".join(f"{x:.3g}" for x in mean(rows, kind, way))
 
+    units = ", ".join(f"{name} {unit}" for name, unit in QUANTITIES.items())
     return [
         Row(
-            f"{words} ({units}; {len(result['paths'])} paths, {len(rows)} flights)",
+            words,
             told(kind, VEHICLE),
             f"thrust and drag {told(kind, FORCE)}; no change {told(kind, NO_CHANGE)}",
         )
         for words, kind in (
-            ("Nano-drone benchmark: `predict` on a path left out, 0.5 s", "after_half_a_second"),
-            ("… sum over 50 steps from the logged state", "sums"),
+            (
+                f"Nano-drone, `predict` on {len(rows)} unseen paths, 0.5 s: {units}",
+                "after_half_a_second",
+            ),
+            ("Nano-drone, the benchmark's sums from the logged state", "sums"),
         )
     ]
 
@@ -202,13 +203,12 @@ def other_engines(result: Any) -> Rows:
 def probabilities(result: Any) -> Rows:
     """Return what probabilities of names are worth."""
     rows = []
-    for words, posed in (("Two simulators", True), ("… without a measured pose", False)):
+    for words, posed in (("Two simulators", True), ("No measured pose", False)):
         flights = flights_of([x for x in result["flights"] if (len(x["task"]) == 3) == posed])
         if flights:
             found = figures(flights)
-            rows += [
-                Row(f"{words}, {len(flights)} flights: {name}", x) for name, x in found.items()
-            ]
+            words = f"{words}, {len(flights)} flights"
+            rows += [Row(f"{words}: {name}", *told) for name, told in found.items()]
     return rows
 
 
