@@ -46,7 +46,6 @@ from windwrench.identification.comparison.trim import Trim, carrying, trim_of, t
 from windwrench.identification.comparison.words import fault_data
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import in_flight
-from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
@@ -62,7 +61,6 @@ Array = NDArray[np.float64]
 
 CUTOFF_HZ = 4.0
 _EDGE = 0.6  # s at either end, where filters start
-_DAY = 86400.0  # s
 PAYLOAD = 0.005  # kg, weighed by those who flew it
 CABLE = 0.5  # m
 CARRIER = 0.0369  # kg, the vehicle without its payload
@@ -198,27 +196,6 @@ def payload_vehicle(mass: float) -> Vehicle:
     )
 
 
-def swing(log: FlightLog, diagnosis: Diagnosis) -> dict[str, list[float]] | None:
-    """Return how strongly the cable pulls sideways (standard deviation, N, x and y): by the model,
-    and by the payload's track.
-    """
-    found = next((e for e in diagnosis.effects if e.name == "slung_payload"), None)
-    if found is None or "payload_position" not in log.extra:
-        return None
-    bare = replace(diagnosis.declared, effects=())
-    flights = RegressedFlights([log], bare)
-    setting = {e.name: dict(e.coefficients) for e in diagnosis.amended.effects}
-    law = flights.residual(
-        {k: v for k, v in setting.items() if k != "slung_payload"}
-    ) - flights.residual(setting)
-    s = motion(log, bare)
-    track = np.column_stack([np.interp(s.t, log.t, x) for x in log.extra["payload_position"].T])
-    smooth = low_pass(track, CUTOFF_HZ, s.period)
-    pull = -PAYLOAD * np.gradient(np.gradient(smooth, s.period, axis=0), s.period, axis=0)
-    edge = round(_EDGE / s.period)
-    return {"law_std": spread(law[:, :2]), "tracked_std": spread(pull[edge:-edge, :2])}
-
-
 def truth_of(name: str) -> str:
     """Return the place that a CrazyPAD file's name tells.
 
@@ -336,28 +313,19 @@ def nanobench(folder: Path) -> list[dict[str, Any]]:
             f"{folder}: {len(paths)} CSV file(s); expected at least three NanoBench flights"
         )
     logs = {p.stem: read_log(p, "nanobench", vehicle) for p in paths}
-    days = {p.stem: open_table(p).read(["t"])["t"][0] // _DAY for p in paths}
-    folds: list[dict[str, Any]] = []
+    folds = []
     for path in paths:
-        test, log = path.stem, logs[path.stem]
-        groups = {"all others": [n for n in logs if n != test]}
-        same = [n for n in groups["all others"] if days[n] == days[test]]
-        if 2 <= len(same) < len(groups["all others"]):
-            groups["the same day"] = same
-        for words, names in groups.items():
-            print(f"NanoBench: {test} from {words}", flush=True)
-            diagnosis = diagnose([logs[n] for n in names], vehicle, [log])
-            folds.append(
-                {
-                    "fitted_on": words,
-                    "flights": names,
-                    **compare(log, diagnosis),
-                    "effects": names_of(diagnosis),
-                    "verdict": diagnosis.verdict,
-                    "remainder": diagnosis.remainder,
-                    "imu": imu_check(path, log, diagnosis),
-                }
-            )
+        test = path.stem
+        print(f"NanoBench: {test} from all others", flush=True)
+        diagnosis = diagnose([log for n, log in logs.items() if n != test], vehicle, [logs[test]])
+        folds.append(
+            {
+                **compare(logs[test], diagnosis),
+                "effects": names_of(diagnosis),
+                "verdict": diagnosis.verdict,
+                "imu": imu_check(path, logs[test], diagnosis),
+            }
+        )
     return folds
 
 
@@ -381,7 +349,6 @@ def slung_payload(folder: Path) -> list[dict[str, Any]]:
                 "payload": loaded,
                 "mass": mass,
                 "effects": names_of(diagnosis),
-                "swing": {log.name: swing(log, diagnosis) for log in logs},
             }
         )
     return loads
