@@ -15,7 +15,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from windwrench.evidence import boards, tasks, trust_table
+from windwrench.evidence import boards, tasks, trust_page
 from windwrench.evidence.kept_results import DOCS, ROOT
 from windwrench.evidence.quotes import read_quotes, unknown_numbers, wrong_quotes
 from windwrench.evidence.scoring import share
@@ -26,7 +26,7 @@ from windwrench.runtime.provenance import made_by
 PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {
     "leaderboard": boards.page,
     "tasks": tasks.page,
-    "trust": trust_table.page,
+    "trust": trust_page.page,
 }
 _MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
 _COMMAND = re.compile(r"python -m ((?:evidence|studies|windwrench)\.[a-z_.]+)")

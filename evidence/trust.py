@@ -15,12 +15,16 @@ from typing import Annotated, NamedTuple
 import typer
 
 from windwrench.evidence.kept_results import DOCS, ROOT, kept
+from windwrench.evidence.measured_flights import PARTS
 from windwrench.evidence.pages import page_of_results
 from windwrench.evidence.runner import ROOMS, start
-from windwrench.evidence.trust_table import TABLE
+from windwrench.evidence.trust_page import RESULTS
 from windwrench.runtime.errors import unknown_name
 from windwrench.runtime.page_files import write_text
 from windwrench.runtime.provenance import git
+
+
+SHARED = "evidence/trials", "evidence/fan_wall.py"  # by several studies
 
 
 class Study(NamedTuple):
@@ -38,23 +42,12 @@ class Study(NamedTuple):
     needs: str
     minutes: float
 
-    @property
-    def command(self) -> str:
-        """Its command line, with the data folder open."""
-        return f"python -m windwrench.evidence.{self.module} {self.options}".strip()
-
-
-def _measured(part: str, needs: str, minutes: float) -> Study:
-    return Study("measured_flights", f"--part {part} --data {{data}}", needs, minutes)
-
 
 STUDIES: Mapping[str, Study] = {
-    "crazypad_e8": _measured("crazypad_e8", "crazypad_e8", 1.0),
-    "crazypad": _measured("crazypad", "crazypad", 0.2),
-    "motor_faults": _measured("motor_faults", "motor_faults", 0.2),
-    "nanobench": _measured("nanobench", "nanobench", 5.0),
-    "slung_payload": _measured("slung_payload", "crazyswarm2_payload", 4.0),
-    "fan_wall": _measured("fan_wall", "fan_wall", 2.0),
+    **{
+        part: Study("measured_flights", f"--part {part} --data {{data}}", folder, 3.0)
+        for part, (folder, _) in PARTS.items()
+    },
     "nanodrone": Study("nanodrone_benchmark", "--data {data}/idsia --runs 1", "idsia", 20.0),
     "published": Study(
         "published", "--racer {data}/racer --imu {data}/crazyflie_imu", "racer", 5.0
@@ -72,12 +65,12 @@ STUDIES: Mapping[str, Study] = {
 
 def is_current(name: str) -> bool:
     """Return whether no code that a study measures differs from the code of its kept result."""
-    path = TABLE[name][0]
+    path = RESULTS[name]
     if not (DOCS / path).exists():
         return False
-    own = f"evidence/{STUDIES[name].module}*"
+    code = *ROOMS, *SHARED, f"evidence/{STUDIES[name].module}*"
     try:
-        git(ROOT, "diff", "--quiet", str(kept(path)["commit"]), "--", *ROOMS, own)
+        git(ROOT, "diff", "--quiet", str(kept(path)["commit"]), "--", *code)
     except subprocess.SubprocessError:
         return False
     return True
@@ -108,9 +101,10 @@ def study(
         hours = sum(x.minutes for x in pending[i:]) / 60.0
         print(f"{i} of {len(pending)} done, {hours:.1f} h of one core left", flush=True)
         began = time.monotonic()
-        words = one.command.format(data=data).split()
-        print(" ".join(words), flush=True)
-        status = subprocess.run([sys.executable, *words[1:]], cwd=ROOT, check=False).returncode
+        words = ["-m", f"windwrench.evidence.{one.module}"]
+        words += one.options.format(data=data.resolve()).split()
+        print("python", *words, flush=True)
+        status = subprocess.run([sys.executable, *words], cwd=ROOT, check=False).returncode
         ended = "done" if status == 0 else f"failed with status {status}; its kept result stays"
         print(f"{ended}, {(time.monotonic() - began) / 60.0:.1f} min", flush=True)
     write_text(page_of_results("trust"), DOCS / "trust.md")
