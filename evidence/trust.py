@@ -23,7 +23,6 @@ from windwrench.runtime.errors import unknown_name
 from windwrench.runtime.page_files import write_text
 from windwrench.runtime.provenance import git
 
-
 SHARED = "evidence/trials", "evidence/fan_wall.py"  # by several studies
 
 
