@@ -13,9 +13,7 @@ from windwrench.evidence.recovery import (
     FLOWN,
     GATES,
     NOISES,
-    SEQUENCES,
     TAILS,
-    WRONG,
     Verdict,
     befall,
     estimated,
@@ -104,20 +102,6 @@ def test_poses_as_noisy_as_declared_are_within_the_limits(kind, event):
     assert verdict.error > 0.0
     assert fly_combination(words) == verdict
     assert fly_combination(words, seed=1) != verdict
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", FILTERS)
-def test_all_combinations_are_within_the_limits(kind):
-    verdicts = {words: fly_combination(words) for words in named(AXES, kind)}
-    assert len(verdicts) == 192
-    assert [(words, v) for words, v in verdicts.items() if v.failures] == []
-
-
-@pytest.mark.slow
-def test_wrong_attitudes_are_got_over_without_a_gate():
-    later = {words: claim.z for words, _, claim in map(fly_wrong_attitudes, range(SEQUENCES))}
-    assert [(words, z) for words, z in later.items() if not z <= WRONG] == []
 
 
 def test_wrong_attitudes_are_as_wrong_as_said():
