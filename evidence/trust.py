@@ -44,21 +44,21 @@ class Study(NamedTuple):
 
 STUDIES: Mapping[str, Study] = {
     **{
-        part: Study("measured_flights", f"--part {part} --data {{data}}", folder, 3.0)
+        part: Study("measured_flights", f"--part {part} --data {{data}}", folder, 2.0)
         for part, (folder, _) in PARTS.items()
     },
     "nanodrone": Study("nanodrone_benchmark", "--data {data}/idsia --runs 1", "idsia", 20.0),
     "published": Study(
         "published", "--racer {data}/racer --imu {data}/crazyflie_imu", "racer", 5.0
     ),
-    "other_engines": Study("other_engines", "", "", 5.0),
+    "other_engines": Study("other_engines", "", "", 1.0),
     "probabilities": Study(
-        "probabilities", "--simulator {data}/../generator/make_flights.py", "../generator", 15.0
+        "probabilities", "--simulator {data}/../generator/make_flights.py", "../generator", 6.0
     ),
     "perfect_models": Study(
-        "perfect_models", "--simulator {data}/../generator/make_flights.py", "../generator", 240.0
+        "perfect_models", "--simulator {data}/../generator/make_flights.py", "../generator", 120.0
     ),
-    "recovery": Study("recovery", "", "", 10.0),
+    "recovery": Study("recovery", "", "", 4.0),
 }
 
 
