@@ -107,8 +107,7 @@ def figures(flights: Sequence[Flight]) -> dict[str, tuple[str, ...]]:
         ),
         "a sure name, nothing missing": (named([x for x in known if not x["truth"]]),),
         "a sure name, unknown cause": (named([x for x in flights if acts_unknown(x)]),),
-        "68 % intervals of coefficients hold": (held(0.9945), "68 %"),
-        "95 % intervals of coefficients hold": (held(1.96), "95 %"),
+        "68 and 95 % intervals of coefficients hold": (f"{held(0.9945)}; {held(1.96)}",),
         "calibration error of names": (
             f"{expected_calibration_error(claims_of(flights)):.3f} ({low:.3f}–{high:.3f})",
             "0",
