@@ -71,16 +71,6 @@ MADE = re.compile(
 )
 
 
-KEPT = [  # commands and commits of the release page's table
-    (command, re.findall(r"[0-9a-f]{7,}", commits))
-    for command, commits in re.findall(
-        r"^\| \[.*? \| `(.+?)` \| [\d.]+ \| (.+?) \|$",
-        (ROOT / "docs/release.md").read_text(encoding="utf-8"),
-        re.M,
-    )
-]
-
-
 def git(*words):
     return said("git", *words, cwd=ROOT)
 
@@ -138,15 +128,8 @@ def test_pages_say_the_commits_that_made_them(tracked):
     if git("rev-parse", "--is-shallow-repository").strip() == "true":
         pytest.skip("a shallow clone does not have the commits")
     named = {one for found in made.values() for line in found for one in line.split(", ")}
-    for commit in named | {one for row in KEPT for one in row[1]}:
+    for commit in named:
         git("merge-base", "--is-ancestor", commit, "HEAD")
-
-
-def test_kept_results_name_commits_that_have_their_code():
-    assert KEPT
-    for command, commits in KEPT:
-        for module in re.findall(r"python -m studies\.(\w+)", command):
-            assert git("ls-tree", commits[0], f"studies/{module}", f"studies/{module}.py"), command
 
 
 DOCUMENTED = (
