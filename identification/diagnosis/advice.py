@@ -14,7 +14,7 @@ from ..findings import NamedEffect
 from ..logs.table import Array, Pair, Values
 from ..motion.inertial_signals import pose_rate
 from .log_offsets import ROTOR_TIME_OFFSET
-from .regression import CENTRAL, RegressedFlights, Setting, moves_time, unit_of_change
+from .regression import CENTRAL, RegressedFlights, moves_time, unit_of_change
 from .worth import BY_CHANCE
 
 FILTERED = (
@@ -34,22 +34,21 @@ OUTSIDE = 0.05
 FEW = 3  # effects whose flights an advice describes
 
 
-def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str]:
-    """Yield the single effect as a possible cause of two effects of a setting.
+def composites(vehicle: Vehicle, found: Mapping[str, tuple[Values, Values]]) -> Iterator[str]:
+    """Yield the single effect as a possible cause of two found effects.
 
     Only the ratios of thrust to mass and to inertia show. So of mass, inertia and a scale of thrust
     any two with like changes equal the third with the opposite change.
 
     Args:
         vehicle: as declared.
-        setting: coefficients of effects.
-        std: their standard deviations.
+        found: coefficients of effects, and their standard deviations.
     """
     roles = (Role.MASS, Role.THRUST, Role.INERTIA)
     for third in roles:
-        pair = [playing(role, among=setting) for role in roles if role != third]
+        pair = [playing(role, among=found) for role in roles if role != third]
         for a, b in itertools.product(*pair):
-            (x, dx), (y, dy) = (_relative(vehicle, e, setting[e], std[e]) for e in (a, b))
+            (x, dx), (y, dy) = (_relative(vehicle, e, *found[e]) for e in (a, b))
             off = np.subtract.outer(x, y)
             alike = SHARE * np.maximum.outer(np.abs(x), np.abs(y))
             if np.all(np.abs(off) < MOST_APART * np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)):

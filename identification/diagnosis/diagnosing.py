@@ -21,6 +21,7 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.threads import one_thread
 from ..findings import (
     CHANNELS,
+    LEAST_RIVAL,
     Alternative,
     Candidate,
     Diagnosis,
@@ -43,7 +44,7 @@ from .commanded_rotors import THRUST_FACTORS
 from .commands import what_commands_show
 from .log_offsets import delays_at_bound
 from .priors import NUISANCE, declared
-from .ranking import LEAST_RIVAL, Report, rank, rank_by_rows
+from .ranking import Report, rank, rank_by_rows
 from .regression import (
     CENTRAL,
     RegressedFlights,
@@ -203,6 +204,7 @@ class _Judged:
             else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
         )
         self._best = likeliest.ranking.sets[0]
+        self._averaged = {e: likeliest.ranking.averaged(e) for e in self._best.effects}
         sensors = {name: value for name, (value, _) in likeliest.sensors.items()}
         known_apart = {**given.fixed, **({"": sensors} if sensors else {})}
         # no set with a larger error on held-out flight is printed
@@ -244,9 +246,7 @@ class _Judged:
             )
         self.effects = tuple(effects)
         self.not_needed = tuple(
-            self._stated(e, self._best.coefficients[e], self._best.std[e])
-            for e in said
-            if e not in fitted.setting
+            self._stated(e, *self._averaged[e]) for e in said if e not in fitted.setting
         )
         structured = strange > 0.5 and structure > 0.0
         self.structure: tuple[Structure, ...] = ()
@@ -281,8 +281,7 @@ class _Judged:
         """Return the standard deviations of an effect in the likeliest set, with the spread from
         flight to flight.
         """
-        std = {**self._best.std, **self.fitted.std}[effect]
-        return self._of_any_flight(effect, self._best.coefficients[effect], std)
+        return self._of_any_flight(effect, *self._averaged[effect])
 
     def _of_any_flight(self, effect: str, values: Values, std: Values) -> NamedNumbers:
         """Return standard deviations of coefficients with the spread from flight to flight."""
@@ -298,9 +297,10 @@ class _Judged:
         apart = [0.0]
         # these flights are late, however late others are
         delays = get(effect).role == Role.DELAY
-        for name, std in (self._best.std[effect] if delays else self._std(effect)).items():
+        values, stds = self._averaged[effect]
+        for name, std in (stds if delays else self._std(effect)).items():
             c = effect, name
-            off = abs(self._best.coefficients[effect][name] - declared(c, self._flights))
+            off = abs(values[name] - declared(c, self._flights))
             if off > LEAST_SIZE * typical_size(c, self._flights.vehicle) and std:
                 apart.append(_apart(off, std))
         return max(apart)
@@ -327,7 +327,9 @@ class _Judged:
         rule = self._rule
         unsure = ": all names are tentative" if named else ""
         doubts = {
-            "composite": tuple(composites(flights.vehicle, self.fitted.setting, self.fitted.std)),
+            "composite": tuple(
+                composites(flights.vehicle, {e: self._averaged[e] for e in self.fitted.setting})
+            ),
             "unknown": (
                 f"a cause outside the library acts with a probability of {strange:.0%}{unsure}",
             )
@@ -364,7 +366,7 @@ class _Judged:
         # the point of action of an effect at the rotors, as declared, is nothing to report
         values = {
             name: x
-            for name, x in fitted.setting[effect].items()
+            for name, x in self._averaged[effect][0].items()
             if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
         }
         uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS

@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from ...dynamics.effects import get
-from ..findings import Disturbance, Ranking
+from ..findings import LEAST_RIVAL, Disturbance, Ranking
 from ..logs.table import Array, Names, Pair, Values
 from .climbing import Height, linearised, mode
 from .likelihood import Likelihood
@@ -39,9 +39,6 @@ from .starting_points import starting_points
 Report = Callable[[str], None]  # takes a line of progress
 # typical sizes of the trials of a lag or a delay as a whole: their columns change with them
 TIME_STARTS = (0.3, 0.6, 1.2)
-# share of the likeliest set's probability from which flights do not tell another effect from one of
-# its own: a likelihood of 20 to 1
-LEAST_RIVAL = 0.05
 ROUNDS = 6  # of fitting the noise beside the best set
 # standard deviations of its prior: largest step of a coefficient in the last of these rounds
 CLOSE = 0.1
@@ -55,7 +52,6 @@ class _FittedPosterior:
     posterior: Posterior
     ranking: Ranking
     setting: Setting  # coefficients of the likeliest set's needed effects
-    std: Setting  # their standard deviations
     gains: Mapping[str, Pair]  # as of ``Posterior.leave_out_needless``
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
@@ -156,7 +152,7 @@ def rank(
     gains = posterior.leave_out_needless(ranking.probability)
     late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
     return _FittedPosterior(
-        posterior, ranking, *posterior.likeliest_setting(), gains, best.gusts(), late
+        posterior, ranking, posterior.likeliest_setting(), gains, best.gusts(), late
     )
 
 
@@ -247,13 +243,12 @@ def rank_by_rows(
     last = posterior()
     ranking = last.ranking()
     gains = last.leave_out_needless(ranking.probability)
-    setting, std = last.likeliest_setting()
+    setting = last.likeliest_setting()
     setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
     return _FittedPosterior(
         last,
         ranking,
         setting,
-        std,
         gains,
         sensors=likelihood.sensors(setting),
         behind=_behind(likelihood, setting),

@@ -59,8 +59,8 @@ STIFFER = {"inertia": {"jx": 0.1, "jy": 0.1, "jz": 0.1}}
     ],
 )
 def test_two_that_change_alike_may_be_a_third(setting, third):
-    std = {effect: dict.fromkeys(values, 0.002) for effect, values in setting.items()}
-    found = list(composites(VEHICLE, setting, std))
+    sized = {effect: (values, dict.fromkeys(values, 0.002)) for effect, values in setting.items()}
+    found = list(composites(VEHICLE, sized))
     assert len(found) == bool(third)
     assert all(third in sentence.split(": ")[1] for sentence in found)
 
