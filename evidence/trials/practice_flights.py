@@ -19,6 +19,7 @@ from windwrench.dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.envs.recording import background, draw_trajectory, record_flight
 from windwrench.evidence.trials.outsiders import HELD_BACK, OUTSIDERS, wrench_input
+from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
@@ -255,8 +256,8 @@ def draw_effect(name: str, vehicle: Vehicle, size: str, rng: np.random.Generator
     like = replace(vehicle, mass=_TYPICAL_MASSES[column])
     coefficients = {
         c.name: c.typical[column]
-        * typical_size((name, c.name), vehicle)
-        / typical_size((name, c.name), like)
+        * typical_size(Column(name, c.name), vehicle)
+        / typical_size(Column(name, c.name), like)
         for c in get(name).coefficients
     }
     if name == "rotor_efficiency":

@@ -13,6 +13,7 @@ from ...dynamics.vehicle import Vehicle
 from ..findings import NamedEffect
 from ..logs.table import Array, Pair, Values
 from ..motion.inertial_signals import pose_rate
+from .column import Column
 from .log_offsets import ROTOR_TIME_OFFSET
 from .regression import CENTRAL, RegressedFlights, moves_time, unit_of_change
 from .worth import BY_CHANCE
@@ -59,7 +60,7 @@ def composites(vehicle: Vehicle, found: Mapping[str, tuple[Values, Values]]) -> 
 def _relative(vehicle: Vehicle, effect: str, values: Values, std: Values) -> Array:
     """Return the relative changes by an effect, and their standard deviations."""
     names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
-    unit = np.array([unit_of_change((effect, name), vehicle) for name in names])
+    unit = np.array([unit_of_change(Column(effect, name), vehicle) for name in names])
     return np.asarray(np.array([[values[name], std.get(name, 0.0)] for name in names]).T / unit)
 
 
@@ -110,7 +111,7 @@ def late_rotors(
     """Yield the delay of the rotor speeds against their log, unless an effect covers it;
     ``sensors``: time offsets and their standard deviations.
     """
-    offset, std = sensors.get(ROTOR_TIME_OFFSET[1], (0.0, math.inf))
+    offset, std = sensors.get(ROTOR_TIME_OFFSET.coefficient, (0.0, math.inf))
     least = max(LEAST_ROTOR_TIME_OFFSET, BY_CHANCE * std)
     if flights.inertial or any(map(moves_time, effects)) or abs(offset) < least:
         return

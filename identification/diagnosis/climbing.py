@@ -66,7 +66,7 @@ def linearised(
         out = {e: dict(values) for e, values in setting.items()}
         best = m.evidence(every).mode * size
         for c, x in zip(base.asked, best.tolist(), strict=True):
-            out[c[0]][c[1]] = changed(c, x, flights)
+            out[c.effect][c.coefficient] = changed(c, x, flights)
         return out
 
     return value, target

@@ -14,8 +14,8 @@ from ..logs.table import Array, ArrayMap, NamedArrays, median_step
 from ..motion.signals import in_body
 from ..motion.smoothing import filtered
 from .causal_filter import FlightState
-from .priors import UNKNOWN
-from .regression import Column, RegressedFlights
+from .column import Column, Part
+from .regression import RegressedFlights
 
 TORQUE_ARM = 0.25  # of the arm: times the weight, the unit of a torque
 HEIGHTS = (0.2, 0.6)  # m above the lowest place: where a bump falls off
@@ -26,7 +26,6 @@ DAMPING_RATIO = 0.08  # of both
 # times ``sets.UNKNOWN_SIZES``: change of an effect's coefficients, as a share of its own wrench,
 # with one standard deviation of a variable
 SHARE_OF_EFFECT = 30.0
-CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +104,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
         z = _scaled(x)
         for i in channels if z.any() else ():
             column = Product(size[i], z, *along_axis(i, rotation))
-            out["", f"{UNKNOWN}{group}: {name} in {i}"] = column
+            out[Column("", name, Part.UNKNOWN, i, group)] = column
 
     for i, axis in enumerate("xyz"):
         along = body[:, i]
@@ -139,11 +138,12 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
         add("resonance", f"a part that swings at {hertz:g} Hz", swing, (3 + i,))
     for i in range(6):
         made = Product(size[i], one, None, slice(i, i + 1))
-        out["", f"{UNKNOWN}constant: a constant in {i}"] = made
+        out[Column("", "a constant", Part.UNKNOWN, i, "constant")] = made
     for hertz in LOAD_HZ:
         swing = _resonance(whole.acceleration[:, :2], hertz, period, ends)
         made = Product(size[0] / max(swing.std(), 1e-9), one, swing, slice(2))
-        out["", f"{UNKNOWN}resonance: a load that swings at {hertz:g} Hz in 0"] = made
+        load = f"a load that swings at {hertz:g} Hz"
+        out[Column("", load, Part.UNKNOWN, 0, "resonance")] = made
     return out
 
 
@@ -196,6 +196,8 @@ def changing_columns(parts: ArrayMap, followed: ArrayMap) -> Columns:
     """
     shares = {effect: SHARE_OF_EFFECT * part for effect, part in parts.items()}
     return {
-        ("", f"{CHANGING}{effect} with {name}"): Product(1.0, x, share)
+        Column("", f"{effect} with {name}", Part.CHANGING, 0, "changing coefficient"): Product(
+            1.0, x, share
+        )
         for (effect, share), (name, x) in itertools.product(shares.items(), followed.items())
     }

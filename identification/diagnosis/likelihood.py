@@ -27,6 +27,7 @@ from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
 from ..motion.smoothing import continuous, filtered, turn_between
 from .causal_filter import Poses, Track, level, run
+from .column import Column, Part
 from .discrepancy import (
     Columns,
     Product,
@@ -44,16 +45,10 @@ from .log_offsets import (
 )
 from .noise_search import FIRST_TIME, SETTLING_TIME, NoiseSearch
 from .priors import (
-    BETWEEN,
-    GAIN,
-    MODEL_ERROR,
     PRIORS,
-    UNKNOWN,
-    WHOLE_PREFIX,
     Base,
     Setting,
     Starts,
-    bare,
     in_prior_units,
     variants_of,
 )
@@ -61,7 +56,6 @@ from .regression import (
     BLOCK,
     CENTRAL,
     STEP,
-    Column,
     RegressedFlights,
     is_delay,
     typical_size,
@@ -137,7 +131,7 @@ class Likelihood:
         self._posed: Columns = {}
         if near and same_noise:
             self._acting, self._posed = (
-                {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
+                {c: x for c, x in part.items() if not c.effect and not c.is_unknown}
                 for part in (near._acting, near._posed)
             )
         else:
@@ -278,7 +272,7 @@ class Likelihood:
 
     def _add(self, column: Column) -> None:
         """Add a coefficient's column, unless it is there already or no such vehicle is possible."""
-        effect, name = column
+        effect = column.effect
         if column in self._acting or column in self._posed:
             return
         if effect and is_delay(effect):
@@ -288,11 +282,10 @@ class Likelihood:
             self._posed[column] = self._moved(column)
             return
         own = dict(self.flights.coefficients(self.setting, effect))
-        if name.startswith(WHOLE_PREFIX):
+        if column.part == Part.AT_CENTRE:
             own[CENTRAL] = 1.0
-        effect, name = bare(column)
-        value, delta = self.flights.step(self.setting, (effect, name))
-        there = {**self.setting, effect: {**own, name: value + delta}}
+        value, delta = self.flights.step(self.setting, column)
+        there = {**self.setting, effect: {**own, column.coefficient: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
             change = self._change(there) / delta
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
@@ -303,9 +296,9 @@ class Likelihood:
         """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
         predicted pose. So the column holds no noise of the measured pose.
         """
-        effect, name = column
         delta = STEP * typical_size(column, self.flights.vehicle)
-        vehicle = replace(self.flights.vehicle, effects=(EffectSetting(effect, {name: delta}),))
+        setting = EffectSetting(column.effect, {column.coefficient: delta})
+        vehicle = replace(self.flights.vehicle, effects=(setting,))
         out = []
         for piece, track in self._seen:
             log = FlightLog(
@@ -328,12 +321,12 @@ class Likelihood:
         acting = self._acting
         if playing(Role.LAG, among=self.setting):
             self._add(LAG_ASYMMETRY)
-        if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
+        if unknown and not any(c.is_unknown for c in acting):
             acting |= discrepancy_columns(*joined(self.tracks), self.flights)
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
-                acting[c] = _without_zeros(self._change({**self.setting, c[0]: dict(start)}))
+                acting[c] = _without_zeros(self._change({**self.setting, c.effect: dict(start)}))
         for effect in library:
             for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
@@ -346,7 +339,7 @@ class Likelihood:
         poses = {}
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
-                moved = [x * self._moved((effect, name)) for name, x in own.items()]
+                moved = [x * self._moved(Column(effect, name)) for name, x in own.items()]
                 poses[effect] = np.sum(moved, axis=0)
             else:
                 parts[effect] = -self._change(without(self.setting, effect))
@@ -362,7 +355,9 @@ class Likelihood:
             # the speeds are of k + 1/2: nothing later than sample k + 1
             u = np.pad(np.diff(s.rotor_speeds, 2, axis=0), ((2, 0), (0, 0)))
             bent.append(replace(s, rotor_speeds=s.rotor_speeds + u))
-        self._acting["", BETWEEN] = self._accelerations(self.setting, bent) - self._base
+        self._acting[Column("", "", Part.BETWEEN_SAMPLES)] = (
+            self._accelerations(self.setting, bent) - self._base
+        )
         self._add_model_errors()
         self._add_answers()
         moved = []
@@ -415,9 +410,9 @@ class Likelihood:
         poses' own noise. With equal offsets of both, only the torque of the thrust remains.
         """
         change[:, :3] = 0.0
-        axis = [c.name for c in get(column[0]).coefficients].index(column[1])
+        axis = [c.name for c in get(column.effect).coefficients].index(column.coefficient)
         (marker,) = playing(Role.MARKER)
-        self._posed[column] = -self._moved((marker, get(marker).coefficients[axis].name))
+        self._posed[column] = -self._moved(Column(marker, get(marker).coefficients[axis].name))
 
     def _add_model_errors(self) -> None:
         """Add the columns of slightly larger forces and torques, and of the torques expected from
@@ -439,7 +434,7 @@ class Likelihood:
                 "expected torque": Product(scale[i], expected[:, i], *own),
             }
             for name, x in errors.items():
-                self._acting["", f"{MODEL_ERROR} of {name} {axis}"] = x
+                self._acting[Column("", f"{name} {axis}", Part.MODEL_ERROR)] = x
 
     def _add_answers(self) -> None:
         """Add the columns of a flight loop's answers to disturbances: along thrust and torques,
@@ -468,7 +463,7 @@ class Likelihood:
             along = along_axis(axis, whole.rotation)
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
                 column = Product(answer / max(x.std(), 1e-9), x, *along)
-                self._acting["", f"answer {i} of axis {axis}"] = column
+                self._acting[Column("", f"answer {i} of axis {axis}", Part.NUISANCE)] = column
 
     def _jumps(self) -> list[Array]:
         """Return the accelerations (n, 6, 3) of each piece for a unit of the gains of a pair of
@@ -499,7 +494,9 @@ class Likelihood:
         steady = self.steady
         asked = (*(c for c in self._acting if c not in moved), *moved)
         # the gains on axes the rotors do not drive stay as fitted
-        drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
+        drives = [
+            Column("", f"axis {axis}", Part.GAIN, state) for axis in DRIVEN for state in STATES
+        ]
         names = (*asked, *drives)
         first = 0
         still = np.zeros_like(self._base)
@@ -617,7 +614,7 @@ def _read_poses(logs: Logs, at: int, vehicle: Vehicle, finer: Iterator[Array]) -
     for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
         q = Rotation.from_matrix(raw.rotation).as_quat(scalar_first=True)
         raw = replace(raw, rotor_speeds=raw.rotor_speeds + next(finer, 0.0))
-        raw = with_time_offsets(raw, {ROTOR_TIME_OFFSET[1]: offset})
+        raw = with_time_offsets(raw, {ROTOR_TIME_OFFSET.coefficient: offset})
         out.append(
             Poses(
                 raw.t,

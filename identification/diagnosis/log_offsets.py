@@ -17,21 +17,22 @@ from ...dynamics.vehicle import Vehicle
 from ..logs.table import Pair, Values
 from ..motion.signals import Signals
 from ..motion.smoothing import lagged, resampled
+from .column import Column, Part
 
 # time offsets (s) of a log: of the rotor speeds' action behind their log, of the attitude ahead of
 # the position, and of the acting velocity behind the position's (as in a simulator with forces held
 # over a step)
-ROTOR_TIME_OFFSET = ("", "rotor_time_offset")
-ATTITUDE_TIME_OFFSET = ("", "attitude_time_offset")
-VELOCITY_TIME_OFFSET = ("", "velocity_time_offset")
+ROTOR_TIME_OFFSET = Column("", "rotor_time_offset", Part.OFFSET)
+ATTITUDE_TIME_OFFSET = Column("", "attitude_time_offset", Part.OFFSET)
+VELOCITY_TIME_OFFSET = Column("", "velocity_time_offset", Part.OFFSET)
 # variance (s2) of the time over which rotor speeds are averaged, to both sides. An IMU hardly has
 # noise, so the rotor speeds' noise and rounding show; and the IMU has a low-pass of its own.
 # Without this average the fit finds an averaging lag, with an offset to bring the rotors forward
 # again
-ROTOR_SPREAD = ("", "rotor_spread")
+ROTOR_SPREAD = Column("", "rotor_spread", Part.OFFSET)
 # s by which lagging rotors speed up sooner and slow down later than the lag. Their mean thrust is
 # larger by as much, and without this offset looks like a smaller mass
-LAG_ASYMMETRY = ("", "lag_asymmetry")
+LAG_ASYMMETRY = Column("", "lag_asymmetry", Part.OFFSET)
 
 
 @dataclass(frozen=True)
@@ -56,9 +57,9 @@ BEHIND_A_FILTER = Offset(0.02, (-0.1, 0.1))
 _NEAR = 0.98  # share of a bound: the last step of a search
 
 
-def bias_column(log: int, axis: int) -> tuple[str, str]:
+def bias_column(log: int, axis: int) -> Column:
     """Return the column of a bias (m/s2) along an axis of the body."""
-    return "", f"accelerometer bias {'xyz'[axis]} {log}"
+    return Column("", f"accelerometer bias {'xyz'[axis]} {log}", Part.OFFSET)
 
 
 def delays_at_bound(setting: Mapping[str, Values]) -> Iterator[str]:
@@ -95,19 +96,19 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
 
 def with_time_offsets(signals: Signals, offsets: Values) -> Signals:
     """Return the signals with the time offsets of rotor speeds, velocity and attitude applied."""
-    if rotors := offsets.get(ROTOR_TIME_OFFSET[1]):
+    if rotors := offsets.get(ROTOR_TIME_OFFSET.coefficient):
         n = np.arange(len(signals.t), dtype=np.float64)
         speeds = resampled(n - rotors / signals.period, n, signals.rotor_speeds)
         signals = replace(signals, rotor_speeds=speeds)
-    if spread := offsets.get(ROTOR_SPREAD[1]):
+    if spread := offsets.get(ROTOR_SPREAD.coefficient):
         from scipy.ndimage import gaussian_filter1d  # needed without a pose alone
 
         over = np.sqrt(spread) / signals.period
         smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")
         signals = replace(signals, rotor_speeds=smooth)
-    if velocity := offsets.get(VELOCITY_TIME_OFFSET[1]):
+    if velocity := offsets.get(VELOCITY_TIME_OFFSET.coefficient):
         signals = replace(signals, velocity=signals.velocity - velocity * signals.acceleration)
-    if attitude := offsets.get(ATTITUDE_TIME_OFFSET[1]):
+    if attitude := offsets.get(ATTITUDE_TIME_OFFSET.coefficient):
         turn = Rotation.from_rotvec(-attitude * signals.angular_velocity).as_matrix()
         signals = replace(signals, rotation=signals.rotation @ turn)
     return signals

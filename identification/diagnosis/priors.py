@@ -12,11 +12,10 @@ import numpy as np
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
 from ..logs.table import Array, NamedNumbers, Pair, Values
+from .column import Column, Part
 from .evidence import Index, Marginal, SetEvidence, marginal, set_evidence
 from .regression import (
     CENTRAL,
-    START_PREFIX,
-    Column,
     Effects,
     RegressedFlights,
     coefficient,
@@ -28,11 +27,6 @@ from .regression import (
 Setting = dict[str, NamedNumbers]
 # columns of whole effects, with the coefficients of each
 Starts = Mapping[Column, Values]
-
-WHOLE_PREFIX = "whole "  # a coefficient of an effect acting at the centre, without a moment
-# columns without an effect: nuisances of any flight, and effects outside the library
-BETWEEN = "rotors between samples"
-MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown ", "nuisance "
 
 
 @dataclass(frozen=True)
@@ -98,7 +92,7 @@ class Base:
     @property
     def asked(self) -> list[Column]:
         """The columns of effects."""
-        return [c for c in self.columns if c[0]]
+        return [c for c in self.columns if c.effect]
 
     def marginal(
         self,
@@ -188,11 +182,6 @@ class _Asked:
         return self.quadratic.explained(index, self.evidence(index).mode)
 
 
-def bare(column: Column) -> Column:
-    """Return a column's coefficient, without the mark of a whole effect."""
-    return column[0], column[1].removeprefix(WHOLE_PREFIX)
-
-
 def variants_of(
     flights: RegressedFlights, effect: str, setting: Collection[str], starts: Starts
 ) -> list[Variant]:
@@ -200,7 +189,7 @@ def variants_of(
     by the vehicle's file.
     """
     own = tuple(flights.columns_of([effect]))
-    wholes = [(c,) for c in starts if c[0] == effect]
+    wholes = [(c,) for c in starts if c.effect == effect]
     if moves_time(effect) and effect not in setting:
         return [own, *wholes]
     if flights.is_nonlinear(effect) and effect not in setting:
@@ -208,37 +197,36 @@ def variants_of(
     if all(c.name != CENTRAL for c in get(effect).coefficients):
         return [own]
     if effect in setting:
-        return [(*own, (effect, CENTRAL))]
-    return [own, tuple((effect, WHOLE_PREFIX + name) for _, name in own)]
+        return [(*own, Column(effect, CENTRAL))]
+    return [own, tuple(c._replace(part=Part.AT_CENTRE) for c in own)]
 
 
 def prior_size(column: Column, flights: RegressedFlights) -> float:
     """Return the standard deviation of a column's coefficient before a flight is seen."""
-    effect, name = column
-    if not effect:
-        if name == BETWEEN:
+    match column.part:
+        case Part.BETWEEN_SAMPLES:
             return PRIORS.between_samples
-        if name.startswith(GAIN):
-            return PRIORS.gains[int(name[-1])]
-        is_error = name.startswith(MODEL_ERROR)
-        return PRIORS.model_error if is_error else typical_size(column, flights.vehicle)
-    if name.startswith(START_PREFIX) or name == CENTRAL:
-        return 1.0
-    factor = PRIORS.any_size if get(effect).any_size else 1.0
-    size = factor * typical_size(bare(column), flights.vehicle)
-    return math.hypot(size, flights.thrust_std) if get(effect).role == Role.THRUST else size
+        case Part.GAIN:
+            return PRIORS.gains[column.number]
+        case Part.MODEL_ERROR:
+            return PRIORS.model_error
+    size = typical_size(column, flights.vehicle)
+    if not column.effect or column.part == Part.START or column.coefficient == CENTRAL:
+        return size
+    effect = get(column.effect)
+    size *= PRIORS.any_size if effect.any_size else 1.0
+    return math.hypot(size, flights.thrust_std) if effect.role == Role.THRUST else size
 
 
 def _bounds(column: Column, flights: RegressedFlights) -> Pair:
-    effect, name = column
-    if not effect:
+    if not column.effect:
         return -math.inf, math.inf
-    if name.startswith(START_PREFIX):
-        return PRIORS.near_start if moves_time(effect) else (0.0, math.inf)
-    c = coefficient(bare(column))
+    if column.part == Part.START:
+        return PRIORS.near_start if moves_time(column.effect) else (0.0, math.inf)
+    c = coefficient(column)
     low = c.minimum
     high = min(c.maximum, c.plausible)
-    if get(effect).role == Role.MASS:
+    if get(column.effect).role == Role.MASS:
         low = max(low, -PRIORS.most_missing_mass * unit_of_change(column, flights.vehicle))
     own = declared(column, flights)
     return min(low - own, 0.0), max(high - own, 0.0)
@@ -248,7 +236,7 @@ def declared(column: Column, flights: RegressedFlights) -> float:
     """Return a column's coefficient by the vehicle's file, the zero of the likelihood's
     coefficient; 0 if not stated.
     """
-    return flights.value({}, bare(column))
+    return flights.value({}, column)
 
 
 def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting: Setting) -> Array:
@@ -263,7 +251,7 @@ def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting:
 
 def changed(column: Column, change: float, flights: RegressedFlights) -> float:
     """Return a column's coefficient by the vehicle's file, changed as far as its limits allow."""
-    limits = coefficient(bare(column))
+    limits = coefficient(column)
     return min(max(declared(column, flights) + change, limits.minimum), limits.maximum)
 
 
@@ -291,8 +279,7 @@ def in_prior_units(
     """
     size = np.array([prior_size(c, flights) for c in names])
     # about zero: the residual without all effects of the setting
-    own = [*map(bare, names)]
-    back = np.append([flights.value(setting, c) - declared(c, flights) for c in own], 1.0)
+    back = np.append([flights.value(setting, c) - declared(c, flights) for c in names], 1.0)
     whole = blocks @ back
     blocks[:, :, -1] = blocks[:, -1, :] = whole
     blocks[:, -1, -1] = whole @ back
@@ -300,9 +287,9 @@ def in_prior_units(
     blocks *= scale[:, None]
     blocks *= scale
     low, high = np.array([_bounds(c, flights) for c in names]).T / size
-    typical = np.array([typical_size(c, flights.vehicle) for c in own])
+    typical = np.array([typical_size(c, flights.vehicle) for c in names])
     total = blocks.sum(axis=0)
-    single = np.flatnonzero([not name.startswith(UNKNOWN) for _, name in names])
+    single = np.flatnonzero([not c.is_unknown for c in names])
     held = np.append(single, len(names))
     return Base(
         names,
@@ -315,8 +302,8 @@ def in_prior_units(
         single,
         penalty,
         frozenset(k for k in setting if k),
-        single[[not names[i][0] for i in single.tolist()]],
+        single[[not names[i].effect for i in single.tolist()]],
         typical / size,
-        [c for c in names if c[1].startswith(UNKNOWN)],
+        [c for c in names if c.is_unknown],
         starts,
     )

@@ -21,11 +21,10 @@ from ...dynamics.effects import get
 from ..findings import LEAST_RIVAL, Disturbance, Ranking
 from ..logs.table import Array, Names, Pair, Values
 from .climbing import Height, linearised, mode
+from .column import Column, Part
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts, prior_size
 from .regression import (
-    START_PREFIX,
-    Column,
     Effects,
     RegressedFlights,
     moves_time,
@@ -46,7 +45,7 @@ MOST_STARTS = 2  # likeliest starts of an effect with nonlinear coefficients, fi
 
 
 @dataclass(frozen=True, eq=False)
-class _FittedPosterior:
+class FittedPosterior:
     """The posterior of flights, and the fit of the likeliest set."""
 
     posterior: Posterior
@@ -65,7 +64,7 @@ def rank(
     flights: RegressedFlights,
     library: Sequence[str],
     report: Report = lambda text: None,
-) -> _FittedPosterior:
+) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -90,7 +89,7 @@ def rank(
             begun = setting
             setting = mode(begun, partial(height, near=near))
             moved = (
-                abs(x - begun[e].get(n, 0.0)) / prior_size((e, n), flights)
+                abs(x - begun[e].get(n, 0.0)) / prior_size(Column(e, n), flights)
                 for e, own in setting.items()
                 for n, x in own.items()
             )
@@ -150,8 +149,8 @@ def rank(
     quieter = best.quieter({column: size}, starts) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
     gains = posterior.leave_out_needless(ranking.probability)
-    late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
-    return _FittedPosterior(
+    late = {c.coefficient: x for c, x in posterior.nuisances().items() if c in flights.offsets}
+    return FittedPosterior(
         posterior, ranking, posterior.likeliest_setting(), gains, best.gusts(), late
     )
 
@@ -162,7 +161,7 @@ def rank_by_rows(
     first: Setting,
     fixed: Setting,
     report: Report = lambda text: None,
-) -> _FittedPosterior:
+) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -187,7 +186,7 @@ def rank_by_rows(
         lags = {
             c: x
             for c, x in starts.items()
-            if not flights.is_nonlinear(c[0]) and c[0] not in setting
+            if not flights.is_nonlinear(c.effect) and c.effect not in setting
         }
         return likelihood.base(setting, lags, unknown=unknown)
 
@@ -210,7 +209,7 @@ def rank_by_rows(
         if not flights.is_nonlinear(effect) or effect in given:
             continue
         report(f"trying {effect}")
-        each = ({**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect)
+        each = ({**first, effect: dict(x)} for c, x in starts.items() if c.effect == effect)
         if own := sorted(each, key=likelihood.objective):
             near = map(likelihood.fitted, own[:MOST_STARTS])
             add(min(near, key=likelihood.objective))
@@ -245,7 +244,7 @@ def rank_by_rows(
     gains = last.leave_out_needless(ranking.probability)
     setting = last.likeliest_setting()
     setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
-    return _FittedPosterior(
+    return FittedPosterior(
         last,
         ranking,
         setting,
@@ -268,7 +267,7 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     m = base.marginal(base.asked, base.plain, likelihood.power)
 
     def explained(effects: set[str]) -> float:
-        return m.explained([i for c, i in m.place.items() if c[0] in effects])
+        return m.explained([i for c, i in m.place.items() if c.effect in effects])
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
@@ -289,7 +288,7 @@ def starts_of(
         own = []
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
-            typical = typical_size((effect, name), flights.vehicle)
+            typical = typical_size(Column(effect, name), flights.vehicle)
             own = [{name: share * typical} for share in TIME_STARTS]
         elif flights.is_nonlinear(effect):
             residuals = residuals or [flights.residual(x) for x in (setting, *others)]
@@ -297,5 +296,5 @@ def starts_of(
             for y in residuals:
                 starts = starting_points(effect, flights, y, stated, beside)
                 own += [{**start, **stated} for start in starts]
-        out |= {(effect, f"{START_PREFIX}{i}"): start for i, start in enumerate(own)}
+        out |= {Column(effect, "", Part.START, i): start for i, start in enumerate(own)}
     return out

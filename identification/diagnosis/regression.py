@@ -29,6 +29,7 @@ from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import LONGEST_GAP, Signals, log_signals
 from ..motion.smoothing import CUTOFFS, low_pass, mean_square, resampled
+from .column import Column, Part
 from .commanded_rotors import (
     UNSTATED_THRUST_STD,
     downsampled,
@@ -78,11 +79,7 @@ LARGE_STEP = 0.5
 Setting = Mapping[str, Values]
 _Residual = Callable[[Setting], Array]  # of flights with a setting (rows, channels)
 Effects = frozenset[str]
-# an effect's coefficient
-Column = tuple[str, str]
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
-# a whole effect at coefficients of its own; the column is a multiple of it
-START_PREFIX = "start "
 
 
 def without(setting: Mapping[str, V], effect: str) -> dict[str, V]:
@@ -120,7 +117,7 @@ def is_nonlinear(effect: str) -> bool:
 
 def coefficient(column: Column) -> Coefficient:
     """Return the declaration of a column's coefficient."""
-    return next(c for c in get(column[0]).coefficients if c.name == column[1])
+    return next(c for c in get(column.effect).coefficients if c.name == column.coefficient)
 
 
 def unit_of_change(column: Column, vehicle: Vehicle) -> float:
@@ -134,13 +131,13 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the
     library's two.
     """
-    if not column[0]:
+    if not column.effect:
         return TIMINGS[column].size if column in TIMINGS else 1.0
-    if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
+    if column.part == Part.START or column.coefficient == CENTRAL:
         return 1.0
     c = coefficient(column)
     if not all(c.typical):
-        same_unit = (o for o in get(column[0]).coefficients if o.unit == c.unit)
+        same_unit = (o for o in get(column.effect).coefficients if o.unit == c.unit)
         return max(abs(o.typical[0]) for o in same_unit) or 1.0
     large, small = np.abs(c.typical)
     share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
@@ -324,11 +321,13 @@ class RegressedFlights:
         """Return the columns of an effect (rows, 6) at typical coefficients, one by one, or as one
         where the force is not linear in them.
         """
-        own = [(effect, c.name) for c in get(effect).coefficients]
+        own = [Column(effect, c.name) for c in get(effect).coefficients]
         if is_nonlinear(effect):
-            setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
+            setting = {effect: {c.coefficient: typical_size(c, self.vehicle) for c in own}}
             return [self.residual({}) - self.residual(setting)]
-        columns = self.columns({}, (c for c in own if c[1] != CENTRAL), self.residual, LARGE_STEP)
+        columns = self.columns(
+            {}, (c for c in own if c.coefficient != CENTRAL), self.residual, LARGE_STEP
+        )
         return [typical_size(c, self.vehicle) * x for c, x in columns.items()]
 
     def _in_own_axes(self, x: Array, noisy: "RegressedFlights") -> Array:
@@ -460,7 +459,7 @@ class RegressedFlights:
 
     def value(self, setting: Setting, column: Column) -> float:
         """Return one of these coefficients; 0 if nothing states it."""
-        return self.coefficients(setting, column[0]).get(column[1], 0.0)
+        return self.coefficients(setting, column.effect).get(column.coefficient, 0.0)
 
     def stated(self, effect: str) -> Values:
         """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
@@ -474,7 +473,7 @@ class RegressedFlights:
         ``central``, without a force of its own.
         """
         return [
-            (e, c.name)
+            Column(e, c.name)
             for e in effects
             for c in get(e).coefficients
             if c.name != CENTRAL and c.name not in self.stated(e)
@@ -518,9 +517,9 @@ class RegressedFlights:
         vehicle = self.amended(setting)
         offsets = setting.get("", {})
         s = with_time_offsets(signals, offsets)
-        s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
+        s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY.coefficient, 0.0))
         wrench, _ = acting_wrench(s, vehicle, self.vehicle)
-        off = np.array([offsets.get(bias_column(log, i)[1], 0.0) for i in range(3)])
+        off = np.array([offsets.get(bias_column(log, i).coefficient, 0.0) for i in range(3)])
         if off.any():
             wrench[:, :3] += self.vehicle.mass * np.einsum("nij,j->ni", s.rotation, off)
         return wrench
@@ -538,7 +537,7 @@ class RegressedFlights:
         """
         value = self.value(setting, column)
         delta = size * typical_size(column, self.vehicle)
-        if column[0]:
+        if column.effect:
             c = coefficient(column)
             delta = math.copysign(delta, c.typical[0])
             delta = delta if c.minimum <= value + delta <= c.maximum else -delta
@@ -559,7 +558,7 @@ class RegressedFlights:
         return {column: self._slope(setting, column, residual, step) for column in wanted}
 
     def _slope(self, setting: Setting, column: Column, residual: _Residual, step: float) -> Array:
-        effect, name = column
+        effect, name, *_ = column
         own = self.coefficients(setting, effect)
         value, delta = self.step(setting, column, step)
 

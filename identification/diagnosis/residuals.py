@@ -25,7 +25,7 @@ MARGIN = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Balance:
+class Balance:
     """The residual of flights (rows, 6), by the declared vehicle and by the amended one."""
 
     before: Array
@@ -37,11 +37,12 @@ class _Balance:
     better: bool  # whether the mean square of force and torque on held-out blocks falls
 
 
-def balance(flights: RegressedFlights, setting: Setting) -> _Balance:
+def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     """Return the residual with a setting of effects. A sensor's bias is no error of the model: the
     residual before is without it, too.
     """
-    sensors = {k: x for k, x in setting.get("", {}).items() if ("", k) in flights.biases}
+    biases = {c.coefficient for c in flights.biases}
+    sensors = {k: x for k, x in setting.get("", {}).items() if k in biases}
     before = flights.residual({"": sensors} if sensors else {})
     after = flights.residual(setting)
     held_out = ~flights.fit_rows
@@ -52,7 +53,7 @@ def balance(flights: RegressedFlights, setting: Setting) -> _Balance:
     least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
     noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
     new, old = (mean_square(x[held_out]) for x in (after, before))
-    return _Balance(
+    return Balance(
         before,
         after,
         floor,

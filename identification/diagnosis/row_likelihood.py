@@ -12,10 +12,10 @@ from ..logs.table import Array, ArrayMap, Pair
 from ..motion.smoothing import mean_square
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
+from .column import Column, Part
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
 from .log_offsets import LAG_ASYMMETRY
 from .priors import (
-    NUISANCE,
     Base,
     Setting,
     Starts,
@@ -23,7 +23,7 @@ from .priors import (
     in_prior_units,
     prior_size,
 )
-from .regression import Column, Effects, RegressedFlights, delivered, without
+from .regression import Effects, RegressedFlights, delivered, without
 from .row_noise import ROUNDS, RowNoise, fitted_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
@@ -65,9 +65,9 @@ class RowLikelihood:
         y = rows.residual(first)
         linear = [e for e in self.library if not self.flights.is_nonlinear(e)]
         columns = rows.columns(first, self.flights.columns_of(linear))
-        traced = {c[0] for c, x in columns.items() if x.any()}
+        traced = {c.effect for c, x in columns.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
-        own = [x * prior_size(c, self.flights) for c, x in columns.items() if c[0] in traced]
+        own = [x * prior_size(c, self.flights) for c, x in columns.items() if c.effect in traced]
         signals = followers(rows)
         explained = np.zeros_like(y)
         without_memory = np.zeros((0, rows.channels, rows.channels))
@@ -92,7 +92,7 @@ class RowLikelihood:
         """
         whole = {**self.rows.fixed, **setting}
         winds = [
-            (e, c.name)
+            Column(e, c.name)
             for e in whole
             if get(e).sets_wind
             for c in get(e).coefficients
@@ -106,8 +106,8 @@ class RowLikelihood:
         slopes = self.rows.columns(setting, winds)
         return _named(
             {
-                f"gust {k} of {name}": x[:, None] * slope
-                for (_, name), slope in slopes.items()
+                f"gust {k} of {c.coefficient}": x[:, None] * slope
+                for c, slope in slopes.items()
                 for k, x in enumerate(shape.T)
             }
         )
@@ -178,7 +178,7 @@ class RowLikelihood:
             columns |= rows.columns(setting, [LAG_ASYMMETRY])
         columns |= rows.columns(setting, flights.columns_of(effects))
         for c, start in starts.items():
-            columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
+            columns[c] = residual - rows.residual({**setting, c.effect: dict(start)})
         if unknown:
             columns |= self._dictionary(setting)
         x = noise.white(np.stack([*columns.values(), residual], axis=2))[self._use]
@@ -266,9 +266,12 @@ class RowLikelihood:
         base = self.base(setting, {}, ())
         modes = base.mode(base.plain, self.power)
         out = {}
-        for (_, name), offset in self.flights.offsets.items():
-            mode, std = modes["", NUISANCE + name]
-            out[name] = float(np.clip(offset.size * mode, *offset.range)), offset.size * std
+        for c, offset in self.flights.offsets.items():
+            mode, std = modes[c._replace(part=Part.NUISANCE)]
+            out[c.coefficient] = (
+                float(np.clip(offset.size * mode, *offset.range)),
+                offset.size * std,
+            )
         return out
 
     def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
@@ -283,4 +286,4 @@ class RowLikelihood:
 
 
 def _named(columns: ArrayMap) -> dict[Column, Array]:
-    return {("", f"{NUISANCE}{name}"): x for name, x in columns.items()}
+    return {Column("", name, Part.NUISANCE): x for name, x in columns.items()}

@@ -9,10 +9,11 @@ import numpy as np
 
 from ...dynamics.effects import Role, get
 from ..logs.table import Array, NamedArrays
+from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .log_offsets import ROTOR_TIME_OFFSET
-from .priors import MODEL_ERROR, PRIORS
-from .regression import Column, RegressedFlights, coefficient, unit_of_change
+from .priors import PRIORS
+from .regression import RegressedFlights, coefficient, unit_of_change
 from .rows import Rows
 
 # standard deviations of the differences from flight to flight
@@ -36,7 +37,7 @@ def between_flights(column: Column, value: float, flights: RegressedFlights) -> 
     """Return the standard deviation of a coefficient from flight to flight, of the mean of these
     flights, in its unit; 0 if unknown. With measured rotors these flights may be of one session.
     """
-    role = get(column[0]).role
+    role = get(column.effect).role
     each = math.sqrt(len(flights.logs))
     load = role == Role.SUSPENDED_LOAD
     unit = coefficient(column).unit
@@ -72,7 +73,7 @@ def row_nuisances(rows: Rows) -> NamedArrays:
         shared = np.mean([out[f"thrust {i}"] for i in numbers], axis=0)
         out |= {f"thrust {i}": out[f"thrust {i}"] - shared for i in numbers}
     offsets = rows.columns({}, flights.offsets)
-    return out | {c[1]: flights.offsets[c].size * x for c, x in offsets.items()}
+    return out | {c.coefficient: flights.offsets[c].size * x for c, x in offsets.items()}
 
 
 def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
@@ -125,13 +126,13 @@ def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedA
     """
     noise = rows.flights.rotor_noise
     varying = noise[0] * (thrust - here * thrust[here > 0.0].mean())
-    out = {f"{MODEL_ERROR} of thrust's changes": rows.from_body(varying * AXES["z"])}
+    out = {"model error of thrust's changes": rows.from_body(varying * AXES["z"])}
     gains = np.hypot(PRIORS.model_error, noise[1:]).tolist()
     for (name, along), gain in zip(AXES.items(), gains, strict=True):
         force = PRIORS.model_error * thrust * along
         torque = gain * turning * along
-        out[f"{MODEL_ERROR} of force {name}"] = rows.from_body(force)
-        out[f"{MODEL_ERROR} of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)
+        out[f"model error of force {name}"] = rows.from_body(force)
+        out[f"model error of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)
     return out
 
 

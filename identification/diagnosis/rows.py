@@ -14,8 +14,9 @@ from ...runtime.arrays import Index
 from ..logs.table import Array, Mask
 from ..motion.signals import in_body
 from ..motion.smoothing import CUTOFFS
+from .column import Column
 from .discrepancy import weight_and_torque
-from .regression import Column, RegressedFlights, Setting, blocks
+from .regression import RegressedFlights, Setting, blocks
 
 COMMANDED_CUTOFF_HZ = 3.5  # for rotors known by commands
 FILTERED_CUTOFF_HZ = 2.0  # for a filtered pose: well below any filter

@@ -13,24 +13,21 @@ from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import LEAST_RIVAL, RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
-from .discrepancy import CHANGING, SHARE_OF_EFFECT
+from .column import Column, Part
+from .discrepancy import SHARE_OF_EFFECT
 from .evidence import Index, Marginal, SetEvidence, evidence_of_one_more, tempering
 from .left_out import LeftOut
 from .priors import (
     PRIORS,
-    WHOLE_PREFIX,
     Base,
     Setting,
     Variant,
     Variants,
-    bare,
     changed,
     variants_of,
 )
 from .regression import (
     CENTRAL,
-    START_PREFIX,
-    Column,
     Effects,
     RegressedFlights,
     coefficient,
@@ -89,7 +86,7 @@ def is_possible(
         Found(
             own,
             {name: std.get(name, 0.0) for name in own},
-            {c.name: typical_size((effect, c.name), vehicle) for c in words.coefficients},
+            {c.name: typical_size(Column(effect, c.name), vehicle) for c in words.coefficients},
             flights.speed,
             frozenset(get(name).family for name in beside),
         )
@@ -154,15 +151,15 @@ class Posterior:
         columns = best.columns
         left_out = LeftOut(base, columns, self.power)
         m = base.marginal(columns, base.plain, self.power)
-        every = {e for e, _ in columns} - self.given
+        every = {c.effect for c in columns} - self.given
         gains: dict[str, Pair] = {}
         while True:
             weak = {}
             for variant in best.variants:
-                effect = variant[0][0]
+                effect = variant[0].effect
                 rest = tuple(x for x in best.variants if x != variant)
-                kept = {v[0][0] for v in rest}
-                less = [i for i, (e, _) in enumerate(columns) if e in kept]
+                kept = {v[0].effect for v in rest}
+                less = [i for i, c in enumerate(columns) if c.effect in kept]
                 gained, std = gains[effect] = left_out.gain(less)
                 smaller = _Candidate(base, rest, m.evidence(less))
                 least = left_out.least * std - self.odds * len(every - kept)
@@ -186,7 +183,7 @@ class Posterior:
         little = PRIORS.negligible * base.typical[at]
         # a start of another base is no small effect
         if self.one_noise:
-            little[[name.startswith(START_PREFIX) for _, name in base.asked]] = 0.0
+            little[[c.part == Part.START for c in base.asked]] = 0.0
         return np.append(base.plain, at), np.append(np.ones(len(base.plain)), little)
 
     def _variants(self, base: Base) -> list[Variant]:
@@ -204,12 +201,12 @@ class Posterior:
         others, little = self._of_any_flight(base)
         m = base.marginal(base.asked, others, self.power, little)
         variants = self._variants(base)
-        ways = Counter(v[0][0] for v in variants)
+        ways = Counter(v[0].effect for v in variants)
         before = {e: self.odds - math.log(count) for e, count in ways.items()}
         tried = base.tried.setdefault(self.power, {})
 
         def score(some: Variants) -> float:
-            key = frozenset(v[0][0] for v in some)
+            key = frozenset(v[0].effect for v in some)
             if self.one_noise:
                 most = max(len(x.effects) for x in self.bases if x.effects <= key)
                 judged = key not in self.idle and len(base.effects) == most
@@ -234,7 +231,7 @@ class Posterior:
                 self.known[key] = _Candidate(base, some, evidence)
             return total
 
-        first = tuple(v for v in variants if self.one_noise and v[0][0] in base.effects)
+        first = tuple(v for v in variants if self.one_noise and v[0].effect in base.effects)
         score(first)
         for some in asked:
             if all(c in m.place for v in some for c in v):
@@ -252,10 +249,10 @@ class Posterior:
     def _possible(self, candidate: _Candidate) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
         asked = [
-            e
-            for (e, name), *_ in candidate.variants
-            if get(e).possible or (self.one_noise and get(e).implausible)
-            if not name.startswith(START_PREFIX)
+            c.effect
+            for c, *_ in candidate.variants
+            if get(c.effect).possible or (self.one_noise and get(c.effect).implausible)
+            if c.part != Part.START
         ]
         setting, std = self._at_mode(candidate) if asked else ({}, {})
         return all(is_possible(self.flights, setting, std[e], e, self.one_noise) for e in asked)
@@ -270,7 +267,7 @@ class Posterior:
             quieter: the last base with the likeliest noise beside the strangest column. The set,
                 and the set with one more column, have the likelier noise of both.
         """
-        group = np.array([name.split(": ")[0] for _, name in self.bases[-1].dictionary])
+        group = np.array([c.group for c in self.bases[-1].dictionary])
         none = []
         more = []
         for base in filter(None, (self.bases[-1], quieter)):
@@ -309,7 +306,8 @@ class Posterior:
         base, best = self._likeliest()
         m = base.marginal(base.asked, base.plain, self.power)
         whole, rest = (
-            m.evidence([m.place[c] for c in best.columns if c[0] != out]) for out in ("", effect)
+            m.evidence([m.place[c] for c in best.columns if c.effect != out])
+            for out in ("", effect)
         )
         return whole.log_evidence - rest.log_evidence
 
@@ -325,15 +323,15 @@ class Posterior:
         the deviance of all effects together.
         """
         base = next(x for x in self.bases if x.effects == self.given)
-        asked = [c for c in base.asked if c[0] not in self.given]
-        always = base.at(c for c in base.asked if c[0] in self.given)
+        asked = [c for c in base.asked if c.effect not in self.given]
+        always = base.at(c for c in base.asked if c.effect in self.given)
         m = base.marginal(asked, np.append(base.plain, always), self.power)
         right = m.quadratic.right
         normal = m.quadratic.normal + np.eye(len(asked))
         whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
         out: NamedNumbers = {}
         for v in self._variants(base):
-            if (effect := v[0][0]) not in self.given:
+            if (effect := v[0].effect) not in self.given:
                 gained = m.explained([m.place[c] for c in v])
                 out[effect] = max(out.get(effect, 0.0), gained / whole)
         return out
@@ -344,7 +342,7 @@ class Posterior:
         """
         base, best = self._likeliest()
         fitted = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
-        return {c: x for c, x in fitted.items() if not c[0]}
+        return {c: x for c, x in fitted.items() if not c.effect}
 
     def shown(self, known: Sequence[Column] = ()) -> NamedNumbers:
         """Return the change of the deviance by a typical size of each effect outside the likeliest
@@ -355,10 +353,10 @@ class Posterior:
         m = base.marginal(base.asked, others, self.power)
         out: NamedNumbers = {}
         for columns in self._variants(base):
-            (effect, name), *_ = columns
-            if name.startswith(START_PREFIX) or effect in {e for e, _ in best.columns}:
+            effect = columns[0].effect
+            if columns[0].part == Part.START or effect in {c.effect for c in best.columns}:
                 continue
-            sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
+            sign = np.sign([coefficient(c).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
             i = [m.place[c] for c in columns]
             out[effect] = max(float(z @ m.quadratic.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
@@ -370,7 +368,7 @@ class Posterior:
         """
         own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
         # an effect of the set is true to some per cent, whatever makes it change
-        changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
+        changing = base.at(c for c in base.columns if c.part == Part.CHANGING)
         others, little = self._of_any_flight(base)
         wrong = np.repeat([1.0, EFFECT_ERROR / SHARE_OF_EFFECT], [len(own), len(changing)])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
@@ -421,21 +419,20 @@ class Posterior:
         mode, deviations = candidate.evidence.mode, candidate.evidence.std
         if widened:
             deviations = deviations * base.scatter(columns, mode, self.power)
-        setting = {e: dict(self.flights.coefficients({}, e)) for e, _ in columns}
+        setting = {e: dict(self.flights.coefficients({}, e)) for e, *_ in columns}
         std: Setting = {e: {} for e in setting}
         size = base.size[base.at(columns)]
         sized = zip(columns, (mode * size).tolist(), (deviations * size).tolist(), strict=True)
         for c, x, deviation in sized:
-            effect, name = bare(c)
-            own = setting[effect]
-            if name.startswith(START_PREFIX):
+            own = setting[c.effect]
+            if c.part == Part.START:
                 own |= base.starts[c]
-                if moves_time(effect):
-                    own[get(effect).coefficients[0].name] *= x
+                if moves_time(c.effect):
+                    own[get(c.effect).coefficients[0].name] *= x
                 continue
-            own[name] = changed(c, x, self.flights)
-            std[effect][name] = deviation
-            if c[1].startswith(WHOLE_PREFIX):
+            own[c.coefficient] = changed(c, x, self.flights)
+            std[c.effect][c.coefficient] = deviation
+            if c.part == Part.AT_CENTRE:
                 own[CENTRAL] = 1.0
         return setting, std
 

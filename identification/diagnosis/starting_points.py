@@ -15,6 +15,7 @@ from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Coefficients, Unexplained
 from ..logs.table import Array
 from ..motion.smoothing import mean_square
+from .column import Column
 from .regression import RegressedFlights, Setting, typical_size
 
 MOST_TRIED = 12  # starts; no more are tried all
@@ -46,7 +47,7 @@ def starting_points(
         Unexplained(
             flights.vehicle,
             {
-                c.name: typical_size((effect, c.name), flights.vehicle)
+                c.name: typical_size(Column(effect, c.name), flights.vehicle)
                 for c in get(effect).coefficients
             },
             stated,

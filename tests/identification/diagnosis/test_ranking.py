@@ -7,6 +7,7 @@ import pytest
 
 from tests.support.flown import DRAG, VEHICLE, settings
 from windwrench.evidence.trials.practice_flights import fly_practice
+from windwrench.identification.diagnosis.column import Column, Part
 from windwrench.identification.diagnosis.likelihood import Likelihood
 from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import RegressedFlights
@@ -48,7 +49,7 @@ def test_equal_offsets_of_mass_and_marker_are_told_by_the_thrust_alone():
     thrust's arm is left; along z it has none.
     """
     base = Likelihood(flown(), {}).base(("com_offset", "marker_offset"), {})
-    at = base.at([("com_offset", "cz"), ("marker_offset", "mz")])
+    at = base.at([Column("com_offset", "cz"), Column("marker_offset", "mz")])
     (a, b), (_, d) = base.total[np.ix_(at, at)] / np.outer(base.size[at], base.size[at])
     assert a + 2.0 * b + d < 1e-5 * (a - 2.0 * b + d)
 
@@ -59,7 +60,7 @@ def test_the_gain_of_a_torque_is_known_where_rotors_leave_their_rounding():
         log = fly_practice(VEHICLE, settings({}), trajectory, 12.0, seed=5)
         base = Likelihood(RegressedFlights([log], VEHICLE), {}).base((), {})
         names = ("expected torque x", "torque x")
-        at = base.at([("", f"model error of {name}") for name in names])
+        at = base.at([Column("", name, Part.MODEL_ERROR) for name in names])
         predicted, all_of_it = base.total[at, at]
         sizes[trajectory] = math.sqrt(predicted / all_of_it)
     assert sizes["excite"] < 7.0

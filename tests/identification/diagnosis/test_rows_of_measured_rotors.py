@@ -15,7 +15,7 @@ from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.evidence.trials.logged_poses import FILTERS
 from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.priors import NUISANCE
+from windwrench.identification.diagnosis.column import Column, Part
 from windwrench.identification.diagnosis.ranking import rank_by_rows
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
@@ -79,7 +79,7 @@ def test_rows_hold_forces_and_torques(offset):
     without = rows.residual({})
     found = rows.residual({"com_offset": dict(OFFSET.coefficients)})
     assert np.square(found[:, 4]).mean() < 0.2 * np.square(without[:, 4]).mean()
-    column = rows.columns({}, [("com_offset", "cx")])["com_offset", "cx"]
+    (column,) = rows.columns({}, [Column("com_offset", "cx")]).values()
     assert_allclose(without - found, 0.01 * column, atol=0.03 * abs(without).max())
 
 
@@ -108,7 +108,7 @@ def test_a_bias_hides_steady_forces_along_the_body():
     flights = RegressedFlights([log], VEHICLE)
     found = rank_by_rows(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {})
     assert found.ranking.sets[0].effects == ()
-    biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
+    biases = [c._replace(part=Part.NUISANCE) for c in flights.biases]
     shown = found.posterior.shown()
     known = found.posterior.shown(biases)
     assert all(x > 13.0 for x in shown.values())

@@ -13,6 +13,7 @@ from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis.advice import composites
+from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY, delays_at_bound
 from windwrench.identification.diagnosis.priors import prior_size
@@ -176,7 +177,7 @@ def test_a_lag_that_is_uneven_leaves_no_mass():
 def test_a_hanging_load_of_half_the_vehicles_mass_is_expected():
     """A prior of a tenth of that mass told measured loads of a half too small by a third."""
     flights = SimpleNamespace(vehicle=load_vehicle("crazyflie"), thrust_std=0.0)
-    assert 0.5 * flights.vehicle.mass < 2.0 * prior_size(("slung_payload", "m"), flights)
+    assert 0.5 * flights.vehicle.mass < 2.0 * prior_size(Column("slung_payload", "m"), flights)
 
 
 @pytest.mark.parametrize(
