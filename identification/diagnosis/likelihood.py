@@ -37,6 +37,7 @@ from .discrepancy import (
     joined,
     variables,
 )
+from .gusty_wind import gusts
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -81,6 +82,7 @@ class Likelihood:
         near: the likelihood of the same flights near another setting. The search for the noise
             begins at its noise; default: at the sensor noise of the first log.
         same_noise: take that noise without a search, and the columns any flight may have.
+        gusty: a wind changes beside its mean; with ``same_noise`` as near.
     """
 
     def __init__(
@@ -89,8 +91,10 @@ class Likelihood:
         setting: Setting,
         near: "Likelihood | None" = None,
         same_noise: bool = False,
+        gusty: bool = False,
     ) -> None:
         self.flights = flights
+        self.gusty: bool = near.gusty if near and same_noise else gusty
         self.setting = setting
         self.vehicle = flights.amended(setting)
         # of each piece: the rounding error of its logged rotor speeds (n, 4), which is added back,
@@ -116,7 +120,7 @@ class Likelihood:
             self.noise = self._first_noise()
             self.gains = np.zeros((len(PAIRS), len(JUMP_STATE)))
             self._see_rotors()
-        if near and same_noise:
+        if near and (same_noise or gusty):
             self._run(self.steady, self._jumps(), self.gains)
             if np.isnan([track.predicted[-1] for track in self.tracks]).any():
                 raise np.linalg.LinAlgError("the filter diverges with these effects")
@@ -136,6 +140,10 @@ class Likelihood:
             )
         else:
             self._add_what_any_flight_may_have()
+        if self.gusty:
+            gusts = self._add_gusts()
+            if not same_noise:
+                self._search_noise(self._explained(self._drawn(gusts)))
 
     @property
     def _seen(self) -> list[tuple[Poses, Track]]:
@@ -367,6 +375,33 @@ class Likelihood:
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
             moved.append(np.column_stack([np.zeros_like(rate), -rate]))
         self._posed[ATTITUDE_TIME_OFFSET] = np.concatenate(moved)
+
+    def _add_gusts(self) -> list[Column]:
+        """Add the columns of a wind's changes, and return them."""
+        out = []
+        t = self.period * np.arange(len(self._base))
+        for wind, shape in gusts(t, self.setting, self.flights).items():
+            value, delta = self.flights.step(self.setting, wind)
+            own = {**self.setting[wind.effect], wind.coefficient: value + delta}
+            slope = self._change({**self.setting, wind.effect: own})[:, :3] / delta
+            for k, x in enumerate(shape.T):
+                column = Column("", f"gust {k} of {wind.coefficient}", Part.NUISANCE)
+                self._acting[column] = Product(1.0, x, slope, slice(3))
+                out.append(column)
+        return out
+
+    def _drawn(self, columns: Iterable[Column]) -> dict[Column, float]:
+        """Return a draw of the posterior of some nuisances, at the setting: their mode would leave
+        too little noise.
+        """
+        base = self.base((), {})
+        plain = base.plain
+        factor = np.linalg.cholesky(base.total[np.ix_(plain, plain)] + np.eye(len(plain)))
+        draw = np.random.default_rng(0).standard_normal(len(plain))
+        right = np.linalg.solve(factor, base.total[plain, -1])
+        z = np.zeros(len(base.names))
+        z[plain] = np.linalg.solve(factor.T, right + draw)
+        return {c: float(z[base.columns[c]]) for c in columns}
 
     def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
         """Return the likelihood of the same columns, with the likeliest noise beside them all at

@@ -79,10 +79,16 @@ def rank(
     def fitted(setting: Setting, near: Likelihood) -> Likelihood:
         report(f"trying {', '.join(setting)}")
         tried[frozenset(setting)] = setting
+        steady = settled(setting, near)
+        if not any(get(e).sets_wind for e in setting):
+            return steady
+        return max(steady, settled(steady.setting, steady, gusty=True), key=alone)
+
+    def settled(setting: Setting, near: Likelihood, gusty: bool = False) -> Likelihood:
         # a slow disturbance does much of what a steady effect does: each is fitted beside the other
         for _ in range(ROUNDS):
             try:
-                near = Likelihood(flights, setting, near)
+                near = Likelihood(flights, setting, near, gusty=gusty)
             except np.linalg.LinAlgError:  # the filter diverges: halfway to the declared vehicle
                 setting = {e: {n: 0.5 * x for n, x in own.items()} for e, own in setting.items()}
                 continue
@@ -139,7 +145,7 @@ def rank(
     # once more, with the dictionary's costly columns, beside the likeliest set
     setting = posterior.best_setting()
     if setting.keys() != best.setting.keys():
-        best = Likelihood(flights, setting, best) if setting else first()[0]
+        best = Likelihood(flights, setting, best, gusty=best.gusty) if setting else first()[0]
         starts = starts_of(flights, library, setting, *([{}] if setting else []))
     whole = best.base(library, starts, unknown=True)
     posterior = Posterior(flights, library, (loud, whole), posterior.tempering())
