@@ -10,7 +10,7 @@ import numpy as np
 
 from ...dynamics.effects import Need, Role, get, needing, playing
 from ...dynamics.vehicle import Vehicle
-from ..findings import NamedEffect
+from ..findings import CHANNELS, NamedEffect
 from ..logs.table import Array, Pair, Values
 from ..motion.inertial_signals import pose_rate
 from .column import Column
@@ -55,6 +55,26 @@ def composites(vehicle: Vehicle, found: Mapping[str, tuple[Values, Values]]) -> 
             if np.all(np.abs(off) < MOST_APART * np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)):
                 other = " or ".join(playing(third))
                 yield f"{a} and {b} change alike: {other} may be the one cause"
+
+
+def cancelling(parts: Mapping[str, Array], left: Array) -> Iterator[str]:
+    """Yield each two effects whose mean forces or torques cancel to a third of either, with their
+    sum, which alone the flight identifies.
+
+    Args:
+        parts: (rows, 6) wrench of each effect.
+        left: (rows, 6) residual beside them. Means within its RMS do not count.
+    """
+    for channel, least, *means in zip(
+        CHANNELS, left.std(axis=0), *(x.mean(axis=0) for x in parts.values()), strict=True
+    ):
+        for (a, x), (b, y) in itertools.combinations(zip(parts, means, strict=True), 2):
+            if min(abs(x), abs(y)) > max(least, BY_CHANCE * abs(x + y)):
+                unit = "N" if channel.startswith("F") else "Nm"
+                yield (
+                    f"{a} and {b} cancel in {channel}, {x:.3g} and {y:.3g} {unit}: the flight "
+                    f"identifies their sum, {x + y:.2g} {unit}"
+                )
 
 
 def _relative(vehicle: Vehicle, effect: str, values: Values, std: Values) -> Array:
