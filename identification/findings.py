@@ -254,20 +254,21 @@ class Ranking:
         382-417.)
         """
         best = self.sets[0]
-        values, std = dict(best.coefficients[effect]), {}
-        least = LEAST_RIVAL * best.probability
-        for name in best.std[effect]:
-            weight, value, spread = np.array(
-                [
-                    (x.probability, x.coefficients[effect][name], x.std[effect][name])
-                    for x in self.sets
-                    if x.probability >= least and name in x.std.get(effect, ())
-                ]
-            ).T
-            values[name] = float(np.average(value, weights=weight))
-            square = np.square(spread) + np.square(value - values[name])
-            std[name] = math.sqrt(np.average(square, weights=weight))
-        return values, std
+        names = [*best.std[effect]]
+        likely = [
+            x
+            for x in self.sets
+            if x.probability >= LEAST_RIVAL * best.probability
+            and {*names} <= {*x.std.get(effect, ())}
+        ]
+        weight = [x.probability for x in likely]
+        value = [[x.coefficients[effect][n] for n in names] for x in likely]
+        std = [[x.std[effect][n] for n in names] for x in likely]
+        mean = np.average(value, axis=0, weights=weight)
+        square = np.square(std) + np.square(value - mean)
+        spread = np.sqrt(np.average(square, axis=0, weights=weight)).tolist()
+        values = {**best.coefficients[effect], **dict(zip(names, mean.tolist(), strict=True))}
+        return values, dict(zip(names, spread, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

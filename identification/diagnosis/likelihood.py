@@ -141,9 +141,12 @@ class Likelihood:
         else:
             self._add_what_any_flight_may_have()
         if self.gusty:
-            gusts = self._add_gusts()
+            self._add_gusts()
             if not same_noise:
-                self._search_noise(self._explained(self._drawn(gusts)))
+                base = self.base((), {})
+                drawn = base.mode(base.plain, draw=True).items()
+                blown = {c: x for c, (x, _) in drawn if c.part == Part.GUST}
+                self._search_noise(self._explained(blown))
 
     @property
     def _seen(self) -> list[tuple[Poses, Track]]:
@@ -289,16 +292,20 @@ class Likelihood:
         if effect and get(effect).kind == "sensing":
             self._posed[column] = self._moved(column)
             return
-        own = dict(self.flights.coefficients(self.setting, effect))
-        if column.part == Part.AT_CENTRE:
-            own[CENTRAL] = 1.0
-        value, delta = self.flights.step(self.setting, column)
-        there = {**self.setting, effect: {**own, column.coefficient: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
-            change = self._change(there) / delta
+            change = self._slope(column)
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
             self._acting[column] = _without_zeros(change)
+
+    def _slope(self, column: Column) -> Array:
+        """Return the change of the acceleration (n, 6) by a unit of a coefficient."""
+        own = dict(self.flights.coefficients(self.setting, column.effect))
+        if column.part == Part.AT_CENTRE:
+            own[CENTRAL] = 1.0
+        value, delta = self.flights.step(self.setting, column)
+        own[column.coefficient] = value + delta
+        return self._change({**self.setting, column.effect: own}) / delta
 
     def _moved(self, column: Column) -> Array:
         """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
@@ -376,32 +383,14 @@ class Likelihood:
             moved.append(np.column_stack([np.zeros_like(rate), -rate]))
         self._posed[ATTITUDE_TIME_OFFSET] = np.concatenate(moved)
 
-    def _add_gusts(self) -> list[Column]:
-        """Add the columns of a wind's changes, and return them."""
-        out = []
+    def _add_gusts(self) -> None:
+        """Add the columns of a wind's changes."""
         t = self.period * np.arange(len(self._base))
         for wind, shape in gusts(t, self.setting, self.flights).items():
-            value, delta = self.flights.step(self.setting, wind)
-            own = {**self.setting[wind.effect], wind.coefficient: value + delta}
-            slope = self._change({**self.setting, wind.effect: own})[:, :3] / delta
+            slope = self._slope(wind)[:, :3]
             for k, x in enumerate(shape.T):
-                column = Column("", f"gust {k} of {wind.coefficient}", Part.NUISANCE)
+                column = Column("", wind.coefficient, Part.GUST, k)
                 self._acting[column] = Product(1.0, x, slope, slice(3))
-                out.append(column)
-        return out
-
-    def _drawn(self, columns: Iterable[Column]) -> dict[Column, float]:
-        """Return a draw of the posterior of some nuisances, at the setting: their mode would leave
-        too little noise.
-        """
-        base = self.base((), {})
-        plain = base.plain
-        factor = np.linalg.cholesky(base.total[np.ix_(plain, plain)] + np.eye(len(plain)))
-        draw = np.random.default_rng(0).standard_normal(len(plain))
-        right = np.linalg.solve(factor, base.total[plain, -1])
-        z = np.zeros(len(base.names))
-        z[plain] = np.linalg.solve(factor.T, right + draw)
-        return {c: float(z[base.columns[c]]) for c in columns}
 
     def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
         """Return the likelihood of the same columns, with the likeliest noise beside them all at
