@@ -254,21 +254,16 @@ class Ranking:
         382-417.)
         """
         best = self.sets[0]
-        names = [*best.std[effect]]
-        likely = [
-            x
-            for x in self.sets
-            if x.probability >= LEAST_RIVAL * best.probability
-            and {*names} <= {*x.std.get(effect, ())}
-        ]
-        weight = [x.probability for x in likely]
-        value = [[x.coefficients[effect][n] for n in names] for x in likely]
-        std = [[x.std[effect][n] for n in names] for x in likely]
-        mean = np.average(value, axis=0, weights=weight)
-        square = np.square(std) + np.square(value - mean)
-        spread = np.sqrt(np.average(square, axis=0, weights=weight)).tolist()
-        values = {**best.coefficients[effect], **dict(zip(names, mean.tolist(), strict=True))}
-        return values, dict(zip(names, spread, strict=True))
+        values, std = dict(best.coefficients[effect]), dict(best.std[effect])
+        likely = [x for x in self.sets if x.probability >= LEAST_RIVAL * best.probability]
+        for name in std:
+            own = [x for x in likely if name in x.std.get(effect, ())]
+            value = np.array([x.coefficients[effect][name] for x in own])
+            square = np.square([x.std[effect][name] for x in own])
+            weight = np.array([x.probability for x in own]) / sum(x.probability for x in own)
+            values[name] = float(weight @ value)
+            std[name] = math.sqrt(weight @ (square + np.square(value - values[name])))
+        return values, std
 
 
 @dataclass(frozen=True, eq=False)
