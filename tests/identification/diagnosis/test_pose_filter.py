@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.flown import VEHICLE, recorded
 from windwrench.envs.plant import PlantSettings
+from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.likelihood import Likelihood, _gyration
 from windwrench.identification.diagnosis.noise_search import NoiseSearch, _free
 from windwrench.identification.diagnosis.regression import RegressedFlights
@@ -113,7 +114,7 @@ def test_columns_say_what_a_coefficient_changes_in_the_innovations():
     z = np.zeros(len(bases[0].total))
     z[-1] = 1.0
     for name, value in torque.items():
-        at = bases[0].columns["constant_torque", name]
+        at = bases[0].columns[Column("constant_torque", name)]
         z[at] = -value / bases[0].size[at]
     linear, exact = (z @ base.total @ z - bases[0].total[-1, -1] for base in bases)
     assert linear == pytest.approx(exact, rel=0.03)
