@@ -11,8 +11,7 @@ import numpy as np
 from ...dynamics.effects import get
 from ..logs.table import Array
 from .column import Column
-from .priors import Setting
-from .regression import RegressedFlights
+from .regression import RegressedFlights, Setting
 
 STD = 0.2  # relative to the mean
 TIME = 2.0  # s, correlation time
