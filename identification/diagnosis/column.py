@@ -12,6 +12,7 @@ class Part(IntEnum):
     START = auto()  # a whole effect at coefficients of its own: the column is a multiple of it
     OFFSET = auto()  # an error of a log's signal, in its unit
     NUISANCE = auto()  # an error of any flight, in standard deviations of its prior
+    GUST = auto()  # a wind's change beside its mean, likewise
     BETWEEN_SAMPLES = auto()  # rotor speeds off a straight line between samples
     MODEL_ERROR = auto()  # a share of the rotors' wrench
     GAIN = auto()  # of a state on the rotors' innovations
@@ -26,7 +27,7 @@ class Column(NamedTuple):
         effect: name of an effect; empty for the parts from ``OFFSET`` on.
         coefficient: name of its coefficient, or of the error or variable.
         part: what changes.
-        number: channel of a column of the dictionary, state of a gain, number of a start.
+        number: channel of a column of the dictionary, state of a gain, number of a start or gust.
         group: of a column of the dictionary.
     """
 

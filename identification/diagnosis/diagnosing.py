@@ -22,7 +22,7 @@ from ..motion.pose_clock import on_pose_clock
 from ..motion.smoothing import CUTOFFS
 from ..prediction import nis_without_wrench_state, rollout_error
 from ..wrench_series import pose_notes
-from .advice import advice, inertial_notes, late_rotors, outside_the_fit
+from .advice import advice, cancelling, inertial_notes, late_rotors, outside_the_fit
 from .column import Part
 from .log_offsets import delays_at_bound
 from .naming import SetFit, fit_sets, judged
@@ -101,6 +101,7 @@ def diagnose(
     notes += [
         *inertial_notes(flights, said),
         *(sentence for sentences in judgement.doubts.values() for sentence in sentences),
+        *cancelling({e: fit.parts[e] for e in said}, fit.residual.after),
         *late_rotors(flights, fit.posterior.setting, fit.posterior.sensors),
         *delays_at_bound(fit.setting),
         *outside_the_fit(flights),

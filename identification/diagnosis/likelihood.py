@@ -38,6 +38,7 @@ from .discrepancy import (
     joined,
     variables,
 )
+from .gusty_wind import gusts
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -86,6 +87,7 @@ class Likelihood:
         near: the likelihood of the same flights near another setting. The search for the noise
             begins at its noise; default: at the sensor noise of the first log.
         same_noise: take that noise without a search, and the columns any flight may have.
+        gusty: a wind changes beside its mean; with ``same_noise`` as near.
     """
 
     def __init__(
@@ -94,8 +96,10 @@ class Likelihood:
         setting: Setting,
         near: "Likelihood | None" = None,
         same_noise: bool = False,
+        gusty: bool = False,
     ) -> None:
         self.flights = flights
+        self.gusty: bool = near.gusty if near and same_noise else gusty
         self.setting = setting
         self.vehicle = flights.amended(setting)
         # of each piece: the rounding error of its logged rotor speeds (n, 4), which is added back,
@@ -121,7 +125,7 @@ class Likelihood:
             self.noise = self._first_noise()
             self.gains = np.zeros((len(PAIRS), len(JUMP_STATE)))
             self._see_rotors()
-        if near and same_noise:
+        if near and (same_noise or gusty):
             self._run(self.steady, self._jumps(), self.gains)
             if np.isnan([track.predicted[-1] for track in self.tracks]).any():
                 raise np.linalg.LinAlgError("the filter diverges with these effects")
@@ -141,6 +145,13 @@ class Likelihood:
             )
         else:
             self._add_what_any_flight_may_have()
+        if self.gusty:
+            self._add_gusts()
+            if not same_noise:
+                base = self.base((), {})
+                drawn = base.mode(base.plain, draw=True).items()
+                blown = {c: x for c, (x, _) in drawn if c.part == Part.GUST}
+                self._search_noise(self._explained(blown))
 
     @functools.cached_property
     def _state(self) -> tuple[FlightState, Array]:
@@ -282,16 +293,20 @@ class Likelihood:
         if effect and get(effect).kind == "sensing":
             self._posed[column] = _whole(self._moved(column))
             return
-        own = dict(self.flights.coefficients(self.setting, effect))
-        if column.part == Part.AT_CENTRE:
-            own[CENTRAL] = 1.0
-        value, delta = self.flights.step(self.setting, column)
-        there = {**self.setting, effect: {**own, column.coefficient: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
-            change = self._change(there, delta)
+            change = self._slope(column)
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
             self._acting[column] = _whole(change)
+
+    def _slope(self, column: Column) -> Array:
+        """Return the change of the acceleration (n, 6) by a unit of a coefficient."""
+        own = dict(self.flights.coefficients(self.setting, column.effect))
+        if column.part == Part.AT_CENTRE:
+            own[CENTRAL] = 1.0
+        value, delta = self.flights.step(self.setting, column)
+        own[column.coefficient] = value + delta
+        return self._change({**self.setting, column.effect: own}, delta)
 
     def _moved(self, column: Column) -> Array:
         """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
@@ -370,6 +385,15 @@ class Likelihood:
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
             moved.append(np.column_stack([np.zeros_like(rate), -rate]))
         self._posed[ATTITUDE_TIME_OFFSET] = _whole(np.concatenate(moved))
+
+    def _add_gusts(self) -> None:
+        """Add the columns of a wind's changes."""
+        t = self.period * np.arange(len(self._base), dtype=np.float64)
+        for wind, shape in gusts(t, self.setting, self.flights).items():
+            slope = self._slope(wind)[:, :3]
+            for k, x in enumerate(shape.T):
+                column = Column("", wind.coefficient, Part.GUST, k)
+                self._acting[column] = Product(1.0, x, slope)
 
     def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
         """Return the likelihood of the same columns, with the likeliest noise beside them all at

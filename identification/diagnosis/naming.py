@@ -12,7 +12,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ...dynamics.effects import Role, get, playing
-from ..findings import Alternative, NamedEffect, Probabilities, RankedSet, TransientDisturbance
+from ..findings import (
+    LEAST_RIVAL,
+    Alternative,
+    NamedEffect,
+    Probabilities,
+    RankedSet,
+    TransientDisturbance,
+)
 from ..logs.table import Array, NamedNumbers, Names, Values
 from ..motion.smoothing import mean_square
 from .advice import FILTERED, composites
@@ -20,7 +27,7 @@ from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .commands import Given, what_commands_show
 from .priors import Setting, declared
-from .ranking import LEAST_RIVAL, FittedPosterior, Report, rank, rank_by_rows
+from .ranking import FittedPosterior, Report, rank, rank_by_rows
 from .regression import (
     CENTRAL,
     RegressedFlights,
@@ -153,9 +160,7 @@ def judged(fit: SetFit, rule: DiagnosisSettings) -> Judgement:
     return Judgement(
         tuple(effects),
         tuple(
-            _stated(fit, e, fit.best.coefficients[e], fit.best.std[e])
-            for e in likely
-            if e not in fitted.setting
+            _stated(fit, e, *fitted.ranking.averaged(e)) for e in likely if e not in fitted.setting
         ),
         doubts,
         Probabilities(names, stated, fit.strange),
@@ -166,8 +171,7 @@ def _std(fit: SetFit, effect: str) -> NamedNumbers:
     """Return the standard deviations of an effect in the likeliest set, with the spread from flight
     to flight.
     """
-    std = {**fit.best.std, **fit.posterior.std}[effect]
-    return _of_any_flight(fit.flights, effect, fit.best.coefficients[effect], std)
+    return _of_any_flight(fit.flights, effect, *fit.posterior.ranking.averaged(effect))
 
 
 def _of_any_flight(
@@ -187,9 +191,10 @@ def _differs(fit: SetFit, effect: str) -> float:
     apart = [0.0]
     # these flights are late, however late others are
     delays = get(effect).role == Role.DELAY
-    for name, std in (fit.best.std[effect] if delays else _std(fit, effect)).items():
+    values, stds = fit.posterior.ranking.averaged(effect)
+    for name, std in (stds if delays else _std(fit, effect)).items():
         c = Column(effect, name)
-        off = abs(fit.best.coefficients[effect][name] - declared(c, fit.flights))
+        off = abs(values[name] - declared(c, fit.flights))
         if off > LEAST_SIZE * typical_size(c, fit.flights.vehicle) and std:
             apart.append(_apart(off, std))
     return max(apart)
@@ -221,8 +226,9 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
     """Return for each check, by its name, sentences with a reason to doubt a name."""
     flights = fit.flights
     unsure = ": all names are tentative" if named else ""
+    found = {e: fit.posterior.ranking.averaged(e) for e in fit.posterior.setting}
     doubts = {
-        "composite": tuple(composites(flights.vehicle, fit.posterior.setting, fit.posterior.std)),
+        "composite": tuple(composites(flights.vehicle, found)),
         "unknown": (
             f"a cause outside the library acts with a probability of {fit.strange:.0%}{unsure}",
         )
@@ -258,7 +264,7 @@ def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool
     # the point of action of an effect at the rotors, as declared, is nothing to report
     values = {
         name: x
-        for name, x in fitted.setting[effect].items()
+        for name, x in fitted.ranking.averaged(effect)[0].items()
         if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
     }
     uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS

@@ -19,7 +19,7 @@ from itertools import chain
 import numpy as np
 
 from ...dynamics.effects import get
-from ..findings import Disturbance, Ranking
+from ..findings import LEAST_RIVAL, Disturbance, Ranking
 from ..logs.table import Array, Names, Pair, Values
 from .climbing import Height, linearised, mode
 from .column import Column, Part
@@ -39,9 +39,6 @@ from .starting_points import starting_points
 Report = Callable[[str], None]  # takes a line of progress
 # typical sizes of the trials of a lag or a delay as a whole: their columns change with them
 TIME_STARTS = (0.3, 0.6, 1.2)
-# share of the likeliest set's probability from which flights do not tell another effect from one of
-# its own: a likelihood of 20 to 1
-LEAST_RIVAL = 0.05
 ROUNDS = 6  # of fitting the noise beside the best set
 # standard deviations of its prior: largest step of a coefficient in the last of these rounds
 CLOSE = 0.1
@@ -55,7 +52,6 @@ class FittedPosterior:
     posterior: Posterior
     ranking: Ranking
     setting: Setting  # coefficients of the likeliest set's needed effects
-    std: Setting  # their standard deviations
     gains: Mapping[str, Pair]  # as of ``Posterior.leave_out_needless``
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
     gusts: tuple[Disturbance, ...] = ()
@@ -85,10 +81,16 @@ def rank(
     def fitted(setting: Setting, near: Likelihood) -> Likelihood:
         report(f"trying {', '.join(setting)}")
         tried[frozenset(setting)] = setting
+        steady = settled(setting, near)
+        if not any(get(e).sets_wind for e in setting):
+            return steady
+        return max(steady, settled(steady.setting, steady, gusty=True), key=alone)
+
+    def settled(setting: Setting, near: Likelihood, gusty: bool = False) -> Likelihood:
         # a slow disturbance does much of what a steady effect does: each is fitted beside the other
         for _ in range(ROUNDS):
             try:
-                near = Likelihood(flights, setting, near)
+                near = Likelihood(flights, setting, near, gusty=gusty)
             except np.linalg.LinAlgError:  # the filter diverges: halfway to the declared vehicle
                 setting = {e: {n: 0.5 * x for n, x in own.items()} for e, own in setting.items()}
                 continue
@@ -144,7 +146,7 @@ def rank(
     # once more, with the dictionary's costly columns, beside the likeliest set
     setting = posterior.best_setting()
     if setting.keys() != best.setting.keys():
-        best = Likelihood(flights, setting, best) if setting else first()[0]
+        best = Likelihood(flights, setting, best, gusty=best.gusty) if setting else first()[0]
         starts = starts_of(flights, library, setting, *([{}] if setting else []))
     whole = best.base(library, starts, unknown=True)
     posterior = Posterior(flights, library, (loud, whole), posterior.tempering())
@@ -156,7 +158,7 @@ def rank(
     gains = posterior.leave_out_needless(ranking.probability)
     late = {c.coefficient: x for c, x in posterior.nuisances().items() if c in flights.offsets}
     return FittedPosterior(
-        posterior, ranking, *posterior.likeliest_setting(), gains, best.gusts(), late
+        posterior, ranking, posterior.likeliest_setting(), gains, best.gusts(), late
     )
 
 
@@ -247,13 +249,12 @@ def rank_by_rows(
     last = posterior()
     ranking = last.ranking()
     gains = last.leave_out_needless(ranking.probability)
-    setting, std = last.likeliest_setting()
+    setting = last.likeliest_setting()
     setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
     return FittedPosterior(
         last,
         ranking,
         setting,
-        std,
         gains,
         sensors=likelihood.sensors(setting),
         behind=_behind(likelihood, setting),

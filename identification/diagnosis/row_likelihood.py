@@ -2,7 +2,6 @@
 settings.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -14,6 +13,7 @@ from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .column import Column, Part
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
+from .gusty_wind import gusts
 from .log_offsets import LAG_ASYMMETRY
 from .priors import (
     Base,
@@ -28,11 +28,6 @@ from .row_noise import ROUNDS, RowNoise, fitted_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
-# a wind beside its mean: standard deviation, relative to the mean, correlation time, s, and fastest
-# change, Hz, outside the rows' noise
-GUST_STD = 0.2
-GUST_TIME = 2.0
-GUST_HZ = 0.4
 # prior standard deviations of a rate loop's answers, beside which the noise is fitted: a column
 # shares with disturbances all that any answer can hold
 FREE = 30.0
@@ -85,31 +80,14 @@ class RowLikelihood:
         return noise
 
     def _gusts(self, setting: Setting) -> dict[Column, Array]:
-        """Return the columns of a wind's change beside its mean: an Ornstein-Uhlenbeck process, as
-        cosines over the flight.
-
-        A gust acts like the wind, through each drag and by the flight's airspeed. As a force of its
-        own, or as a noise, the gusts of a periodic flight pass for more drag and less wind.
-        """
-        whole = {**self.rows.fixed, **setting}
-        winds = [
-            Column(e, c.name)
-            for e in whole
-            if get(e).sets_wind
-            for c in get(e).coefficients
-            if c.unit == "m/s"
-        ]
-        std = GUST_STD * math.hypot(*(self.flights.value(whole, c) for c in winds))
+        """Return the columns of a wind's changes."""
         t = np.concatenate([[0.0], np.cumsum(np.diff(self.rows.t) * ~self.rows.begins[1:])])
-        rate = np.arange(1, int(2.0 * GUST_HZ * t[-1]) + 1) * math.pi / t[-1]
-        size = std * np.sqrt(4.0 * GUST_TIME / t[-1] / (1.0 + np.square(rate * GUST_TIME)))
-        shape = np.cos(np.outer(t, rate)) * size
-        slopes = self.rows.columns(setting, winds)
+        each = gusts(t, {**self.rows.fixed, **setting}, self.flights)
         return _named(
             {
                 f"gust {k} of {c.coefficient}": x[:, None] * slope
-                for c, slope in slopes.items()
-                for k, x in enumerate(shape.T)
+                for c, slope in self.rows.columns(setting, each).items()
+                for k, x in enumerate(each[c].T)
             }
         )
 

@@ -11,7 +11,7 @@ from scipy.special import logsumexp, softmax
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
-from ..findings import RankedSet, Ranking
+from ..findings import LEAST_RIVAL, RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
 from .column import Column, Part
 from .discrepancy import SHARE_OF_EFFECT
@@ -384,17 +384,9 @@ class Posterior:
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._at_mode(self.known[key])[0]
 
-    def likeliest_setting(self) -> tuple[Setting, Setting]:
-        """Return the coefficients of the likeliest set, or of its needed effects, and their
-        standard deviations. These contain the changes by needless effects left out.
-        """
-        whole = self.best_setting()
-        setting, std = self._at_mode(self._likeliest()[1])
-        wide = {
-            e: {n: math.hypot(x, setting[e][n] - whole[e][n]) for n, x in own.items()}
-            for e, own in std.items()
-        }
-        return setting, wide
+    def likeliest_setting(self) -> Setting:
+        """Return the coefficients of the likeliest set, or of its needed effects alone."""
+        return self._at_mode(self._likeliest()[1])[0]
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects with, each alone, at least half of
@@ -450,7 +442,11 @@ class Posterior:
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
         best = sorted(p, key=p.__getitem__, reverse=True)
         sets = tuple(
-            RankedSet(tuple(sorted(key)), p[key], *self._at_mode(self.known[key], key == best[0]))
+            RankedSet(
+                tuple(sorted(key)),
+                p[key],
+                *self._at_mode(self.known[key], p[key] >= LEAST_RIVAL * p[best[0]]),
+            )
             for key in best
             if p[key] >= LEAST_PROBABILITY
         )

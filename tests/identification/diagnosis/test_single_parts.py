@@ -12,7 +12,7 @@ from tests.support.flown import VEHICLE, recorded, resting, settings
 from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.evidence.trials.practice_flights import fly_practice
-from windwrench.identification.diagnosis.advice import composites
+from windwrench.identification.diagnosis.advice import cancelling, composites
 from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY, delays_at_bound
@@ -60,10 +60,17 @@ STIFFER = {"inertia": {"jx": 0.1, "jy": 0.1, "jz": 0.1}}
     ],
 )
 def test_two_that_change_alike_may_be_a_third(setting, third):
-    std = {effect: dict.fromkeys(values, 0.002) for effect, values in setting.items()}
-    found = list(composites(VEHICLE, setting, std))
+    sized = {effect: (values, dict.fromkeys(values, 0.002)) for effect, values in setting.items()}
+    found = list(composites(VEHICLE, sized))
     assert len(found) == bool(third)
     assert all(third in sentence.split(": ")[1] for sentence in found)
+
+
+def test_effects_that_cancel_are_told_by_their_sum():
+    lift, load, drag = np.outer([0.25, -0.22, 0.2], np.eye(6)[2])[:, None]
+    (told,) = cancelling({"lift": lift, "load": load}, 0.1 * np.eye(6))
+    assert told.endswith("their sum, 0.03 N")
+    assert not [*cancelling({"lift": lift, "drag": drag}, 0.1 * np.eye(6))]
 
 
 STARTS = "starting_points=lambda flights: [{'a': 0.15, 'w': 1.25 + 0.125 * i} for i in range(60)]"
