@@ -198,7 +198,8 @@ def commands(c, seen):
 
 
 def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
-    c = CompiledFilter(export_c(VEHICLE, policy=exportable_policy("sac-0")), tmp_path)
+    policy = exportable_policy("sac-0")
+    c = CompiledFilter(export_c(VEHICLE, "constant-gain", policy=policy), tmp_path)
     python = load_policy(POLICY)
     rng = default_rng(0)
     force = rng.normal(0.3, 0.3, (50, 3))
@@ -211,7 +212,8 @@ def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
 
 
 def test_the_law_with_lead(tmp_path):
-    c = CompiledFilter(export_c(VEHICLE, policy=exportable_policy("lead")), tmp_path)
+    policy = exportable_policy("lead")
+    c = CompiledFilter(export_c(VEHICLE, "constant-gain", policy=policy), tmp_path)
     seen = np.zeros((5, 8))
     seen[:, TORQUE_Z] = torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
     seen[:, FORCE_X] = force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
