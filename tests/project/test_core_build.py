@@ -106,6 +106,6 @@ def test_the_core_s_tests_pass_under_sanitizers(tmp_path):
     build = ("setup.py", "--quiet", "build_ext", "--inplace")
     said(sys.executable, *build, cwd=checkout, env=environment)
     environment |= {"LD_PRELOAD": library, "ASAN_OPTIONS": "detect_leaks=0"}
-    # the headers alone are compiled with the sanitizers by their own tests
+    # tests/live/test_export_c.py compiles the headers alone with the sanitizers
     words = ["-m", "pytest", "-p", "no:cacheprovider", "-k", "forced or precision", "tests/core"]
     assert " passed" in said(sys.executable, *words, cwd=checkout, env=environment)
