@@ -122,7 +122,6 @@ def test_the_page_in_a_real_browser(watched, tmp_path):
     ("sent", "taken", "code", "word"),
     [
         (signal.SIGINT, signal.default_int_handler, 130, "interrupted"),
-        (signal.SIGTERM, signal.default_int_handler, 143, "terminated"),
         (signal.SIGTERM, signal.SIG_IGN, 143, "terminated"),  # interrupts are ignored, as by nohup
     ],
 )

@@ -97,7 +97,7 @@ def test_a_full_disk_for_errors_keeps_the_exit_code():
 
 def test_hostile_names_are_shown_and_never_sent(call, tmp_path):
     name = b"a\x1b[31m\xff\xc3\xa9\r.csv"
-    assert_one_line(run(b"estimate", name), rb"a\x1b[31m\xff" + "é".encode() + rb"\r.csv: cannot")
+    assert r"error: a\x1b[31m\xffé\r.csv: cannot" in call("estimate", os.fsdecode(name))[2]
     ascii_only = {"PYTHONIOENCODING": "ascii"}
     done = run(b"estimate", name, environment=ascii_only)
     assert_one_line(done, rb"a\x1b[31m\xff\xe9\r.csv: cannot be read")
