@@ -19,7 +19,7 @@ from tests.support.sizes import rms
 from windwrench.dynamics import load_vehicle
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 
-VEHICLES = {name: load_vehicle(name) for name in ("ardrone2", "crazyflie", "hummingbird")}
+VEHICLES = {name: load_vehicle(name) for name in ("ardrone2", "crazyflie")}
 FILTERS = {"ukf": WrenchUKF, "constant gain": ConstantGainFilter}
 HEIGHT = 1.2  # m
 FORCE = 0.1  # of the weight, upwards: what the rotors need not carry
@@ -182,7 +182,7 @@ SLOW = (("crazyflie", 0.1), ("ardrone2", 0.05))
 LIVES = (
     *(
         (vehicle, kind, dt, gate, fault)
-        for vehicle, dt in (("ardrone2", 0.005), ("crazyflie", 0.01), ("hummingbird", 0.01))
+        for vehicle, dt in (("ardrone2", 0.005), ("crazyflie", 0.01))
         for kind in FILTERS
         for gate in (None, 0.999)
         for fault in POSES
