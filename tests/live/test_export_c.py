@@ -30,7 +30,6 @@ from tests.support.exported_c.hostile import PERIOD, hostile
 from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
 from tests.support.paths import ROOT
-from tests.support.synthetic_wrench import TICKS, observations
 from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Tracker
 from windwrench.controllers.lqg import LQG
@@ -38,6 +37,7 @@ from windwrench.controllers.observation import FORCE_X, TORQUE_Z, VELOCITY_Y
 from windwrench.controllers.trained_policy import TaskPolicy, load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names, parse_setting
+from windwrench.envs import FanTrackingEnv
 from windwrench.envs.closed_loop import Stage
 from windwrench.envs.vector import SETTLE_TICKS
 from windwrench.envs.wind_tasks import WindTrajectoryEnv
@@ -385,17 +385,13 @@ def c(tmp_path_factory):
     return CompiledFilter(exported, tmp_path_factory.mktemp("tracker"))
 
 
-def fans(count, decisions, rng):
-    t = 0.005 * np.arange(decisions * TICKS)
-    start = rng.uniform(-0.3, 0.3, (count, 1))
-    return start + 0.8 * np.sin(rng.uniform(0.05, 0.35, (count, 1)) / 0.8 * t)
-
-
 def test_given_the_same_random_numbers_it_commands_the_same(c):
-    rng = default_rng(1)
-    seen = observations(fans(6, 60, rng), BRIEFING, rng)
+    envs = FanTrackingEnv.vector(6, scenario="base")
+    envs.reset(seed=1)
+    still = np.zeros((6, 1), dtype=np.float32)
+    seen = np.array([envs.step(still)[0] for _ in range(60)])
     apart = []
-    for one in seen.astype(np.float32):
+    for one in seen.swapaxes(0, 1):
         law = OwnTracker(particles=PARTICLES)
         law.brief(BRIEFING)
         law.reset()
@@ -403,7 +399,7 @@ def test_given_the_same_random_numbers_it_commands_the_same(c):
         assert np.ptp(python) > 0.2
         apart.append(abs(commands(c, one) - python))
     apart = np.array(apart)
-    assert np.max(apart[:, :6]) < 1e-4
+    assert np.sum(np.max(apart[:, :6], axis=1) < 1e-5) >= 5
     # where rounding once draws another particle than Python does, commands go on a little apart
     assert np.sum(np.max(apart, axis=1) < 1e-3) >= 4
     assert np.max(apart) < 0.1
