@@ -291,7 +291,7 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
     pyarrow = pytest.importorskip("pyarrow", reason="pip install 'windwrench[parquet]'")
     from pyarrow import parquet
 
-    rows = 50_000
+    rows = 12_000
     columns = {name: np.full(rows, float(name == "qw")) for name in REQUIRED}
     columns["t"] = 0.005 * np.arange(rows)
     path = tmp_path / "flight.parquet"
