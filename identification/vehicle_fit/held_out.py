@@ -7,9 +7,8 @@ its torque, both; and where torque is refuted, the flight loop's reaction in its
 stands if no quantity is worse than the better one of no change and of thrust and drag. The one with
 the least mean of these ratios is the vehicle.
 
-One flight, or flights of commands on one day, show no other day. They are predicted with a thrust
-off by the spread between days to either side. One flight tells no reaction: on a slower flight of
-a racer the body rate was off by 3 times the error of no change.
+One flight tells no reaction: on a slower flight of a racer the body rate was off by 3 times the
+error of no change.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,7 +33,6 @@ from ..prediction import (
 )
 from .channels import Pieces
 from .closed_loop import LoopFit, fit_loop
-from .geometry import USUAL
 from .model import coefficients
 from .solve import VehicleFit, refitted
 from .spectra import Segment, Spectra, edges_of
@@ -75,7 +73,6 @@ class _HeldParts(NamedTuple):
     starts: list[LoggedStarts]  # of each log
     segment: list[Index]  # of each log's starts
     refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
-    spreads: tuple[float, ...]  # factors of the thrust
 
     def errors(self, models: Callable[[VehicleFit, Index], Models]) -> Errors:
         """Return the errors of models made of each refit and the numbers of its segments."""
@@ -86,10 +83,9 @@ class _HeldParts(NamedTuple):
             if any(len(of.rows) for of in starts):
                 vehicles = models(part, np.flatnonzero(kept))
                 said = errors.setdefault(where, {name: [] for name in vehicles})
-                for share in self.spreads:
-                    of_day = [_with_thrust(v, share) for v in vehicles.values()]
-                    for name, off in zip(vehicles, errors_at(starts, of_day), strict=True):
-                        said[name].append(off)
+                offs = errors_at(starts, list(vehicles.values()))
+                for name, off in zip(vehicles, offs, strict=True):
+                    said[name].append(off)
         return errors
 
 
@@ -115,18 +111,7 @@ def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -
         kept = [fold != held for held in np.unique(fold)]
         if len(kept) > 1:
             refits += list(zip([where] * len(kept), kept, refitted(fit, kept), strict=True))
-    commands = fit.drive.commands
-    spread = USUAL.command_spread if commands else USUAL.thrust_spread
-    one_day = commands or np.ptp(number) == 0
-    return _HeldParts(starts, segment, refits, (1.0 - spread, 1.0 + spread) if one_day else (1.0,))
-
-
-def _with_thrust(vehicle: Vehicle, share: float) -> Vehicle:
-    """Return a vehicle with a share of its thrust, by rotor speeds and by commands."""
-    curve = vehicle.motor_curve
-    if curve is not None:
-        curve = replace(curve, thrust=tuple(share * c for c in curve.thrust))
-    return replace(vehicle, k=share * vehicle.k, p=share * vehicle.p, motor_curve=curve)
+    return _HeldParts(starts, segment, refits)
 
 
 def held_out(
@@ -159,9 +144,15 @@ def held_out(
         why = _reason(errors)
         if OTHER_FLIGHTS in errors:
             fitted = loop = fit_loop(parts.starts, parts.segment, vehicle_of(fit, why))
-            further = parts.errors(
-                lambda part, kept: loops_of(vehicle_of(part, why), fitted.by(kept))
-            )
+
+            def without(part: VehicleFit, kept: Index) -> Models:
+                vehicle = vehicle_of(part, why)
+                inside = [np.isin(numbers, kept) for numbers in parts.segment]
+                starts = [of.those(keep) for of, keep in zip(parts.starts, inside, strict=True)]
+                groups = [of[keep] for of, keep in zip(parts.segment, inside, strict=True)]
+                return loops_of(vehicle, fit_loop(starts, groups, vehicle, fitted.theta).loop)
+
+            further = parts.errors(without)
             errors = {where: {**each, **further[where]} for where, each in errors.items()}
             stands = standing(errors)
     pooled = {

@@ -14,13 +14,13 @@ from tests.support.model_flights import (
     GUSTS,
     WITH_EFFECTS,
     YAWED,
-    drawn,
     simulate_model,
 )
 from tests.support.vehicles import POSE, VEHICLE
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import Uncertainty
 from windwrench.envs.recording import record_flight
+from windwrench.envs.scenarios import draw_vehicle
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band, nees
 from windwrench.estimator.model_uncertainty import factors_alone, factors_of
@@ -73,7 +73,7 @@ def test_intervals_hold_what_they_say(source):
     error = np.empty((3, runs, 6))
     for r in range(runs):
         rng = default_rng(r)
-        true = drawn(vehicle, rng)
+        true = draw_vehicle(vehicle, rng)
         sway = 1.0 + rng.uniform(0.0, 0.3) * np.sin(0.015 * np.arange(steps) + rng.uniform(0, 6))
         speeds = np.tile(true.hover_rate * np.sqrt(sway)[:, None], 4)
         run = simulate_model(true, tuning, speeds, seed=r, **YAWED)
@@ -98,7 +98,7 @@ def test_intervals_hold_on_flights_of_another_model(name):
     vehicle = load_vehicle(name)
     inside = {"hover": [], "circle": [], "fast": [], "excite": []}
     for seed, trajectory in enumerate(15 * list(inside)):
-        true = drawn(vehicle, default_rng((7, seed)))
+        true = draw_vehicle(vehicle, default_rng((7, seed)))
         flown = record_flight(true, trajectory=trajectory, seconds=20.0, seed=7000 + seed)
         log = FlightLog(**flown, name="flight", source="flight")
         series = estimate_log(log, vehicle, tuning=tune_to_log(log, vehicle).tuning)
