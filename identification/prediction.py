@@ -234,7 +234,7 @@ class PredictionErrors:
         return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))
 
 
-ErrorsByPart = Mapping[str, PredictionErrors]  # of flights or blocks
+ErrorsByPart = Mapping[str, Sequence[PredictionErrors]]  # of flights or blocks, of some models
 
 
 def errors_of_models(

@@ -43,21 +43,12 @@ _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 
 class LoopFit(NamedTuple):
-    """The likeliest coefficients (9,) in the order of ``LoopReaction``, and their standard
-    deviations (9,), by the scatter of groups of starts (a sandwich).
+    """The likeliest loop, and the standard deviations (9,) of its coefficients, by the scatter of
+    groups of starts (a sandwich).
     """
 
-    theta: Array
+    loop: LoopReaction
     deviations: Array
-
-    @property
-    def loop(self) -> LoopReaction:
-        """The loop of the coefficients."""
-        return _loop(self.theta)
-
-
-def _loop(theta: Array) -> LoopReaction:
-    return LoopReaction(*theta.tolist())
 
 
 def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
@@ -74,7 +65,7 @@ def fit_loop(
     starts: Sequence[LoggedStarts],
     groups: Sequence[Index],
     vehicle: Vehicle,
-    near: Array | None = None,
+    near: LoopReaction | None = None,
 ) -> LoopFit:
     """Return the loop of flights with starts, one at least, each of a group.
 
@@ -82,7 +73,7 @@ def fit_loop(
         starts: of each flight.
         groups: (n,) of each flight's starts.
         vehicle: with the force, inertia and rotors that stay.
-        near: (9,) coefficients by most of the starts: two rounds from there; None: from usual ones.
+        near: the loop by more starts: two rounds from there; None: from a usual one.
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
@@ -95,14 +86,14 @@ def fit_loop(
     sizes: Array = np.concatenate(scales)[:, None, :, None]
 
     def off(theta: Array) -> Array:
-        model = replace(vehicle, closed_loop=_loop(theta))
+        model = replace(vehicle, closed_loop=LoopReaction(*theta.tolist()))
         return _compared(thin, [part.flown(model) for part in thin]) / sizes
 
     begin = np.array(astuple(_BEGIN))
     speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
     turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
     begin[list(UNITS).index("unmeasured")] = np.sqrt(np.square(turning).mean())
-    theta = begin if near is None else near
+    theta = begin if near is None else np.array(astuple(near))
     e, damping = off(theta), 1e-3
     for _ in range(_ROUNDS if near is None else _AGAIN):
         norms = np.linalg.norm(e, axis=-1)
@@ -128,7 +119,8 @@ def fit_loop(
             break
     scores = (group == np.unique(group)[:, None]) @ gradients
     inverse = np.linalg.inv(grams.sum(axis=0))
-    return LoopFit(theta, np.sqrt(np.diag(inverse @ scores.T @ scores @ inverse)))
+    deviations = np.linalg.norm(scores @ inverse, axis=0)
+    return LoopFit(LoopReaction(*theta.tolist()), deviations)
 
 
 def _loss(e: Array, away: Array) -> float:

@@ -53,15 +53,14 @@ class HeldOut(NamedTuple):
     """What predictions of held-out data say.
 
     Attributes:
-        errors: the vehicle's, by ``held_out_blocks`` and ``flights_left_out``.
-        simplest: the same of thrust and drag with an unchanged body rate.
+        errors: the vehicle's, and of thrust and drag with an unchanged body rate, by
+            ``held_out_blocks`` and ``flights_left_out``.
         stands: the model of ``models_of`` that stands.
         loop: the flight loop's reaction, where this stands in for the torque.
         why: figures of a refuted torque; else empty.
     """
 
     errors: ErrorsByPart
-    simplest: ErrorsByPart
     stands: str
     loop: LoopFit | None = None
     why: str = ""
@@ -74,14 +73,14 @@ class _HeldParts(NamedTuple):
     segment: list[Index]  # of each log's starts
     refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
 
-    def errors(self, models: Callable[[VehicleFit, Index], Models]) -> Errors:
-        """Return the errors of models made of each refit and the numbers of its segments."""
+    def errors(self, models: Callable[[VehicleFit, Mask], Models]) -> Errors:
+        """Return the errors of models made of each refit and the segments that it keeps."""
         errors: Errors = {}
         for where, kept, part in self.refits:
             each = zip(self.starts, self.segment, strict=True)
             starts = [of.those(~kept[numbers]) for of, numbers in each]
             if any(len(of.rows) for of in starts):
-                vehicles = models(part, np.flatnonzero(kept))
+                vehicles = models(part, kept)
                 said = errors.setdefault(where, {name: [] for name in vehicles})
                 offs = errors_at(starts, list(vehicles.values()))
                 for name, off in zip(vehicles, offs, strict=True):
@@ -137,7 +136,7 @@ def held_out(
     parts = _held_parts(pieces, logs, fit, vehicle_of(fit, ""))
     errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
     if not errors:
-        return HeldOut({}, {}, "")
+        return HeldOut({}, "")
     stands, why = standing(errors), ""
     loop: LoopFit | None = None
     if stands not in ("torque", WHOLE):
@@ -145,21 +144,21 @@ def held_out(
         if OTHER_FLIGHTS in errors:
             fitted = loop = fit_loop(parts.starts, parts.segment, vehicle_of(fit, why))
 
-            def without(part: VehicleFit, kept: Index) -> Models:
+            def without(part: VehicleFit, kept: Mask) -> Models:
                 vehicle = vehicle_of(part, why)
-                inside = [np.isin(numbers, kept) for numbers in parts.segment]
-                starts = [of.those(keep) for of, keep in zip(parts.starts, inside, strict=True)]
-                groups = [of[keep] for of, keep in zip(parts.segment, inside, strict=True)]
-                return loops_of(vehicle, fit_loop(starts, groups, vehicle, fitted.theta).loop)
+                each = zip(parts.starts, parts.segment, strict=True)
+                starts = [of.those(kept[numbers]) for of, numbers in each]
+                groups = [numbers[kept[numbers]] for numbers in parts.segment]
+                return loops_of(vehicle, fit_loop(starts, groups, vehicle, fitted.loop).loop)
 
             further = parts.errors(without)
             errors = {where: {**each, **further[where]} for where, each in errors.items()}
             stands = standing(errors)
     pooled = {
-        name: {where: PredictionErrors.pooled(each[name]) for where, each in errors.items()}
-        for name in (stands, SIMPLEST)
+        where: [PredictionErrors.pooled(each[name]) for name in (stands, SIMPLEST)]
+        for where, each in errors.items()
     }
-    return HeldOut(pooled[stands], pooled[SIMPLEST], stands, loop, why)
+    return HeldOut(pooled, stands, loop, why)
 
 
 def models_of(vehicle: Vehicle) -> Models:
@@ -241,8 +240,8 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
         f"({turning:.2f} times its power)"
     )
     if turning > 1.0:
-        return HeldOut({}, {}, NO_CHANGE if force else "force", why=why)
-    return HeldOut({}, {}, "torque" if force else WHOLE)
+        return HeldOut({}, NO_CHANGE if force else "force", why=why)
+    return HeldOut({}, "torque" if force else WHOLE)
 
 
 def powers(
