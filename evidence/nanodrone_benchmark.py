@@ -139,7 +139,7 @@ def section(result: Mapping[str, Any]) -> str:
     errors = " | ".join(f"{name} {unit}" for name, unit in QUANTITIES.items())
     lines = [f"| path held out | predicted by | {errors} |", "| --- " * 6 + "|"]
     for path, rows in result["paths"].items():
-        for way in (*WAYS, PAST):
+        for way in rows[0]["sums"]:
             cells = " | ".join(f"{x:.3g}" for x in mean(rows, "sums", way))
             lines.append(f"| {path} | {way} | {cells} |")
     loops = result["closed_loop"]
