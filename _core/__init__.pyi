@@ -286,6 +286,10 @@ def predict_flight(
         NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
     period: float,
+    aloft: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    spread: float,
     keeps_velocity: bool,
     reaction: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
@@ -293,8 +297,9 @@ def predict_flight(
     path: Annotated[NDArray[numpy.float64], dict(shape=(None, None, 13), order="C", device="cpu")],
 ) -> None:
     """Run a model along a flight of states (n, 13), and a copy of it from each start, a row;
-    write the copy's states (starts, ahead, 13), a period (s) apart. With keeps_velocity no
-    force acts. The reaction (9) of a flight loop turns the body, too; (0): none.
+    write the copy's states (starts, ahead, 13), a period (s) apart. The rows `aloft` before tell
+    the thrust, known to a share of `spread`; 0: as the model's. With keeps_velocity no force
+    acts. The reaction (9) of a flight loop turns the body, too; (0): none.
     """
 
 def choose_likeliest(

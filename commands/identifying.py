@@ -82,12 +82,8 @@ def identify(
         with working("predicting"):
             parts_of = [[window] for window in windows[len(logs) :]]
             models = identified.vehicle, models_of(identified.vehicle)[SIMPLEST]
-            errors, simplest = errors_of_models(unseen, models, windows=parts_of)
-        identified = replace(
-            identified,
-            predicted={**identified.predicted, "prediction": errors},
-            simplest={**identified.simplest, "prediction": simplest},
-        )
+            errors = errors_of_models(unseen, models, windows=parts_of)
+        identified = replace(identified, predicted={**identified.predicted, "prediction": errors})
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
     log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
@@ -111,12 +107,12 @@ def identify(
             console.print(f"{e.name}: {e.status}: {e.how}")
     for line in identified.advice:
         console.print(line)
-    for of, errors in identified.predicted.items():
+    for of, (errors, simplest) in identified.predicted.items():
         after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
         console.print(f"{of.replace('_', ' ')}: {after}, by a fit without them:")
         show_table(
             ("mean error", "of the vehicle", "thrust and drag", "if nothing changes", "unit"),
-            table_of(errors, identified.simplest[of]),
+            table_of(errors, simplest),
         )
     console.print(use_of(identified))
     result = {"headline": headline(identified), **identified_data(identified)}

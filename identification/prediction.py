@@ -44,6 +44,7 @@ _HEAVY = 1e9  # kg m2: torques turn nothing
 _STEP_TOLERANCE = 0.1  # of a period: a step so little too long is still one step
 # s after the start of unbroken pose: the filter of a prediction's start settles
 _START_MARGIN = 0.5
+_CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
 _END_MARGIN = 0.1  # s before its end: the low-pass of the flight to compare with
 _HORIZON = 1.0  # s, of ``rollout_error``
 _START_EVERY = 0.25  # s, of an error's predictions
@@ -76,8 +77,9 @@ def predict(
 
     The model starts at a row from position, velocity, attitude and angular velocity. From then on
     only the logged rotor speeds and voltage enter; a rotor speed holds over the interval before its
-    sample. Rotors and effects start with the memory of the flight before. Declared sensing effects
-    are taken out of the log. No row after a start changes its state.
+    sample. Rotors and effects start with the memory of the flight before. Without ``state``, rows
+    before the start tell the thrust of commands along body axes. Declared sensing effects are taken
+    out of the log. No row after a start changes its state.
 
     A torque that held-out flights refuted (``vehicle.status``) leaves the body rate as at the
     start, unless the vehicle states the flight loop's reaction (``closed_loop``): the body then
@@ -115,7 +117,7 @@ def predict(
         ]
     )
     starts = starts[finite_rows(states[starts])]
-    x = _flown(log, vehicle, states, starts, ahead)
+    x = _flown(log, vehicle, states, starts, ahead, state is None)
     parts = (x[..., part] for part in (POSITION, VELOCITY, QUATERNION, RATE))
     return Prediction(starts, log.period, *parts)
 
@@ -143,17 +145,19 @@ def _checked(log: FlightLog, state: ArrayLike) -> Array:
     return states
 
 
-def _flown(log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead: int) -> Array:
+def _flown(
+    log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead: int, shown: bool = True
+) -> Array:
     """Return the model's states (starts, ahead, STATE), a period apart, from the states (N, STATE)
     of a log at some rows in ascending order. For the memory of effects, the last state holds over
-    rows without one.
+    rows without one. Where ``shown``, thrust of commands is as the rows before a start show.
     """
     path = np.zeros((len(starts), ahead, STATE))
     if not len(starts):
         return path
-    known = finite_rows(states)
-    first = int(np.argmax(known))
-    last_known = np.maximum.accumulate(np.where(known, np.arange(len(log.t)), 0))[first:]
+    finite, known = finite_rows(states), vehicle.uncertainty
+    first = int(np.argmax(finite))
+    last_known = np.maximum.accumulate(np.where(finite, np.arange(len(log.t)), 0))[first:]
     loop = vehicle.closed_loop
     if vehicle.status.torque == "refuted" and loop is None:
         vehicle = replace(vehicle, inertia=_HEAVY * np.eye(3))
@@ -171,6 +175,8 @@ def _flown(log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead:
         states[last_known],
         starts - first,
         log.period,
+        _off_ground(log, vehicle, states)[first:] & shown,
+        math.hypot(known.thrust, known.command) if log.commanded else 0.0,
         vehicle.status.force == "refuted",
         reaction,
         path,
@@ -228,7 +234,7 @@ class PredictionErrors:
         return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))
 
 
-ErrorsByPart = Mapping[str, PredictionErrors]  # of flights or blocks
+ErrorsByPart = Mapping[str, Sequence[PredictionErrors]]  # of flights or blocks, of some models
 
 
 def errors_of_models(
@@ -317,8 +323,8 @@ def logged_starts(
     log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float
 ) -> LoggedStarts:
     """Return starts every 0.25 s whose horizon (s) lies in one of the segments, times (s) from and
-    to, by the filters of a vehicle. The rotors carry the vehicle at both ends: no model has the
-    ground's force.
+    to, by the filters of a vehicle. The rotors carry the vehicle off the ground at both ends: no
+    model has the ground's force.
 
     Raises:
         InputError: no stretch of pose is unbroken for 3 s.
@@ -327,7 +333,8 @@ def logged_starts(
     ahead = log.period * np.arange(1, max(1, round(horizon / log.period)) + 1)
     each = (np.arange(t0, min(t1, log.t[-1]) - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
-    aloft = carried(log.rotor_speeds, log.period)
+    states = causal_states(log, vehicle)
+    aloft = carried(log.rotor_speeds, log.period) & _off_ground(log, vehicle, states)
     starts, seen = [], []
     for piece in log_signals(log):
         first, last = piece.t[0] + _START_MARGIN, piece.t[-1] - horizon - _END_MARGIN
@@ -338,11 +345,22 @@ def logged_starts(
         rows = rows[:: math.ceil(len(rows) / _MOST_STARTS) or 1]
         starts.append(rows)
         turned = continuous(Rotation.from_matrix(piece.rotation).as_quat(scalar_first=True))
-        states = np.hstack([piece.position, turned, piece.velocity, piece.angular_velocity])
+        flown = np.hstack([piece.position, turned, piece.velocity, piece.angular_velocity])
         at = log.t[rows, None] + ahead
-        seen.append(resampled(at.ravel(), piece.t, states).reshape(*at.shape, STATE))
-    states = causal_states(log, vehicle)
+        seen.append(resampled(at.ravel(), piece.t, flown).reshape(*at.shape, STATE))
     return LoggedStarts(log, states, np.concatenate(starts), np.concatenate(seen))
+
+
+def _off_ground(log: FlightLog, vehicle: Vehicle, states: Array) -> Mask:
+    """Return the rows (N,) off the ground, by the states (N, STATE) so far: of a log whose first
+    0.5 s have too little thrust to fly, those above the first place.
+    """
+    height = states[:, POSITION][:, 2]
+    first = np.argmax(np.isfinite(height))
+    early = (log.t >= log.t[first]) & (log.t <= log.t[first] + _START_MARGIN)
+    thrust = np.square(log.rotor_speeds[early]) @ vehicle.k
+    rests = np.median(thrust) < 0.5 * vehicle.weight
+    return height > (height[first] + _CLEARANCE if rests else -np.inf)
 
 
 def _attitudes(states: Array) -> Rotation:

@@ -50,9 +50,10 @@ void undo_sensing_of(std::uintptr_t model, In<-1> t, Bools seen, Out<-1, 11> sam
 }
 
 void write_prediction(std::uintptr_t model, In<-1> t, In<-1, 4> speeds, In<-1> voltage,
-                      In<-1, FLOWN> states, Ints<-1> starts, double period, bool keeps_velocity,
-                      In<-1> reaction, Out<-1, -1, FLOWN> path) {
-  check_rows(t.size(), speeds, states);
+                      In<-1, FLOWN> states, Ints<-1> starts, double period, Bools aloft,
+                      double spread, bool keeps_velocity, In<-1> reaction,
+                      Out<-1, -1, FLOWN> path) {
+  check_rows(t.size(), speeds, states, aloft);
   check_rows(starts.size(), path);
   for (std::size_t k = 0; k < starts.size(); k++)
     if (starts.data()[k] < 0 || std::size_t(starts.data()[k]) + 1 >= t.size())
@@ -61,7 +62,7 @@ void write_prediction(std::uintptr_t model, In<-1> t, In<-1, 4> speeds, In<-1> v
     throw nb::value_error("predict_flight: expected 9 numbers of a reaction, or none");
   auto *loop = reaction.size() ? reinterpret_cast<const LoopReaction *>(reaction.data()) : nullptr;
   predict_flight(model_at(model), rotors_of(speeds, voltage), t.data(), rows(states), starts.data(),
-                 std::int64_t(starts.size()), period, keeps_velocity, loop,
+                 std::int64_t(starts.size()), period, aloft.data(), spread, keeps_velocity, loop,
                  std::int64_t(path.shape(1)), reinterpret_cast<double (*)[FLOWN]>(path.data()));
 }
 
@@ -223,11 +224,15 @@ void bind_diagnosis(nb::module_ &m) {
         "Bring samples (n, 11), rotor speeds and pose, back to the truth in place; rows `seen` "
         "have\n"
         "a pose.");
-  m.def("predict_flight", &write_prediction, "model"_a, "t"_a, "speeds"_a, "voltage"_a, "states"_a,
-        "starts"_a, "period"_a, "keeps_velocity"_a, "reaction"_a, "path"_a.noconvert(),
-        "Run a model along a flight of states (n, 13), and a copy of it from each start, a row;\n"
-        "write the copy's states (starts, ahead, 13), a period (s) apart. With keeps_velocity no\n"
-        "force acts. The reaction (9) of a flight loop turns the body, too; (0): none.");
+  m.def(
+      "predict_flight", &write_prediction, "model"_a, "t"_a, "speeds"_a, "voltage"_a, "states"_a,
+      "starts"_a, "period"_a, "aloft"_a, "spread"_a, "keeps_velocity"_a, "reaction"_a,
+      "path"_a.noconvert(),
+      "Run a model along a flight of states (n, 13), and a copy of it from each start, a row;\n"
+      "write the copy's states (starts, ahead, 13), a period (s) apart. The rows `aloft` before "
+      "tell\n"
+      "the thrust, known to a share of `spread`; 0: as the model's. With keeps_velocity no force\n"
+      "acts. The reaction (9) of a flight loop turns the body, too; (0): none.");
   m.def("choose_likeliest", &choose_states, "last"_a, "posed"_a, "numbers"_a, "innovations"_a,
         "states"_a.noconvert(), "best"_a.noconvert(),
         "Write the state (n, 13) after the `last` of a filter's calls of each row, and the\n"

@@ -10,6 +10,7 @@ from dataclasses import astuple, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ...dynamics.vehicle import LoopReaction, Vehicle
 from ...runtime.arrays import Array, Index
@@ -35,62 +36,44 @@ _PRIOR = 0.003
 _STARTS = 500  # predictions of a fit, spread over the flights
 _TIMES = 5  # compared in a horizon
 _ROUNDS = 15
+_AGAIN = 2  # rounds without some starts
 _SETTLED = 1e-4  # share of the loss: a smaller fall ends the search
 _LEAST = 1e-6  # of the errors where nothing changes: smaller ones count as this
 _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 
 class LoopFit(NamedTuple):
-    """The likeliest coefficients, and the normal equations of g groups of starts and the prior.
-
-    Attributes:
-        theta: (9,) in the order of ``LoopReaction``.
-        names: (g,) of the groups; -1: the prior.
-        grams: (g, 9, 9).
-        gradients: (g, 9).
+    """The likeliest loop, and the standard deviations (9,) of its coefficients, by the scatter of
+    groups of starts (a sandwich).
     """
 
-    theta: Array
-    names: Index
-    grams: Array
-    gradients: Array
-
-    def by(self, names: Index) -> LoopReaction:
-        """Return the loop by some groups alone: one step of Gauss-Newton from here."""
-        kept = np.isin(self.names, names) | (self.names < 0)
-        gram, gradient = self.grams[kept].sum(axis=0), self.gradients[kept].sum(axis=0)
-        return _loop(_moved(self.theta, gram, gradient, 0.0))
-
-    @property
-    def loop(self) -> LoopReaction:
-        """The loop by all starts."""
-        return _loop(self.theta)
-
-    @property
-    def deviations(self) -> Array:
-        """Standard deviations (9,), by the scatter of the groups (a sandwich)."""
-        inverse = np.linalg.inv(self.grams.sum(axis=0))
-        return np.sqrt(np.diag(inverse @ self.gradients.T @ self.gradients @ inverse))
-
-
-def _loop(theta: Array) -> LoopReaction:
-    return LoopReaction(*theta.tolist())
+    loop: LoopReaction
+    deviations: Array
 
 
 def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
-    """Return the coefficients after a damped step, those of one sign not beyond 0."""
-    damped = gram + damping * np.diag(np.diag(gram))
-    moved = theta - np.linalg.solve(damped, gradient)
-    return np.where(_EITHER_SIGN, moved, np.maximum(moved, 0.0))
+    """Return the coefficients after a damped step, the best one with those of one sign not beyond
+    0.
+    """
+    root = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
+    aim = root.T @ theta - np.linalg.solve(root, gradient)
+    least = np.where(_EITHER_SIGN, -np.inf, 0.0)
+    return np.asarray(lsq_linear(root.T, aim, (least, np.inf)).x)
 
 
-def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: Vehicle) -> LoopFit:
+def fit_loop(
+    starts: Sequence[LoggedStarts],
+    groups: Sequence[Index],
+    vehicle: Vehicle,
+    near: LoopReaction | None = None,
+) -> LoopFit:
     """Return the loop of flights with starts, one at least, each of a group.
 
     Args:
         starts: of each flight.
         groups: (n,) of each flight's starts.
         vehicle: with the force, inertia and rotors that stay.
+        near: the loop by more starts: two rounds from there; None: from a usual one.
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
@@ -103,15 +86,16 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
     sizes: Array = np.concatenate(scales)[:, None, :, None]
 
     def off(theta: Array) -> Array:
-        model = replace(vehicle, closed_loop=_loop(theta))
+        model = replace(vehicle, closed_loop=LoopReaction(*theta.tolist()))
         return _compared(thin, [part.flown(model) for part in thin]) / sizes
 
     begin = np.array(astuple(_BEGIN))
     speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
     turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
     begin[list(UNITS).index("unmeasured")] = np.sqrt(np.square(turning).mean())
-    theta, e, damping = begin, off(begin), 1e-3
-    for _ in range(_ROUNDS):
+    theta = begin if near is None else np.array(astuple(near))
+    e, damping = off(theta), 1e-3
+    for _ in range(_ROUNDS if near is None else _AGAIN):
         norms = np.linalg.norm(e, axis=-1)
         least = np.maximum(0.5 * np.median(norms, axis=(0, 1)), _LEAST)
         root = 1.0 / np.sqrt(np.maximum(norms, least))[..., None]
@@ -133,9 +117,10 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
             damping *= 8.0
         if before - loss < _SETTLED * before:
             break
-    names = np.unique(group)
-    of = (group == names[:, None]).astype(np.float64)
-    return LoopFit(theta, names, np.tensordot(of, grams, 1), of @ gradients)
+    scores = (group == np.unique(group)[:, None]) @ gradients
+    inverse = np.linalg.inv(grams.sum(axis=0))
+    deviations = np.linalg.norm(scores @ inverse, axis=0)
+    return LoopFit(LoopReaction(*theta.tolist()), deviations)
 
 
 def _loss(e: Array, away: Array) -> float:

@@ -7,9 +7,8 @@ its torque, both; and where torque is refuted, the flight loop's reaction in its
 stands if no quantity is worse than the better one of no change and of thrust and drag. The one with
 the least mean of these ratios is the vehicle.
 
-One flight, or flights of commands on one day, show no other day. They are predicted with a thrust
-off by the spread between days to either side. One flight tells no reaction: on a slower flight of
-a racer the body rate was off by 3 times the error of no change.
+One flight tells no reaction: on a slower flight of a racer the body rate was off by 3 times the
+error of no change.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,7 +33,6 @@ from ..prediction import (
 )
 from .channels import Pieces
 from .closed_loop import LoopFit, fit_loop
-from .geometry import USUAL
 from .model import coefficients
 from .solve import VehicleFit, refitted
 from .spectra import Segment, Spectra, edges_of
@@ -55,15 +53,14 @@ class HeldOut(NamedTuple):
     """What predictions of held-out data say.
 
     Attributes:
-        errors: the vehicle's, by ``held_out_blocks`` and ``flights_left_out``.
-        simplest: the same of thrust and drag with an unchanged body rate.
+        errors: the vehicle's, and of thrust and drag with an unchanged body rate, by
+            ``held_out_blocks`` and ``flights_left_out``.
         stands: the model of ``models_of`` that stands.
         loop: the flight loop's reaction, where this stands in for the torque.
         why: figures of a refuted torque; else empty.
     """
 
     errors: ErrorsByPart
-    simplest: ErrorsByPart
     stands: str
     loop: LoopFit | None = None
     why: str = ""
@@ -75,21 +72,19 @@ class _HeldParts(NamedTuple):
     starts: list[LoggedStarts]  # of each log
     segment: list[Index]  # of each log's starts
     refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
-    spreads: tuple[float, ...]  # factors of the thrust
 
-    def errors(self, models: Callable[[VehicleFit, Index], Models]) -> Errors:
-        """Return the errors of models made of each refit and the numbers of its segments."""
+    def errors(self, models: Callable[[VehicleFit, Mask], Models]) -> Errors:
+        """Return the errors of models made of each refit and the segments that it keeps."""
         errors: Errors = {}
         for where, kept, part in self.refits:
             each = zip(self.starts, self.segment, strict=True)
             starts = [of.those(~kept[numbers]) for of, numbers in each]
             if any(len(of.rows) for of in starts):
-                vehicles = models(part, np.flatnonzero(kept))
+                vehicles = models(part, kept)
                 said = errors.setdefault(where, {name: [] for name in vehicles})
-                for share in self.spreads:
-                    of_day = [_with_thrust(v, share) for v in vehicles.values()]
-                    for name, off in zip(vehicles, errors_at(starts, of_day), strict=True):
-                        said[name].append(off)
+                offs = errors_at(starts, list(vehicles.values()))
+                for name, off in zip(vehicles, offs, strict=True):
+                    said[name].append(off)
         return errors
 
 
@@ -115,18 +110,7 @@ def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -
         kept = [fold != held for held in np.unique(fold)]
         if len(kept) > 1:
             refits += list(zip([where] * len(kept), kept, refitted(fit, kept), strict=True))
-    commands = fit.drive.commands
-    spread = USUAL.command_spread if commands else USUAL.thrust_spread
-    one_day = commands or np.ptp(number) == 0
-    return _HeldParts(starts, segment, refits, (1.0 - spread, 1.0 + spread) if one_day else (1.0,))
-
-
-def _with_thrust(vehicle: Vehicle, share: float) -> Vehicle:
-    """Return a vehicle with a share of its thrust, by rotor speeds and by commands."""
-    curve = vehicle.motor_curve
-    if curve is not None:
-        curve = replace(curve, thrust=tuple(share * c for c in curve.thrust))
-    return replace(vehicle, k=share * vehicle.k, p=share * vehicle.p, motor_curve=curve)
+    return _HeldParts(starts, segment, refits)
 
 
 def held_out(
@@ -152,23 +136,29 @@ def held_out(
     parts = _held_parts(pieces, logs, fit, vehicle_of(fit, ""))
     errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
     if not errors:
-        return HeldOut({}, {}, "")
+        return HeldOut({}, "")
     stands, why = standing(errors), ""
     loop: LoopFit | None = None
     if stands not in ("torque", WHOLE):
         why = _reason(errors)
         if OTHER_FLIGHTS in errors:
             fitted = loop = fit_loop(parts.starts, parts.segment, vehicle_of(fit, why))
-            further = parts.errors(
-                lambda part, kept: loops_of(vehicle_of(part, why), fitted.by(kept))
-            )
+
+            def without(part: VehicleFit, kept: Mask) -> Models:
+                vehicle = vehicle_of(part, why)
+                each = zip(parts.starts, parts.segment, strict=True)
+                starts = [of.those(kept[numbers]) for of, numbers in each]
+                groups = [numbers[kept[numbers]] for numbers in parts.segment]
+                return loops_of(vehicle, fit_loop(starts, groups, vehicle, fitted.loop).loop)
+
+            further = parts.errors(without)
             errors = {where: {**each, **further[where]} for where, each in errors.items()}
             stands = standing(errors)
     pooled = {
-        name: {where: PredictionErrors.pooled(each[name]) for where, each in errors.items()}
-        for name in (stands, SIMPLEST)
+        where: [PredictionErrors.pooled(each[name]) for name in (stands, SIMPLEST)]
+        for where, each in errors.items()
     }
-    return HeldOut(pooled[stands], pooled[SIMPLEST], stands, loop, why)
+    return HeldOut(pooled, stands, loop, why)
 
 
 def models_of(vehicle: Vehicle) -> Models:
@@ -250,8 +240,8 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
         f"({turning:.2f} times its power)"
     )
     if turning > 1.0:
-        return HeldOut({}, {}, NO_CHANGE if force else "force", why=why)
-    return HeldOut({}, {}, "torque" if force else WHOLE)
+        return HeldOut({}, NO_CHANGE if force else "force", why=why)
+    return HeldOut({}, "torque" if force else WHOLE)
 
 
 def powers(

@@ -9,7 +9,7 @@ are fixed by a named assumption, or left out.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -161,7 +161,6 @@ def identify(
         tuple(notes),
         tuple(advice_of(named)),
         tested.errors,
-        tested.simplest,
     )
 
 
@@ -174,7 +173,7 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
         models |= loops_of(vehicle, tested.loop.loop)
         stands = IDENTIFIED if "closed loop" in tested.stands else REFUTED
         for size, (c, unit), value in zip(
-            tested.loop.deviations, UNITS.items(), tested.loop.theta, strict=True
+            tested.loop.deviations, UNITS.items(), astuple(tested.loop.loop), strict=True
         ):
             name, wide = f"closed_loop {c}", 1.96 * size
             named[name] = Estimate(name, value, value - wide, value + wide, unit, stands, LOOP)

@@ -62,13 +62,11 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     slope = (columns(lag + step) - columns(lag - step)) @ best / (2.0 * step)
     moves = np.column_stack([columns(lag), slope])
     inverse = np.linalg.inv(moves.T @ moves)
-    seconds = pieces[0].period * np.arange(len(speeds)).repeat(speeds.shape[1])
-    block = (seconds / _SEGMENT).astype(int)
-    count = int(block.max()) + 1
-    # errors go on within a segment: a sandwich over segments
-    scores = np.array([moves[block == b].T @ residual[block == b] for b in range(count)])
-    meat = scores.T @ scores * (count / max(count - 1, 1))
-    size = math.sqrt((inverse @ meat @ inverse)[-1, -1])
-    width = float(student.ppf(0.975, max(count - 1, 3))) * size
+    block = (pieces[0].period / _SEGMENT * (np.arange(residual.size) // 4)).astype(int)
+    # errors go on within a segment: a sandwich over segments, of the lag alone
+    scores = np.bincount(block, residual * (moves @ inverse[-1]))
+    least = max(len(scores) - 1, 1)
+    size = math.sqrt(scores @ scores * len(scores) / least)
+    width = float(student.ppf(0.975, max(least, 3))) * size
     interval = (lag, max(lag - width, 0.0), lag + width)
     return MotorResponse(best, interval, float(residual.std() / target.std()))

@@ -54,9 +54,9 @@ def identified_data(identified: Identified) -> Data:
         "status": identified.vehicle.status,
     }
     keys = ("unit", "model", "if_nothing_changes", "thrust_and_drag")
-    for where, errors in identified.predicted.items():
+    for where, (errors, simplest) in identified.predicted.items():
         data[where] = {"starts": errors.starts, "horizon_s": errors.horizon}
-        ends = errors.model, errors.still, identified.simplest[where].model
+        ends = errors.model, errors.still, simplest.model
         for name, *of in zip(QUANTITIES, QUANTITIES.values(), *ends, strict=True):
             data[where][name.replace(" ", "_")] = dict(zip(keys, of, strict=True))
     told: Data = plain(data)
@@ -139,7 +139,8 @@ def write_identified(identified: Identified, path: Path) -> list[Path]:
     written = [path, data, picture]
     if identified.predicted:
         written.append(path.with_name(f"{path.stem}.prediction.png"))
-        write_png(_prediction_picture(*list(identified.predicted.items())[-1]), written[-1])
+        where, (errors, _) = list(identified.predicted.items())[-1]
+        write_png(_prediction_picture(where, errors), written[-1])
     return written
 
 

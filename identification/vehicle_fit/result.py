@@ -53,7 +53,6 @@ class Identified:
     notes: Names
     advice: Names
     # errors on data outside the fit: held_out_blocks, flights_left_out (each in turn, of several),
-    # and prediction, of further flights
+    # and prediction, of further flights; the vehicle's, and of thrust and drag with an unchanged
+    # body rate
     predicted: ErrorsByPart
-    # the same of thrust and drag with an unchanged body rate
-    simplest: ErrorsByPart

@@ -14,14 +14,18 @@ from tests.support.model_flights import (
     GUSTS,
     WITH_EFFECTS,
     YAWED,
-    drawn,
     simulate_model,
 )
 from tests.support.vehicles import POSE, VEHICLE
+from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import Uncertainty
+from windwrench.envs.recording import record_flight
+from windwrench.envs.scenarios import draw_vehicle
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 from windwrench.estimator.consistency import chi2_band, nees
 from windwrench.estimator.model_uncertainty import factors_alone, factors_of
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.wrench_series import estimate_log, tune_to_log
 
 
 def share_within(values, band):
@@ -69,7 +73,7 @@ def test_intervals_hold_what_they_say(source):
     error = np.empty((3, runs, 6))
     for r in range(runs):
         rng = default_rng(r)
-        true = drawn(vehicle, rng)
+        true = draw_vehicle(vehicle, rng)
         sway = 1.0 + rng.uniform(0.0, 0.3) * np.sin(0.015 * np.arange(steps) + rng.uniform(0, 6))
         speeds = np.tile(true.hover_rate * np.sqrt(sway)[:, None], 4)
         run = simulate_model(true, tuning, speeds, seed=r, **YAWED)
@@ -83,6 +87,30 @@ def test_intervals_hold_what_they_say(source):
     assert 0.92 < torque < 0.98  # of 240: 0.028 is the deviation of a share of 0.95, twice
     assert 0.9 < force < 0.99  # the axes of a force share one error of thrust
     assert np.mean(abs(error[0]) < 1.96 * error[2]) < 0.8  # of noise alone
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ardrone2", "crazyflie"])
+def test_intervals_hold_on_flights_of_another_model(name):
+    """60 flights of 20 s in MuJoCo in turbulence, estimated as ``windwrench estimate`` does. Hover
+    falls short along x and y: turbulence changes within 0.2 s, the walk that is fitted in 1 s.
+    """
+    vehicle = load_vehicle(name)
+    inside = {"hover": [], "circle": [], "fast": [], "excite": []}
+    for seed, trajectory in enumerate(15 * list(inside)):
+        true = draw_vehicle(vehicle, default_rng((7, seed)))
+        flown = record_flight(true, trajectory=trajectory, seconds=20.0, seed=7000 + seed)
+        log = FlightLog(**flown, name="flight", source="flight")
+        series = estimate_log(log, vehicle, tuning=tune_to_log(log, vehicle).tuning)
+        rows = np.arange(800, len(log.t), 200)
+        off = abs(series.force - flown["force"])[rows]
+        std = series.std_force[rows]
+        inside[trajectory].append(np.mean(off < 1.96 * std))
+    shares = {trajectory: np.mean(of) for trajectory, of in inside.items()}
+    flights = np.concatenate(list(inside.values()))
+    half = 1.96 * flights.std(ddof=1) / np.sqrt(len(flights))
+    print(f"{name}: {flights.mean():.3f} +- {half:.3f}, in hover {shares['hover']:.2f}")
+    assert all(share > (0.78 if t == "hover" else 0.9) for t, share in shares.items()), shares
 
 
 @pytest.mark.parametrize("make", [WrenchUKF, ConstantGainFilter])

@@ -101,7 +101,7 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(identified):
     assert (share[2:] > 0.9).all()
     assert (share[:2] < 0.1).all()
     assert list(found.predicted) == ["held_out_blocks", "flights_left_out"]
-    for errors in found.predicted.values():
+    for errors, _ in found.predicted.values():
         assert (errors.model[:, -1] < 0.3 * errors.still[:, -1]).all()
 
 
