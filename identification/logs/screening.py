@@ -348,16 +348,18 @@ def stuck_channels(log: FlightLog, vehicle: Vehicle) -> _Findings:
     """
     rotors, seen = log.rotor_speeds, np.flatnonzero(log.valid)
     aloft = np.square(rotors) @ vehicle.k > 0.3 * vehicle.weight
-    # a rotor at its limit stands still rightly
-    turning = (rotors > 0.0) & (rotors < (0.99 * vehicle.omega_max or np.inf))
+    # a rotor at its limit, or at full command, stands still rightly
+    most = rotors.max() if log.commanded else 0.99 * vehicle.omega_max or np.inf
+    turning = (rotors > 0.0) & (rotors < most)
     place, flown = log.position[seen], aloft[seen]
     for i in range(4):
-        rows, names = aloft & turning[:, i], "the other rotor speeds"
-        yield from _still(f"omega{i + 1}", log.t, rows, rotors, [i], names)
+        yield from _still(
+            f"omega{i + 1}", log.t, aloft & turning[:, i], rotors, [i], "the other rotor speeds"
+        )
     for i, axis in enumerate("xyz"):
         yield from _still(f"p{axis}", log.t[seen], flown, place, [i], "the other coordinates")
-    pose, own = np.hstack([place, log.quaternion[seen]]), [3, 4, 5, 6]
-    yield from _still("the attitude", log.t[seen], flown, pose, own, "the coordinates")
+    pose = np.hstack([place, log.quaternion[seen]])
+    yield from _still("the attitude", log.t[seen], flown, pose, [3, 4, 5, 6], "the coordinates")
     said = (f"warning: {doubt}" for doubt in motor_doubts(log))
     yield from (_Note(text) for text in said if text not in log.notes)
 
@@ -386,4 +388,4 @@ def _stretches(rows: Mask, t: Array, least: float) -> str:
     runs = [(t[end - 1] - t[first], -t[first]) for first, end in runs_of(rows)]
     count = sum(seconds >= least for seconds, _ in runs)
     seconds, begin = max(runs, default=(0.0, 0.0))
-    return f"{seconds:.3g} s from t = {-begin:.6g} s ({count} such stretch(es))" if count else ""
+    return f"{seconds:.3g} s from t = {-begin:.4g} s ({count} in all)" if count else ""
