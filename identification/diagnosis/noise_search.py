@@ -6,7 +6,7 @@ signals of the axis' states than the pose.
 
 import math
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -58,14 +58,11 @@ class NoiseSearch:
             gains: (3, e) at its start.
         """
         x = _free(near)
-        low = x - 16.0
-        high = x + 16.0
-        low[:, 0] = math.log(LEAST_POSE)
-        low[:, 2:] = (math.log(TIMES[0]), 0.0)
-        high[:, 2:] = (math.log(TIMES[1]), 1e4)
+        ends = np.array([x - 16.0, x + 16.0])
+        ends[0, :, 0] = math.log(LEAST_POSE)
+        ends[:, :, 2:] = np.transpose([np.log(TIMES), [0.0, 1e4]])[:, None]
         none = np.full(gains.size, np.inf)
-        low = np.append(-none, low)
-        high = np.append(none, high)
+        low, high = np.hstack([[-none, none], ends.reshape(2, -1)])
         at = np.clip(np.append(gains, x), low, high)
         height, seen = self._height(at)
         normal, right = self._slopes(at, seen)
@@ -127,9 +124,7 @@ class NoiseSearch:
         """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
         covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
         """
-        noise = [_noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in range(SEARCHED)]
-        moved = PoseNoise(*(np.stack(each) for each in zip(*map(astuple, noise), strict=True)))
-        there = steady_filter(moved, self.period, self.gravity)
+        there = self._filter(at + STEP * np.eye(len(at))[-SEARCHED:])
         gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
         slopes = np.concatenate([gain, (there.keep - here.keep)[..., None]], axis=2) / STEP
         change = (there.covariance - here.covariance) / STEP
@@ -146,6 +141,9 @@ def _free(noise: PoseNoise) -> Array:
 
 
 def _noise(at: Array) -> PoseNoise:
-    x = at[-SEARCHED:].reshape(6, 4)
-    pose, disturbance, time = np.exp(x[:, :3]).T
-    return PoseNoise(pose, disturbance, time, disturbance * np.sqrt(x[:, 3]))
+    """Return the noise whose searched numbers are the last of each row (..., c)."""
+    pose, disturbance, time, share = np.moveaxis(
+        at[..., -SEARCHED:].reshape(*at.shape[:-1], 6, 4), -1, 0
+    )
+    white = np.exp(disturbance) * np.sqrt(share)
+    return PoseNoise(np.exp(pose), np.exp(disturbance), np.exp(time), white)
