@@ -16,7 +16,7 @@ import numpy as np
 from ... import _core
 from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array, Rows
+from ..logs.table import Array, Mask, Rows
 from ..motion.residual import loaded_model
 from .steady_filter import SteadyFilter
 
@@ -33,6 +33,7 @@ class Poses:
     start: Array  # (p, 6) m/s, and rad/s, body: the velocities at the start of each piece
     sample: Rows  # (n,) number of the sample in its piece
     log: Rows  # (n,) index of its log among the flights
+    counted: Mask  # (n,) whether it is in the fit
     period: float  # s
 
     @property
@@ -43,7 +44,7 @@ class Poses:
     @property
     def pieces(self) -> list[slice]:
         """The samples of each piece."""
-        return [slice(*ends) for ends in pairwise([*self.begins.tolist(), len(self.t)])]
+        return [slice(*ends) for ends in pairwise([*self.begins, len(self.t)])]
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
 from ..logs.flight_log import FlightLog
-from ..logs.table import Array, Mask
+from ..logs.table import Array
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
@@ -69,10 +69,12 @@ STATES = (0, 1, 2)  # pose, rate and disturbance of an axis
 # rad of tilt for a rad/s2 of roll or pitch: the unit of gains of sideways states
 SIDEWAYS = 0.01
 FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, where the search for the noise begins
-# (6, 3, 4) whether an axis jumps by thrust, torque or turn, for each of thrust and torques
-DRIVES = np.zeros((6, 3, len(DRIVEN)))
-DRIVES[:3, 0, 0] = DRIVES[[3, 4, 5], 1, [1, 2, 3]] = 1.0
-NO_SHARES, NO_SLOPES = np.empty((6, 3, 0)), np.empty((6, 7, 0))
+# shares of thrust, torque and turn in the jumps of an axis, by a unit of the gains: (6, 3, 9) of
+# each pair on each of the three, and (6, 3, 4) of the axes driven by thrust and torques
+OF_PAIRS = np.einsum("ap,kl->akpl", OWN, np.eye(3)).reshape(6, 3, -1)
+OF_DRIVEN = np.zeros((6, 3, len(DRIVEN)))
+OF_DRIVEN[:3, 0, 0] = OF_DRIVEN[[3, 4, 5], 1, [1, 2, 3]] = 1.0
+NO_SLOPES = np.empty((6, 7, 0))
 # the state that jumps, by the gains of a pair on the rotors' innovations: thrust, torque, turn
 JUMP_STATE = np.tile(STATES, 3)
 HELD = np.array(PRIORS.gains)[JUMP_STATE]  # standard deviations of these gains
@@ -113,7 +115,8 @@ class Likelihood:
         if not near or sensing_of(near.vehicle) != sensing_of(self.vehicle):
             self.poses = self._read_poses()
         self.period = self.poses.period
-        self._counted = self._in_fit()
+        # the states (3,) after a period of one m/s2 or rad/s2
+        self._units = np.array([self.period**2, self.period, 1.0])
         if not near:
             self.noise = self._first_noise()
             # on the rotors' innovations
@@ -162,12 +165,16 @@ class Likelihood:
         finer = iter(self.finer)
         out = []
         for at in np.unique(self.flights.log[self.flights.fit_rows]).tolist():
+            rows = np.flatnonzero(self.flights.log == at)
             undone = undo_log_sensing(self.flights.logs[at], on_time)
             for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
                 raw = replace(raw, rotor_speeds=raw.rotor_speeds + next(finer, 0.0))
                 raw = with_time_offsets(raw, {ROTOR_TIME_OFFSET.coefficient: offset})
                 q = Rotation.from_matrix(raw.rotation).as_quat(scalar_first=True)
                 n = len(raw.t)
+                near = np.searchsorted(self.flights.t[rows], raw.t).clip(max=len(rows) - 1)
+                counted = self.flights.fit_rows[rows[near]]
+                counted[: round(SETTLING_TIME / raw.period)] = False
                 out.append(
                     (
                         raw.t,
@@ -178,20 +185,10 @@ class Likelihood:
                         np.hstack([smooth.velocity[:1], smooth.angular_velocity[:1]]),
                         np.arange(n),
                         np.full(n, at),
+                        counted,
                     )
                 )
         return Poses(*map(np.concatenate, zip(*out, strict=True)), period=raw.period)
-
-    def _in_fit(self) -> Mask:
-        """Return the samples in the fit (n,), like the rows of their block."""
-        poses = self.poses
-        out: Mask = poses.sample >= round(SETTLING_TIME / self.period)
-        for log in np.unique(poses.log):
-            rows = np.flatnonzero(self.flights.log == log)
-            own = poses.log == log
-            at = np.searchsorted(self.flights.t[rows], poses.t[own]).clip(max=len(rows) - 1)
-            out[own] &= self.flights.fit_rows[rows[at]]
-        return out
 
     def _signals(self) -> list[Signals]:
         """Return each piece as the filter sees it between samples, for the effect models."""
@@ -271,7 +268,6 @@ class Likelihood:
         Args:
             explained: (2, n, 6) known changes of the pose and of the acceleration beside the model.
         """
-        own = np.einsum("ap,kl,s->akpls", OWN, np.eye(3), self._units).reshape(6, 3, -1)
 
         def see(steady: SteadyFilter, gains: Array) -> Array:
             self._run(steady, gains)
@@ -281,10 +277,10 @@ class Likelihood:
                 left = np.diff(np.concatenate([x for _, x in each])).reshape(-1, 6)
                 left = left @ np.linalg.inv(steady.whitening).T
                 self.track = replace(self.track, innovations=left)
-            return self.track.innovations[self._counted]
+            return self.track.innovations[self.poses.counted]
 
         def products(steady: SteadyFilter, slopes: Array) -> Array:
-            each = self._changes(steady, shares=own, slopes=slopes)
+            each = self._changes(steady, shares=OF_PAIRS, slopes=slopes)
             return functools.reduce(np.add, (x.T @ x for _, x in each))
 
         search = NoiseSearch(see, products, HELD, self.period, self.vehicle.gravity)
@@ -314,10 +310,7 @@ class Likelihood:
 
     def _change(self, setting: Setting, units: float = 1.0) -> Array:
         """Return the change of the acceleration (n, 6) with a setting so many units away."""
-        change = self._accelerations(setting, self.signals)
-        change -= self._base
-        change /= units
-        return change
+        return (self._accelerations(setting, self.signals) - self._base) / units
 
     def _add(self, column: Column) -> None:
         """Add a coefficient's column, unless it is there already or no such vehicle is possible."""
@@ -390,26 +383,25 @@ class Likelihood:
 
     def _add_changing_coefficients(self) -> None:
         """Add the dictionary's columns: effects of the setting with changing coefficients."""
-        parts = {}
-        poses = {}
+        followed = variables(self.track)
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
                 moved = [x * self._moved(Column(effect, name)) for name, x in own.items()]
-                poses[effect] = np.sum(moved, axis=0)
+                self._posed |= changing_columns({effect: np.sum(moved, axis=0)}, followed)
             else:
-                parts[effect] = -self._change(without(self.setting, effect))
-        followed = variables(self.track)
-        self._acting |= changing_columns(parts, followed)
-        self._posed |= changing_columns(poses, followed)
+                change = -self._change(without(self.setting, effect))
+                self._acting |= changing_columns({effect: change}, followed)
 
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
         self._add(ROTOR_TIME_OFFSET)
-        bent = []  # away from the straight line, by the second difference
-        for s in self.signals:
-            # the speeds are of k + 1/2: nothing later than sample k + 1
-            u = np.pad(np.diff(s.rotor_speeds, 2, axis=0), ((2, 0), (0, 0)))
-            bent.append(replace(s, rotor_speeds=s.rotor_speeds + u))
+        # away from the straight line, by the second difference. The speeds are of k + 1/2: nothing
+        # later than sample k + 1
+        bent = [
+            replace(s, rotor_speeds=s.rotor_speeds + np.pad(u, ((2, 0), (0, 0))))
+            for s in self.signals
+            for u in [np.diff(s.rotor_speeds, 2, axis=0)]
+        ]
         change = self._accelerations(self.setting, bent) - self._base
         self._acting[Column("", "", Part.BETWEEN_SAMPLES)] = _whole(change)
         self._add_model_errors()
@@ -536,11 +528,6 @@ class Likelihood:
         x[:, :2, 2] = SIDEWAYS * self.flights.vehicle.gravity * x[:, 4:2:-1, 1]
         return x
 
-    @property
-    def _units(self) -> Array:
-        """The states (3,) after a period of one m/s2 or rad/s2."""
-        return np.array([self.period**2, self.period, 1.0])
-
     def _products(self, starts: Starts) -> Base:
         self.jumps = self._jumps()
         moved = self._posed
@@ -550,13 +537,12 @@ class Likelihood:
         drives = [
             Column("", f"axis {axis}", Part.GAIN, state) for axis in DRIVEN for state in STATES
         ]
-        shares = (DRIVES[..., None] * self._units).reshape(6, 3, -1)
         n = len(self._base)
         still = Product(0.0, Product.ones(n), Product.ones(n, 1))
         x = [self._acting.get(c, still) for c in asked]
-        each = self._changes(steady, x, [*moved.values()], shares)
+        each = self._changes(steady, x, [*moved.values()], OF_DRIVEN)
         blocks = ((log, rows.T @ rows) for log, rows in each)
-        penalty = float(self._counted.sum() * np.linalg.slogdet(steady.covariance)[1])
+        penalty = float(self.poses.counted.sum() * np.linalg.slogdet(steady.covariance)[1])
         names = (*asked, *drives)
         return in_prior_units(self.flights, names, blocks, penalty, self.setting, starts)
 
@@ -565,7 +551,7 @@ class Likelihood:
         steady: SteadyFilter,
         acting: Sequence[Product] = (),
         moved: Sequence[Product] = (),
-        shares: Array = NO_SHARES,
+        shares: Array = OF_DRIVEN[:, :, :0],
         slopes: Array = NO_SLOPES,
         every: bool = False,
     ) -> Iterator[tuple[int, Array]]:
@@ -577,16 +563,17 @@ class Likelihood:
             steady: the filter.
             acting: acceleration of the model by a unit of each of the first columns.
             moved: shift of the measured pose by a unit of the last of these.
-            shares: (6, 3, e) of the jumps by a unit of the next columns, of the states in turn,
-                before the pose of a sample is read.
+            shares: (6, 3, e) ``OF_PAIRS`` or ``OF_DRIVEN``: of the jumps by a unit of the next 3 e
+                columns, of the states in turn, before the pose of a sample is read.
             slopes: (6, 7, m) change of the gains of each axis, in the order of
                 ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns.
             every: all samples count.
         """
+        shares = (shares[..., None] * self._units).reshape(6, 3, -1)
         count = len(acting) + shares.shape[2] + slopes.shape[2]
         length = round(BLOCK / self.period)
         track = self.track
-        counted = self._counted | every
+        counted = self.poses.counted | every
         for piece in self.poses.pieces:
             state = np.zeros((6, 3, count))
             # one block's columns are in memory at a time

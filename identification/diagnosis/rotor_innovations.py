@@ -44,11 +44,11 @@ def rotor_innovations(poses: Poses, track: Track) -> Array:
     inside = np.diff(poses.sample) == 1
     between = np.square(0.5 * (speeds[:-1] + speeds[1:]))[inside]
     effectiveness = np.linalg.lstsq(between, track.rotors[:-1][inside], rcond=None)[0]
-    rotors = np.square(speeds) @ effectiveness
-    out = np.zeros_like(rotors)
+    rotors: Array = np.square(speeds) @ effectiveness
     later = poses.sample >= LAGS
-    out[later] = rotors[later] - _predicted(track, rotors, later)
-    return out
+    rotors[later] -= _predicted(track, rotors, later)
+    rotors[~later] = 0.0
+    return rotors
 
 
 def unrounded(poses: Poses, track: Track, step: float) -> Array:
