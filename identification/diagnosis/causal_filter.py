@@ -34,7 +34,6 @@ class Poses:
     sample: Rows  # (n,) number of the sample in its piece
     log: Rows  # (n,) index of its log among the flights
     counted: Mask  # (n,) whether it is in the fit
-    period: float  # s
 
     @property
     def begins(self) -> Rows:
@@ -84,11 +83,12 @@ def level(heading: Array, x: Array) -> Array:
     return np.column_stack([c * ahead - s * left, s * ahead + c * left, up])
 
 
-def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
+def run(poses: Poses, period: float, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
     """Return the pieces as the filter with a vehicle's model sees them.
 
     Args:
         poses: the pieces.
+        period: s.
         vehicle: the model.
         steady: the filter's gains.
         known: (n, 6, 3) corrections of pose, rate and disturbance of each axis before the pose of
@@ -100,7 +100,7 @@ def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> T
         models = loaded_model(vehicle)[0].copy()
         _core.run_causal_filter(
             models.ctypes.data,
-            poses.period,
+            period,
             poses.rotor_speeds[at],
             poses.voltage[at],
             poses.position[at],

@@ -100,10 +100,6 @@ class Likelihood:
         same_noise: bool = False,
         gusty: bool = False,
     ) -> None:
-        self.flights = flights
-        self.gusty: bool = near.gusty if near and same_noise else gusty
-        self.setting = setting
-        self.vehicle = flights.amended(setting)
         # the rounding error of the logged rotor speeds of each piece (n, 4), which is added back
         self.finer: list[Array] = []
         if near:
@@ -114,17 +110,17 @@ class Likelihood:
         self.vehicle = flights.amended(setting)
         if not near or sensing_of(near.vehicle) != sensing_of(self.vehicle):
             self.poses = self._read_poses()
-        self.period = self.poses.period
         # the states (3,) after a period of one m/s2 or rad/s2
         self._units = np.array([self.period**2, self.period, 1.0])
         if not near:
             self.noise = self._first_noise()
             # on the rotors' innovations
             self.gains: Array = np.zeros((len(PAIRS), len(JUMP_STATE)))
+            self.steady = steady_filter(self.noise, self.period, self.vehicle.gravity)
             self._see_rotors()
         self.jumps = self._jumps()
         if near and (same_noise or gusty):
-            self._run(self.steady, self.gains)
+            self._run()
             if np.isnan(self.track.predicted).any():
                 raise np.linalg.LinAlgError("the filter diverges with these effects")
         else:
@@ -188,7 +184,8 @@ class Likelihood:
                         counted,
                     )
                 )
-        return Poses(*map(np.concatenate, zip(*out, strict=True)), period=raw.period)
+        self.period = raw.period
+        return Poses(*map(np.concatenate, zip(*out, strict=True)))
 
     def _signals(self) -> list[Signals]:
         """Return each piece as the filter sees it between samples, for the effect models."""
@@ -216,24 +213,19 @@ class Likelihood:
     def _see_rotors(self) -> None:
         """Take the rotors' innovations by a filter that follows the pose closely."""
         self.jumps = np.zeros((len(self.poses.t), 6, 3))
-        self._run(self.steady, self.gains)
+        self._run()
         if self._rounding_std:
             finer = unrounded(self.poses, self.track, self.vehicle.omega_lsb)
             self.finer = np.split(finer, self.poses.begins[1:])
             self.poses = replace(self.poses, rotor_speeds=self.poses.rotor_speeds + finer)
-            self._run(self.steady, self.gains)
+            self._run()
         self.answers = rotor_innovations(self.poses, self.track)
 
-    @property
-    def steady(self) -> SteadyFilter:
-        """The filter."""
-        return steady_filter(self.noise, self.period, self.vehicle.gravity)
-
-    def _run(self, steady: SteadyFilter, gains: Array) -> None:
-        each = (OWN @ gains).reshape(6, -1, len(STATES)) * self._units
+    def _run(self) -> None:
+        each = (OWN @ self.gains).reshape(6, -1, len(STATES)) * self._units
         # the jumps of the states (n, 6, 3) by the rotors' innovations
         self.known = (self.jumps.swapaxes(0, 1) @ each).swapaxes(0, 1)
-        self.track = run(self.poses, self.vehicle, steady, self.known)
+        self.track = run(self.poses, self.period, self.vehicle, self.steady, self.known)
 
     # Noise
 
@@ -270,22 +262,25 @@ class Likelihood:
         """
 
         def see(steady: SteadyFilter, gains: Array) -> Array:
-            self._run(steady, gains)
+            self.steady = steady
+            self.gains = gains
+            self._run()
             if explained is not None:
                 pose, force = map(_whole, explained)
-                each = self._changes(steady, [force], [pose], every=True)
+                each = self._changes([force], [pose], every=True)
                 left = np.diff(np.concatenate([x for _, x in each])).reshape(-1, 6)
                 left = left @ np.linalg.inv(steady.whitening).T
                 self.track = replace(self.track, innovations=left)
             return self.track.innovations[self.poses.counted]
 
-        def products(steady: SteadyFilter, slopes: Array) -> Array:
-            each = self._changes(steady, shares=OF_PAIRS, slopes=slopes)
+        def products(slopes: Array) -> Array:
+            each = self._changes(shares=OF_PAIRS, slopes=slopes)
             return functools.reduce(np.add, (x.T @ x for _, x in each))
 
         search = NoiseSearch(see, products, HELD, self.period, self.vehicle.gravity)
         self.noise, self.gains = search.likeliest(self.noise, self.gains)
-        self._run(self.steady, self.gains)
+        self.steady = steady_filter(self.noise, self.period, self.vehicle.gravity)
+        self._run()
 
     def gusts(self) -> tuple[Disturbance, ...]:
         """Return the disturbance of each channel. The rotors show a part: a flight loop on a gyro
@@ -531,7 +526,6 @@ class Likelihood:
     def _products(self, starts: Starts) -> Base:
         self.jumps = self._jumps()
         moved = self._posed
-        steady = self.steady
         asked = (*(c for c in self._acting if c not in moved), *moved)
         # the gains on axes the rotors do not drive stay as fitted
         drives = [
@@ -540,15 +534,14 @@ class Likelihood:
         n = len(self._base)
         still = Product(0.0, Product.ones(n), Product.ones(n, 1))
         x = [self._acting.get(c, still) for c in asked]
-        each = self._changes(steady, x, [*moved.values()], OF_DRIVEN)
+        each = self._changes(x, [*moved.values()], OF_DRIVEN)
         blocks = ((log, rows.T @ rows) for log, rows in each)
-        penalty = float(self.poses.counted.sum() * np.linalg.slogdet(steady.covariance)[1])
+        penalty = float(self.poses.counted.sum() * np.linalg.slogdet(self.steady.covariance)[1])
         names = (*asked, *drives)
         return in_prior_units(self.flights, names, blocks, penalty, self.setting, starts)
 
     def _changes(
         self,
-        steady: SteadyFilter,
         acting: Sequence[Product] = (),
         moved: Sequence[Product] = (),
         shares: Array = OF_DRIVEN[:, :, :0],
@@ -560,7 +553,6 @@ class Likelihood:
         fit.
 
         Args:
-            steady: the filter.
             acting: acceleration of the model by a unit of each of the first columns.
             moved: shift of the measured pose by a unit of the last of these.
             shares: (6, 3, e) ``OF_PAIRS`` or ``OF_DRIVEN``: of the jumps by a unit of the next 3 e
@@ -582,8 +574,8 @@ class Likelihood:
                 out = np.empty((np.count_nonzero(counted[at]), 6, count + 1))
                 _core.sensitivities(
                     self.period,
-                    steady.gain,
-                    steady.keep,
+                    self.steady.gain,
+                    self.steady.keep,
                     track.heading[at],
                     track.rotation[at],
                     track.rotors[at],
@@ -597,7 +589,7 @@ class Likelihood:
                     slopes,
                     track.innovations[at],
                     track.disturbance[at],
-                    steady.whitening,
+                    self.steady.whitening,
                     counted[at],
                     state,
                     out,

@@ -45,7 +45,7 @@ class NoiseSearch:
     """
 
     see: Callable[[SteadyFilter, Array], Array]
-    products: Callable[[SteadyFilter, Array], Array]
+    products: Callable[[Array], Array]
     held: Array
     period: float
     gravity: float
@@ -106,7 +106,7 @@ class NoiseSearch:
         """
         steady = self._filter(at)
         slopes, change = self._filter_slopes(at, steady)
-        whole = self.products(steady, slopes)
+        whole = self.products(slopes)
         normal = whole[:-1, :-1]
         right = whole[:-1, -1]
         held = np.tile(self.held, len(PAIRS))

@@ -59,7 +59,7 @@ def test_rotors_that_answer_a_product_of_rates_have_no_innovation_by_it():
     heading = np.tile([1.0, 0.0], (n, 1))
     t = 0.005 * np.arange(n)
     k = np.arange(n)
-    poses = Poses(t, zeros[:, :3], heading, speeds, zeros[:, 0], zeros[:1], k, k, k > 0, 0.005)
+    poses = Poses(t, zeros[:, :3], heading, speeds, zeros[:, 0], zeros[:1], k, k, k > 0)
     track = Track(
         t, zeros[:, :3], level, zeros[:, :3], rate, zeros, between**2 @ mix, zeros, zeros, heading,
         zeros, zeros,
