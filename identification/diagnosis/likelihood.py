@@ -409,7 +409,7 @@ class Likelihood:
 
     def _add_gusts(self) -> None:
         """Add the columns of a wind's changes."""
-        t = self.period * np.arange(len(self._base), dtype=np.float64)
+        t = self.period * np.arange(len(self._base))
         for wind, shape in gusts(t, self.setting, self.flights).items():
             slope = self._slope(wind)[:, :3]
             for k, x in enumerate(shape.T):

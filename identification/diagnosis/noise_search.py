@@ -50,6 +50,7 @@ class NoiseSearch:
     period: float
     gravity: float
 
+    @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
     def likeliest(self, near: PoseNoise, gains: Array) -> tuple[PoseNoise, Array]:
         """Return the noise and the gains (3, e) at maximum likelihood, by damped steps.
 
@@ -87,7 +88,6 @@ class NoiseSearch:
     def _filter(self, at: Array) -> SteadyFilter:
         return steady_filter(_noise(at), self.period, self.gravity)
 
-    @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
     def _height(self, at: Array) -> tuple[float, Array]:
         """Return minus the logarithm of the likelihood and the prior, up to a constant, and the
         innovations (n, 6).
@@ -99,14 +99,16 @@ class NoiseSearch:
         size = np.linalg.slogdet(steady.covariance)[1]
         return float(0.5 * (square + len(seen) * size)), seen
 
-    @np.errstate(over="ignore", invalid="ignore")
     def _slopes(self, at: Array, seen: Array) -> ArrayPair:
         """Return Fisher's information (c, c), and minus the height's gradient (c,), at the
         innovations ``seen`` last.
         """
         steady = self._filter(at)
-        slopes, change = self._filter_slopes(at, steady)
-        whole = self.products(slopes)
+        there = self._filter(at + STEP * np.eye(len(at))[-SEARCHED:])
+        gain = (there.gain - steady.gain).reshape(SEARCHED, 6, 6)
+        slopes = np.concatenate([gain, (there.keep - steady.keep)[..., None]], axis=2) / STEP
+        change = (there.covariance - steady.covariance) / STEP  # (m, 6, 6)
+        whole = self.products(np.moveaxis(slopes, 0, -1))
         normal = whole[:-1, :-1]
         right = whole[:-1, -1]
         held = np.tile(self.held, len(PAIRS))
@@ -119,16 +121,6 @@ class NoiseSearch:
         normal[count:, count:] += 0.5 * len(seen) * np.einsum("mij,lji->ml", share, share)
         right[count:] += 0.5 * np.einsum("mij,ji->m", share, left)
         return normal, right
-
-    def _filter_slopes(self, at: Array, here: SteadyFilter) -> ArrayPair:
-        """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
-        covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
-        """
-        there = self._filter(at + STEP * np.eye(len(at))[-SEARCHED:])
-        gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
-        slopes = np.concatenate([gain, (there.keep - here.keep)[..., None]], axis=2) / STEP
-        change = (there.covariance - here.covariance) / STEP
-        return np.moveaxis(slopes, 0, -1), change
 
 
 def _free(noise: PoseNoise) -> Array:
