@@ -8,7 +8,7 @@ gains, and linear recursions give the derivatives of its innovations, exactly bu
 Rotor speeds move linearly between samples.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -95,7 +95,7 @@ def run(poses: Poses, period: float, vehicle: Vehicle, steady: SteadyFilter, kno
             sample k is read, in the directions of ``Track.innovations``.
     """
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
-    out = Track(poses.t, *(np.empty((len(poses.t), *shape)) for shape in shapes))
+    written = [np.empty((len(poses.t), *shape)) for shape in shapes]
     for at, start in zip(poses.pieces, poses.start, strict=True):
         models = loaded_model(vehicle)[0].copy()
         _core.run_causal_filter(
@@ -109,8 +109,9 @@ def run(poses: Poses, period: float, vehicle: Vehicle, steady: SteadyFilter, kno
             steady.gain,
             steady.keep,
             known[at],
-            *(getattr(out, field.name)[at] for field in fields(out)[1:]),
+            *(x[at] for x in written),
         )
         raise_errors()
-    np.divide(out.rotors, [vehicle.mass, *np.diagonal(vehicle.inertia)], out=out.rotors)
+    out = Track(poses.t, *written)
+    out.rotors[:] /= [vehicle.mass, *np.diagonal(vehicle.inertia)]
     return out

@@ -153,6 +153,7 @@ class Likelihood:
 
         For late or early poses, rotor speeds are moved instead: moved poses would lose noise.
         """
+        flights = self.flights
         late = [e for e in sensing_of(self.vehicle) if is_delay(e.name)]
         offset = sum(x for e in late for x in e.coefficients.values())
         on_time = replace(
@@ -160,16 +161,16 @@ class Likelihood:
         )
         finer = iter(self.finer)
         out = []
-        for at in np.unique(self.flights.log[self.flights.fit_rows]).tolist():
-            rows = np.flatnonzero(self.flights.log == at)
-            undone = undo_log_sensing(self.flights.logs[at], on_time)
+        for at in np.unique(flights.log[flights.fit_rows]).tolist():
+            rows = np.flatnonzero(flights.log == at)
+            undone = undo_log_sensing(flights.logs[at], on_time)
             for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
                 raw = replace(raw, rotor_speeds=raw.rotor_speeds + next(finer, 0.0))
                 raw = with_time_offsets(raw, {ROTOR_TIME_OFFSET.coefficient: offset})
                 q = Rotation.from_matrix(raw.rotation).as_quat(scalar_first=True)
                 n = len(raw.t)
-                near = np.searchsorted(self.flights.t[rows], raw.t).clip(max=len(rows) - 1)
-                counted = self.flights.fit_rows[rows[near]]
+                near = np.searchsorted(flights.t[rows], raw.t).clip(max=len(rows) - 1)
+                counted = flights.fit_rows[rows[near]]
                 counted[: round(SETTLING_TIME / raw.period)] = False
                 out.append(
                     (
@@ -409,7 +410,7 @@ class Likelihood:
 
     def _add_gusts(self) -> None:
         """Add the columns of a wind's changes."""
-        t = self.period * np.arange(len(self._base))
+        t = self.period * np.arange(len(self._base), dtype=np.float64)
         for wind, shape in gusts(t, self.setting, self.flights).items():
             slope = self._slope(wind)[:, :3]
             for k, x in enumerate(shape.T):
@@ -571,7 +572,7 @@ class Likelihood:
             # one block's columns are in memory at a time
             for begin in range(piece.start, piece.stop, length):
                 at = slice(begin, min(begin + length, piece.stop))
-                out = np.empty((np.count_nonzero(counted[at]), 6, count + 1))
+                out = np.empty((counted[at].sum(), 6, count + 1))
                 _core.sensitivities(
                     self.period,
                     self.steady.gain,

@@ -101,7 +101,7 @@ class NoiseSearch:
 
     def _slopes(self, at: Array, seen: Array) -> ArrayPair:
         """Return Fisher's information (c, c), and minus the height's gradient (c,), at the
-        innovations ``seen`` last.
+        innovations ``seen`` last. The filter's derivatives are differences.
         """
         steady = self._filter(at)
         there = self._filter(at + STEP * np.eye(len(at))[-SEARCHED:])
@@ -111,15 +111,14 @@ class NoiseSearch:
         whole = self.products(np.moveaxis(slopes, 0, -1))
         normal = whole[:-1, :-1]
         right = whole[:-1, -1]
-        held = np.tile(self.held, len(PAIRS))
-        count = len(held)
-        normal[range(count), range(count)] += held**-2
-        right[:count] -= at[:count] / held**2
+        prior = np.append(np.tile(self.held**-2, len(PAIRS)), np.zeros(SEARCHED))
+        normal += np.diag(prior)
+        right -= prior * at
         # by the innovations' covariance
         share = np.linalg.solve(steady.covariance, change)  # (m, 6, 6)
         left = np.linalg.solve(steady.covariance, seen.T @ seen) - len(seen) * np.eye(6)
-        normal[count:, count:] += 0.5 * len(seen) * np.einsum("mij,lji->ml", share, share)
-        right[count:] += 0.5 * np.einsum("mij,ji->m", share, left)
+        normal[-SEARCHED:, -SEARCHED:] += 0.5 * len(seen) * np.einsum("mij,lji->ml", share, share)
+        right[-SEARCHED:] += 0.5 * np.einsum("mij,ji->m", share, left)
         return normal, right
 
 

@@ -71,7 +71,7 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     S = P[..., ::3, ::3] + np.eye(2)
     K = P[..., ::3] @ np.linalg.inv(S)
     one, other = pose[..., :, None], pose[..., None, :]
-    units = np.array([1.0, 1.0 / period, 1.0 / period**2])
+    units = period ** -np.arange(3.0)
     gain = K.reshape(*pose.shape, 3, 2) * (one / other)[..., None, :] * units[:, None]
     gain[..., 1, :, :] = gain[..., 1, :, ::-1].copy()  # its own first
     gain = gain.reshape(*keep.shape, 3, 2).take(np.argsort(PAIRS.ravel()), axis=-3)
