@@ -106,7 +106,7 @@ def rank(
         return Likelihood(flights, setting, near, same_noise=True)
 
     def around(best: Likelihood) -> tuple[Starts, Posterior]:
-        starts = starts_of(flights, library, best.setting, {})
+        starts = _starts_of(flights, library, best.setting, {})
         return starts, Posterior(flights, library, (loud, best.base(library, starts)))
 
     def alone(best: Likelihood) -> float:
@@ -116,7 +116,7 @@ def rank(
 
     def first() -> tuple[Likelihood, Starts, Base]:
         nothing = Likelihood(flights, {})
-        starts = starts_of(flights, library, {})
+        starts = _starts_of(flights, library, {})
         return nothing, starts, nothing.base(library, starts)
 
     # made anew at the end if no set is likeliest: its columns of ten minutes take 0.5 GB
@@ -147,7 +147,7 @@ def rank(
     setting = posterior.best_setting()
     if setting.keys() != best.setting.keys():
         best = Likelihood(flights, setting, best, gusty=best.gusty) if setting else first()[0]
-        starts = starts_of(flights, library, setting, *([{}] if setting else []))
+        starts = _starts_of(flights, library, setting, *([{}] if setting else []))
     whole = best.base(library, starts, unknown=True)
     posterior = Posterior(flights, library, (loud, whole), posterior.tempering())
     column, size, gained = posterior.strangest()
@@ -184,7 +184,7 @@ def rank_by_rows(
     first = {e: x for e, x in first.items() if e in library}
     given = frozenset(first)
     first = likelihood.fitted(first)
-    starts = starts_of(flights, library, first)
+    starts = _starts_of(flights, library, first)
     fitted = {given: first}
     bases = {given: likelihood.base(first, starts)}
     idle = set()
@@ -281,7 +281,7 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     return {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
 
 
-def starts_of(
+def _starts_of(
     flights: RegressedFlights, library: Sequence[str], setting: Setting, *others: Setting
 ) -> Starts:
     """Return columns of whole effects outside a setting, with the coefficients of each: lags and
