@@ -333,10 +333,11 @@ def logged_starts(
     ahead = log.period * np.arange(1, max(1, round(horizon / log.period)) + 1)
     each = (np.arange(t0, min(t1, log.t[-1]) - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
+    pieces = log_signals(log)
     states = causal_states(log, vehicle)
     aloft = carried(log.rotor_speeds, log.period) & _off_ground(log, vehicle, states)
     starts, seen = [], []
-    for piece in log_signals(log):
+    for piece in pieces:
         first, last = piece.t[0] + _START_MARGIN, piece.t[-1] - horizon - _END_MARGIN
         inside = times[(times >= first) & (times <= last)]
         rows = np.unique(np.searchsorted(log.t, inside - 0.5 * log.period))

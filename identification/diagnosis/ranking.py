@@ -105,55 +105,55 @@ def rank(
                 break
         return Likelihood(flights, setting, near, same_noise=True)
 
-    def around(best: Likelihood) -> tuple[Starts, Posterior]:
-        starts = _starts_of(flights, library, best.setting, {})
-        return starts, Posterior(flights, library, (loud, best.base(library, starts)))
+    def starts(setting: Setting) -> Starts:
+        return _starts_of(flights, library, setting, *([{}] if setting else []))
+
+    def around(best: Likelihood) -> Posterior:
+        return Posterior(flights, library, (loud, best.base(library, starts(best.setting))))
 
     def alone(best: Likelihood) -> float:
         bases = [best.base(best.setting, {})] * 2
         scores = Posterior(flights, [*best.setting], bases).scores
         return scores.get(frozenset(best.setting), -math.inf)
 
-    def first() -> tuple[Likelihood, Starts, Base]:
-        nothing = Likelihood(flights, {})
-        starts = _starts_of(flights, library, {})
-        return nothing, starts, nothing.base(library, starts)
-
     # made anew at the end if no set is likeliest: its columns of ten minutes take 0.5 GB
-    best, starts, loud = first()
+    best = Likelihood(flights, {})
+    begun = starts({})
+    loud = best.base(library, begun)
     everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
     beside = {c: x for c, (x, _) in everything.items()}
-    posterior = Posterior(flights, library, (loud, best.quieter(beside, starts)))
+    posterior = Posterior(flights, library, (loud, best.quieter(beside, begun)))
     # settings as asked for: beside the end of a fit, a little of other effects moves the request
     tried: dict[Effects, Setting] = {frozenset(): {}}
     # the best effect first, alone: another set's columns are of the model with that effect
     if setting := posterior.best_setting(1):
         best = fitted(setting, best)
-        starts, posterior = around(best)
+        posterior = around(best)
         # a similar effect counts as a disturbance beside it: each is judged beside its own noise
         # one after the other: each holds a tenth of a diagnosis' memory
         each = (fitted(rival, best) for rival in posterior.rivals(setting))
         best = max(chain([best], each), key=alone)
         if best.setting.keys() != setting.keys():
-            starts, posterior = around(best)
+            posterior = around(best)
     for _ in range(ROUNDS):
         # the columns of the same set change with its coefficients, if these have moved far
         setting = posterior.best_setting()
         if not posterior.is_elsewhere(setting, tried):
             break
         best = fitted(setting, best)
-        starts, posterior = around(best)
+        posterior = around(best)
     # once more, with the dictionary's costly columns, beside the likeliest set
     setting = posterior.best_setting()
     if setting.keys() != best.setting.keys():
-        best = Likelihood(flights, setting, best, gusty=best.gusty) if setting else first()[0]
-        starts = _starts_of(flights, library, setting, *([{}] if setting else []))
-    whole = best.base(library, starts, unknown=True)
+        near = best if setting else None
+        best = Likelihood(flights, setting, near, gusty=near is not None and near.gusty)
+    begun = starts(best.setting)
+    whole = best.base(library, begun, unknown=True)
     posterior = Posterior(flights, library, (loud, whole), posterior.tempering())
     column, size, gained = posterior.strangest()
     # among so many columns one explains as much by chance, and no noise beside it is likelier
     by_chance = 2.0 * math.log(len(whole.dictionary))
-    quieter = best.quieter({column: size}, starts) if gained > by_chance else None
+    quieter = best.quieter({column: size}, begun) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
     gains = posterior.leave_out_needless(ranking.probability)
     late = {c.coefficient: x for c, x in posterior.nuisances().items() if c in flights.offsets}

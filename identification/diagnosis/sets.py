@@ -1,10 +1,10 @@
 """The posterior over sets of effects, from sums of products beside some of the sets."""
 
 import math
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from scipy.special import logsumexp, softmax
@@ -58,6 +58,11 @@ class _Candidate:
     @property
     def columns(self) -> list[Column]:
         return [c for columns in self.variants for c in columns]
+
+    @property
+    def fitted(self) -> Index:
+        """The indices of the nuisances and of the set's columns."""
+        return np.append(self.base.plain, self.base.at(self.columns))
 
 
 def is_possible(
@@ -130,12 +135,16 @@ class Posterior:
         for i in range(0 if self.one_noise else 1, len(bases)):
             self._search(i)
         if not self.one_noise:
-            likeliest = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-            self._search(0, [self.known[k].variants for k in likeliest[:KEPT_ASKED]])
+            self._search(0, [self.known[k].variants for k in self._ranked[:KEPT_ASKED]])
 
-    def _likeliest(self) -> tuple[Base, _Candidate]:
-        best = self._needed or self.known[max(self.scores, key=self.scores.__getitem__)]
-        return best.base, best
+    @property
+    def _ranked(self) -> list[Effects]:
+        """The sets, the likeliest first."""
+        return sorted(self.scores, key=self.scores.__getitem__, reverse=True)
+
+    @property
+    def _likeliest(self) -> _Candidate:
+        return self._needed or self.known[self._ranked[0]]
 
     def leave_out_needless(self, probability: Values) -> dict[str, Pair]:
         """Put the likeliest set's needed effects in its place, and return each effect's gain
@@ -147,7 +156,8 @@ class Posterior:
         Args:
             probability: each effect's probability.
         """
-        base, best = self._likeliest()
+        best = self._likeliest
+        base = best.base
         columns = best.columns
         left_out = LeftOut(base, columns, self.power)
         m = base.marginal(columns, base.plain, self.power)
@@ -171,9 +181,8 @@ class Posterior:
 
     def tempering(self) -> float:
         """Return the power of the likelihood by the scatter beside the likeliest set."""
-        base, best = self._likeliest()
-        fitted = np.sort(np.append(base.plain, base.at(best.columns)))
-        return tempering(base.blocks, np.searchsorted(base.single, fitted))
+        best = self._likeliest
+        return tempering(best.base.blocks, np.searchsorted(best.base.single, np.sort(best.fitted)))
 
     def _of_any_flight(self, base: Base) -> tuple[Index, Array]:
         """Return the columns of everything any flight may have, and of a little of every effect,
@@ -186,23 +195,23 @@ class Posterior:
             little[[c.part == Part.START for c in base.asked]] = 0.0
         return np.append(base.plain, at), np.append(np.ones(len(base.plain)), little)
 
-    def _variants(self, base: Base) -> list[Variant]:
-        out = []
+    def _variants(self, base: Base) -> dict[str, list[Variant]]:
+        """Return the variants of each effect with columns in a base."""
+        out = {}
         for effect in self.library:
-            for columns in variants_of(self.flights, effect, base.effects, base.starts):
-                known = tuple(c for c in columns if c in base.columns)
-                # a balance does not see the point of action
-                if known and (self.one_noise or known == columns):
-                    out.append(known)
+            every = variants_of(self.flights, effect, base.effects, base.starts)
+            seen = (tuple(c for c in v if c in base.columns) for v in every)
+            # a balance does not see the point of action
+            if own := [v for v in seen if v and (self.one_noise or v in every)]:
+                out[effect] = own
         return out
 
     def _search(self, number: int, asked: Sequence[Variants] = ()) -> None:
         base = self.bases[number]
         others, little = self._of_any_flight(base)
         m = base.marginal(base.asked, others, self.power, little)
-        variants = self._variants(base)
-        ways = Counter(v[0].effect for v in variants)
-        before = {e: self.odds - math.log(count) for e, count in ways.items()}
+        ways = self._variants(base)
+        variants = [*chain.from_iterable(ways.values())]
         tried = base.tried.setdefault(self.power, {})
 
         def score(some: Variants) -> float:
@@ -225,7 +234,7 @@ class Posterior:
                         tried[some] = new.evidence
             if (evidence := tried[some]) is None:
                 return -math.inf
-            total = evidence.log_evidence + sum(before[e] for e in key)
+            total = evidence.log_evidence + sum(self.odds - math.log(len(ways[e])) for e in key)
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
                 self.known[key] = _Candidate(base, some, evidence)
@@ -295,25 +304,26 @@ class Posterior:
         """Return the log-likelihood ratio of the likeliest set with an effect to the likeliest
         without it, less the prior odds.
         """
-        value = {key: x - self.odds * len(key) for key, x in self.scores.items()}
-        have = max(x for key, x in value.items() if effect in key)
-        return have - max((x for key, x in value.items() if effect not in key), default=-math.inf)
+        value = {False: -math.inf}
+        for key, x in self.scores.items():
+            has = effect in key
+            value[has] = max(value.get(has, -math.inf), x - self.odds * len(key))
+        return value[True] - value[False]
 
     def factor_in_set(self, effect: str) -> float:
         """Return the logarithm of the Bayes factor of the likeliest set over the same without an
         effect, with nothing in its place.
         """
-        base, best = self._likeliest()
-        m = base.marginal(base.asked, base.plain, self.power)
-        whole, rest = (
-            m.evidence([m.place[c] for c in best.columns if c.effect != out])
-            for out in ("", effect)
-        )
-        return whole.log_evidence - rest.log_evidence
+        best = self._likeliest
+        m = best.base.marginal(best.columns, best.base.plain, self.power)
+        rest = [i for c, i in m.place.items() if c.effect != effect]
+        whole = m.evidence(range(len(m.place)))
+        return whole.log_evidence - m.evidence(rest).log_evidence
 
     def left(self) -> float:
         """Return the deviance left by the likeliest set, with the nuisances integrated out."""
-        base, best = self._likeliest()
+        best = self._likeliest
+        base = best.base
         m = base.marginal(best.columns, base.plain, self.power).quadratic
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
@@ -329,30 +339,29 @@ class Posterior:
         right = m.quadratic.right
         normal = m.quadratic.normal + np.eye(len(asked))
         whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
-        out: NamedNumbers = {}
-        for v in self._variants(base):
-            if (effect := v[0].effect) not in self.given:
-                gained = m.explained([m.place[c] for c in v])
-                out[effect] = max(out.get(effect, 0.0), gained / whole)
-        return out
+        return {
+            e: max(m.explained([m.place[c] for c in v]) for v in own) / whole
+            for e, own in self._variants(base).items()
+            if e not in self.given
+        }
 
     def nuisances(self) -> dict[Column, Pair]:
         """Return the nuisances of any flight at the mode beside the likeliest set: values and
         standard deviations.
         """
-        base, best = self._likeliest()
-        fitted = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
-        return {c: x for c, x in fitted.items() if not c.effect}
+        best = self._likeliest
+        modes = best.base.mode(best.fitted, self.power)
+        return {c: x for c, x in modes.items() if not c.effect}
 
     def shown(self, known: Sequence[Column] = ()) -> NamedNumbers:
         """Return the change of the deviance by a typical size of each effect outside the likeliest
         set; ``known``: nuisances taken as fully known.
         """
-        base, best = self._likeliest()
-        others = np.append(np.setdiff1d(base.plain, base.at(known)), base.at(best.columns))
-        m = base.marginal(base.asked, others, self.power)
+        best = self._likeliest
+        base = best.base
+        m = base.marginal(base.asked, np.setdiff1d(best.fitted, base.at(known)), self.power)
         out: NamedNumbers = {}
-        for columns in self._variants(base):
+        for columns in chain.from_iterable(self._variants(base).values()):
             effect = columns[0].effect
             if columns[0].part == Part.START or effect in {c.effect for c in best.columns}:
                 continue
@@ -366,7 +375,7 @@ class Posterior:
         """Return the likelihood of a base's dictionary beside the base's columns of the likeliest
         set.
         """
-        own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
+        own = base.at(c for c in self._likeliest.columns if c in base.columns)
         # an effect of the set is true to some per cent, whatever makes it change
         changing = base.at(c for c in base.columns if c.part == Part.CHANGING)
         others, little = self._of_any_flight(base)
@@ -381,20 +390,21 @@ class Posterior:
 
     def best_setting(self, most: float = math.inf) -> Setting:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
-        key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
+        key = next(k for k in self._ranked if len(k) <= most)
         return self._at_mode(self.known[key])[0]
 
     def likeliest_setting(self) -> Setting:
         """Return the coefficients of the likeliest set, or of its needed effects alone."""
-        return self._at_mode(self._likeliest()[1])[0]
+        return self._at_mode(self._likeliest)[0]
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects with, each alone, at least half of
         a setting's gain.
         """
         least = 0.5 * (self.scores.get(frozenset(setting), -math.inf) + self.scores[frozenset()])
-        keys = [k for k, x in self.scores.items() if len(k) == 1 and x > least and k - {*setting}]
-        keys.sort(key=self.scores.__getitem__, reverse=True)
+        keys = [
+            k for k in self._ranked if len(k) == 1 and self.scores[k] > least and k - {*setting}
+        ]
         return [self._at_mode(self.known[k])[0] for k in keys[:MOST_RIVALS]]
 
     def is_elsewhere(self, new: Setting, tried: Mapping[Effects, Setting]) -> bool:
@@ -440,7 +450,7 @@ class Posterior:
         """Return probabilities; ``quieter`` as of ``structure``."""
         p = dict(zip(self.scores, softmax([*self.scores.values()]).tolist(), strict=True))
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
-        best = sorted(p, key=p.__getitem__, reverse=True)
+        best = self._ranked
         sets = tuple(
             RankedSet(
                 tuple(sorted(key)),

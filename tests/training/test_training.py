@@ -59,9 +59,7 @@ def make_env(config, seed=0):
     )
 
 
-@pytest.mark.parametrize(
-    "algorithm", mostly_slow(LEARNERS, {"sac", "recurrent-ppo"}.__contains__)
-)
+@pytest.mark.parametrize("algorithm", mostly_slow(LEARNERS, {"sac", "recurrent-ppo"}.__contains__))
 def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
     config = tiny(algorithm)
     train(config, "base", 3, tmp_path / "whole")

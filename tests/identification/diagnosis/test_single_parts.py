@@ -17,7 +17,7 @@ from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY, delays_at_bound
 from windwrench.identification.diagnosis.priors import prior_size
-from windwrench.identification.diagnosis.ranking import rank, _starts_of
+from windwrench.identification.diagnosis.ranking import _starts_of, rank
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.starting_points import starting_points
 from windwrench.identification.diagnosis.traces import ORDER, carrying_channels
