@@ -81,10 +81,9 @@ def diagnose(
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
     fit = fit_sets(flights, [n for n in names() if n not in without], report)
-    judgement = judged(fit, settings)
-    effects = judgement.effects
+    effects, not_needed, doubts, probabilities = judged(fit, settings)
     structure = _structure(fit)
-    noisy = fit.residual.noisy or is_beyond_calm(fit.posterior.gusts, vehicle) or fit.pushes
+    noisy = fit.residual.noisy or is_beyond_calm(fit.gusts, vehicle) or fit.pushes
     remainder = "structured" if structure else "random" if noisy else "none"
     sure = remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
@@ -96,13 +95,13 @@ def diagnose(
     report("predicting the flights")
     named = {e: x for e, x in fit.setting.items() if e}
     amended = flights.amended(named) if named else vehicle
-    posterior = fit.posterior.posterior
+    posterior = fit.posterior
     said = [effect.name for effect in effects]
     notes += [
         *inertial_notes(flights, said),
-        *(sentence for sentences in judgement.doubts.values() for sentence in sentences),
+        *(sentence for sentences in doubts.values() for sentence in sentences),
         *cancelling({e: fit.parts[e] for e in said}, fit.residual.after),
-        *late_rotors(flights, fit.posterior.setting, fit.posterior.sensors),
+        *late_rotors(flights, fit.needed, fit.sensors),
         *delays_at_bound(fit.setting),
         *outside_the_fit(flights),
     ]
@@ -119,8 +118,8 @@ def diagnose(
     return Diagnosis(
         verdict=verdict,
         remainder=remainder,
-        effects=effects,
-        not_needed=judgement.not_needed,
+        effects=tuple(effects),
+        not_needed=tuple(not_needed),
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
         before=Errors(*residual.error_before, *predicted[vehicle]),
         after=Errors(*residual.error_after, *predicted[amended]),
@@ -135,7 +134,7 @@ def diagnose(
             for e in effects
         ),
         structure=structure,
-        gusts=fit.posterior.gusts,
+        gusts=fit.gusts,
         pushes=tuple(fit.pushes),
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
@@ -146,9 +145,9 @@ def diagnose(
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(hidden),
-        doubts=judgement.doubts,
-        ranking=fit.posterior.ranking,
-        probabilities=judgement.probabilities,
+        doubts=doubts,
+        ranking=fit.ranking,
+        probabilities=probabilities,
     )
 
 
@@ -156,9 +155,9 @@ def _structure(fit: SetFit) -> tuple[Structure, ...]:
     """Return the dictionary's best column beside the likeliest set, if a cause outside the library
     is likely and shows there.
     """
-    if fit.strange <= 0.5 or fit.posterior.ranking.structure <= 0.0:
+    if fit.strange <= 0.5 or fit.ranking.structure <= 0.0:
         return ()
-    posterior = fit.posterior.posterior
+    posterior = fit.posterior
     c, _, gained = posterior.strangest()
     where = f"{CHANNELS[c.number]} with {c.coefficient}"
     if c.part == Part.CHANGING:

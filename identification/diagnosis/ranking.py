@@ -12,7 +12,7 @@ a fitted one.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 
@@ -51,14 +51,14 @@ class FittedPosterior:
 
     posterior: Posterior
     ranking: Ranking
-    setting: Setting  # coefficients of the likeliest set's needed effects
+    needed: Setting  # coefficients of the likeliest set's needed effects
     gains: Mapping[str, Pair]  # as of ``Posterior.leave_out_needless``
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
-    gusts: tuple[Disturbance, ...] = ()
+    gusts: tuple[Disturbance, ...]
     # biases and time offsets of the sensors, with their standard deviations
-    sensors: Mapping[str, Pair] = field(default_factory=dict)
+    sensors: Mapping[str, Pair]
     # for each effect of the set: effects hidden in these logs that do as well in its place
-    behind: Mapping[str, Names] = field(default_factory=dict)
+    behind: Mapping[str, Names]
 
 
 def rank(
@@ -158,7 +158,7 @@ def rank(
     gains = posterior.leave_out_needless(ranking.probability)
     late = {c.coefficient: x for c, x in posterior.nuisances().items() if c in flights.offsets}
     return FittedPosterior(
-        posterior, ranking, posterior.likeliest_setting(), gains, best.gusts(), late
+        posterior, ranking, posterior.likeliest_setting(), gains, best.gusts(), late, {}
     )
 
 
@@ -256,8 +256,9 @@ def rank_by_rows(
         ranking,
         setting,
         gains,
-        sensors=likelihood.sensors(setting),
-        behind=_behind(likelihood, setting),
+        (),
+        likelihood.sensors(setting),
+        _behind(likelihood, setting),
     )
 
 

@@ -182,7 +182,7 @@ class Posterior:
     def tempering(self) -> float:
         """Return the power of the likelihood by the scatter beside the likeliest set."""
         best = self._likeliest
-        return tempering(best.base.blocks, np.searchsorted(best.base.single, np.sort(best.fitted)))
+        return tempering(best.base.blocks, np.searchsorted(best.base.single, best.fitted))
 
     def _of_any_flight(self, base: Base) -> tuple[Index, Array]:
         """Return the columns of everything any flight may have, and of a little of every effect,
@@ -216,14 +216,10 @@ class Posterior:
 
         def score(some: Variants) -> float:
             key = frozenset(v[0].effect for v in some)
-            if self.one_noise:
-                most = max(len(x.effects) for x in self.bases if x.effects <= key)
-                judged = key not in self.idle and len(base.effects) == most
-            else:  # another base has the columns of this set
-                judged = number > 0 or not any(
-                    x.effects and key >= x.effects for x in self.bases[1:]
-                )
-            if len(key) < len(some) or not judged:
+            most = max((len(x.effects) for x in self.bases if x.effects <= key), default=0)
+            # else another base has more of the columns of this set
+            judged = len(base.effects) == most or (number > 0 and not self.one_noise)
+            if len(key) < len(some) or key in self.idle or not judged:
                 return -math.inf
             if some not in tried:
                 tried[some] = None
@@ -260,8 +256,7 @@ class Posterior:
         asked = [
             c.effect
             for c, *_ in candidate.variants
-            if get(c.effect).possible or (self.one_noise and get(c.effect).implausible)
-            if c.part != Part.START
+            if c.part != Part.START and (get(c.effect).possible or get(c.effect).implausible)
         ]
         setting, std = self._at_mode(candidate) if asked else ({}, {})
         return all(is_possible(self.flights, setting, std[e], e, self.one_noise) for e in asked)
