@@ -47,7 +47,8 @@ from .log_offsets import (
 )
 from .noise_search import FIRST_TIME, SETTLING_TIME, NoiseSearch
 from .priors import (
-    PRIORS,
+    GAINS,
+    MODEL_ERROR,
     Base,
     Setting,
     Starts,
@@ -241,7 +242,7 @@ class Likelihood:
             each = self._changes(steady, jumps, shares=own, slopes=slopes)
             return functools.reduce(np.add, (x.T @ x for _, x in each))
 
-        held = np.array(PRIORS.gains)[JUMP_STATE]
+        held = np.array(GAINS)[JUMP_STATE]
         search = NoiseSearch(see, products, held, self.period, self.vehicle.gravity)
         self.noise, self.gains = search.likeliest(self.noise, self.gains)
         self._run(self.steady, jumps, self.gains)
@@ -453,7 +454,7 @@ class Likelihood:
         whole, _ = self._state
         expected = whole.rotors[:, 1:] - np.concatenate(self.answers)[:, 1:]
         share = rounded / np.maximum(expected.var(axis=0), rounded)
-        scale = np.hypot(1.0, share / PRIORS.model_error)
+        scale = np.hypot(1.0, share / MODEL_ERROR)
         for i, axis in enumerate("xyz"):
             own = along_axis(3 + i, whole.rotation)
             errors = {

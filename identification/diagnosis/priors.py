@@ -29,31 +29,24 @@ Setting = dict[str, NamedNumbers]
 Starts = Mapping[Column, Values]
 
 
-@dataclass(frozen=True)
-class _PriorSettings:
-    """Beliefs before a flight is seen."""
-
-    expected: float = 1.0  # number of effects missing in a model
-    # typical sizes: every effect acts a little, and none up to this size is worth a name. The
-    # standard deviation of any coefficient of an unnamed effect
-    negligible: float = 0.03
-    any_size: float = 3.0  # typical sizes, of effects of any size; of others one
-    most_missing_mass: float = 0.9  # share of the declared mass a vehicle may lack
-    # times a column's own lag or delay: range in which the column stands for it
-    near_start: Pair = (0.5, 1.5)
-    # error of any model as a share of an axis' force or torque: of thrust along its axis and across
-    # it, and of the torques. Propellers and bearings are not stable to less
-    model_error: float = 0.003
-    # standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
-    # units of one period of such an acceleration. They leave the gains free: a loop that shows the
-    # tilt it sees has gains of some 3,000, 100 and 1
-    gains: tuple[float, float, float] = (1e4, 1e3, 1e2)
-    # second differences of the rotor speeds: standard deviation of their path between samples from
-    # a straight line
-    between_samples: float = 0.5
-
-
-PRIORS = _PriorSettings()
+EXPECTED = 1.0  # number of effects missing in a model, before a flight is seen
+# typical sizes: every effect acts a little, and none up to this size is worth a name. The standard
+# deviation of any coefficient of an unnamed effect
+NEGLIGIBLE = 0.03
+ANY_SIZE = 3.0  # typical sizes, of effects of any size; of others one
+MOST_MISSING_MASS = 0.9  # share of the declared mass a vehicle may lack
+# times a column's own lag or delay: range in which the column stands for it
+NEAR_START = (0.5, 1.5)
+# error of any model as a share of an axis' force or torque: of thrust along its axis and across it,
+# and of the torques. Propellers and bearings are not stable to less
+MODEL_ERROR = 0.003
+# standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
+# units of one period of such an acceleration. They leave the gains free: a loop that shows the tilt
+# it sees has gains of some 3,000, 100 and 1
+GAINS = (1e4, 1e3, 1e2)
+# second differences of the rotor speeds: standard deviation of their path between samples from a
+# straight line
+BETWEEN_SAMPLES = 0.5
 # columns of one variant of an effect: all coefficients, or one of its starting points
 Variant = tuple[Column, ...]
 Variants = tuple[Variant, ...]  # of a set, one of each effect
@@ -212,16 +205,16 @@ def prior_size(column: Column, flights: RegressedFlights) -> float:
     """Return the standard deviation of a column's coefficient before a flight is seen."""
     match column.part:
         case Part.BETWEEN_SAMPLES:
-            return PRIORS.between_samples
+            return BETWEEN_SAMPLES
         case Part.GAIN:
-            return PRIORS.gains[column.number]
+            return GAINS[column.number]
         case Part.MODEL_ERROR:
-            return PRIORS.model_error
+            return MODEL_ERROR
     size = typical_size(column, flights.vehicle)
     if not column.effect or column.part == Part.START or column.coefficient == CENTRAL:
         return size
     effect = get(column.effect)
-    size *= PRIORS.any_size if effect.any_size else 1.0
+    size *= ANY_SIZE if effect.any_size else 1.0
     return math.hypot(size, flights.thrust_std) if effect.role == Role.THRUST else size
 
 
@@ -229,12 +222,12 @@ def _bounds(column: Column, flights: RegressedFlights) -> Pair:
     if not column.effect:
         return -math.inf, math.inf
     if column.part == Part.START:
-        return PRIORS.near_start if moves_time(column.effect) else (0.0, math.inf)
+        return NEAR_START if moves_time(column.effect) else (0.0, math.inf)
     c = coefficient(column)
     low = c.minimum
     high = min(c.maximum, c.plausible)
     if get(column.effect).role == Role.MASS:
-        low = max(low, -PRIORS.most_missing_mass * unit_of_change(column, flights.vehicle))
+        low = max(low, -MOST_MISSING_MASS * unit_of_change(column, flights.vehicle))
     own = declared(column, flights)
     return min(low - own, 0.0), max(high - own, 0.0)
 

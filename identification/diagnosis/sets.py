@@ -18,7 +18,8 @@ from .discrepancy import SHARE_OF_EFFECT
 from .evidence import Index, Marginal, SetEvidence, evidence_of_one_more, tempering
 from .left_out import LeftOut
 from .priors import (
-    PRIORS,
+    EXPECTED,
+    NEGLIGIBLE,
     Base,
     Setting,
     Variant,
@@ -125,7 +126,7 @@ class Posterior:
         self.idle = idle
         self.given = given or frozenset()
         self.one_noise = given is not None
-        inclusion = min(PRIORS.expected / max(len(library) - len(self.given), 1), 0.5)
+        inclusion = min(EXPECTED / max(len(library) - len(self.given), 1), 0.5)
         self.odds = math.log(inclusion / (1.0 - inclusion))  # before the flight, of an effect
         self.known: dict[Effects, _Candidate] = {}
         self.scores: dict[Effects, float] = {}
@@ -189,7 +190,7 @@ class Posterior:
         with standard deviations.
         """
         at = base.at(base.asked)
-        little = PRIORS.negligible * base.typical[at]
+        little = NEGLIGIBLE * base.typical[at]
         # a start of another base is no small effect
         if self.one_noise:
             little[[c.part == Part.START for c in base.asked]] = 0.0
