@@ -57,10 +57,10 @@ def linearised(
     within the limits of the coefficients.
     """
     m = base.marginal(base.asked, base.plain, power)
-    every = range(len(m.at))
-    size = base.size[m.at]
+    every = range(len(m.place))
+    size = base.size[base.at(m.place)]
     z = from_declared(base.asked, flights, setting)
-    value = 0.5 * (float(z @ z) - m.quadratic.explained(every, z)) - m.quadratic.constant
+    value = 0.5 * (float(z @ z) - m.explained(every, z)) - m.constant
 
     def target() -> Setting:
         out = {e: dict(values) for e, values in setting.items()}

@@ -100,7 +100,12 @@ class Base:
         products = power * self.total
         products[-1, -1] += power * self.penalty
         at = self.at(asked)
-        return _Asked(self, asked, at, marginal(products, at, others, size))
+        return _Asked(
+            **vars(marginal(products, at, others, size)),
+            place={c: i for i, c in enumerate(asked)},
+            low=self.low[at],
+            high=self.high[at],
+        )
 
     def mode(self, chosen: Index, power: float = 1.0, draw: bool = False) -> dict[Column, Pair]:
         """Return the coefficients of some columns at the mode without all others, or a draw about
@@ -160,26 +165,20 @@ class Base:
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Asked(Marginal):
     """The likelihood of some columns of a base, with all others integrated out."""
 
-    base: Base
-    columns: Sequence[Column]
-    at: Index  # in the base
-    quadratic: Marginal
-
-    @cached_property
-    def place(self) -> dict[Column, int]:
-        """The index of each column."""
-        return {c: i for i, c in enumerate(self.columns)}
+    place: dict[Column, int]  # the index of each column
+    low: Array
+    high: Array
 
     def evidence(self, index: Sequence[int]) -> SetEvidence:
         """Return the evidence of some of the columns, by their index."""
-        return set_evidence(self.quadratic, index, self.base.low[self.at], self.base.high[self.at])
+        return set_evidence(self, index, self.low, self.high)
 
-    def explained(self, index: Sequence[int]) -> float:
+    def gain(self, index: Sequence[int]) -> float:
         """Return the deviance explained by some of the columns, by their index."""
-        return self.quadratic.explained(index, self.evidence(index).mode)
+        return self.explained(index, self.evidence(index).mode)
 
 
 def variants_of(

@@ -275,7 +275,7 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     m = base.marginal(base.asked, base.plain, likelihood.power)
 
     def explained(effects: set[str]) -> float:
-        return m.explained([i for c, i in m.place.items() if c.effect in effects])
+        return m.gain([i for c, i in m.place.items() if c.effect in effects])
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)

@@ -320,7 +320,7 @@ class Posterior:
         """Return the deviance left by the likeliest set, with the nuisances integrated out."""
         best = self._likeliest
         base = best.base
-        m = base.marginal(best.columns, base.plain, self.power).quadratic
+        m = base.marginal(best.columns, base.plain, self.power)
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
@@ -332,11 +332,11 @@ class Posterior:
         asked = [c for c in base.asked if c.effect not in self.given]
         always = base.at(c for c in base.asked if c.effect in self.given)
         m = base.marginal(asked, np.append(base.plain, always), self.power)
-        right = m.quadratic.right
-        normal = m.quadratic.normal + np.eye(len(asked))
+        right = m.right
+        normal = m.normal + np.eye(len(asked))
         whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
         return {
-            e: max(m.explained([m.place[c] for c in v]) for v in own) / whole
+            e: max(m.gain([m.place[c] for c in v]) for v in own) / whole
             for e, own in self._variants(base).items()
             if e not in self.given
         }
@@ -364,7 +364,7 @@ class Posterior:
             sign = np.sign([coefficient(c).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
             i = [m.place[c] for c in columns]
-            out[effect] = max(float(z @ m.quadratic.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
+            out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
 
     def _dictionary_beside_best(self, base: Base) -> Marginal:
@@ -382,7 +382,7 @@ class Posterior:
             np.concatenate([others, own, changing]),
             self.power if varied else ROUNDED * self.power,
             np.append(little, wrong),
-        ).quadratic
+        )
 
     def best_setting(self, most: float = math.inf) -> Setting:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
