@@ -5,7 +5,7 @@ of blocks, or logs, outside the fit.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -128,7 +128,18 @@ def diagnose(
         advice=tuple(advice(effects, sorted(unseen), remainder, flights.filtered, hidden)),
         notes=tuple(dict.fromkeys(notes)),
         candidates=tuple(Candidate(e, gain, e in said) for e, gain in alone),
-        traces=tuple(_traces(fit)),
+        traces=tuple(
+            Trace(
+                flights.logs[flights.log[rows[0]]].name,
+                flights.period,
+                flights.t[rows],
+                residual.before[rows],
+                residual.after[rows],
+                ~flights.fit_rows[rows],
+                {effect: part[rows] for effect, part in fit.parts.items()},
+            )
+            for rows in flights.runs
+        ),
         signatures=tuple(
             signature(flights, fit.setting, e.name, fit.parts[e.name], residual.after)
             for e in effects
@@ -165,26 +176,11 @@ def _structure(fit: SetFit) -> tuple[Structure, ...]:
     return (Structure(c.group, where, gained / posterior.left()),)
 
 
-def _traces(fit: SetFit) -> Iterator[Trace]:
-    """Yield the residual of each piece of flight over time."""
-    flights = fit.flights
-    for rows in flights.runs:
-        yield Trace(
-            flights.logs[flights.log[rows[0]]].name,
-            flights.period,
-            flights.t[rows],
-            fit.residual.before[rows],
-            fit.residual.after[rows],
-            ~flights.fit_rows[rows],
-            {effect: part[rows] for effect, part in fit.parts.items()},
-        )
-
-
 def _segments(flights: RegressedFlights) -> list[tuple[int, float, float]]:
     """Return the held-out stretches of flight: log, from, to (s)."""
     blocks = np.unique(flights.block[~flights.fit_rows])
     ends = [np.flatnonzero(flights.block == b)[[0, -1]] for b in blocks]
-    return [(int(flights.log[a]), float(flights.t[a]), float(flights.t[b])) for a, b in ends]
+    return [(int(flights.log[a]), *flights.t[[a, b]].tolist()) for a, b in ends]
 
 
 def _predicted(

@@ -58,6 +58,7 @@ class SetFit(FittedPosterior):
         residual: with them.
         parts: growth of the residual (rows, 6) with one effect left out.
         pushes: transient disturbances.
+        strange: probability of a cause outside the library.
     """
 
     flights: RegressedFlights
@@ -66,16 +67,12 @@ class SetFit(FittedPosterior):
     residual: Balance
     parts: Mapping[str, Array]
     pushes: Sequence[TransientDisturbance]
+    strange: float
 
     @property
     def best(self) -> RankedSet:
         """The likeliest set."""
         return self.ranking.sets[0]
-
-    @property
-    def strange(self) -> float:
-        """Probability of a cause outside the library."""
-        return unknown(self.ranking.structure, bool(self.pushes))
 
 
 def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) -> SetFit:
@@ -91,7 +88,7 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
         else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
     )
     sensors = {name: value for name, (value, _) in likeliest.sensors.items()}
-    known_apart = {**given.fixed, **({"": sensors} if sensors else {})}
+    known_apart = {**given.fixed, "": sensors}
     # no set with a larger error on held-out flight is printed
     for fitted in (likeliest, replace(likeliest, needed={}, behind={})):
         setting = known_apart | fitted.needed
@@ -108,6 +105,7 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
         residual=residual,
         parts=parts,
         pushes=pushes,
+        strange=unknown(fitted.ranking.structure, bool(pushes)),
     )
 
 

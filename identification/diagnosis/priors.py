@@ -172,13 +172,17 @@ class _Asked(Marginal):
     low: Array
     high: Array
 
-    def evidence(self, index: Sequence[int]) -> SetEvidence:
-        """Return the evidence of some of the columns, by their index."""
-        return set_evidence(self, index, self.low, self.high)
+    def index(self, columns: Iterable[Column]) -> list[int]:
+        """Return the indices of some of the columns."""
+        return [self.place[c] for c in columns]
 
-    def gain(self, index: Sequence[int]) -> float:
-        """Return the deviance explained by some of the columns, by their index."""
-        return self.explained(index, self.evidence(index).mode)
+    def evidence(self, columns: Iterable[Column]) -> SetEvidence:
+        """Return the evidence of some of the columns."""
+        return set_evidence(self, self.index(columns), self.low, self.high)
+
+    def gain(self, columns: Sequence[Column]) -> float:
+        """Return the deviance explained by some of the columns."""
+        return self.explained(self.index(columns), self.evidence(columns).mode)
 
 
 def variants_of(

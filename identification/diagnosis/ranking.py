@@ -155,11 +155,9 @@ def rank(
     by_chance = 2.0 * math.log(len(whole.dictionary))
     quieter = best.quieter({column: size}, begun) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
-    gains = posterior.leave_out_needless(ranking.probability)
+    setting, gains = posterior.leave_out_needless(ranking.probability)
     late = {c.coefficient: x for c, x in posterior.nuisances().items() if c in flights.offsets}
-    return FittedPosterior(
-        posterior, ranking, posterior.likeliest_setting(), gains, best.gusts(), late, {}
-    )
+    return FittedPosterior(posterior, ranking, setting, gains, best.gusts(), late, {})
 
 
 def rank_by_rows(
@@ -247,9 +245,8 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
-    ranking = last.ranking()
-    gains = last.leave_out_needless(ranking.probability)
-    setting = last.likeliest_setting()
+    ranking = last.ranking(None)
+    setting, gains = last.leave_out_needless(ranking.probability)
     setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
     return FittedPosterior(
         last,
@@ -275,7 +272,7 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     m = base.marginal(base.asked, base.plain, likelihood.power)
 
     def explained(effects: set[str]) -> float:
-        return m.gain([i for c, i in m.place.items() if c.effect in effects])
+        return m.gain([c for c in m.place if c.effect in effects])
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)

@@ -147,9 +147,9 @@ class Posterior:
     def _likeliest(self) -> _Candidate:
         return self._needed or self.known[self._ranked[0]]
 
-    def leave_out_needless(self, probability: Values) -> dict[str, Pair]:
-        """Put the likeliest set's needed effects in its place, and return each effect's gain
-        together with the effects already left out: nats, and its standard error.
+    def leave_out_needless(self, probability: Values) -> tuple[Setting, dict[str, Pair]]:
+        """Put the likeliest set's needed effects in its place, and return their coefficients, and
+        each effect's gain together with the effects already left out: nats, and its standard error.
 
         A gain must exceed the odds against these effects before the flight. The least probable
         effect goes first: another may need its place.
@@ -172,12 +172,12 @@ class Posterior:
                 kept = {v[0].effect for v in rest}
                 less = [i for i, c in enumerate(columns) if c.effect in kept]
                 gained, std = gains[effect] = left_out.gain(less)
-                smaller = _Candidate(base, rest, m.evidence(less))
+                smaller = _Candidate(base, rest, m.evidence(chain.from_iterable(rest)))
                 least = left_out.least * std - self.odds * len(every - kept)
                 if gained < least and self._possible(smaller):
                     weak[probability[effect], gained / (std + 1e-9)] = smaller
             if not weak:
-                return gains
+                return self._at_mode(best)[0], gains
             self._needed = best = weak[min(weak)]
 
     def tempering(self) -> float:
@@ -225,8 +225,7 @@ class Posterior:
             if some not in tried:
                 tried[some] = None
                 with suppress(np.linalg.LinAlgError):
-                    index = [m.place[c] for v in some for c in v]
-                    new = _Candidate(base, some, m.evidence(index))
+                    new = _Candidate(base, some, m.evidence(chain.from_iterable(some)))
                     if self._possible(new):
                         tried[some] = new.evidence
             if (evidence := tried[some]) is None:
@@ -262,7 +261,7 @@ class Posterior:
         setting, std = self._at_mode(candidate) if asked else ({}, {})
         return all(is_possible(self.flights, setting, std[e], e, self.one_noise) for e in asked)
 
-    def structure(self, quieter: Base | None = None) -> float:
+    def structure(self, quieter: Base | None) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
 
         Each group of the dictionary is equally likely to have the column, and so is each column of
@@ -312,9 +311,8 @@ class Posterior:
         """
         best = self._likeliest
         m = best.base.marginal(best.columns, best.base.plain, self.power)
-        rest = [i for c, i in m.place.items() if c.effect != effect]
-        whole = m.evidence(range(len(m.place)))
-        return whole.log_evidence - m.evidence(rest).log_evidence
+        rest = m.evidence(c for c in best.columns if c.effect != effect)
+        return m.evidence(best.columns).log_evidence - rest.log_evidence
 
     def left(self) -> float:
         """Return the deviance left by the likeliest set, with the nuisances integrated out."""
@@ -336,7 +334,7 @@ class Posterior:
         normal = m.normal + np.eye(len(asked))
         whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
         return {
-            e: max(m.gain([m.place[c] for c in v]) for v in own) / whole
+            e: max(map(m.gain, own)) / whole
             for e, own in self._variants(base).items()
             if e not in self.given
         }
@@ -363,7 +361,7 @@ class Posterior:
                 continue
             sign = np.sign([coefficient(c).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
-            i = [m.place[c] for c in columns]
+            i = m.index(columns)
             out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
 
@@ -388,10 +386,6 @@ class Posterior:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
         key = next(k for k in self._ranked if len(k) <= most)
         return self._at_mode(self.known[key])[0]
-
-    def likeliest_setting(self) -> Setting:
-        """Return the coefficients of the likeliest set, or of its needed effects alone."""
-        return self._at_mode(self._likeliest)[0]
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects with, each alone, at least half of
@@ -442,7 +436,7 @@ class Posterior:
                 own[CENTRAL] = 1.0
         return setting, std
 
-    def ranking(self, quieter: Base | None = None) -> Ranking:
+    def ranking(self, quieter: Base | None) -> Ranking:
         """Return probabilities; ``quieter`` as of ``structure``."""
         p = dict(zip(self.scores, softmax([*self.scores.values()]).tolist(), strict=True))
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
