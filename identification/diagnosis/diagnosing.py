@@ -16,7 +16,7 @@ from ...runtime.threads import one_thread
 from ..findings import CHANNELS, Candidate, Diagnosis, Errors, Structure, Trace
 from ..logs.flight_log import Logs
 from ..logs.screening import LEAST_SECONDS, screen_log
-from ..logs.table import Array, Pair
+from ..logs.table import Pair
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.pose_clock import on_pose_clock
 from ..motion.smoothing import CUTOFFS
@@ -83,7 +83,7 @@ def diagnose(
     fit = fit_sets(flights, [n for n in names() if n not in without], report)
     effects, not_needed, doubts, probabilities = judged(fit, settings)
     structure = _structure(fit)
-    noisy = fit.residual.noisy or is_beyond_calm(fit.gusts, vehicle) or fit.pushes
+    noisy = fit.noisy or is_beyond_calm(fit.gusts, vehicle) or fit.pushes
     remainder = "structured" if structure else "random" if noisy else "none"
     sure = remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
@@ -100,7 +100,7 @@ def diagnose(
     notes += [
         *inertial_notes(flights, said),
         *(sentence for sentences in doubts.values() for sentence in sentences),
-        *cancelling({e: fit.parts[e] for e in said}, fit.residual.after),
+        *cancelling({e: fit.parts[e] for e in said}, fit.after),
         *late_rotors(flights, fit.needed, fit.sensors),
         *delays_at_bound(fit.setting),
         *outside_the_fit(flights),
@@ -113,7 +113,6 @@ def diagnose(
     by_imu = {e for e in not_shown if by_bias[e] >= LEAST_SHOWN}
     hidden = sorted(flights.needs_pose | by_imu)
     unseen = (flights.not_identifiable | not_shown - by_imu) - flights.needs_pose
-    residual = fit.residual
     alone = sorted(posterior.alone().items(), key=lambda x: -x[1])
     return Diagnosis(
         verdict=verdict,
@@ -121,10 +120,10 @@ def diagnose(
         effects=tuple(effects),
         not_needed=tuple(not_needed),
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
-        before=Errors(*residual.error_before, *predicted[vehicle]),
-        after=Errors(*residual.error_after, *predicted[amended]),
-        floor_force_rms=residual.floor[0],
-        floor_torque_rms=residual.floor[1],
+        before=Errors(*fit.error_before, *predicted[vehicle]),
+        after=Errors(*fit.error_after, *predicted[amended]),
+        floor_force_rms=fit.floor[0],
+        floor_torque_rms=fit.floor[1],
         advice=tuple(advice(effects, sorted(unseen), remainder, flights.filtered, hidden)),
         notes=tuple(dict.fromkeys(notes)),
         candidates=tuple(Candidate(e, gain, e in said) for e, gain in alone),
@@ -133,16 +132,15 @@ def diagnose(
                 flights.logs[flights.log[rows[0]]].name,
                 flights.period,
                 flights.t[rows],
-                residual.before[rows],
-                residual.after[rows],
+                fit.before[rows],
+                fit.after[rows],
                 ~flights.fit_rows[rows],
                 {effect: part[rows] for effect, part in fit.parts.items()},
             )
             for rows in flights.runs
         ),
         signatures=tuple(
-            signature(flights, fit.setting, e.name, fit.parts[e.name], residual.after)
-            for e in effects
+            signature(flights, fit.setting, e.name, fit.parts[e.name], fit.after) for e in effects
         ),
         structure=structure,
         gusts=fit.gusts,
@@ -193,10 +191,7 @@ def _predicted(
             distance = rollout_error(log, vehicle, own)
             seconds = sum(b - a for a, b in own)
             each.append((nis_without_wrench_state(log, vehicle, own), distance * distance, seconds))
-    nis, squares, weight = np.array(each).reshape(-1, 3).T
-    return _mean(nis, weight), math.sqrt(_mean(squares, weight))
-
-
-def _mean(values: Array, weight: Array) -> float:
-    good = np.isfinite(values)
-    return float(np.average(values[good], weights=weight[good])) if good.any() else math.nan
+    values = np.ma.masked_invalid(np.reshape(each, (-1, 3)))
+    mean = np.ma.average(values[:, :2], axis=0, weights=values[:, 2])
+    nis, square = mean.filled(math.nan).tolist()
+    return nis, math.sqrt(square)

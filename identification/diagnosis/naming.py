@@ -48,23 +48,20 @@ LEAST_SIZE = 0.1  # typical sizes, from which a calibration is worth a name
 
 
 @dataclass(frozen=True, eq=False)
-class SetFit(FittedPosterior):
-    """The likeliest set of effects behind flights, and the residual beside it.
+class SetFit(FittedPosterior, Given, Balance):
+    """The likeliest set of effects behind flights, the facts known before, and the residual beside
+    it.
 
     Attributes:
         flights: the vehicle's flights.
-        given: facts known before effects are asked about.
         setting: coefficients of the needed effects; under no name the sensors' errors.
-        residual: with them.
         parts: growth of the residual (rows, 6) with one effect left out.
         pushes: transient disturbances.
         strange: probability of a cause outside the library.
     """
 
     flights: RegressedFlights
-    given: Given
     setting: Setting
-    residual: Balance
     parts: Mapping[str, Array]
     pushes: Sequence[TransientDisturbance]
     strange: float
@@ -99,10 +96,10 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
     pushes = transient_disturbances(flights, setting)
     return SetFit(
         **vars(fitted),
+        **vars(given),
+        **vars(residual),
         flights=flights,
-        given=given,
         setting=setting,
-        residual=residual,
         parts=parts,
         pushes=pushes,
         strange=unknown(fitted.ranking.structure, bool(pushes)),
@@ -115,8 +112,7 @@ def judged(
     """Return the effects that a fit names, the effects left out as needless, doubts and
     probabilities, as of ``Diagnosis``; ``rule`` says when a name is sure.
     """
-    given = fit.given
-    known = {e: _differs(fit, e) for e in given.first if e in fit.best.effects}
+    known = {e: _differs(fit, e) for e in fit.first if e in fit.best.effects}
     likely = [e for e in fit.best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
     named = [e for e in fit.needed if e in likely]
     rivals = {e: _rivals(fit, e) for e in named}
@@ -126,7 +122,7 @@ def judged(
         known[e] = beside_unknown(min(sum(alike), 1.0), factor, fit.ranking.structure, fit.strange)
     doubts = _doubts(fit, named, rule)
     unsure = bool(set(doubts) - {"assumed thrust"})
-    sizes = worth(fit.flights, given.fixed, given.first, fit.needed)
+    sizes = worth(fit.flights, fit.fixed, fit.first, fit.needed)
     names = {e: known[e] for e in named}
     effects = [
         _named(
@@ -138,7 +134,7 @@ def judged(
         )
         for e in named
     ]
-    if late := given.late:
+    if late := fit.late:
         names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
         effects.append(
             replace(
@@ -148,7 +144,7 @@ def judged(
             )
         )
     stated = tuple(
-        Alternative(tuple(e for e in x.effects if e not in given.first), x.probability)
+        Alternative(tuple(e for e in x.effects if e not in fit.first), x.probability)
         for x in fit.ranking.sets
         if x.probability >= LEAST_STATED
     )
@@ -198,7 +194,7 @@ def _rivals(fit: SetFit, effect: str) -> Names:
     """Return the effects with nearly the likelihood of one in the likeliest set, in its
     place.
     """
-    if effect in fit.given.first:
+    if effect in fit.first:
         factors = playing(*THRUST_FACTORS)
         return tuple(x for x in factors if x != effect) if effect in factors else ()
     own = {*fit.best.effects}
@@ -262,7 +258,7 @@ def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool
             for name, x in std.items()
         }
     # shares of the residual's energy without it, each channel over its sensors' noise
-    after = fit.residual.after
+    after = fit.after
     over = mean_square(flights.visible_noise) ** 0.5 + 1e-12
     left, whole = (
         float(mean_square(x[~flights.fit_rows] / over).mean())
