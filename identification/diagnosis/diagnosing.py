@@ -193,5 +193,5 @@ def _predicted(
             each.append((nis_without_wrench_state(log, vehicle, own), distance * distance, seconds))
     values = np.ma.masked_invalid(np.reshape(each, (-1, 3)))
     mean = np.ma.average(values[:, :2], axis=0, weights=values[:, 2])
-    nis, square = mean.filled(math.nan).tolist()
+    nis, square = np.ma.filled(mean, math.nan).tolist()
     return nis, math.sqrt(square)

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ..findings import LEAST_RIVAL, Disturbance, Ranking
-from ..logs.table import Array, Names, Pair, Values
+from ..logs.table import Names, Pair, Values
 from .climbing import Height, linearised, mode
 from .column import Column, Part
 from .likelihood import Likelihood
@@ -287,7 +287,6 @@ def _starts_of(
     of the setting, and of ``others``: an effect may act in the place of another.
     """
     out: dict[Column, Values] = {}
-    residuals: list[Array] = []
     beside = [*setting, *(e.name for e in flights.vehicle.effects)]
     for effect in (e for e in library if e not in setting):
         own = []
@@ -296,10 +295,9 @@ def _starts_of(
             typical = typical_size(Column(effect, name), flights.vehicle)
             own = [{name: share * typical} for share in TIME_STARTS]
         elif flights.is_nonlinear(effect):
-            residuals = residuals or [flights.residual(x) for x in (setting, *others)]
             stated = flights.stated(effect)
-            for y in residuals:
-                starts = starting_points(effect, flights, y, stated, beside)
+            for x in (setting, *others):
+                starts = starting_points(effect, flights, flights.residual(x), stated, beside)
                 own += [{**start, **stated} for start in starts]
         out |= {Column(effect, "", Part.START, i): start for i, start in enumerate(own)}
     return out

@@ -163,15 +163,14 @@ class Posterior:
         left_out = LeftOut(base, columns, self.power)
         m = base.marginal(columns, base.plain, self.power)
         every = {c.effect for c in columns} - self.given
-        gains: dict[str, Pair] = {}
+        gains = {}
         while True:
             weak = {}
             for variant in best.variants:
                 effect = variant[0].effect
                 rest = tuple(x for x in best.variants if x != variant)
                 kept = {v[0].effect for v in rest}
-                less = [i for i, c in enumerate(columns) if c.effect in kept]
-                gained, std = gains[effect] = left_out.gain(less)
+                gained, std = gains[effect] = left_out.gain(m.index(chain.from_iterable(rest)))
                 smaller = _Candidate(base, rest, m.evidence(chain.from_iterable(rest)))
                 least = left_out.least * std - self.odds * len(every - kept)
                 if gained < least and self._possible(smaller):
@@ -245,8 +244,8 @@ class Posterior:
         more = 1 if asked else max(MOST_EFFECTS + len(self.given) - len(first), 1)
         for size in range(more):
             level.sort(key=score, reverse=True)
-            grown: dict[frozenset[Variant], Variants] = {}
             kept = level[: KEPT_SETS if size else 2 * KEPT_SETS]
+            grown: dict[frozenset[Variant], Variants] = {}
             for new in ((*some, v) for some in kept for v in variants):
                 grown.setdefault(frozenset(new), new)
             level = list(grown.values())
