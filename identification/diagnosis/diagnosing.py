@@ -5,7 +5,7 @@ of blocks, or logs, outside the fit.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ...runtime.threads import one_thread
 from ..findings import CHANNELS, Candidate, Diagnosis, Errors, Structure, Trace
 from ..logs.flight_log import Logs
 from ..logs.screening import LEAST_SECONDS, screen_log
-from ..logs.table import Array, Pair
+from ..logs.table import Pair
 from ..motion.noise_spectrum import filtering_notes, pose_was_filtered
 from ..motion.pose_clock import on_pose_clock
 from ..motion.smoothing import CUTOFFS
@@ -81,10 +81,9 @@ def diagnose(
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
     fit = fit_sets(flights, [n for n in names() if n not in without], report)
-    judgement = judged(fit, settings)
-    effects = judgement.effects
+    effects, not_needed, doubts, probabilities = judged(fit, settings)
     structure = _structure(fit)
-    noisy = fit.residual.noisy or is_beyond_calm(fit.posterior.gusts, vehicle) or fit.pushes
+    noisy = fit.noisy or is_beyond_calm(fit.gusts, vehicle) or fit.pushes
     remainder = "structured" if structure else "random" if noisy else "none"
     sure = remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
@@ -96,13 +95,13 @@ def diagnose(
     report("predicting the flights")
     named = {e: x for e, x in fit.setting.items() if e}
     amended = flights.amended(named) if named else vehicle
-    posterior = fit.posterior.posterior
+    posterior = fit.posterior
     said = [effect.name for effect in effects]
     notes += [
         *inertial_notes(flights, said),
-        *(sentence for sentences in judgement.doubts.values() for sentence in sentences),
-        *cancelling({e: fit.parts[e] for e in said}, fit.residual.after),
-        *late_rotors(flights, fit.posterior.setting, fit.posterior.sensors),
+        *(sentence for sentences in doubts.values() for sentence in sentences),
+        *cancelling({e: fit.parts[e] for e in said}, fit.after),
+        *late_rotors(flights, fit.needed, fit.sensors),
         *delays_at_bound(fit.setting),
         *outside_the_fit(flights),
     ]
@@ -114,28 +113,37 @@ def diagnose(
     by_imu = {e for e in not_shown if by_bias[e] >= LEAST_SHOWN}
     hidden = sorted(flights.needs_pose | by_imu)
     unseen = (flights.not_identifiable | not_shown - by_imu) - flights.needs_pose
-    residual = fit.residual
     alone = sorted(posterior.alone().items(), key=lambda x: -x[1])
     return Diagnosis(
         verdict=verdict,
         remainder=remainder,
-        effects=effects,
-        not_needed=judgement.not_needed,
+        effects=tuple(effects),
+        not_needed=tuple(not_needed),
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
-        before=Errors(*residual.error_before, *predicted[vehicle]),
-        after=Errors(*residual.error_after, *predicted[amended]),
-        floor_force_rms=residual.floor[0],
-        floor_torque_rms=residual.floor[1],
+        before=Errors(*fit.error_before, *predicted[vehicle]),
+        after=Errors(*fit.error_after, *predicted[amended]),
+        floor_force_rms=fit.floor[0],
+        floor_torque_rms=fit.floor[1],
         advice=tuple(advice(effects, sorted(unseen), remainder, flights.filtered, hidden)),
         notes=tuple(dict.fromkeys(notes)),
         candidates=tuple(Candidate(e, gain, e in said) for e, gain in alone),
-        traces=tuple(_traces(fit)),
+        traces=tuple(
+            Trace(
+                flights.logs[flights.log[rows[0]]].name,
+                flights.period,
+                flights.t[rows],
+                fit.before[rows],
+                fit.after[rows],
+                ~flights.fit_rows[rows],
+                {effect: part[rows] for effect, part in fit.parts.items()},
+            )
+            for rows in flights.runs
+        ),
         signatures=tuple(
-            signature(flights, fit.setting, e.name, fit.parts[e.name], residual.after)
-            for e in effects
+            signature(flights, fit.setting, e.name, fit.parts[e.name], fit.after) for e in effects
         ),
         structure=structure,
-        gusts=fit.posterior.gusts,
+        gusts=fit.gusts,
         pushes=tuple(fit.pushes),
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
@@ -146,9 +154,9 @@ def diagnose(
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(hidden),
-        doubts=judgement.doubts,
-        ranking=fit.posterior.ranking,
-        probabilities=judgement.probabilities,
+        doubts=doubts,
+        ranking=fit.ranking,
+        probabilities=probabilities,
     )
 
 
@@ -156,9 +164,9 @@ def _structure(fit: SetFit) -> tuple[Structure, ...]:
     """Return the dictionary's best column beside the likeliest set, if a cause outside the library
     is likely and shows there.
     """
-    if fit.strange <= 0.5 or fit.posterior.ranking.structure <= 0.0:
+    if fit.strange <= 0.5 or fit.ranking.structure <= 0.0:
         return ()
-    posterior = fit.posterior.posterior
+    posterior = fit.posterior
     c, _, gained = posterior.strangest()
     where = f"{CHANNELS[c.number]} with {c.coefficient}"
     if c.part == Part.CHANGING:
@@ -166,26 +174,11 @@ def _structure(fit: SetFit) -> tuple[Structure, ...]:
     return (Structure(c.group, where, gained / posterior.left()),)
 
 
-def _traces(fit: SetFit) -> Iterator[Trace]:
-    """Yield the residual of each piece of flight over time."""
-    flights = fit.flights
-    for rows in flights.runs:
-        yield Trace(
-            flights.logs[flights.log[rows[0]]].name,
-            flights.period,
-            flights.t[rows],
-            fit.residual.before[rows],
-            fit.residual.after[rows],
-            ~flights.fit_rows[rows],
-            {effect: part[rows] for effect, part in fit.parts.items()},
-        )
-
-
 def _segments(flights: RegressedFlights) -> list[tuple[int, float, float]]:
     """Return the held-out stretches of flight: log, from, to (s)."""
     blocks = np.unique(flights.block[~flights.fit_rows])
     ends = [np.flatnonzero(flights.block == b)[[0, -1]] for b in blocks]
-    return [(int(flights.log[a]), float(flights.t[a]), float(flights.t[b])) for a, b in ends]
+    return [(int(flights.log[a]), *flights.t[[a, b]].tolist()) for a, b in ends]
 
 
 def _predicted(
@@ -198,10 +191,7 @@ def _predicted(
             distance = rollout_error(log, vehicle, own)
             seconds = sum(b - a for a, b in own)
             each.append((nis_without_wrench_state(log, vehicle, own), distance * distance, seconds))
-    nis, squares, weight = np.array(each).reshape(-1, 3).T
-    return _mean(nis, weight), math.sqrt(_mean(squares, weight))
-
-
-def _mean(values: Array, weight: Array) -> float:
-    good = np.isfinite(values)
-    return float(np.average(values[good], weights=weight[good])) if good.any() else math.nan
+    values = np.ma.masked_invalid(np.reshape(each, (-1, 3)))
+    mean = np.ma.average(values[:, :2], axis=0, weights=values[:, 2])
+    nis, square = np.ma.filled(mean, math.nan).tolist()
+    return nis, math.sqrt(square)

@@ -46,7 +46,8 @@ from .log_offsets import (
 )
 from .noise_search import FIRST_TIME, SETTLING_TIME, NoiseSearch
 from .priors import (
-    PRIORS,
+    GAINS,
+    MODEL_ERROR,
     Base,
     Setting,
     Starts,
@@ -77,7 +78,7 @@ OF_DRIVEN[:3, 0, 0] = OF_DRIVEN[[3, 4, 5], 1, [1, 2, 3]] = 1.0
 NO_SLOPES = np.empty((6, 7, 0))
 # the state that jumps, by the gains of a pair on the rotors' innovations: thrust, torque, turn
 JUMP_STATE = np.tile(STATES, 3)
-HELD = np.array(PRIORS.gains)[JUMP_STATE]  # standard deviations of these gains
+HELD = np.array(GAINS)[JUMP_STATE]  # standard deviations of these gains
 
 
 class Likelihood:
@@ -478,7 +479,7 @@ class Likelihood:
                 "force": Product(1.0, thrust, *along_axis(i, rotation)),
                 "torque": Product(1.0, torque, *own),
                 "expected torque": Product(
-                    math.hypot(1.0, share / PRIORS.model_error), expected, *own
+                    math.hypot(1.0, share / MODEL_ERROR), expected, *own
                 ),
             }
             for name, x in errors.items():

@@ -48,36 +48,28 @@ LEAST_SIZE = 0.1  # typical sizes, from which a calibration is worth a name
 
 
 @dataclass(frozen=True, eq=False)
-class SetFit:
-    """The likeliest set of effects behind flights, and the residual beside it.
+class SetFit(FittedPosterior, Given, Balance):
+    """The likeliest set of effects behind flights, the facts known before, and the residual beside
+    it.
 
     Attributes:
         flights: the vehicle's flights.
-        given: facts known before effects are asked about.
-        posterior: of sets of effects, with the fit of the likeliest set's needed effects.
-        setting: coefficients of these effects; under no name the sensors' errors.
-        residual: with them.
+        setting: coefficients of the needed effects; under no name the sensors' errors.
         parts: growth of the residual (rows, 6) with one effect left out.
         pushes: transient disturbances.
+        strange: probability of a cause outside the library.
     """
 
     flights: RegressedFlights
-    given: Given
-    posterior: FittedPosterior
     setting: Setting
-    residual: Balance
     parts: Mapping[str, Array]
     pushes: Sequence[TransientDisturbance]
+    strange: float
 
     @property
     def best(self) -> RankedSet:
         """The likeliest set."""
-        return self.posterior.ranking.sets[0]
-
-    @property
-    def strange(self) -> float:
-        """Probability of a cause outside the library."""
-        return unknown(self.posterior.ranking.structure, bool(self.pushes))
+        return self.ranking.sets[0]
 
 
 def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) -> SetFit:
@@ -93,45 +85,44 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
         else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
     )
     sensors = {name: value for name, (value, _) in likeliest.sensors.items()}
-    known_apart = {**given.fixed, **({"": sensors} if sensors else {})}
+    known_apart = {**given.fixed, "": sensors}
     # no set with a larger error on held-out flight is printed
-    for fitted in (likeliest, replace(likeliest, setting={}, behind={})):
-        setting = known_apart | fitted.setting
+    for fitted in (likeliest, replace(likeliest, needed={}, behind={})):
+        setting = known_apart | fitted.needed
         residual = balance(flights, setting)
         if residual.better:
             break
     parts = {e: flights.residual(without(setting, e)) - residual.after for e in setting if e}
     pushes = transient_disturbances(flights, setting)
-    return SetFit(flights, given, fitted, setting, residual, parts, pushes)
+    return SetFit(
+        **vars(fitted),
+        **vars(given),
+        **vars(residual),
+        flights=flights,
+        setting=setting,
+        parts=parts,
+        pushes=pushes,
+        strange=unknown(fitted.ranking.structure, bool(pushes)),
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class Judgement:
-    """The names behind flights: as of ``Diagnosis``."""
-
-    effects: tuple[NamedEffect, ...]
-    not_needed: tuple[NamedEffect, ...]
-    doubts: Mapping[str, Names]
-    probabilities: Probabilities
-
-
-def judged(fit: SetFit, rule: DiagnosisSettings) -> Judgement:
-    """Return the effects that a fit names; ``rule`` says when a name is sure."""
-    given = fit.given
-    fitted = fit.posterior
-    known = {e: _differs(fit, e) for e in given.first if e in fit.best.effects}
+def judged(
+    fit: SetFit, rule: DiagnosisSettings
+) -> tuple[Sequence[NamedEffect], Sequence[NamedEffect], dict[str, Names], Probabilities]:
+    """Return the effects that a fit names, the effects left out as needless, doubts and
+    probabilities, as of ``Diagnosis``; ``rule`` says when a name is sure.
+    """
+    known = {e: _differs(fit, e) for e in fit.first if e in fit.best.effects}
     likely = [e for e in fit.best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
-    named = [e for e in fitted.setting if e in likely]
+    named = [e for e in fit.needed if e in likely]
     rivals = {e: _rivals(fit, e) for e in named}
     for e in {*named}.difference(known):  # an effect, or its rivals in these flights
-        alike = [x.probability for x in fitted.ranking.sets if {e, *rivals[e]} & {*x.effects}]
-        factor = fitted.posterior.factor_in_set(e)
-        known[e] = beside_unknown(
-            min(sum(alike), 1.0), factor, fitted.ranking.structure, fit.strange
-        )
+        alike = [x.probability for x in fit.ranking.sets if {e, *rivals[e]} & {*x.effects}]
+        factor = fit.posterior.factor_in_set(e)
+        known[e] = beside_unknown(min(sum(alike), 1.0), factor, fit.ranking.structure, fit.strange)
     doubts = _doubts(fit, named, rule)
     unsure = bool(set(doubts) - {"assumed thrust"})
-    sizes = worth(fit.flights, given.fixed, given.first, fitted.setting)
+    sizes = worth(fit.flights, fit.fixed, fit.first, fit.needed)
     names = {e: known[e] for e in named}
     effects = [
         _named(
@@ -143,7 +134,7 @@ def judged(fit: SetFit, rule: DiagnosisSettings) -> Judgement:
         )
         for e in named
     ]
-    if late := given.late:
+    if late := fit.late:
         names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
         effects.append(
             replace(
@@ -153,25 +144,19 @@ def judged(fit: SetFit, rule: DiagnosisSettings) -> Judgement:
             )
         )
     stated = tuple(
-        Alternative(tuple(e for e in x.effects if e not in given.first), x.probability)
-        for x in fitted.ranking.sets
+        Alternative(tuple(e for e in x.effects if e not in fit.first), x.probability)
+        for x in fit.ranking.sets
         if x.probability >= LEAST_STATED
     )
-    return Judgement(
-        tuple(effects),
-        tuple(
-            _stated(fit, e, *fitted.ranking.averaged(e)) for e in likely if e not in fitted.setting
-        ),
-        doubts,
-        Probabilities(names, stated, fit.strange),
-    )
+    needless = [_stated(fit, e, *fit.ranking.averaged(e)) for e in likely if e not in fit.needed]
+    return effects, needless, doubts, Probabilities(names, stated, fit.strange)
 
 
 def _std(fit: SetFit, effect: str) -> NamedNumbers:
     """Return the standard deviations of an effect in the likeliest set, with the spread from flight
     to flight.
     """
-    return _of_any_flight(fit.flights, effect, *fit.posterior.ranking.averaged(effect))
+    return _of_any_flight(fit.flights, effect, *fit.ranking.averaged(effect))
 
 
 def _of_any_flight(
@@ -191,7 +176,7 @@ def _differs(fit: SetFit, effect: str) -> float:
     apart = [0.0]
     # these flights are late, however late others are
     delays = get(effect).role == Role.DELAY
-    values, stds = fit.posterior.ranking.averaged(effect)
+    values, stds = fit.ranking.averaged(effect)
     for name, std in (stds if delays else _std(fit, effect)).items():
         c = Column(effect, name)
         off = abs(values[name] - declared(c, fit.flights))
@@ -209,14 +194,14 @@ def _rivals(fit: SetFit, effect: str) -> Names:
     """Return the effects with nearly the likelihood of one in the likeliest set, in its
     place.
     """
-    if effect in fit.given.first:
+    if effect in fit.first:
         factors = playing(*THRUST_FACTORS)
         return tuple(x for x in factors if x != effect) if effect in factors else ()
     own = {*fit.best.effects}
     least = LEAST_RIVAL * fit.best.probability
     swapped = [
         own ^ {*x.effects}
-        for x in fit.posterior.ranking.sets
+        for x in fit.ranking.sets
         if x.probability > least and len(x.effects) == len(own)
     ]
     return tuple(e for x in swapped if effect in x and len(x) == 2 for e in x - {effect})
@@ -226,7 +211,7 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
     """Return for each check, by its name, sentences with a reason to doubt a name."""
     flights = fit.flights
     unsure = ": all names are tentative" if named else ""
-    found = {e: fit.posterior.ranking.averaged(e) for e in fit.posterior.setting}
+    found = {e: fit.ranking.averaged(e) for e in fit.needed}
     doubts = {
         "composite": tuple(composites(flights.vehicle, found)),
         "unknown": (
@@ -242,7 +227,7 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
         "hidden cause": tuple(
             f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like "
             "it. Log the pose to tell them apart"
-            for effect, hidden in fit.posterior.behind.items()
+            for effect, hidden in fit.behind.items()
             if hidden
         ),
         "assumed thrust": tuple(
@@ -259,12 +244,11 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
 def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool) -> NamedEffect:
     flights = fit.flights
     vehicle = flights.vehicle
-    fitted = fit.posterior
     std = _std(fit, effect)
     # the point of action of an effect at the rotors, as declared, is nothing to report
     values = {
         name: x
-        for name, x in fitted.ranking.averaged(effect)[0].items()
+        for name, x in fit.ranking.averaged(effect)[0].items()
         if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
     }
     uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS
@@ -274,7 +258,7 @@ def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool
             for name, x in std.items()
         }
     # shares of the residual's energy without it, each channel over its sensors' noise
-    after = fit.residual.after
+    after = fit.after
     over = mean_square(flights.visible_noise) ** 0.5 + 1e-12
     left, whole = (
         float(mean_square(x[~flights.fit_rows] / over).mean())
@@ -287,7 +271,7 @@ def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool
         indistinguishable_from=others,
         evidence={
             "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
-            "log_bayes_factor": fitted.posterior.log_bayes_factor(effect),
+            "log_bayes_factor": fit.posterior.log_bayes_factor(effect),
             "largest_coefficient_in_typical_sizes": max(
                 abs(x) / typical_size(Column(effect, name), vehicle) * (name != CENTRAL)
                 for name, x in values.items()
@@ -295,13 +279,13 @@ def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool
             "size_over_what_is_left": size,
             **stated.evidence,
         },
-        channels=carrying_channels(flights, fitted.setting, effect),
+        channels=carrying_channels(flights, fit.needed, effect),
     )
 
 
 def _stated(fit: SetFit, effect: str, values: Values, std: Values) -> NamedEffect:
     """Return an effect with its gain on flight left out of its fit."""
-    gained, spread = fit.posterior.gains[effect]
+    gained, spread = fit.gains[effect]
     return NamedEffect(
         name=effect,
         coefficients=values,

@@ -29,31 +29,24 @@ Setting = dict[str, NamedNumbers]
 Starts = Mapping[Column, Values]
 
 
-@dataclass(frozen=True)
-class _PriorSettings:
-    """Beliefs before a flight is seen."""
-
-    expected: float = 1.0  # number of effects missing in a model
-    # typical sizes: every effect acts a little, and none up to this size is worth a name. The
-    # standard deviation of any coefficient of an unnamed effect
-    negligible: float = 0.03
-    any_size: float = 3.0  # typical sizes, of effects of any size; of others one
-    most_missing_mass: float = 0.9  # share of the declared mass a vehicle may lack
-    # times a column's own lag or delay: range in which the column stands for it
-    near_start: Pair = (0.5, 1.5)
-    # error of any model as a share of an axis' force or torque: of thrust along its axis and across
-    # it, and of the torques. Propellers and bearings are not stable to less
-    model_error: float = 0.003
-    # standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
-    # units of one period of such an acceleration. They leave the gains free: a loop that shows the
-    # tilt it sees has gains of some 3,000, 100 and 1
-    gains: tuple[float, float, float] = (1e4, 1e3, 1e2)
-    # second differences of the rotor speeds: standard deviation of their path between samples from
-    # a straight line
-    between_samples: float = 0.5
-
-
-PRIORS = _PriorSettings()
+EXPECTED = 1.0  # number of effects missing in a model, before a flight is seen
+# typical sizes: every effect acts a little, and none up to this size is worth a name. The standard
+# deviation of any coefficient of an unnamed effect
+NEGLIGIBLE = 0.03
+ANY_SIZE = 3.0  # typical sizes, of effects of any size; of others one
+MOST_MISSING_MASS = 0.9  # share of the declared mass a vehicle may lack
+# times a column's own lag or delay: range in which the column stands for it
+NEAR_START = (0.5, 1.5)
+# error of any model as a share of an axis' force or torque: of thrust along its axis and across it,
+# and of the torques. Propellers and bearings are not stable to less
+MODEL_ERROR = 0.003
+# standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
+# units of one period of such an acceleration. They leave the gains free: a loop that shows the tilt
+# it sees has gains of some 3,000, 100 and 1
+GAINS = (1e4, 1e3, 1e2)
+# second differences of the rotor speeds: standard deviation of their path between samples from a
+# straight line
+BETWEEN_SAMPLES = 0.5
 # columns of one variant of an effect: all coefficients, or one of its starting points
 Variant = tuple[Column, ...]
 Variants = tuple[Variant, ...]  # of a set, one of each effect
@@ -107,7 +100,12 @@ class Base:
         products = power * self.total
         products[-1, -1] += power * self.penalty
         at = self.at(asked)
-        return _Asked(self, asked, at, marginal(products, at, others, size))
+        return _Asked(
+            **vars(marginal(products, at, others, size)),
+            place={c: i for i, c in enumerate(asked)},
+            low=self.low[at],
+            high=self.high[at],
+        )
 
     def mode(self, chosen: Index, power: float = 1.0, draw: bool = False) -> dict[Column, Pair]:
         """Return the coefficients of some columns at the mode without all others, or a draw about
@@ -167,26 +165,24 @@ class Base:
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Asked(Marginal):
     """The likelihood of some columns of a base, with all others integrated out."""
 
-    base: Base
-    columns: Sequence[Column]
-    at: Index  # in the base
-    quadratic: Marginal
+    place: dict[Column, int]  # the index of each column
+    low: Array
+    high: Array
 
-    @cached_property
-    def place(self) -> dict[Column, int]:
-        """The index of each column."""
-        return {c: i for i, c in enumerate(self.columns)}
+    def index(self, columns: Iterable[Column]) -> list[int]:
+        """Return the indices of some of the columns."""
+        return [self.place[c] for c in columns]
 
-    def evidence(self, index: Sequence[int]) -> SetEvidence:
-        """Return the evidence of some of the columns, by their index."""
-        return set_evidence(self.quadratic, index, self.base.low[self.at], self.base.high[self.at])
+    def evidence(self, columns: Iterable[Column]) -> SetEvidence:
+        """Return the evidence of some of the columns."""
+        return set_evidence(self, self.index(columns), self.low, self.high)
 
-    def explained(self, index: Sequence[int]) -> float:
-        """Return the deviance explained by some of the columns, by their index."""
-        return self.quadratic.explained(index, self.evidence(index).mode)
+    def gain(self, columns: Sequence[Column]) -> float:
+        """Return the deviance explained by some of the columns."""
+        return self.explained(self.index(columns), self.evidence(columns).mode)
 
 
 def variants_of(
@@ -212,16 +208,16 @@ def prior_size(column: Column, flights: RegressedFlights) -> float:
     """Return the standard deviation of a column's coefficient before a flight is seen."""
     match column.part:
         case Part.BETWEEN_SAMPLES:
-            return PRIORS.between_samples
+            return BETWEEN_SAMPLES
         case Part.GAIN:
-            return PRIORS.gains[column.number]
+            return GAINS[column.number]
         case Part.MODEL_ERROR:
-            return PRIORS.model_error
+            return MODEL_ERROR
     size = typical_size(column, flights.vehicle)
     if not column.effect or column.part == Part.START or column.coefficient == CENTRAL:
         return size
     effect = get(column.effect)
-    size *= PRIORS.any_size if effect.any_size else 1.0
+    size *= ANY_SIZE if effect.any_size else 1.0
     return math.hypot(size, flights.thrust_std) if effect.role == Role.THRUST else size
 
 
@@ -229,12 +225,12 @@ def _bounds(column: Column, flights: RegressedFlights) -> Pair:
     if not column.effect:
         return -math.inf, math.inf
     if column.part == Part.START:
-        return PRIORS.near_start if moves_time(column.effect) else (0.0, math.inf)
+        return NEAR_START if moves_time(column.effect) else (0.0, math.inf)
     c = coefficient(column)
     low = c.minimum
     high = min(c.maximum, c.plausible)
     if get(column.effect).role == Role.MASS:
-        low = max(low, -PRIORS.most_missing_mass * unit_of_change(column, flights.vehicle))
+        low = max(low, -MOST_MISSING_MASS * unit_of_change(column, flights.vehicle))
     own = declared(column, flights)
     return min(low - own, 0.0), max(high - own, 0.0)
 

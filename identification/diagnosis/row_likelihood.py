@@ -210,7 +210,7 @@ class RowLikelihood:
         integrated out.
         """
         base = self.base(setting, {}, ())
-        m = base.marginal((), base.plain, self.power).quadratic
+        m = base.marginal((), base.plain, self.power)
         off = from_declared(self.flights.columns_of(setting), self.flights, setting)
 
         def target() -> Setting:

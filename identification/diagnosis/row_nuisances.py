@@ -12,7 +12,7 @@ from ..logs.table import Array, NamedArrays
 from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .log_offsets import ROTOR_TIME_OFFSET
-from .priors import PRIORS
+from .priors import MODEL_ERROR
 from .regression import RegressedFlights, coefficient, unit_of_change
 from .rows import Rows
 
@@ -127,9 +127,9 @@ def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedA
     noise = rows.flights.rotor_noise
     varying = noise[0] * (thrust - here * thrust[here > 0.0].mean())
     out = {"model error of thrust's changes": rows.from_body(varying * AXES["z"])}
-    gains = np.hypot(PRIORS.model_error, noise[1:]).tolist()
+    gains = np.hypot(MODEL_ERROR, noise[1:]).tolist()
     for (name, along), gain in zip(AXES.items(), gains, strict=True):
-        force = PRIORS.model_error * thrust * along
+        force = MODEL_ERROR * thrust * along
         torque = gain * turning * along
         out[f"model error of force {name}"] = rows.from_body(force)
         out[f"model error of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)

@@ -81,7 +81,7 @@ def likelihood(left: ArrayLike) -> Array:
     return np.asarray(-10.0 * np.log(np.clip(left, 0.01, _MOST_SHARE)).sum(axis=-1))
 
 
-def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
+def _shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
     """Return the shares of variances ``total`` (...) left by signals of variance ``power`` and
     covariance ``cross``, times a gain in range: ``gain`` (2, ...).
     """
@@ -286,7 +286,7 @@ class Evidence:
         # log-likelihood ratios against a flight on its side, and below its origin
         cost = 60.0 * (mean[2] <= GOOD * np.linalg.norm(mean))
         cost += 3.0 * ((frames.position @ middle)[2] < 0.0)
-        left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
+        left = _shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
         return float(left), cost, self._needed(along, reading)
 
     def fit(self, reading: Convention, torques: bool = True) -> Fit:
@@ -321,7 +321,7 @@ class Evidence:
         needed = needed[: len(rows)]
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
-        left = shares(  # (d, 1 + torques)
+        left = _shares(  # (d, 1 + torques)
             there @ np.square(needed).T,
             (given * given).sum(axis=2),
             (given * needed).sum(axis=2),

@@ -116,7 +116,7 @@ def map_table(
             )
         log_map = replace(log_map, vehicle="".join(named))
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
-    log_map = fitted(table.header, table.path, log_map, vehicle, reader)
+    log_map = _fitted(table.header, table.path, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
     if log_map.is_own and rows_apart(ChannelGroup(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
@@ -372,7 +372,7 @@ def _order_note(order: Order) -> str:
     return f"{order_words(order)}{f' ({names[0]})' if names else ''}"
 
 
-def fitted(
+def _fitted(
     names: Texts, source: object, log_map: LogMap, vehicle: SomeVehicle, reader: str
 ) -> LogMap:
     """Return a map with the ways to fill a section from a table's columns, and with the range of

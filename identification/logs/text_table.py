@@ -188,14 +188,14 @@ def open_table(path: Path) -> Table:
     if name.endswith(".parquet"):
         return open_parquet(path)
     if is_table(path):
-        return open_text(path)
+        return _open_text(path)
     raise InputError(
         f"{path}: unknown kind of file; expected a table whose name ends in "
         f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES, *ARRAY_SUFFIXES)))}"
     )
 
 
-def open_text(path: Path) -> Table:
+def _open_text(path: Path) -> Table:
     """Open a text table.
 
     Raises:

@@ -144,7 +144,7 @@ def write_identified(identified: Identified, path: Path) -> list[Path]:
     return written
 
 
-def fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
+def _fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
 
     Both are (n, 6), behind the picture's low-pass and within the band of the fit.
@@ -178,7 +178,7 @@ def _picture(identified: Identified) -> "Figure":
     longest = max(identified.pieces, key=lambda p: len(p.t))
     t = longest.t
     shown = np.abs(t - t[len(t) // 2]) <= 0.5 * _SHOWN_SECONDS
-    curves = ((x[shown] * scale).T for x in fitted(identified, longest))
+    curves = ((x[shown] * scale).T for x in _fitted(identified, longest))
     figure = new_figure(4.8)
     axes = figure.subplots(2, 3, sharex=True)
     titles = [

@@ -16,7 +16,7 @@ from windwrench.evidence.probabilities.calibration import RESULTS, flights_of
 from windwrench.evidence.probabilities.fitting import fit
 from windwrench.evidence.probabilities.flights import WAYS_TO_LOG
 from windwrench.identification.diagnosis.settings import DIAGNOSIS
-from windwrench.identification.diagnosis.unknown import UNKNOWN
+from windwrench.identification.diagnosis.unknown import ABSORBED, PUSH
 
 QUOTES, NOT_RESULTS = quoting.read_quotes()
 
@@ -95,7 +95,7 @@ def test_the_rule_of_a_sure_name_is_that_of_the_code():
     assert f"its printed probability is {DIAGNOSIS.least_sure_probability:.0%} or more" in rule
     assert f"has a probability of {DIAGNOSIS.most_unknown:.0%} at most" in rule
     assert f"the flight has {DIAGNOSIS.least_seconds:g} s" in rule
-    assert f"in the mean {UNKNOWN.absorbed / (UNKNOWN.absorbed + 1.0):.0%}" in rule
+    assert f"in the mean {ABSORBED / (ABSORBED + 1.0):.0%}" in rule
 
 
 def test_a_sure_name_is_printed_with_what_the_page_says_and_without_a_ceiling():
@@ -107,8 +107,8 @@ def test_a_sure_name_is_printed_with_what_the_page_says_and_without_a_ceiling():
 
 
 def test_the_weight_of_a_push_is_that_of_the_kept_flights():
-    found = fit(flights_of(kept("results/unknown_weights.json.gz")))
-    assert found.push == pytest.approx(UNKNOWN.push, abs=0.02)
+    _, push = fit(flights_of(kept("results/unknown_weights.json.gz")))
+    assert push == pytest.approx(PUSH, abs=0.02)
 
 
 def test_a_run_has_flights_of_both_simulators_and_all_logs_and_none_twice():

@@ -117,7 +117,7 @@ def channels(
         InputError: pyulog is missing, the file is no ULog or no quadrotor's, or lacks four motors.
     """
     topics, stated, is_damaged = _read_ulog(path)
-    flown = what_flew(stated, topics.pop(_STATUS, []))
+    flown = _what_flew(stated, topics.pop(_STATUS, []))
     flown.check(path)
     parameters = {
         n: x for n, x in stated.items() if has_ranges or not re.search(r"_(MIN|MAX)\d*$", n)
@@ -176,7 +176,7 @@ def _read_ulog(path: Path) -> tuple[_Topics, NamedNumbers, bool]:
     with one_line(f"{path}: cannot be read as a ULog", "a PX4 log (.ulg)"):
         # pyulog prints its doubts; the notes say them
         with open_regular(path, WHAT) as file, redirect_stdout(io.StringIO()):
-            parsed = counting(Parser)(file, sorted(wanted))
+            parsed = _counting(Parser)(file, sorted(wanted))
         with open_regular(path, WHAT) as file:  # each message states its length
             size, place = file.seek(0, os.SEEK_END), _HEADER
             while place + _MESSAGE <= size:
@@ -265,7 +265,7 @@ class _TooMuchError(Exception):
     """Ends the parser: after all usual errors the parser goes on."""
 
 
-def counting(parser: Any) -> Any:
+def _counting(parser: Any) -> Any:
     """Return pyulog's class ``ULog``, with a _TooMuchError beyond ``FileLimits``."""
     counts: Counter[str] = Counter()
 
@@ -317,7 +317,7 @@ def _fields(name: str, formats: Data, known: dict[str, int], depth: int) -> int:
     return known[name]
 
 
-def what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
+def _what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
     """Return a log's statements on its vehicle.
 
     Args:

@@ -93,7 +93,7 @@ def test_deviations_hold_a_coefficient_that_changes(blocks):
         one, none = np.ones(1), np.arange(0)
         base = Base([column], one, -inf * one, inf * one, sums.sum(axis=0), sums, flight,
                     np.arange(1), 0.0, frozenset(), none, one, [], {})  # fmt: skip
-        found = base.marginal([column], none).evidence([0])
+        found = base.marginal([column], none).evidence([column])
         wide = base.scatter([column], found.mode, 1.0)
         off.append(found.mode / found.std / np.array([1.0, wide[0]]))
     stated, widened = np.mean(np.abs(off) > 2.0, axis=0)

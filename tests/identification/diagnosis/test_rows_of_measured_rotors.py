@@ -89,7 +89,7 @@ def test_a_centre_of_mass_is_found_behind_a_filter(offset):
     assert best.effects == ("com_offset",)
     assert found.ranking.probability["com_offset"] > 0.95
     assert best.coefficients["com_offset"]["cx"] == pytest.approx(0.01, abs=0.001)
-    assert worth(offset, {}, (), found.setting)["com_offset"] > 1.0
+    assert worth(offset, {}, (), found.needed)["com_offset"] > 1.0
 
 
 def test_a_weak_rotor_is_found_by_an_imu_alone(weak):
