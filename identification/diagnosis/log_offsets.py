@@ -66,8 +66,9 @@ def delays_at_bound(setting: Mapping[str, Values]) -> Iterator[str]:
     """Yield the delays of a setting, coefficients by effect, whose search ended at its bound."""
     for effect in playing(Role.DELAY, among=filter(None, setting)):
         for c in get(effect).coefficients:
-            bound = c.maximum if setting[effect].get(c.name, 0.0) > 0.0 else c.minimum
-            if bound and abs(setting[effect].get(c.name, 0.0)) > _NEAR * abs(bound):
+            value = setting[effect].get(c.name, 0.0)
+            bound = c.maximum if value > 0.0 else c.minimum
+            if bound and value / bound > _NEAR:
                 yield (
                     f"{effect}: the search ends at {1000.0 * bound:.3g} ms, and the delay may be "
                     "longer. Compare the clocks of pose and rotor speeds"
@@ -81,12 +82,8 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
     To first order: behind a lag of ``tau -+ asymmetry``, rotor speeds follow ``u + asymmetry
     |dW/dt|`` with the lag ``tau``, where W follows u.
     """
-    lags = (
-        e.coefficients.get(get(e.name).coefficients[0].name, 0.0)
-        for e in vehicle.effects
-        if get(e.name).role == Role.LAG
-    )
-    lag = max(lags, default=0.0)
+    every = ((get(e.name), e.coefficients) for e in vehicle.effects)
+    lag = max((e.vector(given)[0] for e, given in every if e.role == Role.LAG), default=0.0)
     if asymmetry == 0.0 or lag == 0.0:
         return signals
     followed = lagged(signals.rotor_speeds, lag, signals.period)

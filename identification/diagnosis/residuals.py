@@ -43,7 +43,7 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     """
     biases = {c.coefficient for c in flights.biases}
     sensors = {k: x for k, x in setting.get("", {}).items() if k in biases}
-    before = flights.residual({"": sensors} if sensors else {})
+    before = flights.residual({"": sensors})
     after = flights.residual(setting)
     held_out = ~flights.fit_rows
     floor = _rms(flights.visible_noise)
@@ -87,7 +87,7 @@ def transient_disturbances(
     if not inner.size:
         return []
     least = LEAST_TRANSIENT * flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
-    largest: dict[str, tuple[float, TransientDisturbance]] = {}
+    found = []
     for cutoff in CUTOFFS.transient_hz:
         slow = flights.low_passed(residual, cutoff)
         size = np.abs(slow[inner])
@@ -96,12 +96,14 @@ def transient_disturbances(
             row = inner[np.argmax(size[:, i])]
             peak = float(slow[row, i])
             above = abs(peak) / max(std[i], 1e-30)
-            before, _ = largest.get(channel, (LEAST_SIGNIFICANCE, None))
-            if above > before and abs(peak) > least[i]:
+            if above > LEAST_SIGNIFICANCE and abs(peak) > least[i]:
                 log = flights.logs[flights.log[row]].name
                 push = TransientDisturbance(channel, log, float(flights.t[row]), peak)
-                largest[channel] = above, push
-    return [transient for _, transient in sorted(largest.values(), key=lambda x: -x[0])]
+                found.append((above, push))
+    largest: dict[str, TransientDisturbance] = {}
+    for _, push in sorted(found, key=lambda x: -x[0]):
+        largest.setdefault(push.channel, push)
+    return [*largest.values()]
 
 
 def _rms(wrench: Array) -> Pair:
