@@ -193,14 +193,13 @@ class RegressedFlights:
                 )
         # torque is left out, and only the time in the air counts
         self.commanded = any(log.commanded for log in self.logs)
-        if self.inertial:  # no log shows a height, and a ground that carries is no effect
-            self.logs = tuple(in_flight_by_thrust(log, vehicle) for log in self.logs)
-        elif self.commanded:
-            self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
+        posed = not (self.commanded or self.inertial)
+        if not posed:  # an IMU shows no height, and a ground that carries is no effect
+            flown_part = in_flight_by_thrust if self.inertial else in_flight
+            self.logs = tuple(flown_part(log, vehicle) for log in self.logs)
         # relative standard deviation of a command's thrust, which no curve of the vehicle states
         assumed = self.commanded and vehicle.motor_curve is None
         self.thrust_std = UNSTATED_THRUST_STD if assumed else 0.0
-        posed = not (self.commanded or self.inertial)
         # a filtered pose hides its own noise, and the filter's delay and bandwidth take more away
         self.filtered = posed and any(map(pose_was_filtered, self.logs))
         periods = [log.period for log in self.logs]
@@ -606,7 +605,7 @@ def _accelerometer(log: FlightLog) -> ArrayPair | None:
     read = finite_rows(log.accelerometer)
     times = log.t[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
-    if not len(times) or np.diff(ends).max() >= LONGEST_GAP:
+    if np.diff(ends).max() >= LONGEST_GAP:
         return None
     period = median_step(times)
     even = np.arange(times[0], times[-1], period)
@@ -628,7 +627,7 @@ def held_out(number: Index) -> Index:
     """
     golden = 0.5 * (5.0**0.5 - 1.0)
     turn = (0.75 + golden * (number // BLOCKS_PER_HELD_OUT)) % 1.0
-    return (BLOCKS_PER_HELD_OUT * turn).astype(np.int64)
+    return np.asarray(BLOCKS_PER_HELD_OUT * turn, np.int64)
 
 
 def _rows(signals: Signals) -> Index:

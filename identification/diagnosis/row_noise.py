@@ -37,8 +37,9 @@ class RowNoise:
     @property
     def known(self) -> Mask:
         """The rows (n,) with all earlier rows of the autoregression."""
-        since = np.arange(len(self.begins))
-        return np.asarray(since - since[self.begins][np.cumsum(self.begins) - 1] >= len(self.lags))
+        at = np.arange(len(self.begins))
+        first = np.flatnonzero(self.begins)[np.cumsum(self.begins) - 1]
+        return np.asarray(at - first >= len(self.lags))
 
     def white(self, x: Array) -> Array:
         """Return rows (n, c, ...) with white noise of variance one; rows outside ``known`` are
@@ -60,10 +61,11 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     size = np.sqrt(mean_square(x[fit]) + np.square(least))
     z = x / size
     use = fit & RowNoise(np.zeros((lags, channels, channels)), np.eye(channels), begins).known
-    for k in range(1, lags + 1):
+    each_lag = range(1, lags + 1)
+    for k in each_lag:
         use[k:] &= fit[:-k]
     at = np.flatnonzero(use)
-    past = np.column_stack([z[at - k] for k in range(1, lags + 1)])
+    past = np.column_stack([z[at - k] for k in each_lag])
     now = z[at]
     loading = len(at) * (LOADING + np.square(least / size))
     fitted = np.linalg.solve(past.T @ past + np.diag(np.tile(loading, lags)), past.T @ now)

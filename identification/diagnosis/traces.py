@@ -67,8 +67,13 @@ def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[
     body = in_body(velocity, rotation)
     speed = np.linalg.norm(body, axis=1)
     heading = heading_of(rotation)
+    in_axes = (("body velocity", "m/s", body), ("angular velocity", "rad/s", rate))
     named = {
-        **{f"body velocity {a} (m/s)": body[:, i] for i, a in enumerate("xyz")},
+        f"{name} {axis} ({unit})": along
+        for name, unit, x in (*in_axes, ("world position", "m", position[:, :2]))
+        for axis, along in zip("xyz", x.T, strict=False)
+    }
+    named |= {
         "speed (m/s)": speed,
         "squared speed (m2/s2)": speed**2,
         "height (m)": position[:, 2],
@@ -78,8 +83,6 @@ def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[
     }
     if flights.rotor_speeds_vary:
         named["thrust (N)"] = flights.rotor_wrench(setting)[:, 0]
-    named |= {f"angular velocity {a} (rad/s)": rate[:, i] for i, a in enumerate("xyz")}
-    named |= {f"world position {a} (m)": position[:, i] for i, a in enumerate("xy")}
     if all(p.signals.voltage is not None for p in pieces):
         named["battery voltage (V)"] = flights.at_rows("voltage", setting)
     return [(name, x) for name, x in named.items() if x.std() > 1e-9]
@@ -93,11 +96,12 @@ def carrying_channels(flights: RegressedFlights, setting: Setting, effect: str) 
     noise = mean_square(flights.sensor_noise) + 1e-30
     force, torque = (mean_square(part) / noise).reshape(2, 3).sum(axis=1)
     least = LEAST_SHARE * max(force + torque, 1e-30)
+    place, turn = ("accelerometer", "gyro") if flights.inertial else ("position", "attitude")
     carrying = {*_read(flights, setting, effect)}
     if force > least:
-        carrying.add("accelerometer" if flights.inertial else "position")
+        carrying.add(place)
     if torque > least and not flights.commanded:
-        carrying.add("gyro" if flights.inertial else "attitude")
+        carrying.add(turn)
     return tuple(channel for channel in ORDER if channel in carrying)
 
 

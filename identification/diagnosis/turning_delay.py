@@ -141,5 +141,5 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> _Spectra:
     )
     share = len(moments) / length / len(x)
     moment, turning = np.square(np.abs(x)), np.square(np.abs(y)) + 1e-300
-    omega = np.asarray(2.0 * np.pi * f[band, None], dtype=np.float64)
+    omega = np.asarray(2.0 * np.pi * f[band, None], np.float64)
     return _Spectra(omega, moment, turning, np.conj(x) * y, share)

@@ -61,9 +61,10 @@ def noise_spectra(log: FlightLog) -> list[_ChannelNoise]:
     out = []
     for channel, pieces, period in _channels(log):
         if (amplitude := _amplitudes(pieces)) is not None:
-            low, high = (share * 0.5 / period for share in BAND)
-            fall = _fall(amplitude, 0.5 / period)
-            out.append(_ChannelNoise(channel, _slope(amplitude), fall, (low, high)))
+            nyquist = 0.5 / period
+            band = BAND[0] * nyquist, BAND[1] * nyquist
+            fall = _fall(amplitude, nyquist)
+            out.append(_ChannelNoise(channel, _slope(amplitude), fall, band))
     return out
 
 
@@ -141,7 +142,7 @@ def filtering_notes(log: FlightLog) -> Names:
     filtered = [noise for noise in noise_spectra(log) if noise.filtered]
     pose = [noise for noise in filtered if noise.channel in POSE_CHANNELS]
     groups = [pose, *([noise] for noise in filtered if noise not in pose)]
-    return tuple(_sentence(group) for group in groups if group)
+    return tuple(map(_sentence, filter(None, groups)))
 
 
 def _sentence(group: Sequence[_ChannelNoise]) -> str:
