@@ -38,7 +38,7 @@ from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import LONGEST_GAP, Signals, log_signals
-from ..motion.smoothing import CUTOFFS, low_pass, mean_square, resampled
+from ..motion.smoothing import CUTOFFS, even_times, low_pass, mean_square, resampled
 from .column import Column, Part
 from .commanded_rotors import (
     UNSTATED_THRUST_STD,
@@ -207,7 +207,7 @@ class RegressedFlights:
         self.has_raw_poses = (
             posed and not self.filtered and np.allclose(periods, periods[0], rtol=0.01)
         )
-        seconds = sum(log.t[-1] - log.t[0] for log in self.logs)
+        seconds = sum(np.ptp(log.t) for log in self.logs)
         self.logs = tuple(excerpt(log, seconds) for log in self.logs)
         self._fit_logs = len(logs)
         self._drift: np.random.Generator | None = None  # of a copy with other errors of the fusion
@@ -267,7 +267,7 @@ class RegressedFlights:
         self.log: Index = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
         self.period = median_step(self.t)  # s, from row to row
         # s of unbroken flight
-        self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
+        self.seconds = float(sum(np.ptp(piece.signals.t) for piece in pieces))
         short = self.commanded and self.seconds < 8 * BLOCK
         self.block: Index = blocks(self.t, self.start, SHORT_BLOCK if short else BLOCK)  # (rows,)
         self.fit_rows: Mask  # (rows,)
@@ -409,11 +409,7 @@ class RegressedFlights:
         pieces = []
         for first in self._first:
             wanted = first.signals.t[first.rows]
-            s = next(
-                s
-                for i, s in cut
-                if i == first.log and s.t[0] <= wanted[0] and s.t[-1] >= wanted[-1]
-            )
+            s = next(s for i, s in cut if i == first.log and s.t[0] <= wanted[0] <= s.t[-1])
             rows = np.rint((wanted - s.t[0]) / s.period).astype(np.int64)
             pieces.append(self._piece(first.log, s, rows))
         return pieces
@@ -551,7 +547,8 @@ class RegressedFlights:
         if column.effect:
             c = coefficient(column)
             delta = math.copysign(delta, c.typical[0])
-            delta = delta if c.minimum <= value + delta <= c.maximum else -delta
+            if not c.minimum <= value + delta <= c.maximum:
+                delta = -delta
         return value, delta
 
     def columns(
@@ -608,7 +605,7 @@ def _accelerometer(log: FlightLog) -> ArrayPair | None:
     if np.diff(ends).max() >= LONGEST_GAP:
         return None
     period = median_step(times)
-    even = np.arange(times[0], times[-1], period)
+    even = even_times(times, period)
     return even, low_pass(resampled(even, times, log.accelerometer[read]), CUTOFFS.pose_hz, period)
 
 

@@ -49,9 +49,9 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     floor = _rms(flights.visible_noise)
     error = _rms(after[held_out])
     # an IMU's own noise, and the rest of a filtered pose's noise, are below a countable disturbance
-    quiet = CALM * weight_and_torque(flights.vehicle)[[0, 3]]
-    least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
-    noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
+    calm = CALM if flights.inertial or flights.filtered else 0.0
+    least = np.hypot(floor, calm * weight_and_torque(flights.vehicle)[[0, 3]])
+    noisy = bool(np.any(error > MOST_FLOOR_RATIO * least))
     new, old = (mean_square(x[held_out]) for x in (after, before))
     return Balance(
         before,

@@ -158,7 +158,7 @@ class RowLikelihood:
         columns = self.nuisances | self._answers
         if noise is not self.noise:
             columns |= self._gusts(setting)
-        if not flights.commanded and playing(Role.LAG, among=list(setting)):
+        if not flights.commanded and playing(Role.LAG, among=setting):
             # lagging rotors may speed up sooner than they slow down
             columns |= rows.columns(setting, [LAG_ASYMMETRY])
         columns |= rows.columns(setting, flights.columns_of(effects))
@@ -181,7 +181,7 @@ class RowLikelihood:
         pieces = flights.pieces({})
         states = []
         for s in (p.signals for p in pieces):
-            rotors = delivered(s, self.flights.vehicle) / flights.inertias[2:]
+            rotors = delivered(s, flights.vehicle) / flights.inertias[2:]
             # the acceleration is the rotors' alone, without disturbances
             push = rotors[:, :1] * s.rotation[:, :, 2]
             states.append(

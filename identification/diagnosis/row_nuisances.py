@@ -97,7 +97,7 @@ def _of_commands(rows: Rows, here: Array, wrench: Array) -> NamedArrays:
     thrust = wrench[:, :1]
     up = thrust * AXES["z"]
     t = flights.t[here[:, 0] > 0.0]
-    w = 2.0 * (flights.t[:, None] - t[0]) / max(t[-1] - t[0], 1e-9) - 1.0
+    w = 2.0 * (flights.t[:, None] - t[0]) / max(np.ptp(t), 1e-9) - 1.0
     out = {
         "thrust": rows.from_body(THRUST_STD * up),
         "drift": rows.from_body(DRIFT_STD * w * up),

@@ -45,7 +45,6 @@ class Rows:
         at: (n,) rows of ``flights``.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
-        log: (n,) index of the log.
         t: (n,) s.
         channels: 3, 6 or 9.
         least: (channels,) best accuracy of a motion.
@@ -55,9 +54,8 @@ class Rows:
 
     def __init__(self, flights: RegressedFlights, fixed: Setting) -> None:
         self.with_torques = not flights.commanded
-        self._cutoff = FILTERED_CUTOFF_HZ if flights.filtered else np.inf
-        if flights.commanded:
-            self._cutoff = COMMANDED_CUTOFF_HZ
+        slow = FILTERED_CUTOFF_HZ if flights.filtered else np.inf
+        self._cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else slow
         cutoff = min(self._cutoff, CUTOFFS.residual_hz)
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
         self._period = step * flights.period

@@ -105,7 +105,7 @@ def fuse(
         positions: measured beside it, world.
         attitudes: likewise. Without positions and attitudes the heading is zero at the start.
     """
-    dt = (imu.t[-1] - imu.t[0]) / (len(imu.t) - 1)
+    dt = np.ptp(imu.t) / (len(imu.t) - 1)
     stride = max(1, round(0.02 / dt))  # 20 ms from state to state, of the integrated IMU
     count = (len(imu.t) - 1) // stride
     T, end = stride * dt, count * stride + 1

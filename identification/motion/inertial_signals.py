@@ -117,7 +117,6 @@ def _piece(log: FlightLog, rows: Rows, gravity: float) -> InertialSignals:
     noise = np.array(imu_noise(log)) / np.sqrt(thin)
     fused = _fused(log, ImuPiece(t, gyro, force, gravity, noise))
     t = t[: np.searchsorted(t, fused.t[-1] + 1e-9)]
-    std = resampled(t, fused.t, fused.std)
     velocity, position, *biases = np.split(resampled(t, fused.t, fused.linear), 4, axis=1)
     gyro, force = gyro[: len(t)] - biases[0], force[: len(t)] - biases[1]
     rotation = _dense(t, gyro, fused)
@@ -132,8 +131,8 @@ def _piece(log: FlightLog, rows: Rows, gravity: float) -> InertialSignals:
         derivative(gyro, period),
         np.maximum(speeds[: len(t)], 0.0),
         voltage_at(log, t),
-        std[:, :9],
-        np.median(fused.std[:, 12:15], axis=0),
+        resampled(t, fused.t, fused.std[:, :9]),
+        np.median(fused.std[:, 12:], axis=0),
     )
 
 
