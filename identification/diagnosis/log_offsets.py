@@ -19,20 +19,25 @@ from ..motion.signals import Signals
 from ..motion.smoothing import lagged, resampled
 from .column import Column, Part
 
+
+def _error(name: str) -> Column:
+    return Column("", name, Part.OFFSET)
+
+
 # time offsets (s) of a log: of the rotor speeds' action behind their log, of the attitude ahead of
 # the position, and of the acting velocity behind the position's (as in a simulator with forces held
 # over a step)
-ROTOR_TIME_OFFSET = Column("", "rotor_time_offset", Part.OFFSET)
-ATTITUDE_TIME_OFFSET = Column("", "attitude_time_offset", Part.OFFSET)
-VELOCITY_TIME_OFFSET = Column("", "velocity_time_offset", Part.OFFSET)
+ROTOR_TIME_OFFSET = _error("rotor_time_offset")
+ATTITUDE_TIME_OFFSET = _error("attitude_time_offset")
+VELOCITY_TIME_OFFSET = _error("velocity_time_offset")
 # variance (s2) of the time over which rotor speeds are averaged, to both sides. An IMU hardly has
 # noise, so the rotor speeds' noise and rounding show; and the IMU has a low-pass of its own.
 # Without this average the fit finds an averaging lag, with an offset to bring the rotors forward
 # again
-ROTOR_SPREAD = Column("", "rotor_spread", Part.OFFSET)
+ROTOR_SPREAD = _error("rotor_spread")
 # s by which lagging rotors speed up sooner and slow down later than the lag. Their mean thrust is
 # larger by as much, and without this offset looks like a smaller mass
-LAG_ASYMMETRY = Column("", "lag_asymmetry", Part.OFFSET)
+LAG_ASYMMETRY = _error("lag_asymmetry")
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,7 @@ _NEAR = 0.98  # share of a bound: the last step of a search
 
 def bias_column(log: int, axis: int) -> Column:
     """Return the column of a bias (m/s2) along an axis of the body."""
-    return Column("", f"accelerometer bias {'xyz'[axis]} {log}", Part.OFFSET)
+    return _error(f"accelerometer bias {'xyz'[axis]} {log}")
 
 
 def delays_at_bound(setting: Mapping[str, Values]) -> Iterator[str]:

@@ -140,7 +140,7 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     library's two.
     """
     if not column.effect:
-        return TIMINGS[column].size if column in TIMINGS else 1.0
+        return TIMINGS.get(column, Offset(1.0)).size
     if column.part == Part.START or column.coefficient == CENTRAL:
         return 1.0
     c = coefficient(column)
@@ -181,7 +181,7 @@ class RegressedFlights:
 
     def __init__(self, logs: Logs, vehicle: Vehicle, test: Logs = ()) -> None:
         self.vehicle = vehicle
-        self._declared: Setting = {e.name: e.coefficients for e in vehicle.effects}
+        self._declared = {e.name: e.coefficients for e in vehicle.effects}
         self.logs = (*logs, *test)
         # without a pose, or with a slow one, the motion is read from an IMU
         self.inertial = any(map(reads_imu, self.logs))
@@ -222,11 +222,11 @@ class RegressedFlights:
         self.without_trace = self.needs_pose = Effects()
         # the noise is added to the logs once more; the change is the effect of noise
         noisy = self._of(noisy_logs(self.logs, vehicle))
-        self.visible_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
+        self.visible_noise = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
         # identifiability depends on all noise, visible or hidden
         if self.filtered:
             noisy = self._of(noisy_logs(self.logs, vehicle, hidden=True))
-        self.sensor_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6)
+        self.sensor_noise = noisy.residual({}) - self.residual({})  # (rows, 6)
         # effects whose columns are sensor noise to a large part
         self.not_identifiable = self._lost_in_noise(noisy)
         rotors = self.rotor_wrench({})
@@ -261,20 +261,20 @@ class RegressedFlights:
         """Cut the flights into pieces, and choose the samples for rows."""
         self._first = pieces = self.pieces({})
         times = [piece.signals.t[piece.rows] for piece in pieces]
-        self.t: Array = np.concatenate(times)  # (rows,) s
-        self.start: Mask = np.concatenate([t == t[0] for t in times])  # first row of a piece
+        self.t = np.concatenate(times)  # (rows,) s
+        self.start = np.concatenate([t == t[0] for t in times])  # first row of a piece
         # (rows,) index of the log
-        self.log: Index = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
+        self.log = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
         self.period = median_step(self.t)  # s, from row to row
         # s of unbroken flight
         self.seconds = float(sum(np.ptp(piece.signals.t) for piece in pieces))
         short = self.commanded and self.seconds < 8 * BLOCK
-        self.block: Index = blocks(self.t, self.start, SHORT_BLOCK if short else BLOCK)  # (rows,)
-        self.fit_rows: Mask  # (rows,)
-        if len(self.logs) > self._fit_logs:
-            self.fit_rows = self.log < self._fit_logs
-        else:
-            self.fit_rows = self.block % BLOCKS_PER_HELD_OUT != held_out(self.block)
+        self.block = blocks(self.t, self.start, SHORT_BLOCK if short else BLOCK)  # (rows,)
+        self.fit_rows: Mask = (  # (rows,)
+            self.log < self._fit_logs
+            if len(self.logs) > self._fit_logs
+            else self.block % BLOCKS_PER_HELD_OUT != held_out(self.block)
+        )
         if self.fit_rows.all() and self.block[-1] > 0:  # fewer than four blocks
             self.fit_rows = self.block < self.block[-1]
 
@@ -449,7 +449,7 @@ class RegressedFlights:
             if isinstance(s := piece.signals, InertialSignals) and piece.log < self._fit_logs:
                 for axis, std in enumerate(s.bias_std.tolist()):
                     c = bias_column(piece.log, axis)
-                    out[c] = Offset(max(std, out[c].size if c in out else 0.0))
+                    out[c] = Offset(max(std, out.get(c, Offset(0.0)).size))
         return out
 
     def amended(self, setting: Setting) -> Vehicle:

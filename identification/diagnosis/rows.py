@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...runtime.arrays import Index
-from ..logs.table import Array, Mask
+from ..logs.table import Array
 from ..motion.signals import in_body
 from ..motion.smoothing import CUTOFFS, low_pass
 from .column import Column
@@ -62,9 +62,9 @@ class Rows:
         self.flights = flights
         self.fixed = fixed
         self.at: Index = np.concatenate([rows[::step] for rows in flights.runs])
-        self.begins: Mask = flights.start[self.at]
-        self.t: Array = flights.t[self.at]
-        self.fit: Mask = flights.fit_rows[self.at]
+        self.begins = flights.start[self.at]
+        self.t = flights.t[self.at]
+        self.fit = flights.fit_rows[self.at]
         self.block = blocks(self.t, self.begins, BLOCK)
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
