@@ -7,7 +7,8 @@ force along the body differs from a bias only where attitude, thrust or the forc
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -40,8 +41,7 @@ ROTOR_SPREAD = _error("rotor_spread")
 LAG_ASYMMETRY = _error("lag_asymmetry")
 
 
-@dataclass(frozen=True)
-class Offset:
+class Offset(NamedTuple):
     """Typical size and range, in its unit."""
 
     size: float

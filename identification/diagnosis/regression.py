@@ -9,9 +9,9 @@ columns share the low-pass.
 import math
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -158,8 +158,7 @@ def typical_sizes(effect: str, vehicle: Vehicle) -> NamedNumbers:
     return {c.coefficient: typical_size(c, vehicle) for c in columns}
 
 
-@dataclass(frozen=True, eq=False)
-class _FlightPiece:
+class _FlightPiece(NamedTuple):
     """One unbroken piece of a flight, with its rows."""
 
     log: int  # index of the log

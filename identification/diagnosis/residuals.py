@@ -1,7 +1,7 @@
 """The residual of flights before and after effects are named: its noise, and its transients."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ LEAST_TRANSIENT = 0.01  # of the weight, or of the weight times the arm
 MARGIN = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class Balance:
+class Balance(NamedTuple):
     """The residual of flights (rows, 6), by the declared vehicle and by the amended one."""
 
     before: Array
@@ -86,7 +85,7 @@ def transient_disturbances(
     inner = np.concatenate([rows[edge : len(rows) - edge] for rows in flights.runs])
     if not inner.size:
         return []
-    least = LEAST_TRANSIENT * flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
+    least = LEAST_TRANSIENT * weight_and_torque(flights.vehicle, 1.0)
     found = []
     for cutoff in CUTOFFS.transient_hz:
         slow = flights.low_passed(residual, cutoff)

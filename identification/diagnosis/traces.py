@@ -16,7 +16,7 @@ from ..findings import CHANNELS, Signature
 from ..logs.table import Array, Names
 from ..motion.signals import Signals, in_body
 from ..motion.smoothing import mean_square
-from .discrepancy import heading_of
+from .discrepancy import heading_of, weight_and_torque
 from .regression import RegressedFlights, Setting, without
 
 # least shares for a channel to carry an effect: of its deviance, in the forces or in the torques,
@@ -111,7 +111,7 @@ def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[
         yield from ("position", "attitude")
         return
     less = without(setting, effect)
-    unit = flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
+    unit = weight_and_torque(flights.vehicle, 1.0)
 
     def added(s: Signals) -> Array:
         """Return the effect's wrench (n, 6) in body axes, over the weight and the weight times the

@@ -2,7 +2,8 @@
 alone.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,8 +15,7 @@ from .inertial_signals import imu_noise, pose_rate, reads_imu
 from .smoothing import CUTOFFS, high_pass, robust_std, turned
 
 
-@dataclass(frozen=True)
-class _SensorNoise:
+class _SensorNoise(NamedTuple):
     """Standard deviations of one sample, per axis."""
 
     position: float  # m
