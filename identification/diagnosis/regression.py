@@ -145,8 +145,8 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
         return 1.0
     c = coefficient(column)
     if not all(c.typical):
-        same_unit = (o for o in get(column.effect).coefficients if o.unit == c.unit)
-        return max(abs(o.typical[0]) for o in same_unit) or 1.0
+        every = get(column.effect).coefficients
+        return max(abs(o.typical[0]) for o in every if o.unit == c.unit) or 1.0
     large, small = np.abs(c.typical)
     share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
     return float(small * (large / small) ** share)
@@ -565,12 +565,12 @@ class RegressedFlights:
         return {column: self._slope(setting, column, residual, step) for column in wanted}
 
     def _slope(self, setting: Setting, column: Column, residual: _Residual, step: float) -> Array:
-        effect, name, *_ = column
+        effect = column.effect
         own = self.coefficients(setting, effect)
         value, delta = self.step(setting, column, step)
 
         def at(moved: float) -> Array:
-            return residual({**setting, effect: {**own, name: moved}})
+            return residual({**setting, effect: {**own, column.coefficient: moved}})
 
         # moving signals in time moves their noise too, and a one-sided step would seem to reduce
         # the noise: the difference is two-sided

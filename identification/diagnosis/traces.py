@@ -59,12 +59,11 @@ def signature(
 
 def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[tuple[str, Array]]:
     """Return the explanatory variables of a force at the rows, named with their units."""
-    position, rotation, velocity = (
-        flights.at_rows(name, setting) for name in ("position", "rotation", "velocity")
-    )
+    position = flights.at_rows("position", setting)
+    rotation = flights.at_rows("rotation", setting)
     pieces = flights.pieces(setting)
     rate = np.concatenate([p.smooth(p.signals.angular_velocity) for p in pieces])
-    body = in_body(velocity, rotation)
+    body = in_body(flights.at_rows("velocity", setting), rotation)
     speed = np.linalg.norm(body, axis=1)
     heading = heading_of(rotation)
     in_axes = (("body velocity", "m/s", body), ("angular velocity", "rad/s", rate))

@@ -97,13 +97,14 @@ def _amplitudes(pieces: Sequence[Array]) -> Array | None:
     The power is the median of half overlapping segments: a leap of the pose, or a touch of the
     ground, spoils some of them.
     """
-    n = SEGMENT
     # second differences, against leakage of slow motion
     rough = [np.diff(piece, 2, axis=0) for piece in pieces]
-    segments = [x[a : a + n] for x in rough for a in range(0, len(x) - n + 1, n // 2)]
+    segments = [
+        x[a : a + SEGMENT] for x in rough for a in range(0, len(x) - SEGMENT + 1, SEGMENT // 2)
+    ]
     if len(segments) < 8:  # the slope's own error is above 0.2
         return None
-    spectra = np.fft.rfft(np.hanning(n)[:, None] * np.array(segments), axis=1)[:, 1:]
+    spectra = np.fft.rfft(np.hanning(SEGMENT)[:, None] * np.array(segments), axis=1)[:, 1:]
     power = np.median(np.square(np.abs(spectra)), axis=0)
     moving = power.max(axis=0) > 0.0
     if not moving.any():
