@@ -30,7 +30,7 @@ from .causal_states import STATE, causal_states, scaled_tuning
 from .logs.commanded_speeds import with_commanded_speeds
 from .logs.flight_log import NORM_TOLERANCE, FlightLog
 from .logs.flight_phases import carried
-from .logs.table import Array, Rows, finite_rows
+from .logs.table import Array, Data, Rows, finite_rows
 from .motion.residual import loaded_model
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import known_pieces, log_signals, longest_step
@@ -291,11 +291,13 @@ class LoggedStarts:
     log: FlightLog  # without declared sensing effects
     states: Array  # (N, STATE) at each row of the log
     rows: Rows  # (n,) the starts'
+    segment: Rows  # (n,) number of the segment with each start
     seen: Array  # (n, m, STATE)
 
     def those(self, keep: Mask | slice) -> LoggedStarts:
         """Return some of the starts."""
-        return replace(self, rows=self.rows[keep], seen=self.seen[keep])
+        some: Data = {name: getattr(self, name)[keep] for name in ("rows", "segment", "seen")}
+        return replace(self, **some)
 
     def flown(self, vehicle: Vehicle) -> Array:
         """Return a model's states (n, m, STATE)."""
@@ -348,7 +350,10 @@ def logged_starts(
         flown = np.hstack([piece.position, turned, piece.velocity, piece.angular_velocity])
         at = log.t[rows, None] + ahead
         seen.append(resampled(at.ravel(), piece.t, flown).reshape(*at.shape, STATE))
-    return LoggedStarts(log, states, np.concatenate(starts), np.concatenate(seen))
+    rows = np.concatenate(starts)
+    begins = [t0 for t0, _ in segments]
+    segment = np.searchsorted(begins, log.t[rows] + log.period, side="right") - 1
+    return LoggedStarts(log, states, rows, segment, np.concatenate(seen))
 
 
 def _off_ground(log: FlightLog, vehicle: Vehicle, states: Array) -> Mask:

@@ -50,17 +50,13 @@ def _undecided(chances: Values) -> str:
 def change_headline(change: Change) -> str:
     """Return a sentence on the change, with its probability."""
     place = change.place
-    chance = change.places[place]
+    chance = f"{change.places[place]:.2f}"
+    if not change.sure:
+        told = _undecided(change.places)
+        return told if place == NOWHERE else f"{told} If the first: {_kind(change)}"
     if place == NOWHERE:
-        if change.sure:
-            return f"Nothing changed (probability {chance:.2f})."
-        other = sorted(change.places, key=change.places.__getitem__, reverse=True)[1]
-        where = f"{other} ({change.places[other]:.2f})"
-        return f"Undecided: nothing changed (probability {chance:.2f}), or likeliest {where}."
-    kind = _kind(change)
-    if change.sure:
-        return f"Changed: {place}, probability {chance:.2f}; {kind}"
-    return f"{_undecided(change.places)} If the first: {kind}"
+        return f"Nothing changed (probability {chance})."
+    return f"Changed: {place}, probability {chance}; {_kind(change)}"
 
 
 def _kind(change: Change) -> str:
@@ -219,7 +215,7 @@ def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path
     Raises:
         InputError: a file cannot be written.
     """
-    data = list(map(fault_data, faults))
+    data = [*map(fault_data, faults)]
     return _written(folder / "rotor_faults.json", data, _draw_faults(faults))
 
 
@@ -242,6 +238,6 @@ def _draw_faults(faults: Sequence[RotorFault]) -> Any:
                 panel.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
                 panel.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
         left.set_title(Path(channels.name).name)
-        chance = fault.probabilities[fault.likeliest]
-        right.set_title(f"{_finding(fault, fault.likeliest)}: {chance:.3f}")
+        likeliest = fault.likeliest
+        right.set_title(f"{_finding(fault, likeliest)}: {fault.probabilities[likeliest]:.3f}")
     return figure

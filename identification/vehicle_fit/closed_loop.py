@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ...dynamics.vehicle import LoopReaction, Vehicle
-from ...runtime.arrays import Array, Index
+from ...runtime.arrays import Array
 from ..prediction import LoggedStarts, offsets
 
 UNITS = {  # in the order of the coefficients
@@ -63,21 +63,19 @@ def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
 
 def fit_loop(
     starts: Sequence[LoggedStarts],
-    groups: Sequence[Index],
     vehicle: Vehicle,
     near: LoopReaction | None = None,
 ) -> LoopFit:
-    """Return the loop of flights with starts, one at least, each of a group.
+    """Return the loop of flights with starts, one at least.
 
     Args:
-        starts: of each flight.
-        groups: (n,) of each flight's starts.
+        starts: of each flight; those of a segment are a group.
         vehicle: with the force, inertia and rotors that stay.
         near: the loop by more starts: two rounds from there; None: from a usual one.
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
-    group = np.concatenate([*(numbers[::every] for numbers in groups), [-1]])
+    group = np.concatenate([*(part.segment for part in thin), [-1]])
     # mean distances (n, 1, 4, 1) of a flight at the horizon's end if nothing changes
     scales = []
     for part in thin:

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import LoopReaction, ModelStatus, Standing, Vehicle
-from ...runtime.arrays import Index, Mask
+from ...runtime.arrays import Mask
 from ..logs.flight_log import Logs
 from ..logs.table import ArrayPair
 from ..prediction import (
@@ -70,15 +70,13 @@ class _HeldParts(NamedTuple):
     """Starts in the segments of a fit, and the parts held out in turn."""
 
     starts: list[LoggedStarts]  # of each log
-    segment: list[Index]  # of each log's starts
     refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
 
     def errors(self, models: Callable[[VehicleFit, Mask], Models]) -> Errors:
         """Return the errors of models made of each refit and the segments that it keeps."""
         errors: Errors = {}
         for where, kept, part in self.refits:
-            each = zip(self.starts, self.segment, strict=True)
-            starts = [of.those(~kept[numbers]) for of, numbers in each]
+            starts = [of.those(~kept[of.segment]) for of in self.starts]
             if any(len(of.rows) for of in starts):
                 vehicles = models(part, kept)
                 said = errors.setdefault(where, {name: [] for name in vehicles})
@@ -98,19 +96,18 @@ def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -
     edges = [edges_of(len(piece.t), piece.period) for piece in pieces]
     ends = [piece.t[[at[:-1], at[1:] - 1]] for piece, at in zip(pieces, edges, strict=True)]
     spans = np.concatenate(ends, axis=1).T  # s, from and to
-    starts, segment = [], []
+    starts = []
     for i, log in enumerate(logs):
         own = np.flatnonzero(number == i)
-        starts.append(logged_starts(log, vehicle, spans[own].tolist(), _HORIZON))
-        begun = log.t[starts[-1].rows] + log.period
-        segment.append(own[np.searchsorted(spans[own, 0], begun, side="right") - 1])
+        part = logged_starts(log, vehicle, spans[own].tolist(), _HORIZON)
+        starts.append(replace(part, segment=own[part.segment]))
     refits = []
     folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
     for where, fold in folds.items():
         kept = [fold != held for held in np.unique(fold)]
         if len(kept) > 1:
             refits += list(zip([where] * len(kept), kept, refitted(fit, kept), strict=True))
-    return _HeldParts(starts, segment, refits)
+    return _HeldParts(starts, refits)
 
 
 def held_out(
@@ -142,14 +139,12 @@ def held_out(
     if stands not in ("torque", WHOLE):
         why = _reason(errors)
         if OTHER_FLIGHTS in errors:
-            fitted = loop = fit_loop(parts.starts, parts.segment, vehicle_of(fit, why))
+            fitted = loop = fit_loop(parts.starts, vehicle_of(fit, why))
 
             def without(part: VehicleFit, kept: Mask) -> Models:
                 vehicle = vehicle_of(part, why)
-                each = zip(parts.starts, parts.segment, strict=True)
-                starts = [of.those(kept[numbers]) for of, numbers in each]
-                groups = [numbers[kept[numbers]] for numbers in parts.segment]
-                return loops_of(vehicle, fit_loop(starts, groups, vehicle, fitted.loop).loop)
+                starts = [of.those(kept[of.segment]) for of in parts.starts]
+                return loops_of(vehicle, fit_loop(starts, vehicle, fitted.loop).loop)
 
             further = parts.errors(without)
             errors = {where: {**each, **further[where]} for where, each in errors.items()}
@@ -267,14 +262,3 @@ def refuted(vehicle: Vehicle) -> list[str]:
     """Return the parts of a vehicle's model that data outside its fit refuted."""
     return [part for part in ("force", "torque") if getattr(vehicle.status, part) == "refuted"]
 
-
-def warnings_of(vehicle: Vehicle) -> list[str]:
-    """Return a warning for a refuted force or torque: what predictions do in its place."""
-    kept = {"force": "keep the velocity", "torque": "keep the body rate"}
-    if vehicle.closed_loop is not None:
-        kept["torque"] = "follow the flight loop's reaction (closed_loop)"
-    return [
-        f"warning: {part}: refuted by data outside the fit. Predictions {kept[part]}; the file's "
-        "numbers of it are assumptions"
-        for part in refuted(vehicle)
-    ]

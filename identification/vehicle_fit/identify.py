@@ -27,7 +27,7 @@ from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
 from .estimates import Estimates, thrust_of
 from .geometry import SPIN, Geometry, Interval
-from .held_out import HeldOut, held_out, loops_of, models_of, warnings_of
+from .held_out import HeldOut, held_out, loops_of, models_of
 from .motors import motor_response
 from .parameters import BIASES, FORCE_BIAS, FURTHER, POSED_BIAS, first_model
 from .plausible import check_thrust
@@ -143,7 +143,6 @@ def identify(
             "the sum of the other two, the most that a body has: something else turns the vehicle"
         )
     vehicle = _with_status(vehicle, named, tested)
-    notes += warnings_of(vehicle)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:

@@ -52,6 +52,7 @@ def identified_data(identified: Identified) -> Data:
         "notes": identified.notes,
         "advice": identified.advice,
         "status": identified.vehicle.status,
+        "use": use_of(identified),
     }
     keys = ("unit", "model", "if_nothing_changes", "thrust_and_drag")
     for where, (errors, simplest) in identified.predicted.items():
