@@ -118,8 +118,8 @@ def predict(
     )
     starts = starts[finite_rows(states[starts])]
     x = _flown(log, vehicle, states, starts, ahead, state is None)
-    parts = (x[..., part] for part in (POSITION, VELOCITY, QUATERNION, RATE))
-    return Prediction(starts, log.period, *parts)
+    parts = POSITION, VELOCITY, QUATERNION, RATE
+    return Prediction(starts, log.period, *(x[..., part] for part in parts))
 
 
 def _checked(log: FlightLog, state: ArrayLike) -> Array:
@@ -259,9 +259,8 @@ def errors_of_models(
     Raises:
         InputError: no stretch of pose is long enough.
     """
-    whole = [[(0.0, math.inf)]] * len(logs)
     starts = []
-    for log, spans in zip(logs, windows or whole, strict=True):
+    for log, spans in zip(logs, windows or [[(0.0, math.inf)]] * len(logs), strict=True):
         ends = [(log.t[0] + begin, log.t[0] + end) for begin, end in spans]
         starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
     if not any(len(part.rows) for part in starts):
@@ -278,8 +277,8 @@ def errors_at(
     for part in starts:
         if not len(part.rows):
             continue
-        still = _distances(part.unchanged, part.seen)
-        means = (_distances(part.flown(v), part.seen) for v in vehicles)
+        paths = part.unchanged, *(part.flown(v) for v in vehicles)
+        still, *means = (_distances(path, part.seen) for path in paths)
         parts.append([PredictionErrors(len(part.rows), part.ahead, mean, still) for mean in means])
     return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
 

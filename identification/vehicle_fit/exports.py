@@ -36,8 +36,9 @@ _CRAZYFLIE = [3, 2, 1, 0]  # front-right, rear-right, rear-left, front-left
 
 
 def _autopilot(line: str, parameters: Names, most_ballistic: float, identified: Identified) -> str:
-    """Return an autopilot's parameters, each in a ``line``: momentum drag (1/s), ballistic coefficients along x and y
-    (kg/m2), hover thrust (share of the full one), and the square's share in the curve.
+    """Return an autopilot's parameters, each in a ``line``: momentum drag (1/s), ballistic
+    coefficients along x and y (kg/m2), hover thrust (share of the full one), and the square's share
+    in the curve.
     """
     vehicle = identified.vehicle
     linear = [drag / vehicle.mass for drag in linear_drag(vehicle)[:2]]

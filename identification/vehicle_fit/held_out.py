@@ -261,4 +261,3 @@ def powers(
 def refuted(vehicle: Vehicle) -> list[str]:
     """Return the parts of a vehicle's model that data outside its fit refuted."""
     return [part for part in ("force", "torque") if getattr(vehicle.status, part) == "refuted"]
-

@@ -88,8 +88,7 @@ class VehicleFit:
         here = of(values(theta))
         steps = 1e-5 * np.eye(len(theta))
         slope = np.array([of(values(theta + e)) - of(values(theta - e)) for e in steps]) / 2e-5
-        variance = float(slope @ self.covariance @ slope)
-        size = self.width * math.sqrt(max(variance, 0.0))
+        size = self.width * math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
         if logarithm and here > 0.0:
             factor = math.exp(min(size / here, 50.0))
             return here, here / factor, here * factor
@@ -108,8 +107,8 @@ def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFi
     powers = [(np.abs(s.columns[:, :, :6]) ** 2).mean(axis=0) for s in made.segments]
     spectra = residual_spectra(made.segments, powers)
     for number in range(_ROUNDS):
-        total = np.sum(_grams(made, spectra), axis=0)
-        theta, information, moved = _moved(made, total, model, theta, _STEPS)
+        grams = np.sum(_grams(made, spectra), axis=0)
+        theta, information, moved = _moved(made, grams, model, theta, _STEPS)
         made = linear()
         if number >= 2 and moved < _CLOSE:
             break
@@ -178,8 +177,8 @@ def score_tests(
     """
     model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
     made = made or fit.balance
-    total = np.sum(_grams(made, fit.spectra), axis=0)
-    step, information, *_ = _newton(made, total, model, start)
+    grams = np.sum(_grams(made, fit.spectra), axis=0)
+    step, information, *_ = _newton(made, grams, model, start)
     gradient, without, tests = information @ step, list(range(len(fit.theta))), {}
 
     def reached(rows: list[int]) -> tuple[float, Array, Array]:
