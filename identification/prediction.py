@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +31,7 @@ from .causal_states import STATE, causal_states, scaled_tuning
 from .logs.commanded_speeds import with_commanded_speeds
 from .logs.flight_log import NORM_TOLERANCE, FlightLog
 from .logs.flight_phases import carried
-from .logs.table import Array, Data, Rows, finite_rows
+from .logs.table import Array, Rows, finite_rows
 from .motion.residual import loaded_model
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import known_pieces, log_signals, longest_step
@@ -54,8 +55,7 @@ _LONGEST_GAP = 2.0  # s without a pose, after which it starts anew (``estimate_l
 _FROZEN = 1e-6  # of its usual standard deviation: a fixed wrench state
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
+class Prediction(NamedTuple):
     """The motion predicted by a model from each of n starts, over m steps of ``period``."""
 
     start: Rows  # (n,) rows of the log
@@ -210,8 +210,7 @@ def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float
 QUANTITIES = {"position": "m", "velocity": "m/s", "attitude": "rad", "body rate": "rad/s"}
 
 
-@dataclass(frozen=True, eq=False)
-class PredictionErrors:
+class PredictionErrors(NamedTuple):
     """Mean distances of predictions from a flight over their starts: a row for each of
     ``QUANTITIES``, a column for each of m samples after the start.
     """
@@ -278,13 +277,12 @@ def errors_at(
         if not len(part.rows):
             continue
         paths = part.unchanged, *(part.flown(v) for v in vehicles)
-        still, *means = (_distances(path, part.seen) for path in paths)
+        still, *means = (distances(path, part.seen) for path in paths)
         parts.append([PredictionErrors(len(part.rows), part.ahead, mean, still) for mean in means])
     return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
 
 
-@dataclass(frozen=True, eq=False)
-class LoggedStarts:
+class LoggedStarts(NamedTuple):
     """n starts of predictions in a log, and the flight at the m samples after each."""
 
     log: FlightLog  # without declared sensing effects
@@ -295,8 +293,8 @@ class LoggedStarts:
 
     def those(self, keep: Mask | slice) -> LoggedStarts:
         """Return some of the starts."""
-        some: Data = {name: getattr(self, name)[keep] for name in ("rows", "segment", "seen")}
-        return replace(self, **some)
+        each = ("rows", "segment", "seen")
+        return self._replace(**{name: getattr(self, name)[keep] for name in each})
 
     def flown(self, vehicle: Vehicle) -> Array:
         """Return a model's states (n, m, STATE)."""
@@ -380,7 +378,7 @@ def offsets(x: Array, y: Array) -> Array:
     return np.stack([off[..., POSITION], off[..., VELOCITY], turn, off[..., RATE]], axis=-2)
 
 
-def _distances(x: Array, y: Array) -> Array:
+def distances(x: Array, y: Array) -> Array:
     """Return the mean distances (4, m) of states (n, m, STATE), in the order of ``QUANTITIES``."""
     return np.transpose(np.linalg.norm(offsets(x, y), axis=-1).mean(axis=0))
 

@@ -67,11 +67,9 @@ def _kind(change: Change) -> str:
         return (
             f"all rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
         )
-    if not change.place.startswith("rotor"):
-        return f"the vehicle carries {size} of its weight more at that side."
-    if change.weaker >= 0.95:
+    if change.weaker >= SURE:
         return f"that rotor delivers {size} less for what it is asked."
-    if change.carries_more >= 0.95:
+    if change.carries_more >= SURE:
         return f"the vehicle carries {size} of its weight more there."
     return (
         f"the rotor delivers {size} less (probability {change.weaker:.2f}), or the vehicle carries "

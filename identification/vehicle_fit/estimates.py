@@ -239,7 +239,7 @@ class Estimates:
         widest = 0.5 * self.arm * self.geometry.arm
         for axis in "xy":
             known = _times(self.arm, self.fit.interval(f"c{axis}", False))
-            doubt = self.doubt or (steady if known[2] - known[1] > widest else "")
+            doubt = self.doubt or steady * (known[2] - known[1] > widest)
             status = IDENTIFIED if self.geometry.known else ASSUMED
             self._say(f"com {axis}", known, "m", how, status, doubt)
         if self.sources.force == "pose":

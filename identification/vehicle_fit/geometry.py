@@ -1,6 +1,6 @@
 """The rotors' positions as a user gives them, and usual ratios of quadrotors."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,8 +32,7 @@ VOLTAGE_EXPONENTS = 2.0
 HOVER_SPEED = 1000.0  # rad/s, for logs without rotor speeds
 
 
-@dataclass(frozen=True, eq=False)
-class Geometry:
+class Geometry(NamedTuple):
     """Rotor positions (4, 3) in m, front-left, rear-left, rear-right, front-right."""
 
     positions: Array

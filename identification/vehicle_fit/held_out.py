@@ -11,18 +11,16 @@ One flight tells no reaction: on a slower flight of a racer the body rate was of
 error of no change.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import LoopReaction, ModelStatus, Standing, Vehicle
-from ...runtime.arrays import Mask
+from ...runtime.arrays import Array, Mask
 from ..logs.flight_log import Logs
-from ..logs.table import ArrayPair
 from ..prediction import (
     QUANTITIES,
     ErrorsByPart,
@@ -35,7 +33,7 @@ from .channels import Pieces
 from .closed_loop import LoopFit, fit_loop
 from .model import coefficients
 from .solve import VehicleFit, refitted
-from .spectra import Segment, Spectra, edges_of
+from .spectra import Spectra, edges_of
 
 FOLDS = 3  # every third segment is held out at a time
 LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
@@ -100,13 +98,12 @@ def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -
     for i, log in enumerate(logs):
         own = np.flatnonzero(number == i)
         part = logged_starts(log, vehicle, spans[own].tolist(), _HORIZON)
-        starts.append(replace(part, segment=own[part.segment]))
+        starts.append(part._replace(segment=own[part.segment]))
     refits = []
     folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
     for where, fold in folds.items():
-        kept = [fold != held for held in np.unique(fold)]
-        if len(kept) > 1:
-            refits += list(zip([where] * len(kept), kept, refitted(fit, kept), strict=True))
+        if np.ptp(fold) > 0:
+            refits += [(where, kept, part) for kept, part in refitted(fit, fold)]
     return _HeldParts(starts, refits)
 
 
@@ -219,16 +216,8 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
     """Return what the balance of held-out segments says: the fit must leave less power of specific
     force along z, and of turning, than no model.
     """
-    segments = fit.balance.segments
-    fold = np.arange(len(segments)) % FOLDS
-    kept = [fold != held for held in np.unique(fold)]
-    left, total = np.sum(
-        [
-            powers(part, list(compress(segments, ~keep)))
-            for keep, part in zip(kept, refitted(fit, kept), strict=True)
-        ],
-        axis=0,
-    )
+    refits = refitted(fit, np.arange(len(fit.balance.segments)) % FOLDS)
+    left, total = np.sum([powers(part)[~kept].sum(axis=0) for kept, part in refits], axis=0)
     force, turning = left[2] > total[2], left[3:].sum() / total[3:].sum()
     why = (
         "not identifiable: torques leave more of the turning of held-out blocks than no model "
@@ -239,23 +228,20 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
     return HeldOut({}, "torque" if force else WHOLE)
 
 
-def powers(
-    fit: VehicleFit, segments: Sequence[Segment], spectra: Spectra | None = None
-) -> ArrayPair:
-    """Return the power (6,) that a fit leaves of specific force and turning, and all of it, from
-    ``LEAST_HZ`` on; ``spectra`` divide it, frequency by frequency.
+def powers(fit: VehicleFit, spectra: Spectra | None = None) -> Array:
+    """Return, segment by segment, the power that a fit leaves of specific force and turning, and
+    all of it (s, 2, 6), from ``LEAST_HZ`` on; ``spectra`` divide it, frequency by frequency.
     """
-    count = len(fit.balance.names)
-    model = coefficients(fit.model, fit.values, fit.balance.names)
-    left, total = np.zeros((2, 6))
-    for i, s in enumerate(segments):
+    names, out = fit.balance.names, []
+    model = coefficients(fit.model, fit.values, names)
+    for i, s in enumerate(fit.balance.segments):
         inside = s.frequency >= LEAST_HZ
         unit = 1.0 if spectra is None else spectra[i][inside]
         measured = s.columns[:, inside, :6]
-        residual = measured - s.columns[:, inside, 6 : 6 + count] @ model.T
-        left += (np.abs(residual) ** 2 / unit).sum(axis=(0, 1))
-        total += (np.abs(measured) ** 2 / unit).sum(axis=(0, 1))
-    return left, total
+        residual = measured - s.columns[:, inside, 6 : 6 + len(names)] @ model.T
+        both = np.abs([residual, measured])
+        out.append((both**2 / unit).sum(axis=(1, 2)))
+    return np.array(out)
 
 
 def refuted(vehicle: Vehicle) -> list[str]:

@@ -179,12 +179,12 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
     if not tested.stands:
         for name, e in named.items():
             if e.status == IDENTIFIED:
-                named[name] = replace(e, status=ASSUMED, how=f"{e.how}; nothing could be held out")
+                named[name] = e._replace(status=ASSUMED, how=f"{e.how}; nothing could be held out")
     flown = models.get(tested.stands, vehicle)
     for effect in vehicle.effects:
         for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
             if effect not in flown.effects and name in named:
-                named[name] = replace(named[name], status=REFUTED, how=WITHOUT_EFFECTS)
+                named[name] = named[name]._replace(status=REFUTED, how=WITHOUT_EFFECTS)
     known = {e.name: e.status for e in named.values() if e.status != NOTHING}
     return replace(flown, status=replace(flown.status, coefficients=known))
 

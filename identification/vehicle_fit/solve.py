@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import t as student
 
-from ...runtime.arrays import Array, Mask
+from ...runtime.arrays import Array, Index, Mask
 from ...runtime.errors import InputError
 from ..logs.table import Data, NamedNumbers, Values
 from .channels import Pieces
@@ -126,20 +126,22 @@ def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFi
     return VehicleFit(model, theta, information, scores, loss, made, spectra)
 
 
-def refitted(fit: VehicleFit, kept: Sequence[Mask]) -> list[VehicleFit]:
-    """Return a fit's coefficients by its ``kept`` segments (s,) alone, at the same spectrum of the
-    noise.
+def refitted(fit: VehicleFit, fold: Index) -> list[tuple[Mask, VehicleFit]]:
+    """Return, without each number of ``fold`` (s,) in turn, the segments (s,) kept, and the
+    coefficients by these alone, at the same spectrum of the noise.
 
     Raises:
         InputError: no segment is kept.
     """
     grams, out = np.array(_grams(fit.balance, fit.spectra)), []
-    for keep in kept:
+    for held in np.unique(fold):
+        keep = fold != held
         if not keep.any():
             raise InputError("the flight is too short; expected more than 5 s without a break")
         total = grams[keep].sum(axis=0)
         theta, information, _ = _moved(fit.balance, total, fit.model, fit.theta, _ROUNDS)
-        out.append(replace(fit, theta=theta, information=information, scores=fit.scores[keep]))
+        part = replace(fit, theta=theta, information=information, scores=fit.scores[keep])
+        out.append((keep, part))
     return out
 
 

@@ -66,7 +66,7 @@ def test_a_file_keeps_the_loop():
 def test_a_known_loop_comes_back(log):
     starts = logged_starts(log, CRAZYFLIE, [(log.t[0], log.t[-1])], 0.5)
     segment = np.arange(len(starts.rows)) // 8
-    made = replace(starts, segment=segment, seen=starts.flown(with_loop(LOOP)))
+    made = starts._replace(segment=segment, seen=starts.flown(with_loop(LOOP)))
     fit = fit_loop([made], with_loop(None))
     found = dict(zip(UNITS, astuple(fit.loop), strict=True))
     for name, value in zip(UNITS, astuple(LOOP), strict=True):
