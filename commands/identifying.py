@@ -2,7 +2,6 @@
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,8 +81,8 @@ def identify(
         with working("predicting"):
             parts_of = [[window] for window in windows[len(logs) :]]
             models = identified.vehicle, models_of(identified.vehicle)[SIMPLEST]
-            errors = errors_of_models(unseen, models, windows=parts_of)
-        identified = replace(identified, predicted={**identified.predicted, "prediction": errors})
+            further = errors_of_models(unseen, models, windows=parts_of)
+        identified = identified._replace(predicted={**identified.predicted, "prediction": further})
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
     log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])

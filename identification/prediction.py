@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,8 +55,7 @@ _LONGEST_GAP = 2.0  # s without a pose, after which it starts anew (``estimate_l
 _FROZEN = 1e-6  # of its usual standard deviation: a fixed wrench state
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
+class Prediction(NamedTuple):
     """The motion predicted by a model from each of n starts, over m steps of ``period``."""
 
     start: Rows  # (n,) rows of the log
@@ -118,8 +118,8 @@ def predict(
     )
     starts = starts[finite_rows(states[starts])]
     x = _flown(log, vehicle, states, starts, ahead, state is None)
-    parts = (x[..., part] for part in (POSITION, VELOCITY, QUATERNION, RATE))
-    return Prediction(starts, log.period, *parts)
+    parts = POSITION, VELOCITY, QUATERNION, RATE
+    return Prediction(starts, log.period, *(x[..., part] for part in parts))
 
 
 def _checked(log: FlightLog, state: ArrayLike) -> Array:
@@ -210,8 +210,7 @@ def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float
 QUANTITIES = {"position": "m", "velocity": "m/s", "attitude": "rad", "body rate": "rad/s"}
 
 
-@dataclass(frozen=True, eq=False)
-class PredictionErrors:
+class PredictionErrors(NamedTuple):
     """Mean distances of predictions from a flight over their starts: a row for each of
     ``QUANTITIES``, a column for each of m samples after the start.
     """
@@ -259,9 +258,8 @@ def errors_of_models(
     Raises:
         InputError: no stretch of pose is long enough.
     """
-    whole = [[(0.0, math.inf)]] * len(logs)
     starts = []
-    for log, spans in zip(logs, windows or whole, strict=True):
+    for log, spans in zip(logs, windows or [[(0.0, math.inf)]] * len(logs), strict=True):
         ends = [(log.t[0] + begin, log.t[0] + end) for begin, end in spans]
         starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
     if not any(len(part.rows) for part in starts):
@@ -278,24 +276,25 @@ def errors_at(
     for part in starts:
         if not len(part.rows):
             continue
-        still = _distances(part.unchanged, part.seen)
-        means = (_distances(part.flown(v), part.seen) for v in vehicles)
+        paths = part.unchanged, *(part.flown(v) for v in vehicles)
+        still, *means = (distances(path, part.seen) for path in paths)
         parts.append([PredictionErrors(len(part.rows), part.ahead, mean, still) for mean in means])
     return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
 
 
-@dataclass(frozen=True, eq=False)
-class LoggedStarts:
+class LoggedStarts(NamedTuple):
     """n starts of predictions in a log, and the flight at the m samples after each."""
 
     log: FlightLog  # without declared sensing effects
     states: Array  # (N, STATE) at each row of the log
     rows: Rows  # (n,) the starts'
+    segment: Rows  # (n,) number of the segment with each start
     seen: Array  # (n, m, STATE)
 
     def those(self, keep: Mask | slice) -> LoggedStarts:
         """Return some of the starts."""
-        return replace(self, rows=self.rows[keep], seen=self.seen[keep])
+        each = ("rows", "segment", "seen")
+        return self._replace(**{name: getattr(self, name)[keep] for name in each})
 
     def flown(self, vehicle: Vehicle) -> Array:
         """Return a model's states (n, m, STATE)."""
@@ -349,7 +348,10 @@ def logged_starts(
         flown = np.hstack([piece.position, turned, piece.velocity, piece.angular_velocity])
         at = log.t[rows, None] + ahead
         seen.append(resampled(at.ravel(), piece.t, flown).reshape(*at.shape, STATE))
-    return LoggedStarts(log, states, np.concatenate(starts), np.concatenate(seen))
+    rows = np.concatenate(starts)
+    begins = [t0 for t0, _ in segments]
+    segment = np.searchsorted(begins, log.t[rows] + log.period, side="right") - 1
+    return LoggedStarts(log, states, rows, segment, np.concatenate(seen))
 
 
 def _off_ground(log: FlightLog, vehicle: Vehicle, states: Array) -> Mask:
@@ -377,7 +379,7 @@ def offsets(x: Array, y: Array) -> Array:
     return np.stack([off[..., POSITION], off[..., VELOCITY], turn, off[..., RATE]], axis=-2)
 
 
-def _distances(x: Array, y: Array) -> Array:
+def distances(x: Array, y: Array) -> Array:
     """Return the mean distances (4, m) of states (n, m, STATE), in the order of ``QUANTITIES``."""
     return np.transpose(np.linalg.norm(offsets(x, y), axis=-1).mean(axis=0))
 

@@ -101,7 +101,7 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
         size = drive.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
         for letter, share in drive.shares.items():
             noise[:, names.index(f"{letter}0")] = size * share
-    return BalanceSpectra(drive, names, nonlinear, tuple(segments), float(seconds.sum()), noise)
+    return BalanceSpectra(drive, names, nonlinear, tuple(segments), seconds.sum(), noise)
 
 
 def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:

@@ -30,20 +30,17 @@ class MotorResponse(NamedTuple):
 
 def motor_response(pieces: Pieces) -> MotorResponse | None:
     """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
-    both = [p for p in pieces if p.rotor_speeds is not None]
-    known = [(p.command, p.period) for p in both if p.command is not None]
-    if len(known) < len(pieces):
-        return None
-    speeds = np.concatenate([p.rotors for p in pieces])
-    commands = np.concatenate([command for command, _ in known])
-    if commands.std() < 1e-3 or speeds.std() == 0.0:
+    known = [(p.command, p.period) for p in pieces if p.command is not None]
+    if len(known) < len(pieces) or any(p.rotor_speeds is None for p in pieces):
         return None
 
     def columns(lag: float) -> Array:
         u = [lagged(command, lag, period).ravel() for command, period in known]
         return np.vander(np.concatenate(u), _POWERS, increasing=True)
 
-    target = speeds.ravel()
+    target = np.concatenate([p.rotors.ravel() for p in pieces])
+    if columns(0.0)[:, 1].std() < 1e-3 or target.std() == 0.0:
+        return None
 
     def fitted(lag: float) -> ArrayPair:
         x = columns(lag)
@@ -67,6 +64,6 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     scores = np.bincount(block, residual * (moves @ inverse[-1]))
     least = max(len(scores) - 1, 1)
     size = math.sqrt(scores @ scores * len(scores) / least)
-    width = float(student.ppf(0.975, max(least, 3))) * size
+    width = student.ppf(0.975, max(least, 3)) * size
     interval = (lag, max(lag - width, 0.0), lag + width)
-    return MotorResponse(best, interval, float(residual.std() / target.std()))
+    return MotorResponse(best, interval, residual.std() / target.std())

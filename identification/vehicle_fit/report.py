@@ -52,6 +52,7 @@ def identified_data(identified: Identified) -> Data:
         "notes": identified.notes,
         "advice": identified.advice,
         "status": identified.vehicle.status,
+        "use": use_of(identified),
     }
     keys = ("unit", "model", "if_nothing_changes", "thrust_and_drag")
     for where, (errors, simplest) in identified.predicted.items():
@@ -92,19 +93,14 @@ def use_of(identified: Identified) -> str:
             f"Use: {kept}, and the flight loop's reaction for the body rate (predict does both). "
             "Plant and tasks fly assumed inertia and reaction torque."
         )
-    if len(parts) == 2:
-        return (
-            "Use: assume an unchanged velocity and body rate; the vehicle predicts no better. Fly "
-            "as advised and identify again."
-        )
-    if parts == ["torque"]:
-        return (
-            "Use: the vehicle for force, with an unchanged body rate (predict does both). Inertia "
-            "and reaction torque are assumed."
-        )
-    if parts:
-        return "Use: the vehicle for torque, with an unchanged velocity (predict does both)."
-    return "Use: this vehicle."
+    return {
+        "": "Use: this vehicle.",
+        "force": "Use: the vehicle for torque, with an unchanged velocity (predict does both).",
+        "torque": "Use: the vehicle for force, with an unchanged body rate (predict does both). "
+        "Inertia and reaction torque are assumed.",
+        "force torque": "Use: assume an unchanged velocity and body rate; the vehicle predicts no "
+        "better. Fly as advised and identify again.",
+    }[" ".join(parts)]
 
 
 def table_of(errors: PredictionErrors, simplest: PredictionErrors) -> list[Names]:
@@ -167,8 +163,8 @@ def explained(identified: Identified) -> Array:
     band. Each frequency counts by its ratio to the noise; NaN without a measurement.
     """
     fit = identified.fit
-    left, total = powers(fit, fit.balance.segments, fit.spectra)
-    return np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0)
+    left, total = powers(fit, fit.spectra).sum(axis=0)
+    return np.asarray(np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0))
 
 
 @styled()
