@@ -35,6 +35,7 @@ from .table import (
     SomeArray,
     Table,
     finite_rows,
+    lengths,
 )
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
@@ -140,7 +141,7 @@ def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
     whatever their length.
     """
     out = np.full((len(t), 4), nan)
-    good = np.linalg.norm(attitude.values, axis=1) > 0.5  # False where NaN
+    good = lengths(attitude.values) > 0.5  # False where NaN
     times, values = attitude.t[good], attitude.values[good]
     after = np.searchsorted(times, t)
     exact = np.isin(t, times)
@@ -209,10 +210,6 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
 ROLLOVER = 2.0**32 * 1e-6  # s, of a counter of 32 bits of microseconds
 _JITTER = 1.0  # s, of the stamps at both ends of a rollover
 _RESET = 1.0  # s, the least step back of a restart; late rows are late by less
-_WINDOW, _LEAST_WINDOW = 5, 3  # stamps, whose median is compared; one decides nothing
-_HOLE = 1.5  # median steps: the least hole that a late row fills
-_ALONE = 100.0  # median steps, and at least ``jitter``: a lone first or last stamp
-# this far off all others is wrong
 
 
 def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Groups]:
@@ -233,8 +230,7 @@ def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Gro
         groups.append(replace(samples, t=samples.t + ROLLOVER * over))
         if over.any():
             notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
-    groups, said = _of_piece(path, groups, piece)
-    notes += said
+    groups = _of_piece(path, groups, piece, notes)
     for i, samples in enumerate(groups):
         rows, late = in_order(samples.t)
         name, count = samples.topic or next(iter(samples.columns), "rows"), len(samples.t)
@@ -250,8 +246,8 @@ def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Gro
     return groups, list(dict.fromkeys(notes))
 
 
-def _of_piece(path: Path, groups: Groups, piece: Piece) -> Noted[Groups]:
-    """Return each group's rows of one piece, and a note on the number of pieces.
+def _of_piece(path: Path, groups: Groups, piece: Piece, notes: Lines) -> Groups:
+    """Return each group's rows of one piece; ``notes`` get one on the number of pieces.
 
     A group with another number of pieces was not written in each of them. Such a group stays whole,
     without rows of earlier times.
@@ -260,19 +256,19 @@ def _of_piece(path: Path, groups: Groups, piece: Piece) -> Noted[Groups]:
     many = mode([len(cut) for _, cut in cuts if len(cut)] or [0]) + 1
     check_piece(path, piece, many)
     if many == 1:
-        return groups, []
+        return groups
     parts = [
         (samples, np.split(np.arange(len(samples.t)), cut) if len(cut) + 1 == many else [])
         for samples, cut in cuts
     ]
     seconds = np.max([[np.ptp(s.t[rows]) for rows in part] for s, part in parts if part], axis=0)
     chosen = seconds.argmax() if piece is None else piece - 1
-    lengths = ", ".join(f"{x:.3g}" for x in seconds)
-    note = (
-        f"the clock starts anew {many - 1} time(s): the file holds {many} pieces of {lengths} s; "
-        f"piece {chosen + 1} was read (default: the longest; --piece reads another)"
+    notes.append(
+        f"the clock starts anew {many - 1} time(s): the file holds {many} pieces of "
+        f"{', '.join(f'{x:.3g}' for x in seconds)} s; piece {chosen + 1} was read (default: the "
+        "longest; --piece reads another)"
     )
-    return [samples.cut(part[chosen]) if part else samples for samples, part in parts], [note]
+    return [samples.cut(part[chosen]) if part else samples for samples, part in parts]
 
 
 def check_piece(path: Path, piece: Piece, many: int) -> None:
@@ -291,8 +287,8 @@ def _resets(t: Array) -> Rows:
     """
     resets = []
     for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
-        before, after = t[max(i - _WINDOW, 0) : i], t[i : i + _WINDOW]
-        enough = min(len(before), len(after)) >= _LEAST_WINDOW
+        before, after = t[max(i - 5, 0) : i], t[i : i + 5]
+        enough = min(len(before), len(after)) > 2  # one stamp decides nothing
         if enough and np.median(after) < np.median(before) - _RESET:
             resets.append(i)
     return np.array(resets, np.intp)
@@ -308,7 +304,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     rows = np.arange(len(t)) if increases else _longest_increase(t)
     if len(rows) > 3:  # a first or a last one far off all others is left out
         steps = np.diff(t[rows])
-        first, last = steps[[0, -1]] > max(_ALONE * np.median(steps), _JITTER)
+        first, last = steps[[0, -1]] > max(100.0 * np.median(steps), _JITTER)
         rows = rows[int(first) : len(rows) - int(last)]
     if increases or len(rows) < 2:
         return rows, 0
@@ -316,7 +312,8 @@ def in_order(t: Array) -> tuple[Rows, int]:
     late = np.setdiff1d(np.flatnonzero((t > t[rows[0]]) & (t < t[rows[-1]])), rows)
     late = late[np.unique(t[late], return_index=True)[1]]
     after = np.searchsorted(t[rows], t[late])
-    late = late[(steps[after - 1] > _HOLE * np.median(steps)) & (t[rows[after]] != t[late])]
+    # a late row fills a hole
+    late = late[(steps[after - 1] > 1.5 * np.median(steps)) & (t[rows[after]] != t[late])]
     together = np.concatenate([rows, late])
     return together[t[together].argsort(kind="stable")], len(late)
 
@@ -340,16 +337,9 @@ def _longest_increase(t: Array) -> Rows:
 
 
 # A table's rows: their times, empty fields, and gaps of the motors.
-_STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
-# s to interpolate: the lag of a small vehicle's motors, with hardly a change of speed. And steps of
-# the channel's own: a slow channel has longer gaps by nature
-_LONGEST_GAP = 0.06
-LONGEST_STEPS = 3.5
+LONGEST_STEPS = 3.5  # of a channel to interpolate: a slow one has longer gaps by nature
 _FINITE = "a finite number"
-_BACK = 0.2  # share of steps back; more are no times
-_ROUNDED = 0.2  # share of repeated times: more were rounded
 _DENSE = 0.5  # share of the rows; a channel with more counts as one of every row
-_FEWEST = 10  # samples of a channel to decide on its rows
 
 
 def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGroup]:
@@ -388,7 +378,7 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGr
         )
     step = np.diff(raw)
     back = np.flatnonzero(step <= 0.0 if is_whole else step < 0.0)
-    if back.size > (0.0 if is_whole else _BACK * len(step)):
+    if back.size > (0.0 if is_whole else 0.2 * len(step)):  # more are no times
         i = back[0]
         raise InputError(
             f"{where}, {samples.place(i + 1)}: {raw[i + 1]:.9g} {unit} "
@@ -406,7 +396,7 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGr
     if is_whole:
         _check_whole(samples, log_map)
         step = np.diff(t)
-        gaps = np.flatnonzero(step[: log_map.stray_rows] > _STRAY_GAP * np.median(step)) + 1
+        gaps = np.flatnonzero(step[: log_map.stray_rows] > 5.0 * np.median(step)) + 1
         for stray in gaps[-1:]:
             notes.append(
                 f"dropped {stray} stray sample(s) before a gap of {step[stray - 1]:.2g} s at the "
@@ -430,7 +420,7 @@ def _even_times(raw: Array) -> SomeArray:
     a time repeats in fewer than a fifth of them.
     """
     step = np.diff(raw)
-    if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < _ROUNDED:
+    if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < 0.2:
         return None
     rows = np.arange(len(raw))
     even = np.polynomial.Polynomial.fit(rows, raw, 1)(rows)
@@ -486,7 +476,7 @@ def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
     if 0.0 < min(placed.mean(), turned.mean()) < _DENSE and (placed != turned).any():
         return True
     return any(
-        x.sum() >= _FEWEST and x[~placed].sum() > (1.0 - 0.5 * placed.mean()) * x.sum()
+        x.sum() >= 10 and x[~placed].sum() > (1.0 - 0.5 * placed.mean()) * x.sum()
         for x in there.values()
         if placed.any()
     )
@@ -546,7 +536,8 @@ def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
         return 0.0
     t = samples.t
     steps = np.diff(t[read])
-    limit = max(_LONGEST_GAP, LONGEST_STEPS * np.median(steps) if len(steps) else 0.0)
+    # s: the lag of a small vehicle's motors, with hardly a change of speed
+    limit = max(0.06, LONGEST_STEPS * np.median(steps) if len(steps) else 0.0)
     gaps = np.diff(t[read], prepend=t[0], append=t[-1])
     at = gaps.argmax()
     is_long = not len(read) or gaps[at] > limit * (1.0 + 1e-9)

@@ -20,13 +20,7 @@ from .flight_log import FlightLog, SomeVehicle
 from .flight_phases import flying
 from .log_map import Commands
 from .magnitudes import within
-from .table import Array, Noted, SomeArray
-
-# s, the longest dip of thrust in flight: a vehicle falls 5 m meanwhile. Without dips, high thrusts
-# alone would remain, with a mean above the weight
-_DIP = 1.0
-_SATURATED = 0.9995  # share of the full command
-_FELT = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be another
+from .table import Array, Noted, SomeArray, lengths
 
 
 def with_commanded_speeds(
@@ -78,7 +72,7 @@ def _speeds(
             "battery's voltage. A constant factor on thrust and the mass cannot be found from this "
             "log"
         ]
-        if saturated := (command.max(axis=1) >= _SATURATED).mean():
+        if saturated := (command.max(axis=1) >= 0.9995).mean():
             notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
         return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
     least, most = model.thrust_span
@@ -87,8 +81,8 @@ def _speeds(
     relative = factor * np.square(share) + rest * share
     total = relative.sum(axis=1)
     x, felt = log.accelerometer, None
-    if x is not None:  # beside a pose, an unusual size counts as unknown
-        usual = within(float(np.nanmedian(np.linalg.norm(x, axis=1))), _FELT)
+    if x is not None:  # beside a pose, an unusual size counts as unknown: a unit may be another
+        usual = within(float(np.nanmedian(lengths(x))), (6.0, 16.0))
         felt = x[:, 2] if usual or not log.has_pose else None
     where = "a pose" if felt is None else "an accelerometer"
     if felt is None and not log.has_pose:
@@ -151,7 +145,9 @@ def _scale(log: FlightLog, total: Array, felt: SomeArray, vehicle: Vehicle) -> f
     rows = log.valid if felt is None else np.isfinite(felt)
     t, total = log.t[rows], total[rows]
     aloft = flying(total)
-    for run in unbroken(t, np.flatnonzero(aloft), _DIP):
+    # a vehicle falls 5 m in a dip of 1 s. Without dips, high thrusts alone would remain, with a
+    # mean above the weight
+    for run in unbroken(t, np.flatnonzero(aloft), 1.0):
         aloft[run[0] : run[-1]] = True
     if felt is not None:
         felt = felt[rows]

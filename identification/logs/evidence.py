@@ -48,7 +48,7 @@ from .readings import (
     as_written,
     log_readings,
 )
-from .table import Array, ArrayPair, Rows, finite_rows, median_step
+from .table import Array, ArrayPair, Rows, finite_rows, lengths, median_step
 
 # Filters, and when a reading is certain.
 _FEWEST = 60  # samples in flight for a decision
@@ -139,9 +139,8 @@ class Evidence:
         if np.isfinite(thrusts).any():
             # more than 1.5 of the 99th percentile is a wrong reading of a sensor
             self._thrusts = np.minimum(thrusts, 1.5 * np.nanquantile(thrusts, 0.99))
-        moving = (x for x in (t[:, None], position, attitude, gyro) if x is not None)
-        there = np.all([finite_rows(x) for x in moving], axis=0)
-        self._compared = self._laid_out(np.flatnonzero(there))
+        moving = [x for x in (t[:, None], position, attitude, gyro) if x is not None]
+        self._compared = self._laid_out(np.flatnonzero(finite_rows(np.hstack(moving))))
         self.enough = len(self._compared) >= _FEWEST  # whether the flight is long enough
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
@@ -282,7 +281,7 @@ class Evidence:
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
         mean = push.mean(axis=0)
-        along = np.sum(force * push, axis=1) / np.maximum(np.linalg.norm(push, axis=1), 1e-9)
+        along = np.sum(force * push, axis=1) / np.maximum(lengths(push), 1e-9)
         # log-likelihood ratios against a flight on its side, and below its origin
         cost = 60.0 * (mean[2] <= GOOD * np.linalg.norm(mean))
         cost += 3.0 * ((frames.position @ middle)[2] < 0.0)

@@ -28,7 +28,7 @@ from .readings import (
     SensorReading,
     applied,
 )
-from .table import Array, Data, Names, finite_rows
+from .table import Array, Data, Names, finite_rows, lengths
 
 # How inertial sensors are compared.
 WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
@@ -52,10 +52,11 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
     if not (notes and log.has_pose and log.has_rotor_speeds):
         return checked, notes
     advice, is_whole = remedies(log, vehicle)
-    wrong = "the pose contradicts the inertial sensors and the rotors"
     for reading in advice if is_whole else ():
         if reading.moves != DECLARED.moves and not _agreeing(applied(log, reading), gravity)[1]:
-            return log, (f"{wrong}: {reading.says}",)
+            return log, (
+                f"the pose contradicts the inertial sensors and the rotors: {reading.says}",
+            )
     return checked, notes
 
 
@@ -104,8 +105,8 @@ def _in_body_axes(log: FlightLog, up: Array) -> FlightLog:
     """Return a log with its accelerometer, in world axes and less ``up`` (3,), in body axes."""
     assert log.accelerometer is not None
     at = Slerp(log.t[log.valid], Rotation.from_quat(log.quaternion[log.valid], scalar_first=True))
-    body = at(np.clip(log.t, at.times[0], at.times[-1]))
-    return replace(log, accelerometer=body.inv().apply(log.accelerometer + up))
+    to_body = at(np.clip(log.t, at.times[0], at.times[-1])).inv()
+    return replace(log, accelerometer=to_body.apply(log.accelerometer + up))
 
 
 def is_stuck(measured: Array) -> bool:
@@ -208,7 +209,7 @@ def _force_shares(
     up = np.array([0.0, 0.0, gravity])
     needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2
     # far above pose noise
-    moves = np.linalg.norm(needed[:, :2], axis=1) > 0.5
+    moves = lengths(needed[:, :2]) > 0.5
     if np.count_nonzero(moves) >= _FEWEST:
         in_body, in_world = (
             median_square((needed - mean_force(middles, t, x))[moves, :2])
@@ -218,11 +219,13 @@ def _force_shares(
         if in_world <= GOOD and likelihood([in_world] * 2) - likelihood([in_body] * 2) >= OTHER:
             return None, up * (np.median(measured[:, 2]) < 0.5 * gravity)
     needed += up
-    readings = AS_DECLARED, *ACCELEROMETER_READINGS
-    means = (mean_force(middles, t, body.apply(measured @ r.turn.T)) for r in readings)
+    size = median_square(needed)
     return [
-        median_square(needed - mean - r.lacks_gravity * up) / median_square(needed)
-        for mean, r in zip(means, readings, strict=True)
+        median_square(
+            needed - mean_force(middles, t, body.apply(measured @ r.turn.T)) - r.lacks_gravity * up
+        )
+        / size
+        for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
     ], None
 
 

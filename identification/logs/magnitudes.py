@@ -20,7 +20,6 @@ from .table import Array, Mask, Pair, finite_rows
 # sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
 _LIKELY = {"time": (0.0002, 0.2), "battery": (2.7, 100.0), "accelerometer": (8.335, 11.278)}
 _CERTAIN = _LIKELY | {"time": (0.0004, 1.0 / 15.0), "battery": (2.7, 60.0)}
-_TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 # of rotors, in words, and in rad/s
 _SPEEDS = {
     "rad/s": ("", 1.0),
@@ -51,16 +50,17 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     accelerometer's median length.
     """
     sizes = {u: size * one for u, one in UNITS[section].items() if u not in ("min", "raw")}
-    likely = (unit for unit in sizes if within(sizes[unit], _LIKELY[section]))
-    unit = next(likely, next(iter(sizes)))
+    likely = [unit for unit in sizes if within(sizes[unit], _LIKELY[section])]
+    unit = [*likely, *sizes][0]
     return unit, within(sizes[unit], _CERTAIN[section])
 
 
 def time_doubt(step: float) -> str:
     """Return a doubt on the time's unit by a median step (s), or nothing."""
+    names = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
     unit, is_sure = likely_unit("time", step)
     words = (
-        f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: "
+        f"t looks like {names[unit]}: its median step is {step:.4g}; expected seconds: "
         f"divide t by {1.0 / UNITS['time'][unit]:g}"
     )
     return words if is_sure and unit != "s" else ""
@@ -199,9 +199,9 @@ def motor_unit(
             False,
             f"the median is {middle:.4g}: few rotors turn as fast in rad/s",
         ),
+        (True, "rotors", "rad/s", False, f"the median is {middle:.4g}; it might be rpm or Hz"),
     )
-    otherwise = f"the median is {middle:.4g}; it might be rpm or Hz"
-    return next((rule[1:] for rule in rules if rule[0]), ("rotors", "rad/s", False, otherwise))
+    return next(rule[1:] for rule in rules if rule[0])
 
 
 def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:

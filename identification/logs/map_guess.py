@@ -50,7 +50,7 @@ from .log_map import (
 )
 from .magnitudes import DOUBTFUL, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .table import Array, ArrayMap, Data, NamedArrays, Names, Table
+from .table import Array, ArrayMap, Data, NamedArrays, Names, Table, lengths
 from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
@@ -133,8 +133,8 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
 
 def _numbers_of(table: Table, names: Sequence[Name]) -> NamedArrays:
     """Return the columns (rows,) of numbers, without columns of later text."""
-    once = [n.column for n in names if table.header.count(n.column) == 1]
-    wanted = [column for column in once if not table.numeric or column in table.numeric]
+    numeric = table.numeric or table.header
+    wanted = [n.column for n in names if table.header.count(n.column) == 1 and n.column in numeric]
     if len(wanted) * table.rows > LIMITS.table_numbers // 2:  # columns with telling names
         named = named_columns(names)
         wanted = [column for column in wanted if column in named]
@@ -329,7 +329,7 @@ class _Guessing:
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
         motors = [self.values(self.parts[part].columns) for part in _MOTORS if part in self.parts]
-        thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
+        thrusts = np.square([*motors, np.ones((len(self.t), 4))][0])
         evidence = Evidence(self.t, thrusts, self.values(place.columns), attitude)
         return RankedFits(evidence.fit(reading, torques=False) for reading in readings)
 
@@ -372,7 +372,7 @@ class _Guessing:
     def accelerometer(self, group: Group) -> None:
         """Find unit and axes of the accelerometer by gravity."""
         values = self.values(group.columns)
-        size = max(float(np.nanmedian(np.linalg.norm(values, axis=1))), 1e-12)
+        size = max(float(np.nanmedian(lengths(values))), 1e-12)
         z = np.nanmean(values[:, 2]) / size
         # without a pose, a negative z may also be gravity in place of the specific force
         sure = bool(z > 0.8 or (z < -0.8 and self.ranking))
@@ -445,8 +445,9 @@ class _Guessing:
     def motors(self, part: str, group: Group) -> None:
         """Find unit and order of rotor speeds or commands, unless the map has such a section."""
         values = self.values(group.columns)
-        power = self.numbers.elasticity(values)
-        kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
+        kind, unit, sure, why = motor_unit(
+            group, values, self.vehicle, self.numbers.elasticity(values)
+        )
         if more := more_rotors(group.columns, self.table):
             self.further[part] = more
             return
@@ -521,5 +522,6 @@ class _Guessing:
         middle = float(np.nanmedian(values[values > 0.0]))
         if np.isfinite(middle):
             guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
-            unit = self.unit("battery", named[0].unit, guessed)
-            self.sections["battery"] = Battery((column,), unit)
+            self.sections["battery"] = Battery(
+                (column,), self.unit("battery", named[0].unit, guessed)
+            )

@@ -38,8 +38,6 @@ FARTHEST = 0.3  # s, of the search
 # s: smaller delays are of filters, and of stamps at a sample's end
 LEAST = 0.01
 SURE = 4.0  # standard deviations
-# s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
-_LAGS = 0.01 * np.arange(11)
 _STEP = 0.001  # s, of the search
 _DELAYS = _STEP * np.arange(-300.0, 301.0)
 _SEGMENT = 2.0  # s, of a spectrum
@@ -113,8 +111,10 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     # s: rotor speeds of flown vehicles act by up to 0.04 later (a flight loop falls over more), and
     # those that pass a filter of their own by up to 0.03 earlier
     honest = np.arange(-0.03, 0.04 + _STEP, _STEP)
+    # a lag, of motors behind a command that was logged for a speed; with a delay together 0.1
     as_good = max(
-        np.max(response.explained(honest[honest <= 0.1 - lag] - late, lag)) for lag in _LAGS
+        np.max(response.explained(honest[honest <= 0.1 - lag] - late, lag))
+        for lag in 0.01 * np.arange(11)
     )
     return _PoseDelay(late, std, bool(best - as_good > 9.0 * scale))
 

@@ -27,7 +27,7 @@ from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, serves
 from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import DOUBTFUL, interpolated, motor_doubts, rotor_doubt, time_doubt, within
-from .table import Array, Mask, Names, median_step
+from .table import Array, Mask, Names, lengths, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
@@ -162,8 +162,9 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     zero = "is 0 while the other rotors turn{}; expected the rotor speeds of all four"
     # less of the weight is no turning rotor, in whatever unit
     if most < 0.003:
-        still = "omega1..omega4 are at rest all the time, so nothing flew"
-        yield _Refused(f"{still}; expected {hover}")
+        yield _Refused(
+            f"omega1..omega4 are at rest all the time, so nothing flew; expected {hover}"
+        )
     if not np.isfinite(most):
         yield _Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
     for rotor in np.flatnonzero(speeds[thrust > 0.3 * most].max(axis=0) <= 0.0):
@@ -187,8 +188,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     if doubt := time_doubt(median_step(times)):
         yield _Refused(doubt)
     carried = carrying(np.square(speeds).max(axis=1))
-    for i in range(4):
-        if stopped := _stretches((speeds[:, i] == 0.0) & carried, log.t, 0.3):
+    for i, speed in enumerate(speeds.T):
+        if stopped := _stretches((speed == 0.0) & carried, log.t, 0.3):
             yield _Fault(f"omega{i + 1} {zero.format(f', for {stopped}')}")
     fastest = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > fastest)).size:
@@ -287,8 +288,8 @@ def _steps(log: FlightLog) -> _Findings:
     seen = np.flatnonzero(log.valid)
     t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
     step = np.diff(t)
-    way = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    angle = np.linalg.norm(turn_between(q[:-1], q[1:]), axis=1)
+    way = lengths(np.diff(position, axis=0))
+    angle = lengths(turn_between(q[:-1], q[1:]))
     # m and rad, and m/s and rad/s over the step
     far, turned = way > 0.3 + 20.0 * step, angle > 0.8 + 60.0 * step
     leaps = far | turned
@@ -352,10 +353,8 @@ def stuck_channels(log: FlightLog, vehicle: Vehicle) -> _Findings:
     most = rotors.max() if log.commanded else 0.99 * vehicle.omega_max or np.inf
     turning = (rotors > 0.0) & (rotors < most)
     place, flown = log.position[seen], aloft[seen]
-    for i in range(4):
-        yield from _still(
-            f"omega{i + 1}", log.t, aloft & turning[:, i], rotors, [i], "the other rotor speeds"
-        )
+    for i, rows in enumerate((aloft[:, None] & turning).T):
+        yield from _still(f"omega{i + 1}", log.t, rows, rotors, [i], "the other rotor speeds")
     for i, axis in enumerate("xyz"):
         yield from _still(f"p{axis}", log.t[seen], flown, place, [i], "the other coordinates")
     pose = np.hstack([place, log.quaternion[seen]])
@@ -377,8 +376,10 @@ def _still(name: str, t: Array, rows: Mask, x: Array, own: list[int], names: str
         if lasts and np.min(changes[end - 1] - changes[first]) < 20:
             still[first:end] = False
     if stretches := _stretches(still, t, _STILL):
-        wrong = "what depends on it there is wrong if its sensor hung"
-        yield _Note(f"warning: {name} stands still for {stretches} while {names} change: {wrong}")
+        yield _Note(
+            f"warning: {name} stands still for {stretches} while {names} change: what depends on "
+            "it there is wrong if its sensor hung"
+        )
 
 
 def _stretches(rows: Mask, t: Array, least: float) -> str:

@@ -80,8 +80,10 @@ class WhatFlew:
         count = WORDS["airframes"].get(self.airframe) if self.rotors is None else self.rotors
         with_rotors = "" if count in (None, 4) else f" with {count} rotors"
         if self.airframe not in ("", QUADROTOR) or with_rotors:
-            what = f"{self.airframe or 'a vehicle'}{with_rotors}"
-            raise InputError(f"{path}: {self.by} says {what}; expected a quadrotor")
+            raise InputError(
+                f"{path}: {self.by} says {self.airframe or 'a vehicle'}{with_rotors}; expected a "
+                "quadrotor"
+            )
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return the statements as rows of a table: name, value, and source."""

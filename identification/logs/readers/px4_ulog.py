@@ -61,18 +61,12 @@ _SENSORS = (  # field of an inertial sensor, and field of its gain over a time
     ("accelerometer_m_s2", "delta_velocity"),
 )
 _MICROSECOND = 1e-6  # s
-_HEADER, _MESSAGE = 16, 3  # bytes, of a file and of a message
 _DEEPEST = 20  # topics within topics
 _MOTOR1 = 101  # PX4's number of the output function "motor 1"
 _BANKS = {"MAIN": "PWM_MAIN_FUNC", "AUX": "PWM_AUX_FUNC", "UAVCAN": "UAVCAN_EC_FUNC"}
 _OUTPUTS = 16  # of a bank
-_ESCS = 8
 _LARGEST_SHARE = 1.5  # an output beyond is no share, but of the protocol's range
-_DSHOT = 1999.0  # full command
-_UAVCAN = 8191.0
-_DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
 _LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed or not
-_ABOVE_PULSES = 1.1  # times the longest pulse: no pulse is longer
 
 
 _Topics = dict[str, list[ArrayMap]]  # columns of each instance
@@ -145,16 +139,24 @@ def channels(
     batteries = [fields.get("connected", 1) for fields in topics.get("battery_status", [])]
     if batteries and not any(map(np.any, batteries)):
         notes.append("battery_status: no battery is connected (connected = 0), so no voltage")
-    instances = [(topic, fields) for topic, each in topics.items() for fields in each]
-    recorded = [s for topic, fields in instances for s in _samples(topic, fields, outputs)]
+    recorded = [
+        samples
+        for topic, instances in topics.items()
+        for fields in instances
+        for samples in _samples(topic, fields, outputs)
+    ]
     empty = {s.topic for s in recorded if not s.columns} - {s.topic for s in recorded if s.columns}
     notes += [f"{topic}: not of four motors that turn; left out" for topic in sorted(empty)]
     sections = sections_of(path, recorded, log_map, "px4_ulog", notes, piece, flown)
     log_map, _, _, said = sections
     if log_map.position is not None and log_map.position.topic == _FILTER:
         fields = topics[_FILTER][0]
-        counters = ("xy_reset_counter", "z_reset_counter")
-        if resets := [name for name in counters if np.ptp(fields.get(name, 0.0)) > 0.0]:
+        resets = [
+            name
+            for name in ("xy_reset_counter", "z_reset_counter")
+            if np.ptp(fields.get(name, 0.0)) > 0.0
+        ]
+        if resets:
             said.append(
                 f"the onboard position was reset in the log ({', '.join(resets)}): it jumps there"
             )
@@ -178,10 +180,10 @@ def _read_ulog(path: Path) -> tuple[_Topics, NamedNumbers, bool]:
         with open_regular(path, WHAT) as file, redirect_stdout(io.StringIO()):
             parsed = _counting(Parser)(file, sorted(wanted))
         with open_regular(path, WHAT) as file:  # each message states its length
-            size, place = file.seek(0, os.SEEK_END), _HEADER
-            while place + _MESSAGE <= size:
+            size, place = file.seek(0, os.SEEK_END), 16  # behind the file's header
+            while place + 3 <= size:
                 file.seek(place)
-                place += _MESSAGE + int.from_bytes(file.read(2), "little")
+                place += 3 + int.from_bytes(file.read(2), "little")
         is_damaged = bool(parsed.file_corruption) or place != size
     topics: _Topics = {}
     for data in (one for one in parsed.data_list if "timestamp" in one.data):
@@ -220,7 +222,7 @@ def unified(topic: str, fields: ArrayMap) -> NamedArrays:
     columns = dict(fields)
     if topic == "esc_status":
         # the ESCs of motors 1 to 4: found by their functions, if all are stated
-        functions = [columns.get(f"esc[{i}].actuator_function", [-1])[-1] for i in range(_ESCS)]
+        functions = [columns.get(f"esc[{i}].actuator_function", [-1])[-1] for i in range(8)]
         reported = [f"esc[{i}].esc_rpm" for i in slots_of_motors(functions, _MOTOR1) or range(4)]
         if not set(reported) <= set(columns):
             return {}
@@ -276,9 +278,11 @@ def _counting(parser: Any) -> Any:
 
     class AddLogged(parser._MessageAddLogged):  # type: ignore[misc]
         def _parse_format(self, message_formats: Data) -> None:
-            # an empty one takes its place, too
-            more = 1 + _fields(self.message_name, message_formats, {}, 0)
-            count("fields of its topics", LIMITS.ulog_fields, more)
+            count(
+                "fields of its topics",
+                LIMITS.ulog_fields,
+                1 + _fields(self.message_name, message_formats, {}, 0),  # an empty one counts, too
+            )
             super()._parse_format(message_formats)
 
     def counted(kind: Any) -> Any:
@@ -368,8 +372,9 @@ def _motor_order(path: Path, parameters: Values, vehicle: SomeVehicle) -> tuple[
             f"{path}: parameters {said} put the rotors at {places} (x forward, y left); expected "
             "one in each quadrant, as on a quad x, or a vehicle file with these rotor_positions"
         )
-    motors = ", ".join(map(str, order))
-    return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
+    return order, (
+        f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {', '.join(map(str, order))}"
+    )
 
 
 def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outputs:
@@ -390,7 +395,7 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
         if of_bank := slots_of_motors(functions, _MOTOR1):
             bank, slots = name, of_bank
-    each = (_of_motors(fields, slots) for fields in sent)
+    each = [_of_motors(fields, slots) for fields in sent]
     motors = next((motors for motors in each if motors is not None), np.zeros((0, 4)))
     most = motors.max(initial=0.0)
     turning = motors[motors > 0.5 * most]  # not the stop command
@@ -399,30 +404,35 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
     def pulses(end: str, default: float) -> Array:
         """Return one end (4,) of the outputs' ranges of pulses, us."""
         names = ((f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots)
-        given = (filter(None, map(positive.get, one)) for one in names)
-        return np.array([next(one, default) for one in given])
+        return np.array([next((given[n] for n in one if n in given), default) for one in names])
 
-    positive = {name: x for name, x in parameters.items() if x > 0.0}
+    given = {name: x for name, x in parameters.items() if x > 0.0}
     lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
     # with a bus for sensors alone the motors have pulses, long ones at rest, too
     has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and (motors < _LEAST_PULSE).any()
+    # DShot150 to DShot1200 are -5 to -2
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
-    is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
+    is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in range(-5, -1) for x in timers)
     if 0.0 < most <= _LARGEST_SHARE:
         return Outputs(slots, np.zeros(4), np.ones(4), "shares of 1")
     is_uavcan = bank == "UAVCAN" or has_bus
-    if is_uavcan or most > _ABOVE_PULSES * highs.max():
-        protocol, high, stated = "UAVCAN", _UAVCAN, is_uavcan
+    if is_uavcan or most > 1.1 * highs.max():  # no pulse is longer
+        protocol, high, stated = "UAVCAN", 8191.0, is_uavcan
     elif is_dshot or usual < _LEAST_PULSE:
-        protocol, high, stated = "DShot", _DSHOT, is_dshot
+        protocol, high, stated = "DShot", 1999.0, is_dshot
     else:
         if not (highs > lows).all():
             raise InputError(
                 f"{path}: the PWM_{bank}_MIN and MAX parameters of the motors' outputs are "
                 f"{lows.tolist()} and {highs.tolist()}; expected MIN below MAX"
             )
-        words = f"pulses, of which one is above {_LARGEST_SHARE:g}: {lows.min():g} to "
-        return Outputs(slots, lows, highs, f"{words}{highs.max():g} us")
+        return Outputs(
+            slots,
+            lows,
+            highs,
+            f"pulses, of which one is above {_LARGEST_SHARE:g}: {lows.min():g} to "
+            f"{highs.max():g} us",
+        )
     if most > high:
         raise InputError(
             f"{path}: actuator_outputs reaches {most:g}; expected shares up to 1, pulses in us, "

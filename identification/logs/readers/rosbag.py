@@ -64,10 +64,7 @@ _Messages = Callable[[str], _Received]  # by topic
 
 # times (N,) in ns, columns by name, and a topic, or a doubt on its time stamps
 _Decoded = tuple[NDArray[np.int64], NamedArrays, str]
-_SAME_CLOCK = 1_000_000_000  # ns between a header's time and the recording's
-_NANOSECOND = 1e-9  # s
 LARGEST = LIMITS.bag_chunk
-_METADATA = 1_000_000  # bytes
 _TABLES = 100  # a bag has four or five
 _COMPUTED = re.compile(r"\bAS\s*\(|\bVIRTUAL\b", re.IGNORECASE)
 _LISTED = re.compile(r"^\s*-\s*['\"]?(.+\.(?:db3|mcap))['\"]?\s*$", re.MULTILINE)
@@ -118,8 +115,7 @@ def read(
         raise InputError(f"{path}: {notes[-1]}")
     origin = min(times[0] for times, _, _ in decoded)
     recorded = [
-        ChannelGroup(_NANOSECOND * (times - origin), columns, name)
-        for times, columns, name in decoded
+        ChannelGroup(1e-9 * (times - origin), columns, name) for times, columns, name in decoded
     ]
     sections = sections_of(path, recorded, log_map, "rosbag", notes, piece)
     return flight_log(path, "rosbag", sections, vehicle)
@@ -253,7 +249,7 @@ def _decoded_topic(fields: MessageFields, messages: _Received) -> _Decoded:
     received_at, sampled_at, doubt = np.array(recorded), np.array(stamped), ""
     if not sampled_at.any():
         doubt = "no time stamps"
-    elif np.abs(sampled_at - received_at).max() > _SAME_CLOCK:
+    elif np.abs(sampled_at - received_at).max() > 1_000_000_000:  # ns
         doubt = "its time stamps are of another clock than the bag's"
     return received_at if doubt else sampled_at, fields.columns(), doubt
 
@@ -325,7 +321,7 @@ def _check_bag_files(path: Path) -> None:
     metadata = (path if is_folder else path.parent) / "metadata.yaml"
     files, text = [path], ""
     if metadata.exists():
-        check_regular(metadata, "the metadata of a ROS 2 bag", _METADATA)
+        check_regular(metadata, "the metadata of a ROS 2 bag", 1_000_000)
         text = metadata.read_bytes().decode("utf-8", "replace")
     if is_folder:
         listed = (path / name for name in _LISTED.findall(text))
