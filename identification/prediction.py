@@ -260,8 +260,8 @@ def errors_of_models(
     """
     starts = []
     for log, spans in zip(logs, windows or [[(0.0, math.inf)]] * len(logs), strict=True):
-        ends = [(log.t[0] + begin, log.t[0] + end) for begin, end in spans]
-        starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
+        parts = (np.array(spans) + log.t[0]).tolist()
+        starts.append(logged_starts(log, vehicles[0], parts, horizon_s))
     if not any(len(part.rows) for part in starts):
         names = ", ".join(log.name for log in logs)
         raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s of flight")

@@ -38,7 +38,7 @@ def vehicle_of(
     """Return the vehicle, ready for estimate, diagnose and the environment. Measured rotor speeds
     have the lag behind them already: then no effect of the model has one.
     """
-    arm, reach = estimates["arm_l"].value, estimates["p/k"].value
+    arm = estimates["arm_l"].value
     effects = _effects(estimates)
     curve = None
     if fit.drive.commands:
@@ -52,8 +52,7 @@ def vehicle_of(
     else:
         k = estimates["k"].value
         if motors is not None:  # thrust against command by way of the speed
-            steady = np.polynomial.polynomial.polypow(motors.speed, 2)
-            curve = MotorCurve(tuple(k * steady))
+            curve = MotorCurve(tuple(k * np.polynomial.polynomial.polypow(motors.speed, 2)))
     late, of_lag = "lag" in fit.model.free, effect_of(Role.LAG)
     if late:
         coefficient = get(of_lag).coefficients[0].name
@@ -67,7 +66,7 @@ def vehicle_of(
         inertia=inertia_of(inertia),
         arm_l=arm,
         k=np.full(4, k),
-        p=np.full(4, reach * k),
+        p=np.full(4, estimates["p/k"].value * k),
         rotor_radius=ROTOR_RADIUS * arm,
         omega_lsb=step,
         omega_source="commanded" if late else "measured",

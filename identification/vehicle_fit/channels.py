@@ -211,8 +211,7 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
     period = median_step(log.t[read])
-    gap = max(_GAP, 3.5 * period)
-    for rows in unbroken(log.t, read, gap, 15, _SHORTEST_PIECE):
+    for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
