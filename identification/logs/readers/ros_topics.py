@@ -233,8 +233,8 @@ class MessageFields:
             before = self._rows()
             paths = list(islice(_paths(message), LIMITS.log_fields + 1))
             check_count(self.where, len(paths), LIMITS.log_fields, "fields of a message")
-            arrays = set(map(array_of, paths if self._is_px4 else self._wanted))
-            if new := [x for x in paths if x not in known and array_of(x) in arrays]:
+            arrays = set(map(_array_of, paths if self._is_px4 else self._wanted))
+            if new := [x for x in paths if x not in known and _array_of(x) in arrays]:
                 known |= {path: _getter(path) for path in new}
                 rows = np.pad(before, ((0, 0), (0, len(new))), constant_values=np.nan)
                 self._numbers = array("d", rows.tobytes())
