@@ -235,9 +235,9 @@ class MessageFields:
             before = self._rows()
             paths = list(islice(_paths(message), LIMITS.log_fields + 1))
             check_count(self.where, len(paths), LIMITS.log_fields, "fields of a message")
-            arrays = set(map(_array_of, self._wanted))
+            arrays = set(map(array_of, self._wanted))
             is_used = self._is_px4
-            if new := [x for x in paths if x not in known and (is_used or _array_of(x) in arrays)]:
+            if new := [x for x in paths if x not in known and (is_used or array_of(x) in arrays)]:
                 known |= {path: _getter(path) for path in new}
                 rows = np.pad(before, ((0, 0), (0, len(new))), constant_values=np.nan)
                 self._numbers = array("d", rows.tobytes())
@@ -268,7 +268,7 @@ class MessageFields:
         )
 
 
-def _array_of(path: str) -> str:
+def array_of(path: str) -> str:
     """Return a field's path without the numbers of its elements: the same for all elements."""
     return re.sub(r"\[\d+\]", "[]", path)
 
