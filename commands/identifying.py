@@ -107,12 +107,12 @@ def identify(
             console.print(f"{e.name}: {e.status}: {e.how}")
     for line in identified.advice:
         console.print(line)
-    for of, (errors, simplest) in identified.predicted.items():
-        after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
+    for of, (vehicle, simplest) in identified.predicted.items():
+        after = f"{vehicle.horizon[-1]:.2g} s after {vehicle.starts} starts"
         console.print(f"{of.replace('_', ' ')}: {after}, by a fit without them:")
         show_table(
             ("mean error", "of the vehicle", "thrust and drag", "if nothing changes", "unit"),
-            table_of(errors, simplest),
+            table_of(vehicle, simplest),
         )
     console.print(use_of(identified))
     result = {"headline": headline(identified), **identified_data(identified)}

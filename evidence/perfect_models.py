@@ -159,7 +159,7 @@ def flown(plant: str, number: int, seconds: float, simulator: str) -> tuple[Flig
     loop = list(LOOPS)[number % len(LOOPS)]
     trajectory = TRAJECTORIES[number // 4 % len(TRAJECTORIES)]
     name = f"{plant} {number}: {trajectory}"
-    t = TICK * np.arange(count)
+    t = np.linspace(0.0, TICK * (count - 1), count)
     other = simulator_at(Path(simulator)) if plant == "other" else None
     vehicle = vehicle_of(other) if other else load_vehicle(VEHICLES[plant])
     wrench = gusts(GUSTS[number % len(GUSTS)], vehicle, rng, count)

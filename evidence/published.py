@@ -159,8 +159,8 @@ def section(result: dict[str, Any]) -> str:
     if pulls := result.get("pull"):
         lines += ["", "| flight | mean pull, N (x, y, z) | off, RMS, N |", "| --- " * 3 + "|"]
         for name, row in pulls.items():
-            cells = (" ".join(f"{x:.4f}" for x in row[key]) for key in ("estimated", "rms_off"))
-            lines.append(f"| {name} | {' | '.join(cells)} |")
+            numbers = (" ".join(f"{x:.4f}" for x in row[key]) for key in ("estimated", "rms_off"))
+            lines.append(f"| {name} | {' | '.join(numbers)} |")
     return "\n".join(lines)
 
 

@@ -333,7 +333,7 @@ def logged_starts(
     ahead = log.period * np.arange(1, max(1, round(horizon / log.period)) + 1)
     each = (np.arange(t0, min(t1, log.t[-1]) - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
-    pieces = log_signals(log)
+    pieces = log_signals(log)  # refuses a log without a pose
     states = causal_states(log, vehicle)
     aloft = carried(log.rotor_speeds, log.period) & _off_ground(log, vehicle, states)
     starts, seen = [], []

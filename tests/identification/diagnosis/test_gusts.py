@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import data_file
+from tests.support.imu_flights import pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.causal_filter import Poses, Track
@@ -31,6 +32,15 @@ def test_gusts_around_a_perfect_model_are_gusts(name, rms):
     gust = {g.channel: g.rms for g in found.gusts}
     assert 0.5 * rms < gust["Fx"] < 2.0 * rms  # N
     assert 0.05 * rms < gust["tau_x"] < 0.2 * rms  # Nm
+
+
+@pytest.mark.parametrize("every", [pytest.param(0), pytest.param(20, marks=pytest.mark.slow)])
+def test_gusts_around_a_perfect_model_are_gusts_without_its_pose(every):
+    vehicle = load_vehicle("ardrone2")
+    log = read_log(data_file("hard_logs/perfect_model_gusts_10mN_imu.csv.gz"), vehicle=vehicle)
+    found = diagnose([pose_removed(log, every)], vehicle)
+    assert found.verdict == "nothing to explain"
+    assert found.probabilities.unknown < 0.25
 
 
 @pytest.mark.slow
