@@ -79,9 +79,13 @@ def cancelling(parts: Mapping[str, Array], left: Array) -> Iterator[str]:
 
 def _relative(vehicle: Vehicle, effect: str, values: Values, std: Values) -> Array:
     """Return the relative changes by an effect, and their standard deviations."""
-    names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
-    unit = np.array([unit_of_change(Column(effect, name), vehicle) for name in names])
-    return np.asarray(np.array([[values[name], std.get(name, 0.0)] for name in names]).T / unit)
+    changes = (
+        np.array([values[c.name], std.get(c.name, 0.0)])
+        / unit_of_change(Column(effect, c.name), vehicle)
+        for c in get(effect).coefficients
+        if c.name in values and c.name != CENTRAL
+    )
+    return np.transpose([*changes])
 
 
 def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:

@@ -3,7 +3,7 @@ any such vehicle, and the delay shown by its turns.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ...dynamics.effects import Role, get, playing
 from ..findings import NamedEffect
@@ -12,8 +12,7 @@ from .commanded_rotors import THRUST_FACTORS
 from .regression import CENTRAL, RegressedFlights
 
 
-@dataclass(frozen=True)
-class Given:
+class Given(NamedTuple):
     """Facts without need of evidence."""
 
     library: list[str]  # effects to ask about

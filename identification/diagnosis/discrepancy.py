@@ -66,11 +66,11 @@ def along_axis(axis: int, rotation: Array) -> tuple[Array, int]:
     return (rotation[:, :, axis], 0) if axis < 3 else (Product.ones(len(rotation), 1), axis)
 
 
-def weight_and_torque(vehicle: Vehicle) -> Array:
+def weight_and_torque(vehicle: Vehicle, arm: float = TORQUE_ARM) -> Array:
     """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
-    quarter of the arm.
+    share of the arm.
     """
-    return vehicle.weight * np.repeat([1.0, TORQUE_ARM * vehicle.arm_l], 3)
+    return vehicle.weight * np.repeat([1.0, arm * vehicle.arm_l], 3)
 
 
 def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Array]:

@@ -7,7 +7,8 @@ force along the body differs from a bias only where attitude, thrust or the forc
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,24 +20,28 @@ from ..motion.signals import Signals
 from ..motion.smoothing import lagged, resampled
 from .column import Column, Part
 
+
+def _error(name: str) -> Column:
+    return Column("", name, Part.OFFSET)
+
+
 # time offsets (s) of a log: of the rotor speeds' action behind their log, of the attitude ahead of
 # the position, and of the acting velocity behind the position's (as in a simulator with forces held
 # over a step)
-ROTOR_TIME_OFFSET = Column("", "rotor_time_offset", Part.OFFSET)
-ATTITUDE_TIME_OFFSET = Column("", "attitude_time_offset", Part.OFFSET)
-VELOCITY_TIME_OFFSET = Column("", "velocity_time_offset", Part.OFFSET)
+ROTOR_TIME_OFFSET = _error("rotor_time_offset")
+ATTITUDE_TIME_OFFSET = _error("attitude_time_offset")
+VELOCITY_TIME_OFFSET = _error("velocity_time_offset")
 # variance (s2) of the time over which rotor speeds are averaged, to both sides. An IMU hardly has
 # noise, so the rotor speeds' noise and rounding show; and the IMU has a low-pass of its own.
 # Without this average the fit finds an averaging lag, with an offset to bring the rotors forward
 # again
-ROTOR_SPREAD = Column("", "rotor_spread", Part.OFFSET)
+ROTOR_SPREAD = _error("rotor_spread")
 # s by which lagging rotors speed up sooner and slow down later than the lag. Their mean thrust is
 # larger by as much, and without this offset looks like a smaller mass
-LAG_ASYMMETRY = Column("", "lag_asymmetry", Part.OFFSET)
+LAG_ASYMMETRY = _error("lag_asymmetry")
 
 
-@dataclass(frozen=True)
-class Offset:
+class Offset(NamedTuple):
     """Typical size and range, in its unit."""
 
     size: float
@@ -59,15 +64,16 @@ _NEAR = 0.98  # share of a bound: the last step of a search
 
 def bias_column(log: int, axis: int) -> Column:
     """Return the column of a bias (m/s2) along an axis of the body."""
-    return Column("", f"accelerometer bias {'xyz'[axis]} {log}", Part.OFFSET)
+    return _error(f"accelerometer bias {'xyz'[axis]} {log}")
 
 
 def delays_at_bound(setting: Mapping[str, Values]) -> Iterator[str]:
     """Yield the delays of a setting, coefficients by effect, whose search ended at its bound."""
     for effect in playing(Role.DELAY, among=filter(None, setting)):
         for c in get(effect).coefficients:
-            bound = c.maximum if setting[effect].get(c.name, 0.0) > 0.0 else c.minimum
-            if bound and abs(setting[effect].get(c.name, 0.0)) > _NEAR * abs(bound):
+            value = setting[effect].get(c.name, 0.0)
+            bound = c.maximum if value > 0.0 else c.minimum
+            if bound and value / bound > _NEAR:
                 yield (
                     f"{effect}: the search ends at {1000.0 * bound:.3g} ms, and the delay may be "
                     "longer. Compare the clocks of pose and rotor speeds"
@@ -81,12 +87,8 @@ def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Sig
     To first order: behind a lag of ``tau -+ asymmetry``, rotor speeds follow ``u + asymmetry
     |dW/dt|`` with the lag ``tau``, where W follows u.
     """
-    lags = (
-        e.coefficients.get(get(e.name).coefficients[0].name, 0.0)
-        for e in vehicle.effects
-        if get(e.name).role == Role.LAG
-    )
-    lag = max(lags, default=0.0)
+    every = ((get(e.name), e.coefficients) for e in vehicle.effects)
+    lag = max((e.vector(given)[0] for e, given in every if e.role == Role.LAG), default=0.0)
     if asymmetry == 0.0 or lag == 0.0:
         return signals
     followed = lagged(signals.rotor_speeds, lag, signals.period)

@@ -1,7 +1,7 @@
 """The residual of flights before and after effects are named: its noise, and its transients."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ LEAST_TRANSIENT = 0.01  # of the weight, or of the weight times the arm
 MARGIN = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class Balance:
+class Balance(NamedTuple):
     """The residual of flights (rows, 6), by the declared vehicle and by the amended one."""
 
     before: Array
@@ -43,15 +42,15 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     """
     biases = {c.coefficient for c in flights.biases}
     sensors = {k: x for k, x in setting.get("", {}).items() if k in biases}
-    before = flights.residual({"": sensors} if sensors else {})
+    before = flights.residual({"": sensors})
     after = flights.residual(setting)
     held_out = ~flights.fit_rows
     floor = _rms(flights.visible_noise)
     error = _rms(after[held_out])
     # an IMU's own noise, and the rest of a filtered pose's noise, are below a countable disturbance
-    quiet = CALM * weight_and_torque(flights.vehicle)[[0, 3]]
-    least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
-    noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
+    calm = CALM if flights.inertial or flights.filtered else 0.0
+    least = np.hypot(floor, calm * weight_and_torque(flights.vehicle)[[0, 3]])
+    noisy = bool(np.any(error > MOST_FLOOR_RATIO * least))
     new, old = (mean_square(x[held_out]) for x in (after, before))
     return Balance(
         before,
@@ -86,8 +85,8 @@ def transient_disturbances(
     inner = np.concatenate([rows[edge : len(rows) - edge] for rows in flights.runs])
     if not inner.size:
         return []
-    least = LEAST_TRANSIENT * flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
-    largest: dict[str, tuple[float, TransientDisturbance]] = {}
+    least = LEAST_TRANSIENT * weight_and_torque(flights.vehicle, 1.0)
+    found = []
     for cutoff in CUTOFFS.transient_hz:
         slow = flights.low_passed(residual, cutoff)
         size = np.abs(slow[inner])
@@ -96,12 +95,14 @@ def transient_disturbances(
             row = inner[np.argmax(size[:, i])]
             peak = float(slow[row, i])
             above = abs(peak) / max(std[i], 1e-30)
-            before, _ = largest.get(channel, (LEAST_SIGNIFICANCE, None))
-            if above > before and abs(peak) > least[i]:
+            if above > LEAST_SIGNIFICANCE and abs(peak) > least[i]:
                 log = flights.logs[flights.log[row]].name
                 push = TransientDisturbance(channel, log, float(flights.t[row]), peak)
-                largest[channel] = above, push
-    return [transient for _, transient in sorted(largest.values(), key=lambda x: -x[0])]
+                found.append((above, push))
+    largest: dict[str, TransientDisturbance] = {}
+    for _, push in sorted(found, key=lambda x: -x[0]):
+        largest.setdefault(push.channel, push)
+    return [*largest.values()]
 
 
 def _rms(wrench: Array) -> Pair:

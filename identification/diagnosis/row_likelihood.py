@@ -55,7 +55,7 @@ class RowLikelihood:
         self.nuisances = _named(row_nuisances(self.rows))
         self.power = 1.0
         self._gusty: dict[Effects, RowNoise] = {}  # sets with a gusty wind, and their noise
-        self.noise: RowNoise = self._noise(first)
+        self.noise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
 
     def _noise(self, first: Setting) -> RowNoise:
@@ -90,17 +90,6 @@ class RowLikelihood:
                 for k, x in enumerate(each[c].T)
             }
         )
-
-    def _noise_beside_gusts(self, setting: Setting) -> RowNoise:
-        """Return the noise of a set with a gusty wind, by a draw of the gusts' posterior: their
-        mode would leave too little noise.
-
-        Source: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82.
-        """
-        columns = self.nuisances | self._gusts(setting)
-        y = self.rows.residual(setting)
-        rng = np.random.default_rng(0)
-        return self._noise_beside(y, [*self._own, *columns.values()], self.noise, rng)[0]
 
     def _noise_beside(
         self,
@@ -158,7 +147,7 @@ class RowLikelihood:
         columns = self.nuisances | self._answers
         if noise is not self.noise:
             columns |= self._gusts(setting)
-        if not flights.commanded and playing(Role.LAG, among=list(setting)):
+        if not flights.commanded and playing(Role.LAG, among=setting):
             # lagging rotors may speed up sooner than they slow down
             columns |= rows.columns(setting, [LAG_ASYMMETRY])
         columns |= rows.columns(setting, flights.columns_of(effects))
@@ -181,7 +170,7 @@ class RowLikelihood:
         pieces = flights.pieces({})
         states = []
         for s in (p.signals for p in pieces):
-            rotors = delivered(s, self.flights.vehicle) / flights.inertias[2:]
+            rotors = delivered(s, flights.vehicle) / flights.inertias[2:]
             # the acceleration is the rotors' alone, without disturbances
             push = rotors[:, :1] * s.rotation[:, :, 2]
             states.append(
@@ -236,7 +225,13 @@ class RowLikelihood:
             return steady
         least = self.objective(steady)
         for _ in range(GUSTY_ROUNDS):
-            self._gusty[key] = self._noise_beside_gusts(setting)
+            # by a draw of the gusts' posterior: their mode would leave too little noise (G. Celeux
+            # and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82)
+            columns = self.nuisances | self._gusts(setting)
+            known = [*self._own, *columns.values()]
+            rng = np.random.default_rng(0)
+            y = self.rows.residual(setting)
+            self._gusty[key], _ = self._noise_beside(y, known, self.noise, rng)
             setting = mode(setting, self._height)
         if self.objective(setting) <= least:
             return setting

@@ -58,16 +58,12 @@ def row_nuisances(rows: Rows) -> NamedArrays:
     flights = rows.flights
     out: NamedArrays = {}
     rotors = flights.rotor_wrench({}) / flights.inertias[2:]
+    of_thrust = _of_commands if flights.commanded else _of_rotors
     numbers = np.unique(flights.log).tolist()
     for i in numbers:
         here = (flights.log == i)[:, None].astype(float)
-        thrust = here * rotors[:, :1]
-        turning = here * rotors[:, 1:]
-        own = _of_accelerometers(rows, here, thrust) if rows.has_accelerometer else {}
-        if flights.commanded:
-            own |= _of_commands(rows, here, thrust)
-        else:
-            own |= _of_rotors(rows, here, thrust, turning)
+        own = _of_accelerometers(rows, here, here * rotors[:, :1]) if rows.has_accelerometer else {}
+        own |= of_thrust(rows, here, here * rotors)
         out |= {f"{name} {i}": x for name, x in own.items()}
     if flights.commanded:
         shared = np.mean([out[f"thrust {i}"] for i in numbers], axis=0)
@@ -90,7 +86,7 @@ def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     return {f"accelerometer {name}": rows.from_body(none, x) for name, x in read.items()}
 
 
-def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
+def _of_commands(rows: Rows, here: Array, wrench: Array) -> NamedArrays:
     """Return the differences between flights with rotors known by commands.
 
     From one sample to the next rotors may be held or not, and lag: half a period is not known. The
@@ -98,9 +94,10 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     answers vertical motion.
     """
     flights = rows.flights
+    thrust = wrench[:, :1]
     up = thrust * AXES["z"]
     t = flights.t[here[:, 0] > 0.0]
-    w = 2.0 * (flights.t[:, None] - t[0]) / max(t[-1] - t[0], 1e-9) - 1.0
+    w = 2.0 * (flights.t[:, None] - t[0]) / max(np.ptp(t), 1e-9) - 1.0
     out = {
         "thrust": rows.from_body(THRUST_STD * up),
         "drift": rows.from_body(DRIFT_STD * w * up),
@@ -117,20 +114,21 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     return out
 
 
-def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedArrays:
-    """Return the errors of the model of measured rotors; ``turning`` (samples, 3): angular
-    acceleration by the rotors, rad/s2.
+def _of_rotors(rows: Rows, here: Array, wrench: Array) -> NamedArrays:
+    """Return the errors of the model of measured rotors; ``wrench`` (samples, 4): accelerations by
+    the rotors, m/s2 and rad/s2.
 
     Noise of the rotor speeds biases a torque's gain low, by its share of the column (errors in
     variables).
     """
     noise = rows.flights.rotor_noise
+    thrust = wrench[:, :1]
     varying = noise[0] * (thrust - here * thrust[here > 0.0].mean())
     out = {"model error of thrust's changes": rows.from_body(varying * AXES["z"])}
     gains = np.hypot(MODEL_ERROR, noise[1:]).tolist()
     for (name, along), gain in zip(AXES.items(), gains, strict=True):
         force = MODEL_ERROR * thrust * along
-        torque = gain * turning * along
+        torque = gain * wrench[:, 1:] * along
         out[f"model error of force {name}"] = rows.from_body(force)
         out[f"model error of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)
     return out

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...runtime.arrays import Index
-from ..logs.table import Array, Mask
+from ..logs.table import Array
 from ..motion.signals import in_body
 from ..motion.smoothing import CUTOFFS, low_pass
 from .column import Column
@@ -45,7 +45,6 @@ class Rows:
         at: (n,) rows of ``flights``.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
-        log: (n,) index of the log.
         t: (n,) s.
         channels: 3, 6 or 9.
         least: (channels,) best accuracy of a motion.
@@ -55,18 +54,17 @@ class Rows:
 
     def __init__(self, flights: RegressedFlights, fixed: Setting) -> None:
         self.with_torques = not flights.commanded
-        self._cutoff = FILTERED_CUTOFF_HZ if flights.filtered else np.inf
-        if flights.commanded:
-            self._cutoff = COMMANDED_CUTOFF_HZ
+        slow = FILTERED_CUTOFF_HZ if flights.filtered else np.inf
+        self._cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else slow
         cutoff = min(self._cutoff, CUTOFFS.residual_hz)
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
         self._period = step * flights.period
         self.flights = flights
         self.fixed = fixed
         self.at: Index = np.concatenate([rows[::step] for rows in flights.runs])
-        self.begins: Mask = flights.start[self.at]
-        self.t: Array = flights.t[self.at]
-        self.fit: Mask = flights.fit_rows[self.at]
+        self.begins = flights.start[self.at]
+        self.t = flights.t[self.at]
+        self.fit = flights.fit_rows[self.at]
         self.block = blocks(self.t, self.begins, BLOCK)
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)

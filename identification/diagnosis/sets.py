@@ -33,7 +33,7 @@ from .regression import (
     RegressedFlights,
     coefficient,
     moves_time,
-    typical_size,
+    typical_sizes,
 )
 
 MOST_EFFECTS = 5  # in a set, beside the given ones
@@ -92,7 +92,7 @@ def is_possible(
         Found(
             own,
             {name: std.get(name, 0.0) for name in own},
-            {c.name: typical_size(Column(effect, c.name), vehicle) for c in words.coefficients},
+            typical_sizes(effect, vehicle),
             flights.speed,
             frozenset(get(name).family for name in beside),
         )

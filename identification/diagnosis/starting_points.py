@@ -15,8 +15,7 @@ from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Coefficients, Unexplained
 from ..logs.table import Array
 from ..motion.smoothing import mean_square
-from .column import Column
-from .regression import RegressedFlights, Setting, typical_size
+from .regression import RegressedFlights, Setting, typical_sizes
 
 MOST_TRIED = 12  # starts; no more are tried all
 KEPT_OF_MORE = 4  # starts of more, the most like the residual
@@ -46,10 +45,7 @@ def starting_points(
     starts = declared(
         Unexplained(
             flights.vehicle,
-            {
-                c.name: typical_size(Column(effect, c.name), flights.vehicle)
-                for c in get(effect).coefficients
-            },
+            typical_sizes(effect, flights.vehicle),
             stated,
             frozenset(get(e).family for e in beside),
             position.mean(axis=0),

@@ -18,7 +18,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
 from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
-from ..motion.signals import Signals, log_signals
+from ..motion.signals import Signals, log_signals, voltage_at
 from ..motion.smoothing import (
     derivative,
     low_pass,
@@ -254,7 +254,7 @@ def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
             resampled(t, log.t, log.rotor_speeds) if sources.rotors == "rotor speeds" else None
         ),
         command=None if log.command is None else resampled(t, log.t, log.command),
-        voltage=None if log.voltage is None else np.interp(t, log.t, log.voltage),
+        voltage=voltage_at(log, t),
     )
     if period < 0.8 / _FASTEST_HZ:
         period = 1.0 / _FASTEST_HZ
