@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array, ArrayMap, NamedArrays, median_step
+from ..logs.table import Array, ArrayMap, NamedArrays, Rows, median_step
 from ..motion.signals import in_body
 from ..motion.smoothing import filtered
 from .causal_filter import FlightState
@@ -73,7 +73,7 @@ def weight_and_torque(vehicle: Vehicle, arm: float = TORQUE_ARM) -> Array:
     return vehicle.weight * np.repeat([1.0, arm * vehicle.arm_l], 3)
 
 
-def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Array]:
+def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Rows]:
     """Return all pieces, one after the other, and their ends without the last."""
     columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(FlightState))
     return FlightState(*columns), np.cumsum([len(track.position) for track in tracks])[:-1]
@@ -85,7 +85,7 @@ def _scaled(x: Array) -> Array:
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFlights) -> Columns:
+def discrepancy_columns(whole: FlightState, ends: Rows, flights: RegressedFlights) -> Columns:
     """Return accelerations (n, 6) by column, each of a standard deviation of the weight, or of the
     weight times the arm.
 
@@ -156,7 +156,7 @@ def heading_of(rotation: Array) -> Array:
     return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
 
 
-def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
+def _resonance(drive: Array, hertz: float, period: float, ends: Rows) -> Array:
     """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
     # s'' = -a - rate^2 s - 2 damping rate s'; the pull is rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz

@@ -6,7 +6,7 @@ signals of the axis' states than the pose.
 
 import math
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -45,11 +45,12 @@ class NoiseSearch:
     """
 
     see: Callable[[SteadyFilter, Array], Array]
-    products: Callable[[SteadyFilter, Array], Array]
+    products: Callable[[Array], Array]
     held: Array
     period: float
     gravity: float
 
+    @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
     def likeliest(self, near: PoseNoise, gains: Array) -> tuple[PoseNoise, Array]:
         """Return the noise and the gains (3, e) at maximum likelihood, by damped steps.
 
@@ -58,14 +59,11 @@ class NoiseSearch:
             gains: (3, e) at its start.
         """
         x = _free(near)
-        low = x - 16.0
-        high = x + 16.0
-        low[:, 0] = math.log(LEAST_POSE)
-        low[:, 2:] = (math.log(TIMES[0]), 0.0)
-        high[:, 2:] = (math.log(TIMES[1]), 1e4)
+        ends = np.array([x - 16.0, x + 16.0])
+        ends[0, :, 0] = math.log(LEAST_POSE)
+        ends[:, :, 2:] = np.transpose([np.log(TIMES), [0.0, 1e4]])[:, None]
         none = np.full(gains.size, np.inf)
-        low = np.append(-none, low)
-        high = np.append(none, high)
+        low, high = np.hstack([[-none, none], ends.reshape(2, -1)])
         at = np.clip(np.append(gains, x), low, high)
         height, seen = self._height(at)
         normal, right = self._slopes(at, seen)
@@ -90,7 +88,6 @@ class NoiseSearch:
     def _filter(self, at: Array) -> SteadyFilter:
         return steady_filter(_noise(at), self.period, self.gravity)
 
-    @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
     def _height(self, at: Array) -> tuple[float, Array]:
         """Return minus the logarithm of the likelihood and the prior, up to a constant, and the
         innovations (n, 6).
@@ -102,38 +99,27 @@ class NoiseSearch:
         size = np.linalg.slogdet(steady.covariance)[1]
         return float(0.5 * (square + len(seen) * size)), seen
 
-    @np.errstate(over="ignore", invalid="ignore")
     def _slopes(self, at: Array, seen: Array) -> ArrayPair:
         """Return Fisher's information (c, c), and minus the height's gradient (c,), at the
-        innovations ``seen`` last.
+        innovations ``seen`` last. The filter's derivatives are differences.
         """
         steady = self._filter(at)
-        slopes, change = self._filter_slopes(at, steady)
-        whole = self.products(steady, slopes)
+        there = self._filter(at + STEP * np.eye(len(at))[-SEARCHED:])
+        gain = (there.gain - steady.gain).reshape(SEARCHED, 6, 6)
+        slopes = np.concatenate([gain, (there.keep - steady.keep)[..., None]], axis=2) / STEP
+        change = (there.covariance - steady.covariance) / STEP  # (m, 6, 6)
+        whole = self.products(np.moveaxis(slopes, 0, -1))
         normal = whole[:-1, :-1]
         right = whole[:-1, -1]
-        held = np.tile(self.held, len(PAIRS))
-        count = len(held)
-        normal[range(count), range(count)] += held**-2
-        right[:count] -= at[:count] / held**2
+        prior = np.append(np.tile(self.held**-2, len(PAIRS)), np.zeros(SEARCHED))
+        normal += np.diag(prior)
+        right -= prior * at
         # by the innovations' covariance
         share = np.linalg.solve(steady.covariance, change)  # (m, 6, 6)
         left = np.linalg.solve(steady.covariance, seen.T @ seen) - len(seen) * np.eye(6)
-        normal[count:, count:] += 0.5 * len(seen) * np.einsum("mij,lji->ml", share, share)
-        right[count:] += 0.5 * np.einsum("mij,ji->m", share, left)
+        normal[-SEARCHED:, -SEARCHED:] += 0.5 * len(seen) * np.einsum("mij,lji->ml", share, share)
+        right[-SEARCHED:] += 0.5 * np.einsum("mij,ji->m", share, left)
         return normal, right
-
-    def _filter_slopes(self, at: Array, here: SteadyFilter) -> ArrayPair:
-        """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
-        covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
-        """
-        noise = [_noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in range(SEARCHED)]
-        moved = PoseNoise(*(np.stack(each) for each in zip(*map(astuple, noise), strict=True)))
-        there = steady_filter(moved, self.period, self.gravity)
-        gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
-        slopes = np.concatenate([gain, (there.keep - here.keep)[..., None]], axis=2) / STEP
-        change = (there.covariance - here.covariance) / STEP
-        return np.moveaxis(slopes, 0, -1), change
 
 
 def _free(noise: PoseNoise) -> Array:
@@ -146,6 +132,9 @@ def _free(noise: PoseNoise) -> Array:
 
 
 def _noise(at: Array) -> PoseNoise:
-    x = at[-SEARCHED:].reshape(6, 4)
-    pose, disturbance, time = np.exp(x[:, :3]).T
-    return PoseNoise(pose, disturbance, time, disturbance * np.sqrt(x[:, 3]))
+    """Return the noise whose searched numbers are the last of each row (..., c)."""
+    pose, disturbance, time, share = np.moveaxis(
+        at[..., -SEARCHED:].reshape(*at.shape[:-1], 6, 4), -1, 0
+    )
+    white = np.exp(disturbance) * np.sqrt(share)
+    return PoseNoise(np.exp(pose), np.exp(disturbance), np.exp(time), white)

@@ -67,13 +67,14 @@ def test_rotors_that_answer_a_product_of_rates_have_no_innovation_by_it():
     mix = 1e-5 * np.array([[1, 1, 1, 1], roll, [-1, 1, 1, -1], [1, -1, 1, -1]]).T
     between = 0.5 * (speeds + np.vstack([speeds[1:], speeds[-1:]]))
     heading = np.tile([1.0, 0.0], (n, 1))
-    t = 0.005 * np.arange(n)
-    poses = Poses(t, 0.005, zeros[:, :3], heading, speeds, zeros[:, 0], np.zeros(3), np.zeros(3))
+    k = np.arange(n)
+    t = 0.005 * k
+    poses = Poses(t, zeros[:, :3], heading, speeds, zeros[:, 0], zeros[:1], k, k, k)
     track = Track(
         t, zeros[:, :3], level, zeros[:, :3], rate, zeros, between**2 @ mix, zeros, zeros, heading,
         zeros, zeros,
     )  # fmt: skip
-    (found,) = rotor_innovations([(poses, track)])
+    found = rotor_innovations(poses, track)
     roll_innovation, answer = found[LAGS:, 1], answered[LAGS:, 1]
     assert abs(np.corrcoef(roll_innovation, answer)[0, 1]) < 0.01
 
