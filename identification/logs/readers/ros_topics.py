@@ -26,7 +26,6 @@ SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerome
 # sections in the messages of another, without a topic of their own
 BESIDE = {"attitude": "position", "gyro": "accelerometer"}
 MOTORS = ("rotors", "commands")
-_MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
 _PX4 = "px4_msgs/msg/"
 
@@ -200,7 +199,7 @@ def stamp(message: Any) -> int:
     if header is not None:
         return min(int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec), _LATEST - 1)
     sampled = int(getattr(message, "timestamp_sample", 0) or getattr(message, "timestamp", 0))
-    return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
+    return 1000 * sampled if sampled < _LATEST // 1000 else 0
 
 
 _Getter = Callable[[Any], Any]  # of a number from a message
@@ -258,9 +257,9 @@ class MessageFields:
 
     def lack(self, columns: Wanted) -> InputError:
         """Return the error for columns without some of the wanted ones."""
-        missing = [name for name in self._wanted if name not in columns]
+        missing = ", ".join(name for name in self._wanted if name not in columns)
         return InputError(
-            f"{self.where}: no field {', '.join(missing)} in its {self._kind}; found "
+            f"{self.where}: no field {missing} in its {self._kind}; found "
             f"{', '.join(islice(columns, 30)) or 'no number'}"
         )
 
