@@ -3,7 +3,7 @@ any such vehicle, and the delay shown by its turns.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from ...dynamics.effects import Role, get, playing
 from ..findings import NamedEffect
@@ -12,7 +12,8 @@ from .commanded_rotors import THRUST_FACTORS
 from .regression import CENTRAL, RegressedFlights
 
 
-class Given(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Given:
     """Facts without need of evidence."""
 
     library: list[str]  # effects to ask about

@@ -478,9 +478,7 @@ class Likelihood:
             errors = {
                 "force": Product(1.0, thrust, *along_axis(i, rotation)),
                 "torque": Product(1.0, torque, *own),
-                "expected torque": Product(
-                    math.hypot(1.0, share / MODEL_ERROR), expected, *own
-                ),
+                "expected torque": Product(math.hypot(1.0, share / MODEL_ERROR), expected, *own),
             }
             for name, x in errors.items():
                 self._acting[Column("", f"{name} {'xyz'[i]}", Part.MODEL_ERROR)] = x

@@ -1,7 +1,7 @@
 """The residual of flights before and after effects are named: its noise, and its transients."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,7 +24,8 @@ LEAST_TRANSIENT = 0.01  # of the weight, or of the weight times the arm
 MARGIN = 1.0
 
 
-class Balance(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Balance:
     """The residual of flights (rows, 6), by the declared vehicle and by the amended one."""
 
     before: Array
