@@ -109,8 +109,8 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
 def judged(
     fit: SetFit, rule: DiagnosisSettings
 ) -> tuple[Sequence[NamedEffect], Sequence[NamedEffect], dict[str, Names], Probabilities]:
-    """Return the effects that a fit names, the effects left out as needless, doubts and
-    probabilities, as of ``Diagnosis``; ``rule`` says when a name is sure.
+    """Return named effects, needless effects, doubts and probabilities, as of ``Diagnosis``;
+    ``rule`` says when a name is sure.
     """
     known = {e: _differs(fit, e) for e in fit.first if e in fit.best.effects}
     likely = [e for e in fit.best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
