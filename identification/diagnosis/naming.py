@@ -26,7 +26,7 @@ from .advice import FILTERED, composites
 from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .commands import Given, what_commands_show
-from .priors import Setting, declared
+from .priors import Setting
 from .ranking import FittedPosterior, Report, rank, rank_by_rows
 from .regression import (
     CENTRAL,
@@ -109,8 +109,8 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
 def judged(
     fit: SetFit, rule: DiagnosisSettings
 ) -> tuple[Sequence[NamedEffect], Sequence[NamedEffect], dict[str, Names], Probabilities]:
-    """Return the effects that a fit names, the effects left out as needless, doubts and
-    probabilities, as of ``Diagnosis``; ``rule`` says when a name is sure.
+    """Return named effects, needless effects, doubts and probabilities, as of ``Diagnosis``;
+    ``rule`` says when a name is sure.
     """
     known = {e: _differs(fit, e) for e in fit.first if e in fit.best.effects}
     likely = [e for e in fit.best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
@@ -152,13 +152,6 @@ def judged(
     return effects, needless, doubts, Probabilities(names, stated, fit.strange)
 
 
-def _std(fit: SetFit, effect: str) -> NamedNumbers:
-    """Return the standard deviations of an effect in the likeliest set, with the spread from flight
-    to flight.
-    """
-    return _of_any_flight(fit.flights, effect, *fit.ranking.averaged(effect))
-
-
 def _of_any_flight(
     flights: RegressedFlights, effect: str, values: Values, std: Values
 ) -> NamedNumbers:
@@ -174,12 +167,13 @@ def _differs(fit: SetFit, effect: str) -> float:
     statement; 0 where the difference is too small for a name.
     """
     apart = [0.0]
-    # these flights are late, however late others are
-    delays = get(effect).role == Role.DELAY
+    # for a delay: these flights are late, however late others are
     values, stds = fit.ranking.averaged(effect)
-    for name, std in (stds if delays else _std(fit, effect)).items():
+    if get(effect).role != Role.DELAY:
+        stds = _of_any_flight(fit.flights, effect, values, stds)
+    for name, std in stds.items():
         c = Column(effect, name)
-        off = abs(values[name] - declared(c, fit.flights))
+        off = abs(values[name] - fit.flights.value({}, c))
         if off > LEAST_SIZE * typical_size(c, fit.flights.vehicle) and std:
             apart.append(_apart(off, std))
     return max(apart)
@@ -244,11 +238,12 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
 def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool) -> NamedEffect:
     flights = fit.flights
     vehicle = flights.vehicle
-    std = _std(fit, effect)
+    found, own = fit.ranking.averaged(effect)
+    std = _of_any_flight(flights, effect, found, own)
     # the point of action of an effect at the rotors, as declared, is nothing to report
     values = {
         name: x
-        for name, x in fit.ranking.averaged(effect)[0].items()
+        for name, x in found.items()
         if name != CENTRAL or x > BY_CHANCE * std.get(name, math.inf)
     }
     uncertain = flights.thrust_std > 0.0 and get(effect).role in THRUST_FACTORS

@@ -151,8 +151,7 @@ class Base:
         there[free] = -power * inverse @ (self.total[free] @ there)
         kept = np.append(self.single, len(self.names))
         each = power * self.blocks[:, np.searchsorted(self.single, free)] @ there[kept] @ inverse
-        stated = np.diagonal(inverse)
-        largest = stated.copy()
+        largest = stated = np.diagonal(inverse)
         by_prior = np.square(inverse).sum(axis=0)
         by_flight = [each[self.flight == i].sum(axis=0) for i in np.unique(self.flight)]
         for sums in (each, by_flight):
@@ -231,22 +230,15 @@ def _bounds(column: Column, flights: RegressedFlights) -> Pair:
     high = min(c.maximum, c.plausible)
     if get(column.effect).role == Role.MASS:
         low = max(low, -MOST_MISSING_MASS * unit_of_change(column, flights.vehicle))
-    own = declared(column, flights)
+    own = flights.value({}, column)
     return min(low - own, 0.0), max(high - own, 0.0)
-
-
-def declared(column: Column, flights: RegressedFlights) -> float:
-    """Return a column's coefficient by the vehicle's file, the zero of the likelihood's
-    coefficient; 0 if not stated.
-    """
-    return flights.value({}, column)
 
 
 def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting: Setting) -> Array:
     """Return the coefficients (c,) of a setting, in standard deviations of their priors."""
     return np.array(
         [
-            (flights.value(setting, c) - declared(c, flights)) / prior_size(c, flights)
+            (flights.value(setting, c) - flights.value({}, c)) / prior_size(c, flights)
             for c in columns
         ]
     )
@@ -255,7 +247,7 @@ def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting:
 def changed(column: Column, change: float, flights: RegressedFlights) -> float:
     """Return a column's coefficient by the vehicle's file, changed as far as its limits allow."""
     limits = coefficient(column)
-    return min(max(declared(column, flights) + change, limits.minimum), limits.maximum)
+    return min(max(flights.value({}, column) + change, limits.minimum), limits.maximum)
 
 
 def in_prior_units(
@@ -281,7 +273,7 @@ def in_prior_units(
     size = np.array([prior_size(c, flights) for c in names])
     scale = np.append(size, 1.0)
     # about zero: the residual without all effects of the setting
-    back = np.append([flights.value(setting, c) - declared(c, flights) for c in names], 1.0)
+    back = np.append([flights.value(setting, c) - flights.value({}, c) for c in names], 1.0)
     single = np.flatnonzero([not c.is_unknown for c in names])
     held = np.append(single, len(names))
     total = np.zeros((len(scale), len(scale)))

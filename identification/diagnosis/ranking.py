@@ -64,7 +64,7 @@ class FittedPosterior:
 def rank(
     flights: RegressedFlights,
     library: Sequence[str],
-    report: Report = lambda text: None,
+    report: Report,
 ) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
@@ -165,7 +165,7 @@ def rank_by_rows(
     library: Sequence[str],
     first: Setting,
     fixed: Setting,
-    report: Report = lambda text: None,
+    report: Report,
 ) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 

@@ -148,8 +148,10 @@ class Posterior:
         return self._needed or self.known[self._ranked[0]]
 
     def leave_out_needless(self, probability: Values) -> tuple[Setting, dict[str, Pair]]:
-        """Put the likeliest set's needed effects in its place, and return their coefficients, and
-        each effect's gain together with the effects already left out: nats, and its standard error.
+        """Put the likeliest set's needed effects in its place, and return their coefficients.
+
+        Return each effect's gain, too, together with the effects already left out: nats, and its
+        standard error.
 
         A gain must exceed the odds against these effects before the flight. The least probable
         effect goes first: another may need its place.

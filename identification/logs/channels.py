@@ -146,20 +146,20 @@ def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
     after = np.searchsorted(times, t)
     exact = np.isin(t, times)
     if exact.all():
-        return np.asarray(values[after])
+        return values[after]
     if len(times) < 2:
         return out
     inside = (t >= times[0]) & (t <= times[-1])
     inside &= exact | (np.diff(times)[after.clip(1, len(times) - 1) - 1] <= longest)
     if inside.any():
-        turn = Slerp(times, Rotation.from_quat(values, scalar_first=True))(t[inside])
-        out[inside] = turn.as_quat(scalar_first=True)
+        turn = Slerp(times, Rotation.from_quat(values, scalar_first=True))
+        out[inside] = turn(t[inside]).as_quat(scalar_first=True)
     return out
 
 
 def scaled(part: Columns, values: Array) -> Array:
     """Return columns (N, k), with the section's signs and scale."""
-    return np.asarray(values * (part.signs or 1) * part.scale)
+    return values * (part.signs or 1) * part.scale
 
 
 def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) -> Array:
@@ -200,7 +200,7 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
     if log_map.world == "enu" and log_map.body == "flu":
         return attitude
     if log_map.world == "ned" and log_map.body == "frd":  # quaternions of any length, NaN included
-        return np.asarray(attitude * [1.0, 1.0, -1.0, -1.0])
+        return attitude * [1.0, 1.0, -1.0, -1.0]
     matrix = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
     turn = Rotation.from_matrix(WORLD_TURNS[log_map.world] @ matrix @ BODY_TURNS[log_map.body].T)
     return np.asarray(turn.as_quat(scalar_first=True))
@@ -226,7 +226,7 @@ def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Gro
     groups = []
     notes = []
     for samples in recorded:
-        over = (np.abs(np.diff(samples.t, prepend=nan) + ROLLOVER) < _JITTER).cumsum()
+        over = (abs(np.diff(samples.t, prepend=nan) + ROLLOVER) < _JITTER).cumsum()
         groups.append(replace(samples, t=samples.t + ROLLOVER * over))
         if over.any():
             notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
@@ -288,8 +288,8 @@ def _resets(t: Array) -> Rows:
     resets = []
     for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
         before, after = t[max(i - 5, 0) : i], t[i : i + 5]
-        enough = min(len(before), len(after)) > 2  # one stamp decides nothing
-        if enough and np.median(after) < np.median(before) - _RESET:
+        # one stamp decides nothing
+        if min(len(before), len(after)) > 2 and np.median(after) < np.median(before) - _RESET:
             resets.append(i)
     return np.array(resets, np.intp)
 
@@ -342,23 +342,22 @@ _FINITE = "a finite number"
 _DENSE = 0.5  # share of the rows; a channel with more counts as one of every row
 
 
-def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGroup]:
-    """Return the map's columns, as written, and notes.
+def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> ChannelGroup:
+    """Return the map's columns, as written; ``notes`` get further ones.
 
     Raises:
         InputError: many times go back, times cannot be told apart, or are fewer than two. Of whole
             rows: one time goes back, or a row lacks a number.
     """
     clock, is_whole = log_map.time, log_map.rows == "whole"
-    where, unit, notes = f"{table.path}: column {clock.column}", clock.unit, []
-    repeated = [name for name, count in Counter(table.header).items() if count > 1]
-    if repeated:
+    where, unit = f"{table.path}: column {clock.column}", clock.unit
+    if repeated := [name for name, count in Counter(table.header).items() if count > 1]:
         notes.append(f"columns that stand there more than once were not used: {repeated[:10]}")
     rows = np.arange(table.rows)
     if not clock.column:
         t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
-        return ChannelGroup(t, columns, table=table, rows=rows), notes
+        return ChannelGroup(t, columns, table=table, rows=rows)
     samples = ChannelGroup(clock.raw(columns), columns, table=table, rows=rows)
     if is_whole:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
@@ -385,8 +384,8 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGr
             f"{'goes back from' if step[i] else 'repeats the time'} {raw[i]:.9g} {unit} of the row "
             f"before; expected {'strictly ' if is_whole else ''}increasing times"
         )
-    begin = raw[0] if clock.offset is None else 0.0
-    t = (raw - begin) * UNITS["time"][unit] + (clock.offset or 0.0)
+    t = raw - raw[0] if clock.offset is None else raw
+    t = t * UNITS["time"][unit] + (clock.offset or 0.0)
     if not np.isfinite(t).all() or ((np.diff(t) <= 0.0) & (step > 0.0)).any():
         raise InputError(
             f"{where}: times of {raw[0]:.6g} to {raw[-1]:.6g} {unit} cannot be told apart; "
@@ -403,16 +402,17 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGr
                 "start"
             )
             samples = samples.cut(slice(stray, None))
-        return samples, notes
+        return samples
     begins = np.flatnonzero(np.diff(raw, prepend=nan) != 0.0)
     if len(begins) < len(t):
         notes.append(f"{len(t) - len(begins)} row(s) repeat a time and were joined to the one row")
-        joined = {}
-        for name, column in samples.columns.items():  # the last value of each
-            there = np.where(np.isnan(column), -1, np.arange(len(t)))
-            joined[name] = column[np.maximum.reduceat(there, begins).clip(begins)]
+        each = np.arange(len(t))
+        joined = {  # the last value of each
+            name: x[np.maximum.reduceat(np.where(np.isnan(x), -1, each), begins).clip(begins)]
+            for name, x in samples.columns.items()
+        }
         samples = replace(samples.cut(np.append(begins[1:], len(t)) - 1), columns=joined)
-    return samples, notes
+    return samples
 
 
 def _even_times(raw: Array) -> SomeArray:
@@ -424,7 +424,7 @@ def _even_times(raw: Array) -> SomeArray:
         return None
     rows = np.arange(len(raw))
     even = np.polynomial.Polynomial.fit(rows, raw, 1)(rows)
-    return even if np.abs(raw - even).max() <= step[step > 0.0].min() else None
+    return even if abs(raw - even).max() <= step[step > 0.0].min() else None
 
 
 def _refuse(

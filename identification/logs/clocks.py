@@ -164,8 +164,8 @@ def _imu_delay(log: FlightLog) -> tuple[float, float, str]:
             common = [GOOD * median_square(unbiased(y - felt(late, x))) for x, y in parts]
             # at most 0.018 s on 34 measured flights
             changes = np.less(own, common).any() and np.ptp(delays) > 0.025
-            said = ", ".join(f"{x:.3f}" for x in delays) + " s in turn"
-            return late, float(np.std(delays) / np.sqrt(_PARTS)), said if changes else ""
+            said = f"{', '.join(f'{x:.3f}' for x in delays)} s in turn" if changes else ""
+            return late, float(np.std(delays) / np.sqrt(_PARTS)), said
     return 0.0, 0.0, ""
 
 

@@ -237,10 +237,10 @@ def _corners(t: Array, values: Array) -> Rows:
     if len(t) < 3:
         return np.empty(0, np.intp)
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
-    steps = np.abs(np.diff(values, axis=0))
+    steps = abs(np.diff(values, axis=0))
     rounding = steps.min(axis=0, where=steps > 0.0, initial=inf)
     line = values[:-2] + share * (values[2:] - values[:-2])
-    off = np.abs(values[1:-1] - line)
+    off = abs(values[1:-1] - line)
     # three rounded values leave a line by at most one rounding step
     least = np.maximum(1e-3 * np.sqrt(mean_square(off)), 1.001 * rounding)
     is_corner = (off > least).any(axis=1)
@@ -286,8 +286,7 @@ def excerpt(log: FlightLog, seconds: float = 0.0) -> FlightLog:
     if share == 1.0 or length <= _WINDOW:
         return log
     count, spare = max(1, round(share * length / _WINDOW)), length - _WINDOW
-    first = 0.0 if count > 1 else 0.5 * spare
-    begins = log.t[0] + np.linspace(first, spare, count)
+    begins = log.t[0] + np.linspace(0.0 if count > 1 else 0.5 * spare, spare, count)
     keep = np.any([(log.t >= at) & (log.t <= at + _WINDOW) for at in begins], axis=0)
     note = (
         f"of {length:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "
@@ -298,21 +297,20 @@ def excerpt(log: FlightLog, seconds: float = 0.0) -> FlightLog:
 
 def parts_of(log: FlightLog) -> list[tuple[Names, Array]]:
     """Return a log's channels (N, k), with their columns' names in a file."""
-    speeds, command, force, torque = log.rotor_speeds, log.command, log.force, log.torque
-    accelerometer, gyro, pose = log.accelerometer, log.gyro, log.position
-    is_whole = log.has_pose or accelerometer is None or gyro is None
+    command, force, torque, pose = log.command, log.force, log.torque, log.position
+    is_whole = log.has_pose or log.accelerometer is None or log.gyro is None
     if is_whole:
         pose = np.column_stack([pose, log.quaternion])
         pose[~log.valid] = nan
     parts: list[tuple[Names, SomeArray]] = [
         (("t",), log.t),
         (POSE[: pose.shape[1]], pose if is_whole or np.isfinite(pose).any() else None),
-        (ROTORS, speeds if log.has_rotor_speeds or command is None else None),
+        (ROTORS, log.rotor_speeds if log.has_rotor_speeds or command is None else None),
         (COMMANDS, command),
         (("vbat",), log.voltage),
         (TRUTH, None if force is None or torque is None else np.column_stack([force, torque])),
-        (ACCELEROMETER, accelerometer),
-        (GYRO, gyro),
+        (ACCELEROMETER, log.accelerometer),
+        (GYRO, log.gyro),
     ]
     return [(names, values) for names, values in parts if values is not None]
 

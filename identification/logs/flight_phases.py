@@ -14,8 +14,6 @@ from .table import Array, Mask, finite_rows, lengths
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
 
-_CLIMB_WINDOW = 0.25  # s, either side, of the mean climb rate
-
 
 def flying(total: Array) -> Mask:
     """Return the samples (N,) with enough thrust (N,), in any unit, to carry a vehicle: more than
@@ -43,7 +41,7 @@ def carried(rotors: Array, period: float) -> Mask:
     """Return the samples (N,), ``period`` s apart, where rotors carry a vehicle, dives included:
     by the squares of their speeds or commands (N, 4), slowly averaged.
     """
-    load = low_pass(np.mean(np.square(rotors), axis=1), CUTOFFS.flying_hz, period)
+    load = low_pass((rotors**2).mean(axis=1), CUTOFFS.flying_hz, period)
     return load > 0.3 * usual_thrust(load)  # a vehicle below stands on the ground
 
 
@@ -53,7 +51,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
     without measured motion.
     """
     if log.has_rotor_speeds:
-        total = np.square(log.rotor_speeds).sum(axis=1)
+        total = (log.rotor_speeds**2).sum(axis=1)
     elif log.command is not None:
         total = np.nan_to_num(log.command).sum(axis=1)
     else:
@@ -82,7 +80,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
         rates = log.gyro[aloft & finite_rows(log.gyro)]
         count = max(1, round(0.2 / log.period))
         means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
-        turns = np.std(means, axis=0).max(initial=0.0) if len(means) else 0.0
+        turns = means.std(axis=0).max(initial=0.0) if len(means) else 0.0
         said = f"the motors run, and the body turns at {turns:.2g} rad/s"
         # means of a vehicle at rest turn by less, whatever its vibration
         return "unknown" if turns < 0.03 else told, said
@@ -110,22 +108,21 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         rotor_speeds: (N, 4) rad/s.
         vehicle: the vehicle.
     """
-    at_rest = np.square(rotor_speeds) @ vehicle.k < 0.1 * vehicle.weight
+    at_rest = rotor_speeds**2 @ vehicle.k < 0.1 * vehicle.weight
     times, last = t.tolist(), len(t) - 1
     on = _run(at_rest)
     off = last - _run(at_rest[::-1])
     starts, lands = on > 0, off < last  # whether the log shows take-off and landing
-    before = float(np.median(height[:on])) if starts else -inf
-    after = float(np.median(height[off + 1 :])) if lands else -inf
+    before = np.median(height[:on]) if starts else -inf
+    after = np.median(height[off + 1 :]) if lands else -inf
     clear = height > max(before, after) + 0.05  # m above the place of rest
     clear[:on] = clear[off + 1 :] = False
     if not clear.any():  # the vehicle never left the ground
         return [Phase(GROUND, times[0], times[-1])]
 
     # well above the ground: a bounce on landing is no flight
-    typical = float(np.median(height[clear]))
-    rise = np.interp(t + _CLIMB_WINDOW, t, height) - np.interp(t - _CLIMB_WINDOW, t, height)
-    climb = rise / (2 * _CLIMB_WINDOW)
+    typical = np.median(height[clear])
+    climb = (np.interp(t + 0.25, t, height) - np.interp(t - 0.25, t, height)) / 0.5
     lift_off, cruise, descent, touch_down = 0, 0, last, last
     if starts:
         lift_off, cruise = _first_climb(clear, height, before, typical, climb)
@@ -137,8 +134,7 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         cruise = descent = (cruise + descent) // 2
     edges = [times[i] for i in (0, lift_off, cruise, descent, touch_down, last)]
     names = (GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND)
-    phases = map(Phase, names, edges, edges[1:])
-    return [phase for phase in phases if phase.end > phase.start]
+    return [p for p in map(Phase, names, edges, edges[1:]) if p.end > p.start]
 
 
 def _first_climb(

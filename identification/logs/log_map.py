@@ -77,7 +77,6 @@ OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # a field that a person must choose
 
 WORLDS: dict[str, str] = WORDS["worlds"]
-BODIES = ("flu", "frd", "y_up")
 UNITS: dict[str, NamedNumbers] = WORDS["factors"]
 COMMAND_UNITS: dict[str, Pair | None] = {
     unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()
@@ -125,7 +124,7 @@ _Range = Annotated[
     AfterValidator(_two_levels),
     expected("two numbers, what stands for no and for full command, such as [1000, 2000]"),
 ]
-_Body = Annotated[str, _one_of(BODIES)]
+_Body = Annotated[str, _one_of(("flu", "frd", "y_up"))]
 _Order = Annotated[Order, BeforeValidator(rotor_order)]
 
 
@@ -330,8 +329,8 @@ class LogMap(_Form):
 
     def with_order(self, order: Order) -> "LogMap":
         """Return the map with this order of rotors and commands."""
-        motors = {name: self.ways(name) for name in ("rotors", "commands")}
-        return self.with_ways({n: [replace(w, order=order) for w in x] for n, x in motors.items()})
+        motors = "rotors", "commands"
+        return self.with_ways({n: [replace(w, order=order) for w in self.ways(n)] for n in motors})
 
     @property
     def wanted(self) -> Lines:

@@ -33,7 +33,6 @@ _LONGEST_STEP = 1.0e12
 LARGEST = 1.0e9  # SI units, all other numbers; millimetres or rpm stay far below
 # median thrust by weight; beyond, another vehicle may have flown
 DOUBTFUL = 0.5, 2.0
-STRONGEST = 300.0  # m/s2 of specific force, above all racers and most sensors' range
 # rad/s: the largest drones' rotors (1.4 m across) hover at 150; slower, the unit is wrong
 _SLOW = 100.0
 _UNEVEN = 2.0  # ratio of two rotors' medians in flight, at most
@@ -73,7 +72,7 @@ def _thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
     if not rotor_speeds.size:
         return 1.0
     with np.errstate(over="ignore"):
-        thrust = np.square(rotor_speeds) @ vehicle.k / vehicle.weight
+        thrust = rotor_speeds**2 @ vehicle.k / vehicle.weight
     return usual if np.isfinite(usual := usual_thrust(thrust)) else 1.0
 
 
@@ -119,7 +118,7 @@ def motor_doubts(log: FlightLog) -> list[str]:
         and np.count_nonzero(np.diff(motors[:, i])) >= 20
     ]
     doubts = [] if len(alike) == 2 else alike[:1]  # two pairs: a flight in one plane without noise
-    medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
+    medians = np.median(motors[carrying((motors**2).sum(axis=1))], axis=0)
     expected = ""
     if medians.max() > _UNEVEN * medians.min():
         expected = f"a ratio of at most {_UNEVEN:g}"
@@ -142,7 +141,7 @@ def motor_unit(
     """
     # the last word of a path such as /fmu/out/esc_status/rotor_speed.00
     names = " ".join(re.sub(r"^.*/(?=.*[a-z])", "", name.lower()) for name in group.columns)
-    turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
+    turning = abs(values[np.isfinite(values) & (values != 0.0)])
     if not turning.size:
         return "commands", "normalised", False, "all are zero"
     low, middle, high = np.quantile(turning, [0.01, 0.5, 1.0]).tolist()
@@ -211,7 +210,7 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
         InputError: a number is beyond any flight's; the message names the number.
     """
     step = np.diff(log.t)
-    where, longest = f"{log.source}: column", np.argmax(step)
+    where, longest = f"{log.source}: column", step.argmax()
     if not log.period >= _SHORTEST_PERIOD:
         raise InputError(
             f"{where} t: the median time step is {log.period:.3g} s; expected at least "
@@ -224,13 +223,13 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
         )
     for names, values in parts_of(log)[1:]:
         columns = values.reshape(len(log.t), -1)
-        for row, i in np.argwhere(np.abs(columns) > LARGEST)[:1]:  # False where NaN
+        for row, i in np.argwhere(abs(columns) > LARGEST)[:1]:  # False where NaN
             raise InputError(
                 f"{where} {names[i]}, row {row + 1}: {columns[row, i]:.3g}; expected a number "
                 f"within {LARGEST:g}"
             )
     doubts = [time_doubt(log.period), *motor_doubts(log)]
-    spread = np.max(np.ptp(log.position[log.valid], axis=0)) if log.has_pose else 0.0
+    spread = np.ptp(log.position[log.valid], axis=0).max() if log.has_pose else 0.0
     if spread > 300.0:
         doubts.append(
             f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres"
@@ -262,8 +261,7 @@ def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     broken = fast & ~far[:-6] & ~far[6:]
     if not broken.any():
         return log, []
-    highest = log.rotor_speeds[broken].max()
     return interpolated(log, broken), [
-        f"{np.count_nonzero(broken)} rotor speeds are broken, up to {highest:.0f} rad/s where "
-        f"99 % are below {high.max():.0f}: they were interpolated"
+        f"{broken.sum()} rotor speeds are broken, up to {log.rotor_speeds[broken].max():.0f} rad/s "
+        f"where 99 % are below {high.max():.0f}: they were interpolated"
     ]

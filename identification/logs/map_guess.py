@@ -23,7 +23,6 @@ from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import WORDS, Group, Name, named_alone, take_apart
 from .column_parts import (
-    CERTAIN_LEAD,
     SHOWN,
     ColumnCandidate,
     Judge,
@@ -32,7 +31,7 @@ from .column_parts import (
     candidates,
     named_columns,
 )
-from .evidence import GOOD, GOOD_TORQUE, TURNING_RATE, Evidence, Fit, RankedFits, likelihood
+from .evidence import GOOD, GOOD_TORQUE, Evidence, Fit, RankedFits, likelihood
 from .flight_log import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
@@ -155,10 +154,16 @@ def _time_column(names: Sequence[Name], data: ArrayMap) -> Name | None:
     for name in named_alone(there, "time"):
         values = data[name.column]
         steps = np.diff(values[np.isfinite(values)])
-        if np.any(steps > 0.0) and np.mean(steps >= 0.0) > 0.9:
+        if (steps > 0.0).any() and (steps >= 0.0).mean() > 0.9:
             return name
     rises = (n for n in there if len(x := data[n.column]) > 2 and (np.diff(x) > 0.0).all())
     return next(rises, None)
+
+
+def _explained(ranking: RankedFits | None) -> float:
+    """Return the share explained by the best reading; 0: less than half, or nothing is known."""
+    left = 1.0 if ranking is None else ranking.fit.horizontal
+    return 1.0 - left if left <= GOOD else 0.0
 
 
 class _Guessing:
@@ -212,7 +217,7 @@ class _Guessing:
         self.free = [name for name in self.free if name.column not in group.columns]
         if part != "commands" and not ranked[0].why.startswith("by"):
             self.unnamed.add(part)
-        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - CERTAIN_LEAD)]
+        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - 2.0)]
         if part in _EXAMPLES and (len(likely) > 1 or part in self.unnamed):
             field = "order" if len(group.columns) == 4 else "columns"
             self.say(part, field, False, "; or ".join(map(str, likely[:SHOWN])))
@@ -229,7 +234,7 @@ class _Guessing:
             why = "no column looks like a time; expected one such as t, time or timestamp"
             for name in named_alone(self.free, "time"):
                 x = self.data.get(name.column, np.zeros(0))
-                if len(x) > 1 and np.mean(np.diff(x) == 0.0) > 0.9:
+                if len(x) > 1 and (np.diff(x) == 0.0).mean() > 0.9:
                     why = f"column {name.column} is {x[0]:g} in nearly every row: a program that "
                     why += "wrote the table left out its digits; expected a time in each row"
                     break
@@ -261,7 +266,7 @@ class _Guessing:
     def half_a_pose(self, part: str) -> None:
         """Keep a position without an attitude, or the reverse, for a person to complete."""
         columns, unit = self.parts[part].columns, self.parts[part].unit
-        most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
+        most = abs(self.numbers.some(columns)).max(initial=0.0)
         made = Columns(columns, unit or "m")
         if part == "attitude":
             made = Attitude(columns)
@@ -311,13 +316,13 @@ class _Guessing:
         t = (raw - known[0]) * units[unit]
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
-        return np.where(np.abs(t - middle) <= 0.5 * LONGEST, t, np.nan)
+        return np.where(abs(t - middle) <= 0.5 * LONGEST, t, np.nan)
 
     def pose_fits(self, place: Group, group: Group) -> RankedFits:
         """Return the fits of a pose in each of a map's frames, units, orders and senses."""
         attitude = self.values(group.columns)
         units: Names = ("deg", "rad")
-        if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
+        if np.nanmax(abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
         elif group.unit in units:
             units = (group.unit,)
@@ -329,7 +334,7 @@ class _Guessing:
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
         motors = [self.values(self.parts[part].columns) for part in _MOTORS if part in self.parts]
-        thrusts = np.square([*motors, np.ones((len(self.t), 4))][0])
+        thrusts = [*motors, np.ones((len(self.t), 4))][0] ** 2
         evidence = Evidence(self.t, thrusts, self.values(place.columns), attitude)
         return RankedFits(evidence.fit(reading, torques=False) for reading in readings)
 
@@ -340,8 +345,8 @@ class _Guessing:
         attitude = self.parts.get("attitude")
         if attitude is None or len(attitude.columns) == 3:
             return 0.0, ""
-        left = self.pose_fits(Group(columns, ""), attitude).fit.horizontal
-        return (1.0 - left if left <= GOOD else 0.0), "their acceleration follows the tilt"
+        ranking = self.pose_fits(Group(columns, ""), attitude)
+        return _explained(ranking), "their acceleration follows the tilt"
 
     def pose(self, place: Group, group: Group) -> None:
         """Find frames, units, order and sense of the pose."""
@@ -416,9 +421,7 @@ class _Guessing:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
         otherwise.
         """
-        ranking = self.gyro_fits(columns)
-        left = 1.0 if ranking is None else ranking.fit.horizontal
-        return (1.0 - left if left <= GOOD else 0.0), "they turn as the attitude does"
+        return _explained(self.gyro_fits(columns)), "they turn as the attitude does"
 
     def gyro(self, group: Group) -> None:
         """Find unit and axes of the gyro: from the pose's turns, or from size and accelerometer."""
@@ -434,7 +437,7 @@ class _Guessing:
             told = {(r.section, r.field) for r in self.reasons if r.certain}
             sure = self.ranking is None and ("accelerometer", "body") in told
             self.say("gyro", "body", sure, "as the accelerometer's")
-            high = float(np.nanquantile(np.abs(self.values(group.columns)), 0.995))
+            high = float(np.nanquantile(abs(self.values(group.columns)), 0.995))
             # 99.5 % of a flight's angular velocities are less than 6 rad/s; 35 rad/s
             # (2000 deg/s) is the range of usual gyros
             unit = "deg/s" if high > 6.0 else "rad/s"
@@ -487,14 +490,16 @@ class _Guessing:
             motion = {
                 part: self.values(self.parts[part].columns) for part in ("position", "attitude")
             }
-        evidence = Evidence(self.t, np.square(values), **motion)
+        evidence = Evidence(self.t, values**2, **motion)
         if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=order) for order in permutations(ROTORS)]
         ranking = RankedFits(map(evidence.fit, ways))
         left, lead, order = ranking.fit.torque, ranking.other("rotors")[1], ranking.best.motors
         names = order_names(order)
-        turns = evidence.turns(best) >= TURNING_RATE
+        # rad/s: in hovers (0.03 in a simulated one) rotors answer disturbances more than they turn
+        # the body, and the mirrored order may explain more
+        turns = evidence.turns(best) >= 0.06
         is_sure = left <= GOOD_TORQUE and ranking.certain("rotors") and turns
         if is_sure or (names and left <= 0.9 and lead >= 1.0):
             why = (
@@ -505,7 +510,7 @@ class _Guessing:
         why = f"{hint}: no order is much likelier than all others"
         # roll and pitch of a plus, by rotors at the left, rear, right and front
         sides = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
-        evidence = Evidence(self.t, np.square(values), sides=sides, **motion)
+        evidence = Evidence(self.t, values**2, sides=sides, **motion)
         plus = RankedFits(map(evidence.fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))

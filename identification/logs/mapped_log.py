@@ -76,8 +76,8 @@ _MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commande
 NO_QUATERNION = 0.5  # length; shorter stands for a missing quaternion
 MOTOR_NAMES = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])), re.IGNORECASE)
 _IMU = ("accelerometer", "gyro")
-# V: below, a lithium cell is empty, and above no multirotor's pack of 14 cells of 4.35 V
-LEAST_VOLTS, MOST_VOLTS = 2.5, 61.0
+# V: no multirotor's pack of 14 cells of 4.35 V has more
+MOST_VOLTS = 61.0
 # times faster than the pose: an inertial sensor has rows of its own. A pose is put to the nearest
 # row, so the pose moves by a tenth of its step at most, with its own noise
 _OWN_ROWS = 5.0
@@ -119,8 +119,8 @@ def map_table(
         log_map = replace(log_map, rows="mixed")
     by = f"columns: by the map {log_map.name}"
     by = "" if log_map.is_own and log_map.rows != "mixed" else by
-    samples, words = rows_of(table, columns, log_map)
-    notes = [*filter(None, (by, *table.notes, *log_map.notes, log_map.time.note, *words))]
+    notes = [*filter(None, (by, *table.notes, *log_map.notes, log_map.time.note))]
+    samples = rows_of(table, columns, log_map, notes)
     sections = sections_of(table.path, [samples], log_map, reader, notes, piece)
     del columns, samples
     table.forget()  # the streams are copies
@@ -286,7 +286,7 @@ def _pose(
     with np.errstate(over="ignore"):
         length = lengths(turns)
     there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
-    off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
+    off = np.flatnonzero(there & ~(abs(length - 1.0) <= NORM_TOLERANCE))
     if off.size:
         what = turn.topic or f"columns {', '.join(turn.columns)}"
         raise InputError(
@@ -384,9 +384,9 @@ def _fitted(
     for section in ("time", *log_map.sections):
         ways = log_map.ways(section)
         fitting[section] = [way for way in ways if header.issuperset(way.named)]
-        absent = [name for name in ways[0].named if name not in header]
-        is_optional = ways[0].optional
-        left_out = is_optional and (len(absent) == len(ways[0].named) or reader)
+        named, is_optional = ways[0].named, ways[0].optional
+        absent = [name for name in named if name not in header]
+        left_out = is_optional and (len(absent) == len(named) or reader)
         if not fitting[section] and not left_out:
             whose = f"{section} (all or none)" if is_optional else section
             missing += [(name, whose) for name in absent]
@@ -430,11 +430,12 @@ def chosen(recorded: Groups, log_map: LogMap) -> tuple[LogMap, dict[str, Channel
     columns and measurements is taken; a position together with its attitude. Optional sections
     without columns are left out.
     """
-    stated, usable = log_map.rows == "whole" or log_map.is_own, {}
+    usable = {}
     for section in log_map.sections:
         ways = [(way, s) for way in log_map.ways(section) for s in recorded if s.has(way)]
         # the only way fills a required section
-        if len(ways) != 1 or not (stated or not ways[0][0].optional):
+        is_stated = log_map.rows == "whole" or log_map.is_own
+        if len(ways) != 1 or (ways[0][0].optional and not is_stated):
             ways = [one for one in ways if _is_measured(section, *one, log_map.rows)]
         usable[section] = ways
     places, turns = usable.get("position", []), usable.get("attitude", [])
@@ -501,8 +502,10 @@ def flight_log(
     notes = [*said]
     made = _cleaned(path, streams, notes)
     kind = next(name for name in _MOTORS if name in made)
-    motors, sensor = made[kind].whole(), made.get("gyro", made.get("accelerometer"))
-    t, pose = _rows(path, made.get("position"), motors, sensor, notes)
+    motors = made[kind].whole()
+    t, pose = _rows(
+        path, made.get("position"), motors, made.get("gyro", made.get("accelerometer")), notes
+    )
     after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
     steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
     if (longest := steps.max(initial=0.0)) > 0.5:
@@ -522,8 +525,7 @@ def flight_log(
     measured = {name: x for name, x in there.items() if name in _IMU and np.isfinite(x).any()}
     speeds = there.get("rotors", np.full((len(t), 4), nan))
     if kind == "wrench" and vehicle is not None:
-        speeds, words = speeds_of_wrench(there["wrench"], vehicle)
-        notes += words
+        speeds = speeds_of_wrench(there["wrench"], vehicle, notes)
     times = t - t[0] if log_map.time.offset is None else t
     notes += time_notes(times)
     without = (~valid).sum() if valid.any() else 0
@@ -581,11 +583,12 @@ def _cleaned(path: Path, streams: Streams, notes: Lines) -> Streams:
         if section == "rotors":
             if (values < 0.0).any():
                 notes.append(f"{name}: negative rotor speeds were taken as positive")
-            values = np.abs(values)
+            values = abs(values)
         elif section == "commands":
             values = values.clip(0.0, 1.0)
         elif section == "battery":
-            plausible = (values >= LEAST_VOLTS) & (values <= MOST_VOLTS)
+            # below, a lithium cell is empty
+            plausible = (values >= 2.5) & (values <= MOST_VOLTS)
             wrong = values[~plausible & (values > 0.0)]
             if len(wrong):
                 notes.append(
@@ -637,7 +640,7 @@ def _rows(
         near = np.searchsorted(t, own).clip(1, len(t) - 1)
         near -= own - t[near - 1] < t[near] - own
         reach = max(0.6 * median_step(t), 0.5 * median_step(own) / _OWN_ROWS)
-        near = np.unique(near[np.abs(t[near] - own) <= reach])
+        near = np.unique(near[abs(t[near] - own) <= reach])
         placed[near, :3] = resampled(t[near], own, values[:, :3])
         placed[near, 3:] = slerp(t[near], replace(seen, values=values[:, 3:]))
     return t, placed

@@ -211,11 +211,9 @@ def reader_by_content(path: Path) -> Reader | None:
         InputError: the path is a folder, but no ROS 2 bag's.
     """
     if not os.path.isdir(path):  # False for an overlong name
-        with suppress(InputError):  # reading the file states the error
+        with suppress(InputError, StopIteration):  # reading the file states the error
             head = _head(path)
-            for reader in READERS.values():
-                if reader.begins and re.match(reader.begins, head):
-                    return reader
+            return next(x for x in READERS.values() if x.begins and re.match(x.begins, head))
         return None
     with one_line(f"{path}: cannot be read as a folder"):
         names = sorted(os.listdir(path))

@@ -166,9 +166,10 @@ class Convention:
             "xyzw": "the quaternion is scalar last",
             "zwxy": "the quaternion is scalar first under the headers of scalar last",
         }
-        order, is_inverse = self.attitude.order, self.attitude.sense != SENSES[0]
-        sense = "world to body" if order in orders else "the quaternion is world to body"
-        facts = orders.get(order, ""), sense if is_inverse else "", self.frames.fact
+        order, sense = self.attitude.order, ""
+        if self.attitude.sense != SENSES[0]:
+            sense = "world to body" if order in orders else "the quaternion is world to body"
+        facts = orders.get(order, ""), sense, self.frames.fact
         if not any(facts):
             return []
         position = _combined(self.frames.position, ("px", "py", "pz"))
@@ -201,7 +202,7 @@ def _quaternion(reading: Convention) -> str:
     world, body = (Rotation.from_matrix(mirror * turn) for turn in (frames.world, frames.body))
     columns = as_written(np.eye(4), reading.attitude)[1]
     made = (world * columns * body).as_quat(scalar_first=True).T
-    first = made[0][np.abs(made[0]) > 0.1][0]
+    first = made[0][abs(made[0]) > 0.1][0]
     text = _combined(made * np.sign(first), ("qw", "qx", "qy", "qz"))
     return text if abs(first) > 0.9 else f"0.7071 {text}"
 

@@ -435,8 +435,7 @@ def _score(head: Lines, layout: _TextLayout) -> tuple[float, int]:
 def _counts(layout: _TextLayout, fields: Texts) -> tuple[int, int]:
     """Return how many fields are empty, and how many hold a number (``nan`` among them)."""
     empty = sum(map(_is_missing, fields))
-    others = sum(number is None for number in map(layout.number, fields))
-    return empty, len(fields) - others - empty
+    return empty, sum(number is not None for number in map(layout.number, fields)) - empty
 
 
 def _header(path: Path, head: Lines, layout: _TextLayout, full: int) -> tuple[int | None, int]:

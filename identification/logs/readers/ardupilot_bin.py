@@ -108,13 +108,12 @@ def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> Flight
     if np.median(volts) > MOST_VOLTS:
         messages["CURR"]["Volt"] = 0.01 * volts
         notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
-    telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
-    notes += telemetry_notes
+    telemetry = _telemetry(messages.pop("ESC", {}), parameters, notes)
     columns = {*log_map.wanted, *_PLACE, *(f"C{i + 1}" for i in range(_CHANNELS))}
     if skipped:
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
-    recorded = [_samples(name, rows, columns) for name, rows in messages.items()]
-    groups = [samples for samples in (*recorded, *telemetry) if len(samples.t) > 1]
+    recorded = [*(_samples(name, rows, columns) for name, rows in messages.items()), *telemetry]
+    groups = [samples for samples in recorded if len(samples.t) > 1]
     sections = sections_of(path, groups, log_map, "ardupilot_bin", notes, piece, flown)
     return flight_log(path, "ardupilot_bin", sections, vehicle, flown)
 
@@ -183,8 +182,10 @@ def _order(path: Path, parameters: Values, vehicle: SomeVehicle) -> tuple[Order,
         return order, f"quad x assumed, which the log does not state: {order_words(order)}"
     kind = int(parameters.get(name, 1))
     if kind == _PLUS and (motors := order_by_places(PLUS, vehicle)):
-        listed = ", ".join(map(str, motors))
-        return motors, f"{name} 0, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {listed}"
+        return motors, (
+            f"{name} 0, a plus: rotors 1, 2, 3, 4 of the vehicle are motors "
+            f"{', '.join(map(str, motors))}"
+        )
     known = stated("airframes")["ardupilot_order"]
     if kind not in known:
         what, end = f"{kind}", ""
@@ -238,10 +239,12 @@ def _with_parameters(
     return replace(log_map, commands=commands).with_order(order), [*log_map.notes, note]
 
 
-def _telemetry(messages: Messages, parameters: Values) -> Noted[Groups]:
-    """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC, and notes."""
+def _telemetry(messages: Messages, parameters: Values, notes: Lines) -> Groups:
+    """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC; ``notes`` get a
+    further one.
+    """
     if not {"Instance", "RPM", "TimeUS"} <= set(messages):
-        return [], []
+        return []
     slots, which = slots_of_motors(_functions(parameters), _MOTOR1), messages["Instance"]
     if not slots or not np.isin(slots, which).all():
         slots = [0, 1, 2, 3]
@@ -249,16 +252,18 @@ def _telemetry(messages: Messages, parameters: Values) -> Noted[Groups]:
     for slot in slots:
         times, rpm = (x[known & (which == slot)] for x in (_times(messages), messages["RPM"]))
         if len(rpm) < 2 or not (rpm > 0.0).any():
-            return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
+            notes.append("ESC telemetry: not of all four motors, or without rpm; left out")
+            return []
         rows, _ = in_order(times)
         each.append((times[rows], rpm[rows]))
     t = each[0][0]
     columns = {f"RPM {motor}": np.interp(t, *one) for motor, one in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)
-    return [ChannelGroup(t, columns, "ESC")], [
+    notes.append(
         f"rotor speeds: measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took "
         "them"
-    ]
+    )
+    return [ChannelGroup(t, columns, "ESC")]
 
 
 def read_dataflash(path: Path, wanted: Wanted) -> tuple[ByType, int]:
@@ -351,7 +356,7 @@ def _layouts(formats: Rows, wanted: Wanted) -> dict[int, tuple[str, Layout, Name
         if not (name in wanted and is_known and len(letters) == len(columns) == len({*columns})):
             continue
         layout = np.dtype([*zip(columns, map(_TYPES.__getitem__, letters), strict=True)])
-        units = [_UNITS.get(letter, 1.0) for letter in letters]
+        units = {column: _UNITS.get(x, 1.0) for column, x in zip(columns, letters, strict=True)}
         if layout.itemsize + _HEAD == length:
-            layouts[number] = name, layout, dict(zip(columns, units, strict=True))
+            layouts[number] = name, layout, units
     return layouts

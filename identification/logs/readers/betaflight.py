@@ -81,8 +81,8 @@ def read(
     begin = next(_HEADERS.finditer(data, start, end)).end()
     if data[begin : begin + 2] == b"H ":
         raise InputError(f"{path}: its headers do not end; expected frames behind them")
-    lines = data[start:begin].decode("ascii", "replace").split("\n")
-    pairs = (line.removeprefix("H ").partition(":") for line in lines)
+    text = data[start:begin].decode("ascii", "replace")
+    pairs = (line.removeprefix("H ").partition(":") for line in text.split("\n"))
     headers = defaultdict(str, {key.strip(): value.strip() for key, _, value in pairs})
     version = headers.get("Data version", "2")
     if version != "2":
@@ -310,7 +310,7 @@ def _layout(path: Path, headers: Headers, names: Lines) -> list[NDArray[np.int64
         np.array(list(zip_longest(*lists, [0], fillvalue=0)), np.int64).T.copy()
         for lists in (encodings, predictors)
     )
-    counts = [len(one) for one in encodings]
+    counts = [*map(len, encodings)]
     return [*rows, *(np.array(x, np.int64) for x in (counts, intervals, constants, places))]
 
 
@@ -321,9 +321,9 @@ def _numbers(path: Path, headers: Headers, key: str, known: Collection[int]) -> 
         InputError: one is unknown.
     """
     texts = headers[key].split(",") if headers[key] else []
-    expected = [str(x) for x in known]
+    expected = [*map(str, known)]
     if bad := [text for text in texts if text.strip() not in expected]:
         raise InputError(
             f"{path}: header {key}: {bad[0][:20]}; expected one of {', '.join(expected)}"
         )
-    return [int(text) for text in texts]
+    return [*map(int, texts)]

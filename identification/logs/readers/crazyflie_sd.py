@@ -177,8 +177,7 @@ def _events(path: Path, data: bytes, kinds: Layouts, begin: int) -> tuple[list[R
         if number not in kinds:
             break
         layout = kinds[number]
-        whole = min((len(data) - place) // layout.itemsize, 4096)
-        rows = np.frombuffer(data, layout, whole, place)
+        rows = np.frombuffer(data, layout, min((len(data) - place) // layout.itemsize, 4096), place)
         other = np.flatnonzero(rows["event"] != number)
         rows = rows[: other[0]] if other.size else rows
         if not len(rows):

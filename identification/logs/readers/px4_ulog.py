@@ -60,7 +60,6 @@ _SENSORS = (  # field of an inertial sensor, and field of its gain over a time
     ("gyro_rad", "delta_angle"),
     ("accelerometer_m_s2", "delta_velocity"),
 )
-_MICROSECOND = 1e-6  # s
 _DEEPEST = 20  # topics within topics
 _MOTOR1 = 101  # PX4's number of the output function "motor 1"
 _BANKS = {"MAIN": "PWM_MAIN_FUNC", "AUX": "PWM_AUX_FUNC", "UAVCAN": "UAVCAN_EC_FUNC"}
@@ -206,8 +205,8 @@ def _samples(topic: str, fields: ArrayMap, outputs: Outputs) -> Iterator[Channel
     """
     published = fields["timestamp"]
     sampled = fields.get("timestamp_sample", published)
-    plausible = ((sampled > 0.0) & (np.abs(published - sampled) < 1e6)).all()
-    t = _MICROSECOND * (sampled if plausible else published)
+    plausible = ((sampled > 0.0) & (abs(published - sampled) < 1e6)).all()
+    t = 1e-6 * (sampled if plausible else published)
     if topic in ("sensor_combined", "vehicle_imu"):
         yield from (_sensor(topic, t, fields, *names) for names in _SENSORS)
         return
@@ -254,12 +253,12 @@ def _sensor(topic: str, t: Array, fields: ArrayMap, field: str, gained: str) -> 
     stored = [f"{source}[{i}]" for i in range(3)]
     axes = {f"{field}{name[-3:]}": fields[name] for name in stored if name in fields}
     if f"{source}_dt" in fields:  # of gains
-        span = _MICROSECOND * fields[f"{source}_dt"]
+        span = 1e-6 * fields[f"{source}_dt"]
         axes = {n: column / np.where(span > 0.0, span, np.nan) for n, column in axes.items()}
         t = t - 0.5 * span
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
-    if field == "accelerometer_m_s2" and (np.abs(late) < 1e6).all():
-        t = t + _MICROSECOND * late
+    if field == "accelerometer_m_s2" and (abs(late) < 1e6).all():
+        t = t + 1e-6 * late
     return ChannelGroup(t, axes, topic)
 
 
@@ -288,8 +287,7 @@ def _counting(parser: Any) -> Any:
     def counted(kind: Any) -> Any:
         class Counted(kind):  # type: ignore[misc]
             def __init__(self, *arguments: Any, **options: Any) -> None:
-                what = "parameters, pieces of information, texts and dropouts"
-                count(what, LIMITS.ulog_texts)
+                count("parameters, pieces of information, texts and dropouts", LIMITS.ulog_texts)
                 super().__init__(*arguments, **options)
 
         return Counted
@@ -335,7 +333,7 @@ def _what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
         return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
     if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
         return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
-    types = [int(x) for fields in statuses for x in fields.get("system_type", ())[-1:]]
+    types = (int(x) for fields in statuses for x in fields.get("system_type", ())[-1:])
     claims = (
         ("mav_type", kind, f"parameter MAV_TYPE = {kind}"),
         *(("mav_type", x, f"vehicle_status.system_type = {x}") for x in types),
@@ -461,6 +459,5 @@ def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> SomeArray:
     """Return the values of the motors' outputs (N, 4). None: one is missing or never changes, as of
     a servo, or of an unused bank.
     """
-    each = [columns.get(f"output[{slot}]", np.zeros(1)) for slot in slots]
-    is_sent = all(np.ptp(np.nan_to_num(one)) > 0.0 for one in each)
-    return np.nan_to_num(np.column_stack(each)) if is_sent else None
+    each = [np.nan_to_num(columns.get(f"output[{slot}]", np.zeros(1))) for slot in slots]
+    return np.column_stack(each) if all(np.ptp(one) > 0.0 for one in each) else None

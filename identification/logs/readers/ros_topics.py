@@ -26,7 +26,6 @@ SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerome
 # sections in the messages of another, without a topic of their own
 BESIDE = {"attitude": "position", "gyro": "accelerometer"}
 MOTORS = ("rotors", "commands")
-_MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
 _PX4 = "px4_msgs/msg/"
 
@@ -200,7 +199,7 @@ def stamp(message: Any) -> int:
     if header is not None:
         return min(int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec), _LATEST - 1)
     sampled = int(getattr(message, "timestamp_sample", 0) or getattr(message, "timestamp", 0))
-    return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
+    return 1000 * sampled if sampled < _LATEST // 1000 else 0
 
 
 _Getter = Callable[[Any], Any]  # of a number from a message
@@ -233,8 +232,8 @@ class MessageFields:
             before = self._rows()
             paths = list(islice(_paths(message), LIMITS.log_fields + 1))
             check_count(self.where, len(paths), LIMITS.log_fields, "fields of a message")
-            arrays = set(map(_array_of, paths if self._is_px4 else self._wanted))
-            if new := [x for x in paths if x not in known and _array_of(x) in arrays]:
+            arrays = set(map(array_of, paths if self._is_px4 else self._wanted))
+            if new := [x for x in paths if x not in known and array_of(x) in arrays]:
                 known |= {path: _getter(path) for path in new}
                 rows = np.pad(before, ((0, 0), (0, len(new))), constant_values=np.nan)
                 self._numbers = array("d", rows.tobytes())
@@ -258,14 +257,14 @@ class MessageFields:
 
     def lack(self, columns: Wanted) -> InputError:
         """Return the error for columns without some of the wanted ones."""
-        missing = [name for name in self._wanted if name not in columns]
+        missing = ", ".join(name for name in self._wanted if name not in columns)
         return InputError(
-            f"{self.where}: no field {', '.join(missing)} in its {self._kind}; found "
+            f"{self.where}: no field {missing} in its {self._kind}; found "
             f"{', '.join(islice(columns, 30)) or 'no number'}"
         )
 
 
-def _array_of(path: str) -> str:
+def array_of(path: str) -> str:
     """Return a field's path without the numbers of its elements: the same for all elements."""
     return re.sub(r"\[\d+\]", "[]", path)
 

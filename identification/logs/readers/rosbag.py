@@ -129,8 +129,7 @@ def _bag_in(path: Path) -> Path:
     """
     if not os.path.isdir(path) or os.path.lexists(path / "metadata.yaml"):
         return path
-    entries = sorted(path.iterdir())
-    files = [x for x in entries if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
+    files = [x for x in path.iterdir() if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
     if len(files) != 1:
         raise InputError(
             f"{path}: no metadata.yaml, and {len(files)} .db3 or .mcap files; expected "
@@ -249,7 +248,7 @@ def _decoded_topic(fields: MessageFields, messages: _Received) -> _Decoded:
     received_at, sampled_at, doubt = np.array(recorded), np.array(stamped), ""
     if not sampled_at.any():
         doubt = "no time stamps"
-    elif np.abs(sampled_at - received_at).max() > 1_000_000_000:  # ns
+    elif abs(sampled_at - received_at).max() > 1_000_000_000:  # ns
         doubt = "its time stamps are of another clock than the bag's"
     return received_at if doubt else sampled_at, fields.columns(), doubt
 
@@ -337,8 +336,9 @@ def _check_bag_files(path: Path) -> None:
             uri = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:
                 database.text_factory = partial(str, errors="replace")
-                query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
-                tables = database.execute(query).fetchmany(_TABLES)
+                tables = database.execute(
+                    "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
+                ).fetchmany(_TABLES)
         for name, kind, sql in tables:
             if kind == "view" or _COMPUTED.search(sql or "") or len(tables) == _TABLES:
                 raise InputError(

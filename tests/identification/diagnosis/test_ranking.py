@@ -23,7 +23,7 @@ def flown(**effects):
 
 
 def test_a_law_that_the_library_lacks_shows_as_structure():
-    assert rank(flown(rotor_drag=DRAG), ("mass", "inertia")).ranking.structure > 10.0
+    assert rank(flown(rotor_drag=DRAG), ("mass", "inertia"), print).ranking.structure > 10.0
 
 
 def blow(loop):
@@ -35,7 +35,9 @@ def blow(loop):
 
 def test_the_swing_of_a_wind_is_no_drag():
     log = FlightLog(**record_flight(VEHICLE, seconds=20.0, seed=1, push=blow))
-    found = rank(RegressedFlights([log], VEHICLE), ("wind", "body_drag", "constant_force")).ranking
+    found = rank(
+        RegressedFlights([log], VEHICLE), ("wind", "body_drag", "constant_force"), print
+    ).ranking
     values, std = found.averaged("wind")
     assert found.sets[0].effects == ("wind",)
     assert values["wx"] == pytest.approx(-6.0, abs=2.0 * std["wx"])
@@ -49,7 +51,7 @@ def test_a_fit_whose_filter_diverges_starts_nearer_to_the_declared_vehicle(monke
     with pytest.raises(np.linalg.LinAlgError, match="diverges"):
         Likelihood(flights, unstable, Likelihood(flights, {}), same_noise=True)
     monkeypatch.setattr(Posterior, "best_setting", lambda *_: unstable)
-    begun = rank(flights, ("rate_damping",)).ranking.sets[0]
+    begun = rank(flights, ("rate_damping",), print).ranking.sets[0]
     assert begun.effects in ((), ("rate_damping",))
 
 

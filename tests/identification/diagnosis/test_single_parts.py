@@ -171,10 +171,10 @@ def test_a_lag_that_is_uneven_leaves_no_mass():
     """The mass is that of a fit to the rotor speeds themselves, which are smoothed here."""
     library = ["motor_lag", "mass"]
     known = rank(
-        RegressedFlights([unevenly_lagging(commanded=False)], VEHICLE), library
+        RegressedFlights([unevenly_lagging(commanded=False)], VEHICLE), library, print
     ).ranking.sets[0]
-    found = rank(RegressedFlights([unevenly_lagging(commanded=True)], VEHICLE), library)
-    assert found.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.006)
+    found = rank(RegressedFlights([unevenly_lagging(commanded=True)], VEHICLE), library, print)
+    assert found.needed["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.006)
     apart, _ = found.posterior.nuisances()[LAG_ASYMMETRY]
     assert 0.5 * APART < apart < 1.5 * APART
     off = [x.coefficients.get("mass", {"dm": 0.0})["dm"] for x in (found.ranking.sets[0], known)]
