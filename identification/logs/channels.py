@@ -468,17 +468,15 @@ def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
     are in all rows alike.
     """
     there = {n: samples.there(part) for n, part in log_map.sections.items() if samples.has(part)}
-    base = "position" if "position" in there else "gyro"
-    if base not in there:
+    placed = there.pop("position", there.get("gyro", np.zeros(0, bool)))
+    if not placed.any():
         return False
-    placed = there.pop(base)
     turned = there.get("attitude", placed)
     if 0.0 < min(placed.mean(), turned.mean()) < _DENSE and (placed != turned).any():
         return True
     return any(
         x.sum() >= 10 and x[~placed].sum() > (1.0 - 0.5 * placed.mean()) * x.sum()
         for x in there.values()
-        if placed.any()
     )
 
 
@@ -516,11 +514,11 @@ def check_rows(samples: ChannelGroup, log_map: LogMap) -> Lines:
                 slow.append(f"{name} {count} of {len(column)}")
             elif count < len(column):
                 filled.append(f"{name} {len(column) - count} (over up to {gap:.3g} s)")
-    listed = {
-        "missing values interpolated": filled,
-        "interpolated to the other rows, since they have values in": slow,
-    }
-    return [f"{what}: {', '.join(columns)}" for what, columns in listed.items() if columns]
+    listed = (
+        ("missing values interpolated", filled),
+        ("interpolated to the other rows, since they have values in", slow),
+    )
+    return [f"{what}: {', '.join(columns)}" for what, columns in listed if columns]
 
 
 def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:

@@ -231,14 +231,15 @@ class _Guessing:
         """Return the fields missing for a flight log."""
         lacks: dict[str, str] = {}
         if self.clock is None:
-            why = "no column looks like a time; expected one such as t, time or timestamp"
+            lacks["time"] = "no column looks like a time; expected one such as t, time or timestamp"
             for name in named_alone(self.free, "time"):
                 x = self.data.get(name.column, np.zeros(0))
                 if len(x) > 1 and (np.diff(x) == 0.0).mean() > 0.9:
-                    why = f"column {name.column} is {x[0]:g} in nearly every row: a program that "
-                    why += "wrote the table left out its digits; expected a time in each row"
+                    lacks["time"] = (
+                        f"column {name.column} is {x[0]:g} in nearly every row: a program that "
+                        "wrote the table left out its digits; expected a time in each row"
+                    )
                     break
-            lacks["time"] = why
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), {*self.sections}
         if "position" not in has and not has.issuperset(imu):
             half = [part for part in pose if part in self.parts]
@@ -250,8 +251,9 @@ class _Guessing:
                     lacks[part] = f"no columns look like one (such as {_EXAMPLES[part]})"
         lacks |= self.further
         if not self.further and has.isdisjoint(("rotors", "commands")):
-            why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
-            lacks["motors"] = why
+            lacks["motors"] = (
+                "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
+            )
         return [
             _Reason(
                 "rotors" if part in _MOTORS else part,
@@ -514,8 +516,10 @@ class _Guessing:
         plus = RankedFits(map(evidence.fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
-            why = f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
-            why += "expected a vehicle file with these rotor_positions"
+            why = (
+                f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
+                "expected a vehicle file with these rotor_positions"
+            )
         return ORDERS[hint], False, why
 
     def battery(self) -> None:

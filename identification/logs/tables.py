@@ -200,10 +200,9 @@ def open_parquet(path: Path) -> Table:
 
 def _check_claims(path: Path, file: Any, names: Texts, size: int, count: int, what: str) -> None:
     """Raise InputError where columns unpack to more bytes or numbers, by the file's metadata."""
-    groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
     claims = [
         (max(chunk.total_uncompressed_size, 0), max(chunk.num_values, 0))
-        for group in groups
+        for group in map(file.metadata.row_group, range(file.metadata.num_row_groups))
         for chunk in map(group.column, range(group.num_columns))
         if chunk.path_in_schema.split(".")[0] in names
     ]

@@ -301,7 +301,7 @@ def _layout(path: Path, headers: Headers, names: Lines) -> list[NDArray[np.int64
 
     top, _, bottom = headers.get("P interval", "1/1").rpartition("/")
     every = headers.get("I interval", "32")
-    intervals = [max(1, number(text, 1)) for text in (every, top or "1", bottom)]
+    intervals = [max(1, number(text, 1)) for text in (every, top, bottom)]
     constants = np.zeros(max(_PREDICTORS) + 1, np.int64)
     constants[4] = number(headers["minthrottle"], 1150)
     constants[8], constants[9] = 1500, number(headers["vbatref"], 4095)

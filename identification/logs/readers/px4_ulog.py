@@ -327,8 +327,10 @@ def _what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
         statuses: instances of vehicle_status.
     """
     known = stated("airframes")
-    names = ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
-    count, frame, kind, start = (int(parameters.get(name, 0)) for name in names)
+    count, frame, kind, start = (
+        int(parameters.get(name, 0))
+        for name in ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
+    )
     if frame in known["px4_airframe"]:
         return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
     if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
