@@ -4,6 +4,8 @@ Effects and coefficients are chosen on the fitted blocks of flight. The errors b
 of blocks, or logs, outside the fit.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 

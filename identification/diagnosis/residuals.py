@@ -8,7 +8,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Disturbance, TransientDisturbance
 from ..logs.table import Array, Pair
-from ..motion.smoothing import CUTOFFS, mean_square
+from ..motion.smoothing import CUTOFFS
 from .discrepancy import weight_and_torque
 from .regression import RegressedFlights, Setting
 
@@ -52,16 +52,9 @@ def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     calm = CALM if flights.inertial or flights.filtered else 0.0
     least = np.hypot(floor, calm * weight_and_torque(flights.vehicle)[[0, 3]])
     noisy = bool(np.any(error > MOST_FLOOR_RATIO * least))
-    new, old = (mean_square(x[held_out]) for x in (after, before))
-    return Balance(
-        before,
-        after,
-        floor,
-        _rms(before[held_out]),
-        error,
-        noisy,
-        bool(np.mean(new / (old + 1e-30)) < 1.0),
-    )
+    old = _rms(before[held_out])
+    better = bool(np.square(error / np.maximum(old, 1e-15)).mean() < 1.0)
+    return Balance(before, after, floor, old, error, noisy, better)
 
 
 def is_beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> bool:

@@ -31,6 +31,7 @@ from .rows import Rows
 # prior standard deviations of a rate loop's answers, beside which the noise is fitted: a column
 # shares with disturbances all that any answer can hold
 FREE = 30.0
+DRAWS = 64  # of the posterior of gusts, for the noise beside them
 GUSTY_ROUNDS = 2  # fits of the noise beside gusts, each with a fit of the wind
 
 
@@ -107,21 +108,26 @@ class RowLikelihood:
             y: with the given effects of every set.
             known: (n, channels) each, columns in standard deviations of their priors.
             noise: at the start.
-            rng: of a draw from the posterior; none: its mode.
+            rng: of draws from the posterior; none: its mode.
         """
         rows = self.rows
         free = FREE if rows.with_torques else 1.0
         X = np.stack([*known, *(free * x for x in self._answers.values())], axis=2)
-        draw = 0.0 if rng is None else rng.standard_normal(X.shape[2])
+        # a single draw moves the noise, and a wind of 6 m/s beside it by 1 m/s
+        draws = (
+            np.zeros((X.shape[2], 1)) if rng is None else rng.standard_normal((X.shape[2], DRAWS))
+        )
+        begins, fit = (np.tile(x, draws.shape[1]) for x in (rows.begins, rows.fit))
         for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
             factor = np.linalg.cholesky(x.T @ x + np.eye(x.shape[1]))
             right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
-            z = np.linalg.solve(factor.T, right + draw)
-            left = y - X[:, :, : len(known)] @ z[: len(known)]
-            noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
-        return noise, z
+            z = np.linalg.solve(factor.T, right[:, None] + draws)
+            left = [y - X[:, :, : len(known)] @ x for x in z[: len(known)].T]
+            noise = fitted_noise(np.concatenate(left), begins, fit, rows.least)
+            noise = noise._replace(begins=rows.begins)
+        return noise, z[:, 0]
 
     def base(
         self,
@@ -225,9 +231,11 @@ class RowLikelihood:
             return steady
         least = self.objective(steady)
         for _ in range(GUSTY_ROUNDS):
-            # by a draw of the gusts' posterior: their mode would leave too little noise (G. Celeux
+            # by draws of the gusts' posterior: their mode would leave too little noise (G. Celeux
             # and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82)
             columns = self.nuisances | self._gusts(setting)
+            if not self.rows.with_torques:  # a tilt is an answer to gusts, and no rate loop's
+                columns |= self._answers
             known = [*self._own, *columns.values()]
             rng = np.random.default_rng(0)
             y = self.rows.residual(setting)

@@ -218,7 +218,7 @@ def test_a_wind_is_no_drag_and_no_tilt(swing):
     drags = {"body_drag", "rotor_drag", "constant_force"}
     assert not {"world_tilt", "thrust_axis_tilt", *drags} & named.keys()
     assert found.probabilities.names["wind"] > 0.8
-    assert found.after.force_rms < 0.3 * found.before.force_rms
+    assert found.after.force_rms < 0.35 * found.before.force_rms
 
 
 def test_in_still_air_nothing_is_sure():
