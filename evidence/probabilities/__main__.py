@@ -3,7 +3,7 @@ what ``docs/trust.md`` shows of their probabilities.
 
 Flights are of two simulators: this project's plant, and one that was written apart from it, with
 another plant, vehicle, controller and trajectories. *Something unknown* is a cause outside the
-library, or an effect that was taken out of the library with all that can stand for this effect.
+library. An effect counts as one if the library lacks the effect and all that can stand for it.
 """
 
 from pathlib import Path

@@ -20,8 +20,8 @@ MOST = 60  # cosines of one component: at 75 s of flight the last has the fastes
 
 
 def gusts(t: Array, setting: Setting, flights: RegressedFlights) -> dict[Column, Array]:
-    """Return possible changes (n, k) of each component of a setting's winds, m/s, in standard
-    deviations of their priors; ``t`` (n,) s, from zero on.
+    """Return possible changes (n, k), m/s, of each component of a setting's winds, in standard
+    deviations of their priors. Times ``t`` (n,) s begin at zero.
     """
     winds = [
         Column(e, c.name)

@@ -149,8 +149,8 @@ class Likelihood:
                 self._search_noise(self._explained(blown))
 
     def _read_poses(self) -> Poses:
-        """Return the unbroken pieces of the flights in the fit as measured, with the vehicle's
-        sensing effects undone and the rotor speeds of each made finer.
+        """Return the unbroken pieces of the flights in the fit as measured. The vehicle's sensing
+        effects are undone, and the rotor speeds of each are made finer.
 
         For late or early poses, rotor speeds are moved instead: moved poses would lose noise.
         """
@@ -509,7 +509,7 @@ class Likelihood:
 
     def _jumps(self) -> Array:
         """Return the accelerations (n, 6, 3) for a unit of the gains of a pair of axes on thrust,
-        on torque and on the turn; ``_units`` makes jumps of the states.
+        on torque and on the turn. ``_units`` makes jumps of the states.
 
         Thrust and torques inform about the axes they drive. A loop that rolls or pitches the
         vehicle has seen its position and the force aside.
@@ -548,9 +548,9 @@ class Likelihood:
         slopes: Array = NO_SLOPES,
         every: bool = False,
     ) -> Iterator[tuple[int, Array]]:
-        """Yield for each block of flight the index of its log, and the change of the predictions
-        with each of c columns and the innovations, whitened (6 m, c + 1), of its m samples in the
-        fit.
+        """Yield for each block of flight the index of its log, and the change of its predictions
+        with each of c columns. The innovations stand last; all are whitened (6 m, c + 1), of the m
+        samples in the fit.
 
         Args:
             acting: acceleration of the model by a unit of each of the first columns.

@@ -1,8 +1,8 @@
 """The names behind flights: the fit of the likeliest set of effects, each effect's probability, and
 the doubts of all.
 
-A name is sure under three conditions: it is probable; its effect is at least as large as the
-unexplained residual beyond the sensors' noise; and little speaks for a cause outside the library.
+A name is sure under three conditions. It is probable. Its effect is at least as large as the
+unexplained residual beyond the sensors' noise. Little speaks for a cause outside the library.
 The rule is the same for every kind of log. The likelihood differs: of the poses, where poses and
 rotors were logged as measured, or of the wrench's balance.
 """

@@ -35,9 +35,9 @@ class NoiseSearch:
     Attributes:
         see: returns the innovations (n, 6) of the flights through a filter with gains (3, e) of
             each pair.
-        products: returns the sums of products (c + 1, c + 1), for the filter of the last ``see``,
-            of the whitened changes of the predictions by the 3 e gains of each pair in turn, and by
-            slopes (6, 7, m) of the filter's gains and ``keep``; the innovations last.
+        products: returns sums of products (c + 1, c + 1) for the filter of the last ``see``. The
+            columns are whitened changes of the predictions: by the 3 e gains of each pair in turn,
+            and by slopes (6, 7, m) of the filter's gains and ``keep``. The innovations stand last.
         held: (e,) standard deviations of the gains' prior. Without it nearly predicted rotor speeds
             would have unlimited gains.
         period: s.

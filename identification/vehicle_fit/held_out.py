@@ -229,8 +229,8 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
 
 
 def powers(fit: VehicleFit, spectra: Spectra | None = None) -> Array:
-    """Return, segment by segment, the power that a fit leaves of specific force and turning, and
-    all of it (s, 2, 6), from ``LEAST_HZ`` on; ``spectra`` divide it, frequency by frequency.
+    """Return the power that a fit leaves of specific force and turning in each segment, and all
+    power (s, 2, 6), from ``LEAST_HZ`` on. ``spectra`` divide the power of each frequency.
     """
     names, out = fit.balance.names, []
     model = coefficients(fit.model, fit.values, names)

@@ -51,6 +51,6 @@ class Identified(NamedTuple):
     notes: Names
     advice: Names
     # errors on data outside the fit: held_out_blocks, flights_left_out (each in turn, of several),
-    # and prediction, of further flights; the vehicle's, and of thrust and drag with an unchanged
-    # body rate
+    # and prediction, of further flights. Those of the vehicle, and of thrust and drag with an
+    # unchanged body rate
     predicted: ErrorsByPart
