@@ -4,8 +4,8 @@ The task is that of *Nonlinear System Identification for a Nano-drone Benchmark*
 Engineering Practice 172, 2026): from the state at a sample and the rotor speeds after it, 50 steps
 of 10 ms. The score is the mean over starts of the error's norm at each step, summed over the steps.
 The vehicle of all paths but one predicts this path. It starts from the logged state, from the
-state of causal filters, or from poses of the last 0.2 s. Beside it stand its thrust and drag with an unchanged
-body rate, and no change.
+state of causal filters, or from poses of the last 0.2 s. Beside it stand its thrust and drag with
+an unchanged body rate, and no change.
 """
 
 from collections.abc import Mapping, Sequence
