@@ -143,7 +143,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         middle = _AMOUNTS @ weights
         std = math.sqrt(np.square(_AMOUNTS - middle) @ weights)
         found[place, kind] = logsumexp(every) + math.log(chance), middle, std
-    chances = dict(zip(found, softmax([log for log, *_ in found.values()]), strict=True))
+    chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
     likeliest = max(places, key=places.__getitem__)
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
