@@ -86,19 +86,27 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 # torch first and by itself: a looser requirement could bring in a build with several gigabytes of CUDA
 $(VENV)/.tested: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt torch
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	WINDWRENCH_CORE=all $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	touch $@
 
 $(VENV)/.light: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	WINDWRENCH_CORE=all $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
 	touch $@
 
 $(VENV)-lowest/.lowest: pyproject.toml .ci/lowest.py
 	$(PYTHON) -m venv $(@D)
 	$(PYTHON) .ci/lowest.py > $(@D)/lowest.txt
-	$(@D)/bin/pip install --quiet --disable-pip-version-check -c $(@D)/lowest.txt -e '.[test]'
+	WINDWRENCH_CORE=all $(@D)/bin/pip install --quiet --disable-pip-version-check -c $(@D)/lowest.txt -e '.[test]'
 	touch $@
+
+# the version in its four places: make version VERSION=2.0.0
+.PHONY: version
+version:
+	sed -i 's|^__version__ = .*|__version__ = "$(VERSION)"|' __init__.py
+	sed -i 's|^version: .*|version: $(VERSION)|' CITATION.cff
+	sed -i 's|version = {[0-9.]*}|version = {$(VERSION)}|' README.md
+	sed -i "s|^## \[Unreleased\]|&\n\n## [$(VERSION)] - $$(date +%F)|" CHANGELOG.md
 
 # README with the repository's address: make address ADDRESS=https://...
 .PHONY: address

@@ -14,7 +14,7 @@ from .runtime.interrupts import is_command, leaving_at_once
 with leaving_at_once(is_command()):
     import gymnasium
 
-__version__ = "1.1.0"
+__version__ = "2.0.0"
 # rooms that are imported when they are asked for
 __all__ = ["__version__", "controllers", "dynamics", "envs", "estimator", "identification"]
 

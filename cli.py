@@ -50,9 +50,9 @@ app = typer.Typer(
     add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    epilog="Exit codes: 0 success; 1 internal error, with its traceback; 2 invalid option or input "
-    "file, or output that cannot be written, with a one-line message; 130 interrupted; 143 live "
-    "terminated, with its summary. NO_COLOR=1 disables colours.",
+    epilog="Exit codes: 0 success; 1 internal error, with a traceback; 2 invalid option or input "
+    "file, or output that cannot be written, with a one-line message; 130 interrupted; 143 "
+    "terminated. NO_COLOR=1 disables colours.",
 )
 _UsageError: Any = typer.BadParameter.__base__  # an option or argument unfit for typer
 
@@ -73,14 +73,15 @@ def windwrench(
     ] = False,
 ) -> None:
     """Estimate the external force and torque (the wrench) on a quadrotor, in flight or from a log.
-    Find what the vehicle's model lacks. Fly, compare and train controllers in simulated wind.
+    Name physical effects that the vehicle's model lacks. Fly, rank and train controllers in
+    simulated wind.
 
-    First step: windwrench demo shows all of this, on one page.
+    First step: windwrench demo flies, estimates, diagnoses and ranks, and writes one page.
 
     Your own log: windwrench flight.ulg checks the log, estimates the wrench and names missing
     effects, on one page.
 
-    Example: windwrench fly --scenario base --seed 4
+    All options of a command: windwrench fly --help
     """
 
 

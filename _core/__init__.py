@@ -1,12 +1,13 @@
 """The compiled core: what is computed at every step.
 
 One of its builds is chosen by the processor's instructions; ``WINDWRENCH_CORE=baseline``,
-``avx2`` or ``avx512`` forces one. In a checkout an edited source is compiled first.
+``avx2`` or ``avx512`` forces one. In a checkout this build is compiled first where it is missing or
+a source was edited.
 """
 
 import os
 from importlib import import_module
-from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.util import find_spec
 from pathlib import Path
 
 # builds, best first, with the processor's flags that each needs, as Linux writes them
@@ -18,19 +19,13 @@ _BUILDS = {
 _HERE = Path(__file__).parent
 
 
-def _flags() -> str:
-    listed = Path("/proc/cpuinfo")
-    lines = listed.read_text().splitlines() if listed.exists() else []
-    return next((line for line in lines if line.startswith("flags")), "")
+def _runnable(cpuinfo: str) -> list[str]:
+    flags = {*cpuinfo.split()}
+    return [name for name, needed in _BUILDS.items() if flags.issuperset(needed.split())]
 
 
-def _found(flags: str, here: Path = _HERE) -> list[str]:
-    return [
-        name
-        for name, needed in _BUILDS.items()
-        if {*needed.split()} <= {*flags.split()}
-        and any((here / (name + end)).exists() for end in EXTENSION_SUFFIXES)
-    ]
+def _found(names: list[str]) -> list[str]:
+    return [name for name in names if find_spec(f".{name}", __name__)]
 
 
 def _chosen(found: list[str], forced: str) -> str:
@@ -41,8 +36,10 @@ def _chosen(found: list[str], forced: str) -> str:
     return forced or found[0]
 
 
+_listed = Path("/proc/cpuinfo")
+_names = _runnable(_listed.read_text() if _listed.exists() else "")
+_forced = os.environ.get("WINDWRENCH_CORE", "")
 if (_HERE.parent / "installation").is_dir():
-    import_module("..installation.sources", __name__).build_changed()
-_name = _chosen(_found(_flags()), os.environ.get("WINDWRENCH_CORE", ""))
-_core = vars(import_module(f".{_name}", __name__))
+    import_module("..installation.sources", __name__).build_changed(_chosen(_names, _forced))
+_core = vars(import_module(f".{_chosen(_found(_names), _forced)}", __name__))
 globals().update({name: value for name, value in _core.items() if name[0] != "_"})

@@ -286,6 +286,10 @@ def predict_flight(
         NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
     period: float,
+    aloft: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    spread: float,
     keeps_velocity: bool,
     reaction: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
@@ -293,8 +297,9 @@ def predict_flight(
     path: Annotated[NDArray[numpy.float64], dict(shape=(None, None, 13), order="C", device="cpu")],
 ) -> None:
     """Run a model along a flight of states (n, 13), and a copy of it from each start, a row;
-    write the copy's states (starts, ahead, 13), a period (s) apart. With keeps_velocity no
-    force acts. The reaction (9) of a flight loop turns the body, too; (0): none.
+    write the copy's states (starts, ahead, 13), a period (s) apart. The rows `aloft` before tell
+    the thrust, known to a share of `spread`; 0: as the model's. With keeps_velocity no force
+    acts. The reaction (9) of a flight loop turns the body, too; (0): none.
     """
 
 def choose_likeliest(
@@ -372,27 +377,39 @@ def sensitivities(
     heading: Annotated[
         NDArray[numpy.float64], dict(shape=(None, 2), order="C", device="cpu", writable=False)
     ],
-    pull: Annotated[
-        NDArray[numpy.float64], dict(shape=(None, 3, 2), order="C", device="cpu", writable=False)
+    rotation: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 3, 3), order="C", device="cpu", writable=False)
+    ],
+    rotors: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, 4), order="C", device="cpu", writable=False)
     ],
     rate: Annotated[
         NDArray[numpy.float64], dict(shape=(None, 3), order="C", device="cpu", writable=False)
     ],
-    gyration: Annotated[
-        NDArray[numpy.float64], dict(shape=(None, 3, 3), order="C", device="cpu", writable=False)
+    twist: Annotated[
+        NDArray[numpy.float64], dict(shape=(3, 3, 3), order="C", device="cpu", writable=False)
     ],
     acting: Sequence[
-        Annotated[
-            NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
+        tuple[
+            float,
+            Annotated[NDArray[numpy.float64], dict(device="cpu", writable=False)],
+            Annotated[NDArray[numpy.float64], dict(device="cpu", writable=False)],
+            int,
         ]
     ],
     moved: Sequence[
-        Annotated[
-            NDArray[numpy.float64], dict(shape=(None, 6), order="C", device="cpu", writable=False)
+        tuple[
+            float,
+            Annotated[NDArray[numpy.float64], dict(device="cpu", writable=False)],
+            Annotated[NDArray[numpy.float64], dict(device="cpu", writable=False)],
+            int,
         ]
     ],
     jumps: Annotated[
-        NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu", writable=False)
+        NDArray[numpy.float64], dict(shape=(None, 6, 3), order="C", device="cpu", writable=False)
+    ],
+    shares: Annotated[
+        NDArray[numpy.float64], dict(shape=(6, 3, None), order="C", device="cpu", writable=False)
     ],
     jump_state: Annotated[
         NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
@@ -409,11 +426,15 @@ def sensitivities(
     whiten: Annotated[
         NDArray[numpy.float64], dict(shape=(6, 6), order="C", device="cpu", writable=False)
     ],
+    counted: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
     state: Annotated[NDArray[numpy.float64], dict(shape=(6, 3, None), order="C", device="cpu")],
     out: Annotated[NDArray[numpy.float64], dict(shape=(None, 6, None), order="C", device="cpu")],
 ) -> None:
-    """Write rows (n, 6, c + 1): the whitened change of the innovations' predictions with a unit of
-    each column, and the innovations, whitened by a lower triangle.
+    """Write rows (m, 6, c + 1) of the counted samples: the whitened change of the innovations'
+    predictions with a unit of each column, and the innovations. Columns are products: scale,
+    x (n,), y (n, k), and their first channel.
     """
 
 def evidence(

@@ -28,7 +28,8 @@ def benchmark(
     imports: list[str] | None = None,
     out: Path = Path("results/benchmark"),
 ) -> dict[str, Any]:
-    """Fly controllers through the same episodes. Write the leaderboard as JSON, table and picture.
+    """Rank controllers on the same simulated episodes. Write the leaderboard as JSON, table and
+    picture.
 
     Example: windwrench benchmark --controllers lead,tracker,sac-0 --scenarios base,fast
     --episodes 40

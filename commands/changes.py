@@ -27,8 +27,8 @@ def compare(
     reading: LogOptions = AS_THEY_ARE,
     out: Path = Path("results/compare"),
 ) -> dict[str, Any]:
-    """Find what changed between two sets of flights. Which rotor, which side: no model has to be
-    true. Write change.json and change.png.
+    """Find what changed between two sets of flights. Name the rotor or side; the vehicle's
+    model need not be right. Write change.json and change.png.
 
     Example: windwrench compare today.csv --against yesterday.csv --vehicle my_drone.yaml
     """

@@ -20,9 +20,9 @@ def check(
     write: Path | None = None,
     out: Path = Path("results/check"),
 ) -> dict[str, Any]:
-    """Say what a flight log holds. How it was read and why; its channels, rates, gaps and doubts.
-    For a table of unknown columns a map is guessed, with ? where you must choose; write a picture
-    of the channels.
+    """Check the channels, units and conventions of a flight log. Print rates, gaps, doubts and the
+    reason of each choice, and draw the channels. For a table of unknown columns propose a map,
+    with ? where you must choose.
 
     Example: windwrench check theirs.csv --vehicle my_drone.yaml --write-map map.yaml
     """

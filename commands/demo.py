@@ -22,8 +22,8 @@ def demo(
     no_open: bool = False,
     out: Path = Path("results/demo"),
 ) -> dict[str, Any]:
-    """Show what this kit does, in two minutes. Fly in the wind, estimate it, record a flight with a
-    hidden effect, diagnose it, and fly better; write one page of all of it.
+    """Show the kit on one page, in a minute. Fly in wind, estimate the wrench, record a flight with
+    a hidden effect, diagnose the flight, and fly with the amended model.
 
     Example: windwrench demo --no-open
     """

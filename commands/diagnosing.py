@@ -33,7 +33,7 @@ def diagnose(
     without: list[str] | None = None,
     out: Path = Path("results/diagnose"),
 ) -> dict[str, Any]:
-    """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
+    """Name effects that a vehicle's model lacks, from flight logs. Write report.json, report.html
     and vehicle.yaml.
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
@@ -76,12 +76,12 @@ def confronted(example: "Example", effects: Sequence[Mapping[str, Any]]) -> list
             for effect in effects
             if {effect["name"], *effect["indistinguishable_from"]} & set(known.effects)
         ]
-        found = f"found, as {' and '.join(named)}" if named else "not found"
-        console.print(f"{' or '.join(known.effects)}: known, and {found}.")
+        found = f"found as {' and '.join(named)}" if named else "not found"
+        console.print(f"Known: {' or '.join(known.effects)}, {found}.")
         rows.append({"known": known.why, "effects": list(known.effects), "named": named})
         others = [name for name in others if name not in named]
     if others:
-        console.print(f"Also named, and nobody knows whether it is so: {', '.join(others)}.")
+        console.print(f"Named without a known answer: {', '.join(others)}.")
     return rows
 
 
@@ -141,7 +141,7 @@ def _show(diagnosis: "Diagnosis") -> None:
             head = [""] * len(head)
     if rows:
         last = ("probability",) if stated else ()
-        show_table(("effect", "", "what it does", *last), rows)
+        show_table(("effect", "", "amount", *last), rows)
     rows = []
     for row in error_table(diagnosis):
         unit = f" ({row['unit']})" if row["unit"] else ""

@@ -29,14 +29,13 @@ _TRACKS: dict[str, tuple[str, str] | None] = {
     ".csv": None,
     ".mcap": ("rosbags", "logs"),
 }
-# sentences for innovations in agreement within a second, of a given and of a fitted tuning
+# sentences for correlated innovations, of a given and of a fitted tuning
 _TOO_SLOW = (
-    "warning: innovations agree with each other within a second: the wrench changes faster than "
-    "the tuning says. It is late, and its deviations are too small. Leave out --no-tune and "
+    "warning: innovations are correlated within a second: the wrench changes faster than the "
+    "tuning allows. The estimate lags, and its deviations are too small. Leave out --no-tune and "
     "--tuning.",
-    "Innovations agree with each other within a second even so: the wrench changes otherwise than "
-    "a random walk. --fit-disturbance fits gusts; windwrench diagnose names an effect that the "
-    "vehicle lacks.",
+    "Innovations are still correlated within a second: the wrench is no random walk. "
+    "--fit-disturbance fits gusts; windwrench diagnose names missing effects.",
 )
 
 

@@ -22,8 +22,8 @@ def export_c(
 ) -> dict[str, Any]:
     """Write the filter as C++ for a flight controller.
 
-    The core's C++17 headers, one header of numbers and a C interface, in single precision unless
-    said otherwise, and without a heap; with an example and a CMake file.
+    The core's C++17 headers, one header of numbers and a C interface, without a heap; an
+    example and a CMake file.
 
     Example: windwrench export-c --vehicle ardrone2 --estimator ukf --out filter
     """

@@ -31,7 +31,7 @@ def fly(
     view: bool = False,
     out: Path = Path("results/fly"),
 ) -> dict[str, Any]:
-    """Fly one episode in the jet or in the wind. Write a picture of it.
+    """Fly one simulated episode in a fan's jet or in wind. Draw the flight.
 
     Example: windwrench fly --scenario static --controller admittance --gif
     """

@@ -2,7 +2,6 @@
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,10 +41,11 @@ def identify(
     out: Path = Path("results/vehicle.yaml"),
 ) -> dict[str, Any]:
     """Identify a vehicle from its flight logs. Thrust and torque coefficients or the thrust curve,
-    inertia, motor lag, centre of mass and drag, each with a 95 % interval; what the flights do not
-    tell is said. Write the vehicle file, the intervals beside it and a picture.
+    inertia, motor lag, centre of mass and drag, each with a 95 % interval; quantities that the
+    flights do not determine are listed. Write the vehicle file, the intervals beside it and a
+    picture.
 
-    With --test, say how well the vehicle predicts flights that it was not fitted to.
+    With --test, measure how well the vehicle predicts flights kept out of the fit.
 
     Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
     """
@@ -81,24 +81,20 @@ def identify(
         with working("predicting"):
             parts_of = [[window] for window in windows[len(logs) :]]
             models = identified.vehicle, models_of(identified.vehicle)[SIMPLEST]
-            errors, simplest = errors_of_models(unseen, models, windows=parts_of)
-        identified = replace(
-            identified,
-            predicted={**identified.predicted, "prediction": errors},
-            simplest={**identified.simplest, "prediction": simplest},
-        )
+            further = errors_of_models(unseen, models, windows=parts_of)
+        identified = identified._replace(predicted={**identified.predicted, "prediction": further})
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
     log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
     seconds = identified.fit.balance.seconds
     console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {headline(identified)}.")
     show_table(
-        ("quantity", "value", "95 % interval", "unit", ""),
+        ("quantity", "value", "± (95 %)", "unit", ""),
         [
             (
                 e.name,
                 f"{e.value:.4g}" if math.isfinite(e.value) else "–",
-                f"{e.low:.4g} to {e.high:.4g}" if math.isfinite(e.low) else "",
+                f"{0.5 * (e.high - e.low):.2g}" if math.isfinite(e.low) else "",
                 e.unit,
                 e.status,
             )
@@ -110,12 +106,12 @@ def identify(
             console.print(f"{e.name}: {e.status}: {e.how}")
     for line in identified.advice:
         console.print(line)
-    for of, errors in identified.predicted.items():
-        after = f"{errors.horizon[-1]:.2g} s after {errors.starts} starts"
-        console.print(f"{of.replace('_', ' ')}: {after}, by what was not fitted to them:")
+    for of, (vehicle, simplest) in identified.predicted.items():
+        after = f"{vehicle.horizon[-1]:.2g} s after {vehicle.starts} starts"
+        console.print(f"{of.replace('_', ' ')}: {after}, by a fit without them:")
         show_table(
             ("mean error", "of the vehicle", "thrust and drag", "if nothing changes", "unit"),
-            table_of(errors, identified.simplest[of]),
+            table_of(vehicle, simplest),
         )
     console.print(use_of(identified))
     result = {"headline": headline(identified), **identified_data(identified)}

@@ -38,8 +38,8 @@ def live(
     rate: float | None = None,
     wait: float = 10.0,
 ) -> dict[str, Any]:
-    """Estimate the wrench while the vehicle flies. Show it, send it back, record the flight. Prints
-    a page on a terminal, else a line for each estimate, the columns of wrench.csv.
+    """Estimate the wrench while the vehicle flies. Show or send the estimate, and record the
+    flight. A terminal shows a live page; a pipe gets one line an estimate, as in wrench.csv.
 
     Example: windwrench live sim:base
     """
@@ -185,12 +185,12 @@ def _summary(session: "Session") -> dict[str, Any]:
         "torque_std_Nm": deviation[3:],
         "ended": session.ended,
     }
-    messages = ", ".join(f"{n} {kind}" for kind, n in sorted(result["messages"].items()))
-    lines = [f"{session.estimates} estimates over {session.seconds:.1f} s, of {messages}"]
+    messages = counts_words(result["messages"])
+    lines = [f"{session.estimates} estimates over {session.seconds:.1f} s; messages: {messages}"]
     if tallies.found:
         lines.append(f"counted: {counts_words(tallies.found)}")
     if restarts:
-        lines.append(f"the filter restarted {restarts} time(s): after gaps or jumps")
+        lines.append(f"restarts of the filter after gaps or jumps: {restarts}")
     if tallies.consistency.seconds:
         lines.append(f"tuning: {tuning_words(tallies.consistency)}")
     lines += session.watch.words

@@ -1,5 +1,6 @@
 """All results of a log, in one go: ``windwrench LOG``."""
 
+import re
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -34,8 +35,8 @@ def look(
     no_open: bool = False,
     out: Path = Path("results/log"),
 ) -> dict[str, Any]:
-    """Say of a flight log all that it allows. What it holds, which force and torque act, and what
-    the vehicle's model lacks; write one page.
+    """Check a flight log, estimate the wrench and name missing effects. Do as much as the log
+    allows, and write one page.
 
     Example: windwrench look flight.csv --vehicle crazyflie
     """
@@ -63,8 +64,11 @@ def look(
         reading = replace(reading, map=str(own_map))
     for text in checked["doubts"]:
         note(f"warning: {text}")
-    drawn, said = folder / "check.png", _what_it_holds(checked)
-    steps = [Step("What the log holds", said, _typed("check", log, reading), drawn)]
+    steps = [
+        Step(
+            "The log", _what_it_holds(checked), _typed("check", log, reading), folder / "check.png"
+        )
+    ]
     _tell(steps[0])
     sentence, then = checked["headline"], ""
     if reading.vehicle is None and checked["vehicle"] in preset_names():
@@ -74,8 +78,8 @@ def look(
         then = _how_to_make_a_vehicle(log, reading)
     else:
         ways: tuple[tuple[str, str, Callable[..., Any], Any], ...] = (
-            ("estimate", "Which force and torque act", estimate, log),
-            ("diagnose", "What the model lacks", diagnose, [log]),
+            ("estimate", "The wrench", estimate, log),
+            ("diagnose", "Missing effects", diagnose, [log]),
         )
         for name, title, work, logs in ways:
             command = _typed(name, log, reading)
@@ -88,13 +92,14 @@ def look(
                 sentence = results[name]["headline"]
                 picture = folder / name / "wrench.png" if name == "estimate" else None
                 report = "" if picture else f"{name}/report.html"
-                steps.append(Step(title, (sentence,), command, picture, report))
+                said = re.sub(r"^Doubt: .+?\. ", "", sentence)  # the log's, said above
+                steps.append(Step(title, (said,), command, picture, report))
             _tell(steps[-1])
     page = folder / "log.html"
     write_page(checked["log"], sentence, steps, then, command_line(), page, checked["doubts"])
     run.record = folder / "run.json"
-    for line in then.splitlines():
-        console.print(line, soft_wrap=True)
+    if then:
+        console.print(then, soft_wrap=True)
     say(page)
     show_page(page, not no_open)
     console.print(sentence)
@@ -118,7 +123,7 @@ def _how_to_make_a_vehicle(log: Path, reading: LogOptions) -> str:
         return f"Force and torque need a vehicle, and identify refuses this log: {refused}"
     then = _typed("", log, replace(reading, vehicle=_VEHICLE))
     return (
-        "Force and torque need a vehicle. Make its file from this log and a mass:\n"
+        "Force and torque need --vehicle: a preset, or a file from this log and a mass:\n"
         f"{_typed('identify', log, reading)} --mass KG --out {_VEHICLE}\n{then}"
     )
 

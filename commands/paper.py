@@ -19,7 +19,7 @@ def reproduce(
 ) -> dict[str, Any]:
     """Reproduce the paper's figures. A repeated command resumes and keeps finished figures.
 
-    Each gives NAME.json (figures of merit), NAME.csv.gz (data), NAME.png and NAME.svg.
+    Each figure gives NAME.json (figures of merit), NAME.csv.gz (data), NAME.png and NAME.svg.
 
     Example: windwrench reproduce fig6 --out results/reproduction
     """
@@ -27,7 +27,8 @@ def reproduce(
 
     if find_spec("..reproduction", __package__) is None:
         raise InputError(
-            "reproduce: an installed wheel holds no figures; expected a checkout of the repository"
+            "reproduce: the installed wheel holds no figures; run in a checkout: pip install -e "
+            "'.[reproduction]'"
         )
     from ..reproduction import NAMES
     from ..reproduction.reproduce import chosen, is_done, numbers_of_seeds, write_page

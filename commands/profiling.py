@@ -22,7 +22,7 @@ def profile(
     write: Path | None = None,
     out: Path = Path("results/profile"),
 ) -> dict[str, Any]:
-    """Draw a wind's force and torque over the place, from a flight. Design the admittance law that
+    """Map a wind's force and torque against position, from a flight. Design the admittance law that
     follows the fan.
 
     Example: windwrench profile hovers.csv --vehicle ardrone2 --write law.yaml

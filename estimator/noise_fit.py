@@ -152,12 +152,12 @@ class NoiseFit:
     def __str__(self) -> str:
         (force, torque), (force_before, torque_before) = self.rise_after, self.rise_before
         return (
-            f"Tuning fitted to this flight: the force rises in {_times(force)} s (before: "
-            f"{_times(force_before)} s), the torque in {_times(torque)} s (before: "
+            f"Tuning fitted to this flight: rise time of force {_times(force)} s (before: "
+            f"{_times(force_before)} s), of torque {_times(torque)} s (before: "
             f"{_times(torque_before)} s). {self.after}; before: {self.before.nis:.2f}, over a "
             f"second {self.before.nis_over_second:.3g}."
             + "".join(
-                f" Unseen, the {name} falls to 1/e in {_times(np.asarray(time))} s."
+                f" Correlation time of the {name}: {_times(np.asarray(time))} s."
                 for name, time in (
                     ("force", self.tuning.force_time),
                     ("torque", self.tuning.torque_time),

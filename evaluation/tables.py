@@ -163,7 +163,7 @@ def legend(task: str, rows: Sequence[Standing]) -> str:
         f"Ranked by {ranked}.": True,
         "IQM: interquartile mean.": by_error,
         "Activity: mean squared change of the command, of its largest.": True,
-        f"P: probability of improvement over {flown_task.rival}.": True,
+        f"P: probability of improvement over {flown_task.rival} (0 % of the way to limit).": True,
         "Score: 0 = hover, 1 = oracle.": "oracle" in flown_task.laws,
         "A terminated episode's rest counts 2.5 m.": any(row.lost_episodes for row in rows),
         "*: reads the truth or a preview.": any(row.uses_truth for row in rows),

@@ -3,8 +3,9 @@
 The task is that of *Nonlinear System Identification for a Nano-drone Benchmark* (Control
 Engineering Practice 172, 2026): from the state at a sample and the rotor speeds after it, 50 steps
 of 10 ms. The score is the mean over starts of the error's norm at each step, summed over the steps.
-The vehicle of all paths but one predicts this path, from the logged state and from the state of
-causal filters. Beside it stand its thrust and drag with an unchanged body rate, and no change.
+The vehicle of all paths but one predicts this path. It starts from the logged state, from the
+state of causal filters, or from poses of the last 0.2 s. Beside it stand its thrust and drag with
+an unchanged body rate, and no change.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,8 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.signal import savgol_coeffs
 
 from windwrench import __version__
 from windwrench.dynamics.vehicle import Vehicle
@@ -22,7 +25,7 @@ from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.table import Array
 from windwrench.identification.logs.text_table import open_table
-from windwrench.identification.motion.smoothing import runs_of
+from windwrench.identification.motion.smoothing import continuous, runs_of
 from windwrench.identification.prediction import (
     QUANTITIES,
     errors_of_models,
@@ -43,6 +46,8 @@ _ALOFT = 0.3  # m
 _HORIZON = 0.5  # s
 VEHICLE, FORCE = "identified vehicle", "its thrust and drag"
 WAYS = (VEHICLE, FORCE, NO_CHANGE)
+PAST = "identified vehicle, from 0.2 s of poses"
+_PAST = 0.2  # s
 
 
 def identified(logs: Sequence[FlightLog]) -> Identified:
@@ -71,14 +76,36 @@ def logged_states(path: Path, log: FlightLog) -> Array:
     return states
 
 
-def sums(log: FlightLog, states: Array, vehicle: Vehicle, every: int = 2) -> list[float]:
-    """Return the benchmark's score (4) of a vehicle from the logged states (N, 13)."""
-    made = predict(log, vehicle, _HORIZON, every, states)
+def past_states(states: Array, period: float) -> Array:
+    """Return states (N, 13) by the poses of logged states alone: velocity and body rate are slopes
+    of parabolas through the last 0.2 s, at their end.
+    """
+    count = round(_PAST / period) + 1
+    weights = savgol_coeffs(count, 2, deriv=1, delta=period, pos=count - 1, use="dot")
+    flown = np.isfinite(states[:, 0])
+    pose = states[flown, :7]
+    pose[:, 3:] = continuous(pose[:, 3:])
+    slopes = sliding_window_view(pose, count, axis=0) @ weights
+    pose = pose[count - 1 :]
+    scalar, vector, turn = pose[:, 3:4], pose[:, 4:], slopes[:, 4:]
+    rate = 2.0 * (scalar * turn - slopes[:, 3:4] * vector - np.cross(vector, turn))
+    out = np.full_like(states, np.nan)
+    out[np.flatnonzero(flown)[count - 1 :]] = np.hstack([pose, slopes[:, :3], rate])
+    return out
+
+
+def sums(
+    log: FlightLog, truth: Array, vehicle: Vehicle, every: int = 2, begin: Array | None = None
+) -> list[float]:
+    """Return the benchmark's score (4) of a vehicle against logged states (N, 13), from states
+    (N, 13); None: the logged ones.
+    """
+    made = predict(log, vehicle, _HORIZON, every, truth if begin is None else begin)
     parts = made.position, made.quaternion, made.velocity, made.angular_velocity
     path = np.concatenate(parts, axis=2)
-    truth = states[made.start[:, None] + np.arange(1, path.shape[1] + 1)]
-    whole = np.isfinite(truth).all(axis=(1, 2))
-    distances = np.linalg.norm(offsets(path[whole], truth[whole]), axis=-1)
+    ahead = truth[made.start[:, None] + np.arange(1, path.shape[1] + 1)]
+    whole = np.isfinite(ahead).all(axis=(1, 2))
+    distances = np.linalg.norm(offsets(path[whole], ahead[whole]), axis=-1)
     found: list[float] = distances.mean(axis=0).sum(axis=0).tolist()
     return found
 
@@ -98,7 +125,10 @@ def judged(found: Identified, logs: Mapping[Path, FlightLog]) -> list[dict[str, 
                 "after_half_a_second": dict(
                     zip(WAYS, (e.model[:, -1].tolist() for e in errors), strict=True)
                 ),
-                "sums": {way: sums(log, states, v) for way, v in zip(WAYS, ways, strict=True)},
+                "sums": {
+                    **{way: sums(log, states, v) for way, v in zip(WAYS, ways, strict=True)},
+                    PAST: sums(log, states, found.vehicle, begin=past_states(states, log.period)),
+                },
             }
         )
     return rows
@@ -109,7 +139,7 @@ def section(result: Mapping[str, Any]) -> str:
     errors = " | ".join(f"{name} {unit}" for name, unit in QUANTITIES.items())
     lines = [f"| path held out | predicted by | {errors} |", "| --- " * 6 + "|"]
     for path, rows in result["paths"].items():
-        for way in WAYS:
+        for way in rows[0]["sums"]:
             cells = " | ".join(f"{x:.3g}" for x in mean(rows, "sums", way))
             lines.append(f"| {path} | {way} | {cells} |")
     loops = result["closed_loop"]
@@ -167,7 +197,7 @@ def study(
             for c in UNITS
             if (e := found.estimates.get(f"closed_loop {c}")) and e.status == IDENTIFIED
         }
-        for way in WAYS:
+        for way in (*WAYS, PAST):
             print(name, way, np.round(mean(result["paths"][name], "sums", way), 2), flush=True)
         if out is not None or not test:
             write_json(result, out or DOCS / "identify" / "nanodrone.json")

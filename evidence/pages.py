@@ -15,7 +15,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from windwrench.evidence import boards, tasks, trust
+from windwrench.evidence import boards, tasks, trust_page
 from windwrench.evidence.kept_results import DOCS, ROOT
 from windwrench.evidence.quotes import read_quotes, unknown_numbers, wrong_quotes
 from windwrench.evidence.scoring import share
@@ -26,7 +26,7 @@ from windwrench.runtime.provenance import made_by
 PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {
     "leaderboard": boards.page,
     "tasks": tasks.page,
-    "trust": trust.page,
+    "trust": trust_page.page,
 }
 _MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
 _COMMAND = re.compile(r"python -m ((?:evidence|studies|windwrench)\.[a-z_.]+)")
@@ -60,14 +60,12 @@ def differing_lines(name: str) -> list[str]:
 
 def missing_sources() -> list[str]:
     """Return the modules that pages name and that do not exist, each with its page. The
-    changelog and the release page's table of kept results name what has left.
+    changelog names what has left.
     """
     pages = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md")))
     missing = []
     for page in pages:
         text = page.read_text(encoding="utf-8")
-        if page.name == "release.md":
-            text = re.sub(r"(?m)^\|.*$", "", text)
         names = [name for name in _MODULE.findall(text) if not _is_file(name)]
         names += [module for module in _COMMAND.findall(text) if not _runs(module)]
         missing += [f"{page.name} names {name}" for name in sorted(set(names))]

@@ -2,6 +2,8 @@
 
 * Force and torque on flights of a racer (NeuroBEM, Bauersfeld and others, RSS 2021): vector RMSE of
   the published network and of estimators (NeuroMHE; TR-NeuroMHE).
+* Pull of a tracked load of 4.7 g on a cable under a Crazyflie (IMRCLab/crazyflie-data-collection),
+  beside its weight and acceleration.
 * Coefficients of a Crazyflie (Eschmann, Albani, Loianno, arXiv 2404.07837: sysid.tools), by the
   same parts of the same logs.
 
@@ -23,7 +25,7 @@ from windwrench.evidence.kept_results import DOCS
 from windwrench.evidence.runner import start
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.text_table import open_table
-from windwrench.identification.motion.smoothing import derivative
+from windwrench.identification.motion.smoothing import derivative, low_pass
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.wrench_series import estimate_log, tune_to_log
@@ -50,6 +52,9 @@ PARTS = {
     "log16": [(15.1, 21.1), (28.1, 32.1)],
 }
 CRAZYFLIE_MASS, CRAZYFLIE_ARM = 0.027, 0.028  # kg, m
+FREE, CARRYING = ("00", "02", "04"), ("06", "12", "20")  # flights without and with a load
+FREE_MASS, CARRIER, LOAD, ARM = 0.037, 0.0397, 0.0047, 0.0325  # kg, m, as their README states
+_PULL_HZ = 2.0
 OF_SYSID_TOOLS = {
     "Jxx": 1.0286e-5,
     "Jyy": 1.1052e-5,
@@ -113,6 +118,29 @@ def crazyflie(data: Path) -> dict[str, list[float]]:
     return {name: [e.value, e.low, e.high] for name, e in named.items()}
 
 
+def pull(data: Path) -> dict[str, dict[str, list[float]]]:
+    """Return mean and RMS difference (N, x, y, z) of a cable's pull, estimated and tracked, by the
+    vehicle of flights without a load.
+    """
+    free = [read_log(data / "brushless_flights" / "data" / f"eckart{n}") for n in FREE]
+    known = identify(free, FREE_MASS, parse_geometry(str(ARM))).vehicle
+    vehicle = replace(known, mass=CARRIER)
+    found = {}
+    for n in CARRYING:
+        log = read_log(data / "brushless_flights_payload" / "data" / f"eckart{n}")
+        made = estimate_log(log, vehicle, tune_to_log(log, vehicle).tuning, smooth=True)
+        place = low_pass(log.extra["payload_position"], _PULL_HZ, log.period)
+        speed = np.gradient(place, log.period, axis=0)
+        moves = np.gradient(speed, log.period, axis=0)
+        moves[:, 2] += vehicle.gravity
+        inner = slice(round(1.0 / log.period), -round(1.0 / log.period))
+        force = low_pass(made.force, _PULL_HZ, log.period)[inner]
+        off = force + LOAD * moves[inner]
+        size = np.sqrt(np.square(off).mean(axis=0))
+        found[n] = {"estimated": force.mean(axis=0).tolist(), "rms_off": size.tolist()}
+    return found
+
+
 def section(result: dict[str, Any]) -> str:
     """Return the tables, as Markdown."""
     lines = []
@@ -128,6 +156,11 @@ def section(result: dict[str, Any]) -> str:
         for name, (value, low, high) in known.items():
             said = f"{OF_SYSID_TOOLS[name]:.4g}"
             lines.append(f"| {name} | {value:.3g} | {low:.3g}–{high:.3g} | {said} |")
+    if pulls := result.get("pull"):
+        lines += ["", "| flight | mean pull, N (x, y, z) | off, RMS, N |", "| --- " * 3 + "|"]
+        for name, row in pulls.items():
+            numbers = (" ".join(f"{x:.4f}" for x in row[key]) for key in ("estimated", "rms_off"))
+            lines.append(f"| {name} | {' | '.join(numbers)} |")
     return "\n".join(lines)
 
 
@@ -138,6 +171,7 @@ def study(
     imu: Annotated[Path, typer.Option(help="Folder of a Crazyflie's logs.")] = Path(
         "../shared/data/crazyflie_imu"
     ),
+    crazyflies: Annotated[Path | None, typer.Option(help="Folder with and without a load.")] = None,
     out: Annotated[Path, typer.Option(help="Results file.")] = DOCS / RESULTS,
 ) -> None:
     """Compare with what is published. Tables without their flights are left out."""
@@ -146,6 +180,8 @@ def study(
         result["races"] = {name: race(racer, name) for name in RACES}
     if imu.is_dir():
         result["crazyflie"] = crazyflie(imu)
+    if crazyflies is not None:
+        result["pull"] = pull(crazyflies)
     write_json(result, out)
     print(section(result))
 

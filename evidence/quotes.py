@@ -11,7 +11,6 @@ from windwrench.runtime.yaml_file import read_yaml
 
 ROOT = DOCS.parent
 FILE = Path(__file__).with_name("quotes.yaml")
-_WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _NUMBER = re.compile(r"(?<![\w.])\d[\d,]*(?:\.\d+)?(?![\w.]*\w\()")
 
 
@@ -50,8 +49,7 @@ def read_quotes(path: Path = FILE) -> tuple[list[Quote], dict[str, list[str]]]:
 def _value(value: Mapping[str, Any]) -> str:
     """Return one figure as prose shows it, from results (JSON) or from a page made of results."""
     if value["from"].endswith(".md"):
-        number = _on_page(value["from"], value["line"], value["finds"])
-        return _WORDS[int(number)] if value.get("form") == "word" else number
+        return _on_page(value["from"], value["line"], value["finds"])
     found: Any = kept(value["from"].removeprefix("docs/"))
     if "where_in" in value:
         found = found[value["where_in"]]

@@ -7,11 +7,12 @@ alone make a filter's error.
 """
 
 import itertools
+import json
 import math
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
@@ -21,17 +22,21 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
+from windwrench import __version__
 from windwrench.dynamics import Vehicle, load_vehicle
 from windwrench.envs.recording import draw_trajectory
 from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchEstimate, WrenchUKF
+from windwrench.evidence.kept_results import DOCS
 from windwrench.evidence.runner import start
-from windwrench.runtime.errors import unknown_name
+from windwrench.runtime.page_files import write_json
+from windwrench.runtime.provenance import commit
 
 Array = NDArray[np.float64]
 Words = tuple[str, ...]  # what a flight is: one key of each axis
 # errors (n, 6) of position and attitude from the true ones (n, 6), in declared deviations
 Errors = Callable[[np.random.Generator, Array], Array]
 
+RESULTS = "results/recovery.json"  # below docs/
 BEFORE, AFTER = 6.0, 20.0  # s of good poses: six rise times, and the time that is judged
 JUMP, TILT = 0.5, math.radians(45.0)  # m, rad
 FORCE, TORQUE = 0.1, 0.05  # external, in weights, and in weights times arm
@@ -179,20 +184,10 @@ def estimated(
     position: Array,
     quaternion: Array,
     gate: float | None = None,
-    told: bool = False,
 ) -> WrenchEstimate:
-    """Return the series of estimates of a filter with the default tuning along measured poses.
-
-    ``told``: it knows the deviation of the poses before the event, instead of the declared one.
-    """
+    """Return the series of estimates of a filter with the default tuning along measured poses."""
     period = 1.0 / flight.rate
     tuning = UKFTuning.for_vehicle(flight.vehicle, period)
-    if told:
-        calm = slice(0, flight.row(BEFORE))
-        seen = Rotation.from_quat(quaternion[calm], scalar_first=True)
-        turns = (seen * flight.attitude[calm].inv()).as_rotvec()
-        off = position[calm] - flight.position[calm]
-        tuning = replace(tuning, position_noise=_rms(off), attitude_noise=_rms(turns))
     made = FILTERS[kind](flight.vehicle, tuning, period, gate)
     made.reset(flight.position[0], flight.attitude[0].as_quat(scalar_first=True))
     rows = zip(flight.rotor_speeds[: len(position)], position, quaternion, strict=True)
@@ -260,8 +255,8 @@ def drawing(words: Words, seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, *" ".join(words).encode()])
 
 
-def fly_combination(words: Words, seed: int = 0, told: bool = False) -> Verdict:
-    """Fly and judge filter, vehicle, noise, event and gate; ``told``: as of ``estimated``."""
+def fly_combination(words: Words, seed: int = 0) -> Verdict:
+    """Fly and judge filter, vehicle, noise, event and gate."""
     kind, flown, noise, event, gate = words
     rng = drawing(words, seed)
     flight = exact_flight(flown, BEFORE + max(EVENTS.values()) + AFTER, seed)
@@ -269,7 +264,7 @@ def fly_combination(words: Words, seed: int = 0, told: bool = False) -> Verdict:
     pose = measured(flight, (NOISES | TAILS)[noise], rng)
     position, quaternion = befall(event, begin, end, *pose, rng)
     rows = slice(0, end + flight.row(AFTER))
-    said = estimated(kind, flight, position[rows], quaternion[rows], GATES[gate], told)
+    said = estimated(kind, flight, position[rows], quaternion[rows], GATES[gate])
     return judged(flight, said, end)
 
 
@@ -283,29 +278,24 @@ def progress(tasks: Sequence[Any]) -> Iterator[Any]:
         yield task
 
 
-def combinations(noises: Mapping[str, Errors], only: str, seeds: int, told: bool) -> None:
-    """Fly all combinations; print those beyond a limit, and counts of them by each word."""
+def combinations(noises: Mapping[str, Errors], only: str, seeds: int) -> dict[str, Any]:
+    """Fly all combinations and print those beyond a limit; return counts and the worst figures."""
     axes = (FILTERS, FLOWN, noises, EVENTS, GATES)
     tasks = [(words, seed) for seed in range(seeds) for words in named(axes, only)]
-    flown, failed, reasons = Counter[str](), Counter[str](), Counter[str]()
-    worst = {False: Verdict(), True: Verdict()}  # told or not
-    wrong = Counter[bool]()
+    reasons, beyond, worst = Counter[str](), 0, Verdict()
     for words, seed in progress(tasks):
-        flown.update(words)
-        for knows in (False, True)[: 1 + told]:
-            verdict = fly_combination(words, seed, knows)
-            worst[knows] = Verdict(*map(max, worst[knows], verdict))
-            wrong[knows] += bool(verdict.failures)
-            if verdict.failures and not knows:
-                failed.update(words)
-                reasons.update(verdict.failures)
-                print(f"{' '.join(words):50} {verdict}: {', '.join(verdict.failures)}", flush=True)
-    for word in filter(flown.get, itertools.chain(*axes)):
-        print(f"{word:14} {failed[word]:4} of {flown[word]} beyond")
-    if told:
-        print(f"{wrong[True]} beyond, of filters that know the noise; worst: {worst[True]}")
-    why = ", ".join(f"{count} by {reason}" for reason, count in reasons.items())
-    print(f"{wrong[False]} of {len(tasks)} are beyond a limit ({why}); worst: {worst[False]}.")
+        verdict = fly_combination(words, seed)
+        worst = Verdict(*map(max, worst, verdict))
+        reasons.update(verdict.failures)
+        if verdict.failures:
+            beyond += 1
+            print(f"{' '.join(words):50} {verdict}: {', '.join(verdict.failures)}", flush=True)
+    return {
+        "flights": len(tasks),
+        "beyond": beyond,
+        "reasons": dict(reasons),
+        "worst": worst._asdict(),
+    }
 
 
 def turned(rng: np.random.Generator, attitude: Rotation) -> tuple[str, Rotation]:
@@ -351,22 +341,17 @@ def fly_wrong_attitudes(seed: int) -> tuple[str, Claim, Claim]:
     return f"{kind} {flown} {noise} {words} {seconds:.2f} s", meanwhile, after
 
 
-def wrong_attitudes(seeds: int) -> None:
-    """Fly sequences of wrong attitudes; print those whose wrench is off by more than it says."""
+def wrong_attitudes(seeds: int) -> dict[str, Any]:
+    """Fly sequences of wrong attitudes; return how many wrenches are off by more than they say."""
     count = seeds * SEQUENCES
-    wrong, worst = [0, 0], [Claim(), Claim()]
+    wrong = [0, 0]
     for seed in progress(range(count)):
         words, *claims = fly_wrong_attitudes(seed)
         wrong = [n + (not claim.z <= WRONG) for n, claim in zip(wrong, claims, strict=True)]
-        worst = [Claim(*map(max, w, c)) for w, c in zip(worst, claims, strict=True)]
         if not max(claim.z for claim in claims) <= WRONG:
-            told = ", ".join(f"z {claim.z:.1f} force {claim.error:.2f}" for claim in claims)
-            print(f"{seed:4} {words:50} meanwhile and later: {told}", flush=True)
-    for when, n, claim in zip(("meanwhile", f"{SETTLED:g} s later"), wrong, worst, strict=True):
-        print(
-            f"{when}: z over {WRONG:g} in {n} of {count}; worst z {claim.z:.1f}, force "
-            f"{claim.error:.2f} weights"
-        )
+            off = ", ".join(f"z {claim.z:.1f} force {claim.error:.2f}" for claim in claims)
+            print(f"{seed:4} {words:50} meanwhile and later: {off}", flush=True)
+    return {"flights": count, "meanwhile": wrong[0], "later": wrong[1]}
 
 
 def poisson_band(count: int, hours: float) -> tuple[float, float]:
@@ -375,13 +360,10 @@ def poisson_band(count: int, hours: float) -> tuple[float, float]:
     return float(low) / hours, float(chi2.ppf(0.975, 2 * count + 2)) / 2.0 / hours
 
 
-def quiet_flights(only: str, seeds: int) -> None:
-    """Fly without an event; print how many restarts an hour has, by each word, and the scale of
-    the noise that filters state.
-    """
+def quiet_flights(only: str, seeds: int) -> dict[str, tuple[int, float]]:
+    """Fly without an event; return restarts and hours flown by each size of the noise."""
     axes = (FILTERS, RATES, QUIET_NOISES, GATES)
-    restarts, hours = Counter[str](), defaultdict[str, float](float)
-    scales = defaultdict[str, list[Array]](list)
+    restarts, hours = Counter[str](), dict.fromkeys(QUIET_NOISES, 0.0)
     for seed, words in progress(list(itertools.product(range(seeds), named(axes, only)))):
         kind, flown, noise, gate = words
         seconds = min(_QUIET, _QUIET_ROWS / float(flown.split("@")[1]))
@@ -389,40 +371,28 @@ def quiet_flights(only: str, seeds: int) -> None:
         position, attitude = measured(flight, QUIET_NOISES[noise], drawing(words, seed))
         quaternion = attitude.as_quat(scalar_first=True)
         said = estimated(kind, flight, position, quaternion, GATES[gate])
-        for word in ("all", f"{noise} {gate}", *words):
-            restarts[word] += int(said.restarts[-1])
-            hours[word] += seconds / 3600.0
-        if hasattr(said, "noise_scale"):
-            scales[noise].append(np.asarray(said.noise_scale))
-    for word, time_flown in sorted(hours.items()):
-        low, high = poisson_band(restarts[word], time_flown)
-        print(
-            f"{word:16} {restarts[word]:6} restarts in {time_flown:.3f} h: "
-            f"{restarts[word] / time_flown:.1f} an hour ({low:.1f} to {high:.1f})"
-        )
-    for noise, series in scales.items():
-        low, median, high = np.quantile(np.concatenate(series), [0.05, 0.5, 0.95])
-        print(f"{noise:16} noise_scale {median:.2f}, nine of ten from {low:.2f} to {high:.2f}")
+        restarts[noise] += int(said.restarts[-1])
+        hours[noise] += seconds / 3600.0
+    return {noise: (restarts[noise], flown) for noise, flown in hours.items() if flown}
 
 
 def study(
-    part: Annotated[
-        str, typer.Option(help="combinations, tails, attitudes or rare.")
-    ] = "combinations",
     only: Annotated[str, typer.Option(help="Words that a flight must hold: 'ukf x3 gap'.")] = "",
     seeds: Annotated[int, typer.Option(min=1, help="Flights of each kind.")] = 1,
-    told: Annotated[bool, typer.Option(help="Also fly filters that know the noise.")] = False,
 ) -> None:
-    """Fly, judge and print."""
-    parts: dict[str, Callable[[], None]] = {
-        "combinations": lambda: combinations(NOISES, only, seeds, told),
-        "tails": lambda: combinations(TAILS, only, seeds, told),
-        "attitudes": lambda: wrong_attitudes(seeds),
-        "rare": lambda: quiet_flights(only, seeds),
+    """Fly and judge all parts; keep the results where all flights were flown."""
+    code = commit()
+    result = {
+        "version": __version__,
+        "commit": code,
+        "combinations": combinations(NOISES, only, seeds),
+        "tails": combinations(TAILS, only, seeds),
+        "attitudes": wrong_attitudes(seeds),
+        "quiet": quiet_flights(only, seeds),
     }
-    if part not in parts:
-        raise unknown_name("part", part, parts)
-    parts[part]()
+    print(json.dumps(result, indent=1))
+    if not only:
+        write_json(result, DOCS / RESULTS)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from windwrench.runtime.workers import Lost, each
 Task = tuple[Any, ...]  # arguments that JSON can hold
 Jobs = Annotated[int, typer.Option(min=1, help="Number of processes.")]
 _MOST_SECONDS = 4 * 3600.0  # of a task
-_ROOMS = ("core", "runtime", "dynamics", "estimator", "controllers", "identification", "envs")
+ROOMS = ("core", "runtime", "dynamics", "estimator", "controllers", "identification", "envs")
 
 
 def code_stamp(*modules: str) -> str:
@@ -30,7 +30,7 @@ def code_stamp(*modules: str) -> str:
     Args:
         modules: paths below this folder without their ending, such as ``trials/outsiders``.
     """
-    return code_digest(_ROOMS, tuple(f"evidence/{name}.py" for name in modules))
+    return code_digest(ROOMS, tuple(f"evidence/{name}.py" for name in modules))
 
 
 def run_tasks(

@@ -9,9 +9,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..dynamics.vehicle import Vehicle
-from .logs.table import Array, ArrayMap, Mask, Names, Pair, Values
+import numpy as np
 
+from ..dynamics.vehicle import Vehicle
+from .logs.table import Array, ArrayMap, Mask, NamedNumbers, Names, Pair, Values
+
+# share of the likeliest set's probability from which flights do not tell another set from this one:
+# a likelihood of 20 to 1
+LEAST_RIVAL = 0.05
 CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
 
 
@@ -239,6 +244,26 @@ class Ranking:
     sets: tuple[RankedSet, ...]
     structure: float
     tempering: float
+
+    def averaged(self, effect: str) -> tuple[NamedNumbers, NamedNumbers]:
+        """Return the coefficients of an effect of the likeliest set, and their standard deviations,
+        averaged over the likely sets with it.
+
+        Each set leaves another share to the effect, also by effects without need of a name. (Model
+        averaging in Occam's window: J. A. Hoeting and others, Statistical Science 14 (1999),
+        382-417.)
+        """
+        best = self.sets[0]
+        values, std = dict(best.coefficients[effect]), dict(best.std[effect])
+        likely = [x for x in self.sets if x.probability >= LEAST_RIVAL * best.probability]
+        for name in std:
+            own = [x for x in likely if name in x.std.get(effect, ())]
+            value = np.array([x.coefficients[effect][name] for x in own])
+            square = np.square([x.std[effect][name] for x in own])
+            weight = np.array([x.probability for x in own]) / sum(x.probability for x in own)
+            values[name] = float(weight @ value)
+            std[name] = math.sqrt(weight @ (square + np.square(value - values[name])))
+        return values, std
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +45,7 @@ _HEAVY = 1e9  # kg m2: torques turn nothing
 _STEP_TOLERANCE = 0.1  # of a period: a step so little too long is still one step
 # s after the start of unbroken pose: the filter of a prediction's start settles
 _START_MARGIN = 0.5
+_CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
 _END_MARGIN = 0.1  # s before its end: the low-pass of the flight to compare with
 _HORIZON = 1.0  # s, of ``rollout_error``
 _START_EVERY = 0.25  # s, of an error's predictions
@@ -53,8 +55,7 @@ _LONGEST_GAP = 2.0  # s without a pose, after which it starts anew (``estimate_l
 _FROZEN = 1e-6  # of its usual standard deviation: a fixed wrench state
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
+class Prediction(NamedTuple):
     """The motion predicted by a model from each of n starts, over m steps of ``period``."""
 
     start: Rows  # (n,) rows of the log
@@ -76,8 +77,9 @@ def predict(
 
     The model starts at a row from position, velocity, attitude and angular velocity. From then on
     only the logged rotor speeds and voltage enter; a rotor speed holds over the interval before its
-    sample. Rotors and effects start with the memory of the flight before. Declared sensing effects
-    are taken out of the log. No row after a start changes its state.
+    sample. Rotors and effects start with the memory of the flight before. Without ``state``, rows
+    before the start tell the thrust of commands along body axes. Declared sensing effects are taken
+    out of the log. No row after a start changes its state.
 
     A torque that held-out flights refuted (``vehicle.status``) leaves the body rate as at the
     start, unless the vehicle states the flight loop's reaction (``closed_loop``): the body then
@@ -115,9 +117,9 @@ def predict(
         ]
     )
     starts = starts[finite_rows(states[starts])]
-    x = _flown(log, vehicle, states, starts, ahead)
-    parts = (x[..., part] for part in (POSITION, VELOCITY, QUATERNION, RATE))
-    return Prediction(starts, log.period, *parts)
+    x = _flown(log, vehicle, states, starts, ahead, state is None)
+    parts = POSITION, VELOCITY, QUATERNION, RATE
+    return Prediction(starts, log.period, *(x[..., part] for part in parts))
 
 
 def _checked(log: FlightLog, state: ArrayLike) -> Array:
@@ -143,17 +145,19 @@ def _checked(log: FlightLog, state: ArrayLike) -> Array:
     return states
 
 
-def _flown(log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead: int) -> Array:
+def _flown(
+    log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead: int, shown: bool = True
+) -> Array:
     """Return the model's states (starts, ahead, STATE), a period apart, from the states (N, STATE)
     of a log at some rows in ascending order. For the memory of effects, the last state holds over
-    rows without one.
+    rows without one. Where ``shown``, thrust of commands is as the rows before a start show.
     """
     path = np.zeros((len(starts), ahead, STATE))
     if not len(starts):
         return path
-    known = finite_rows(states)
-    first = int(np.argmax(known))
-    last_known = np.maximum.accumulate(np.where(known, np.arange(len(log.t)), 0))[first:]
+    finite, known = finite_rows(states), vehicle.uncertainty
+    first = int(np.argmax(finite))
+    last_known = np.maximum.accumulate(np.where(finite, np.arange(len(log.t)), 0))[first:]
     loop = vehicle.closed_loop
     if vehicle.status.torque == "refuted" and loop is None:
         vehicle = replace(vehicle, inertia=_HEAVY * np.eye(3))
@@ -171,6 +175,8 @@ def _flown(log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead:
         states[last_known],
         starts - first,
         log.period,
+        _off_ground(log, vehicle, states)[first:] & shown,
+        math.hypot(known.thrust, known.command) if log.commanded else 0.0,
         vehicle.status.force == "refuted",
         reaction,
         path,
@@ -204,8 +210,7 @@ def rollout_error(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float
 QUANTITIES = {"position": "m", "velocity": "m/s", "attitude": "rad", "body rate": "rad/s"}
 
 
-@dataclass(frozen=True, eq=False)
-class PredictionErrors:
+class PredictionErrors(NamedTuple):
     """Mean distances of predictions from a flight over their starts: a row for each of
     ``QUANTITIES``, a column for each of m samples after the start.
     """
@@ -228,7 +233,7 @@ class PredictionErrors:
         return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))
 
 
-ErrorsByPart = Mapping[str, PredictionErrors]  # of flights or blocks
+ErrorsByPart = Mapping[str, Sequence[PredictionErrors]]  # of flights or blocks, of some models
 
 
 def errors_of_models(
@@ -253,11 +258,10 @@ def errors_of_models(
     Raises:
         InputError: no stretch of pose is long enough.
     """
-    whole = [[(0.0, math.inf)]] * len(logs)
     starts = []
-    for log, spans in zip(logs, windows or whole, strict=True):
-        ends = [(log.t[0] + begin, log.t[0] + end) for begin, end in spans]
-        starts.append(logged_starts(log, vehicles[0], ends, horizon_s))
+    for log, spans in zip(logs, windows or [[(0.0, math.inf)]] * len(logs), strict=True):
+        parts = (np.array(spans) + log.t[0]).tolist()
+        starts.append(logged_starts(log, vehicles[0], parts, horizon_s))
     if not any(len(part.rows) for part in starts):
         names = ", ".join(log.name for log in logs)
         raise InputError(f"{names}: expected a pose, unbroken for {horizon_s + 1:g} s of flight")
@@ -272,24 +276,25 @@ def errors_at(
     for part in starts:
         if not len(part.rows):
             continue
-        still = _distances(part.unchanged, part.seen)
-        means = (_distances(part.flown(v), part.seen) for v in vehicles)
+        paths = part.unchanged, *(part.flown(v) for v in vehicles)
+        still, *means = (distances(path, part.seen) for path in paths)
         parts.append([PredictionErrors(len(part.rows), part.ahead, mean, still) for mean in means])
     return [PredictionErrors.pooled(each) for each in zip(*parts, strict=True)]
 
 
-@dataclass(frozen=True, eq=False)
-class LoggedStarts:
+class LoggedStarts(NamedTuple):
     """n starts of predictions in a log, and the flight at the m samples after each."""
 
     log: FlightLog  # without declared sensing effects
     states: Array  # (N, STATE) at each row of the log
     rows: Rows  # (n,) the starts'
+    segment: Rows  # (n,) number of the segment with each start
     seen: Array  # (n, m, STATE)
 
     def those(self, keep: Mask | slice) -> LoggedStarts:
         """Return some of the starts."""
-        return replace(self, rows=self.rows[keep], seen=self.seen[keep])
+        each = ("rows", "segment", "seen")
+        return self._replace(**{name: getattr(self, name)[keep] for name in each})
 
     def flown(self, vehicle: Vehicle) -> Array:
         """Return a model's states (n, m, STATE)."""
@@ -317,8 +322,8 @@ def logged_starts(
     log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float
 ) -> LoggedStarts:
     """Return starts every 0.25 s whose horizon (s) lies in one of the segments, times (s) from and
-    to, by the filters of a vehicle. The rotors carry the vehicle at both ends: no model has the
-    ground's force.
+    to, by the filters of a vehicle. The rotors carry the vehicle off the ground at both ends: no
+    model has the ground's force.
 
     Raises:
         InputError: no stretch of pose is unbroken for 3 s.
@@ -327,9 +332,11 @@ def logged_starts(
     ahead = log.period * np.arange(1, max(1, round(horizon / log.period)) + 1)
     each = (np.arange(t0, min(t1, log.t[-1]) - horizon + 1e-9, _START_EVERY) for t0, t1 in segments)
     times = np.concatenate([np.empty(0), *each])
-    aloft = carried(log.rotor_speeds, log.period)
+    pieces = log_signals(log)  # refuses a log without a pose
+    states = causal_states(log, vehicle)
+    aloft = carried(log.rotor_speeds, log.period) & _off_ground(log, vehicle, states)
     starts, seen = [], []
-    for piece in log_signals(log):
+    for piece in pieces:
         first, last = piece.t[0] + _START_MARGIN, piece.t[-1] - horizon - _END_MARGIN
         inside = times[(times >= first) & (times <= last)]
         rows = np.unique(np.searchsorted(log.t, inside - 0.5 * log.period))
@@ -338,11 +345,25 @@ def logged_starts(
         rows = rows[:: math.ceil(len(rows) / _MOST_STARTS) or 1]
         starts.append(rows)
         turned = continuous(Rotation.from_matrix(piece.rotation).as_quat(scalar_first=True))
-        states = np.hstack([piece.position, turned, piece.velocity, piece.angular_velocity])
+        flown = np.hstack([piece.position, turned, piece.velocity, piece.angular_velocity])
         at = log.t[rows, None] + ahead
-        seen.append(resampled(at.ravel(), piece.t, states).reshape(*at.shape, STATE))
-    states = causal_states(log, vehicle)
-    return LoggedStarts(log, states, np.concatenate(starts), np.concatenate(seen))
+        seen.append(resampled(at.ravel(), piece.t, flown).reshape(*at.shape, STATE))
+    rows = np.concatenate(starts)
+    begins = [t0 for t0, _ in segments]
+    segment = np.searchsorted(begins, log.t[rows] + log.period, side="right") - 1
+    return LoggedStarts(log, states, rows, segment, np.concatenate(seen))
+
+
+def _off_ground(log: FlightLog, vehicle: Vehicle, states: Array) -> Mask:
+    """Return the rows (N,) off the ground, by the states (N, STATE) so far: of a log whose first
+    0.5 s have too little thrust to fly, those above the first place.
+    """
+    height = states[:, POSITION][:, 2]
+    first = np.argmax(np.isfinite(height))
+    early = (log.t >= log.t[first]) & (log.t <= log.t[first] + _START_MARGIN)
+    thrust = np.square(log.rotor_speeds[early]) @ vehicle.k
+    rests = np.median(thrust) < 0.5 * vehicle.weight
+    return height > (height[first] + _CLEARANCE if rests else -np.inf)
 
 
 def _attitudes(states: Array) -> Rotation:
@@ -358,7 +379,7 @@ def offsets(x: Array, y: Array) -> Array:
     return np.stack([off[..., POSITION], off[..., VELOCITY], turn, off[..., RATE]], axis=-2)
 
 
-def _distances(x: Array, y: Array) -> Array:
+def distances(x: Array, y: Array) -> Array:
     """Return the mean distances (4, m) of states (n, m, STATE), in the order of ``QUANTITIES``."""
     return np.transpose(np.linalg.norm(offsets(x, y), axis=-1).mean(axis=0))
 

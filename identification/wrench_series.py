@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
@@ -218,7 +219,7 @@ def counts(series: WrenchSeries) -> dict[str, int]:
 
 def uncertainty_note(series: WrenchSeries) -> str:
     """Return the accuracy of force and torque in words, with the largest part of it."""
-    force = f"Standard deviation an axis: force {_largest_part(series, slice(3, 6), 'N')}"
+    force = f"Standard deviation per axis: force {_largest_part(series, slice(3, 6), 'N')}"
     if not np.isfinite(series.std_torque).any():
         return force
     return f"{force}, torque {_largest_part(series, slice(3), 'Nm')}"
@@ -238,7 +239,7 @@ def _largest_part(series: WrenchSeries, axes: slice, unit: str) -> str:
     parts["the rotors between samples"] = total - sum(parts.values())
     name = max(parts, key=parts.__getitem__)
     share = f"{100.0 * parts[name] / total:.0f} % of the variance"
-    return f"{1e3 * np.sqrt(total):.2g} m{unit} ({share}: {name})"
+    return f"{1e3 * np.sqrt(total):.3g} m{unit} ({share}: {name})"
 
 
 def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[str]:
@@ -315,7 +316,8 @@ def calls_of(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tupl
     """Return a filter's calls for some rows: each row from the row before in equal steps of at most
     one period, and a correction by its measurements; and the row of each call.
     """
-    steps = [steps_between(dt, ukf.period) for dt in (log.t[rows] - log.t[rows - 1]).tolist()]
+    parted = cache(steps_between)  # few time steps differ
+    steps = [parted(dt, ukf.period) for dt in (log.t[rows] - log.t[rows - 1]).tolist()]
     sensors = [log.gyro, log.accelerometer] if with_imu else [None, None]
     felt = [np.full((len(rows), 3), np.nan) if x is None else x[rows] for x in sensors]
     read = np.transpose([finite_rows(x) for x in felt]) @ IMU_PARTS
@@ -327,7 +329,7 @@ def calls_of(log: FlightLog, rows: Rows, ukf: WrenchUKF, with_imu: bool) -> tupl
     imu = slice(len(carried), len(to) - len(posed))
     calls["z"][imu, :6] = np.nan_to_num(np.hstack(felt)[read > 0])
     calls["parts"][imu], calls["parts"][imu.stop :] = read[read > 0], 3
-    calls["dt"][: imu.start] = np.concatenate(steps)
+    calls["dt"][: imu.start] = [*chain.from_iterable(steps)]
     calls["voltage"] = ukf.vehicle.voltage_ref
     if log.voltage is not None:
         calls["voltage"] = 0.5 * (log.voltage[to - 1] + log.voltage[to])

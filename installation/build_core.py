@@ -14,14 +14,13 @@ import subprocess
 import sys
 import sysconfig
 from concurrent.futures import ThreadPoolExecutor
-from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.metadata import version
 from pathlib import Path
 
 from compilers import compiler
 from setuptools import Extension
 from setuptools.command.build_ext import build_ext
-from sources import BUILT, ROOT, digest
+from sources import ROOT, SOABI, built, digest
 
 # names of the extensions, worst first, and flags of GCC, Clang and zig
 AVX2 = ["-mavx2", "-mfma"]
@@ -41,17 +40,27 @@ NANOBIND_FLAGS = [*COMMON, "-O2", "-fno-strict-aliasing"]
 UNITS = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("core/binding/units/*.cpp"))
 
 
-def sets() -> list[str]:
-    """Return the instruction sets to build: ``$WINDWRENCH_CORE`` alone where it is given; on
-    machines other than Linux on x86-64 the baseline.
+def sets(checkout: bool = False) -> list[str]:
+    """Return the instruction sets to build: all of this platform for a wheel, in a checkout the
+    set that this machine loads; ``$WINDWRENCH_CORE`` names another, or ``all``.
     """
     known = list(SETS)
     if not (sys.platform == "linux" and platform.machine() == "x86_64"):
         known = known[:1]
-    chosen = os.environ.get("WINDWRENCH_CORE")
-    if chosen and chosen not in known:
-        raise SystemExit(f"WINDWRENCH_CORE: {chosen!r}: expected one of {', '.join(known)}")
-    return [chosen] if chosen else known
+    chosen = os.environ.get("WINDWRENCH_CORE", "")
+    if chosen in known:
+        return [chosen]
+    if chosen not in ("", "all"):
+        expected = ", ".join([*known, "all"])
+        raise SystemExit(f"WINDWRENCH_CORE: {chosen!r}: expected one of {expected}")
+    return [best(known)] if checkout and not chosen else known
+
+
+def best(names: list[str]) -> str:
+    """Return the last of these sets whose instructions this machine has."""
+    listed = Path("/proc/cpuinfo")
+    flags = {f"-m{flag}" for flag in (listed.read_text().split() if listed.exists() else [])}
+    return [name for name in names if flags.issuperset(SETS[name])][-1]
 
 
 def extensions() -> list[Extension]:
@@ -63,13 +72,15 @@ class BuildCore(build_ext):
     """Compile and link the extensions with one compiler, as many objects at once as cores."""
 
     def run(self) -> None:
-        """Build, and note in a checkout of what sources; sets that are not built anew leave it."""
+        """Build. A checkout gets the set that this machine loads, a third of the compiling, and
+        notes of what sources. Another set follows when ``WINDWRENCH_CORE`` asks for it.
+        """
         built_of = digest()
+        names = sets(self.inplace)
+        self.extensions = [e for e in self.extensions if e.name.rpartition(".")[2] in names]
         super().run()
-        if self.inplace:
-            for name in {*SETS} - {*sets()}:
-                (ROOT / "_core" / (name + EXTENSION_SUFFIXES[0])).unlink(missing_ok=True)
-            BUILT.write_text(built_of)
+        for name in names if self.inplace else []:
+            built(name).write_text(built_of)
 
     def build_extensions(self) -> None:
         """Compile all objects side by side, then link each extension."""
@@ -83,7 +94,7 @@ class BuildCore(build_ext):
         # flags of the user's own hold for the core; but contraction stays off
         machine = shlex.split(os.environ.get("ARCHFLAGS", ""))
         own = [*shlex.split(os.environ.get("CXXFLAGS", "")), *EXACT, *machine]
-        folder = ROOT / "build/core" / str(sysconfig.get_config_var("SOABI"))
+        folder = ROOT / "build/core" / str(SOABI)
         objects = Objects(words, folder, version("nanobind"))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             shared = pool.submit(

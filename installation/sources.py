@@ -12,8 +12,7 @@ import sysconfig
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-# the digest of what the extensions beside were built of
-BUILT = ROOT / "_core" / f"built.{sysconfig.get_config_var('SOABI')}.txt"
+SOABI = sysconfig.get_config_var("SOABI")
 
 
 def sources() -> list[Path]:
@@ -31,27 +30,33 @@ def digest() -> str:
     return sha.hexdigest()
 
 
-def is_built() -> bool:
-    """Return whether the extensions in the checkout are those of today's sources."""
-    return BUILT.is_file() and BUILT.read_text() == digest()
+def built(name: str) -> Path:
+    """Return the file with the digest of the sources that an instruction set was built of."""
+    return ROOT / "_core" / f"built.{name}.{SOABI}.txt"
 
 
-def build_changed() -> None:
-    """Build all sets in the checkout where a source changed; one process builds, others wait.
+def is_built(name: str) -> bool:
+    """Return whether an instruction set in the checkout is built of today's sources."""
+    return built(name).is_file() and built(name).read_text() == digest()
+
+
+def build_changed(name: str) -> None:
+    """Build an instruction set in the checkout where a source changed; one process builds, others
+    wait.
 
     Raises ``ImportError`` with the compiler's words where the build fails.
     """
-    if is_built():
+    if is_built(name):
         return
     with open(ROOT / "_core/.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if is_built():
+        if is_built(name):
             return
-        print("windwrench: the core changed and is built anew", file=sys.stderr)
+        print(f"windwrench: the core for {name} is built anew", file=sys.stderr)
         ended = subprocess.run(
             [sys.executable, "setup.py", "--quiet", "build_ext", "--inplace"],
             cwd=ROOT,
-            env={name: value for name, value in os.environ.items() if name != "WINDWRENCH_CORE"},
+            env=os.environ | {"WINDWRENCH_CORE": name},
             capture_output=True,
             text=True,
         )

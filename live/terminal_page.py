@@ -89,8 +89,8 @@ def _lines(session: Session) -> list[Text]:
 def tuning_words(consistency: Consistency) -> str:
     """Return the innovations' verdict on the tuning, with advice for a slow one."""
     advice = (
-        "; the tuning is too slow for this flight: --record it, have windwrench estimate fit one, "
-        "and give that with --tuning"
+        "; the tuning is too slow for this flight: --record the flight, fit a tuning with "
+        "windwrench estimate, and give its tuning.yaml as --tuning"
     )
     return f"{consistency}{advice if consistency.too_slow else ''}"
 

@@ -1,5 +1,6 @@
 // What a diagnosis computes at each row of a log, for Python. A model's memory is Python's: a NumPy
 // record, laid out as `Model<double>` at its beginning, given by its address.
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "../diagnosis/causal_filter.hpp"
@@ -49,9 +50,10 @@ void undo_sensing_of(std::uintptr_t model, In<-1> t, Bools seen, Out<-1, 11> sam
 }
 
 void write_prediction(std::uintptr_t model, In<-1> t, In<-1, 4> speeds, In<-1> voltage,
-                      In<-1, FLOWN> states, Ints<-1> starts, double period, bool keeps_velocity,
-                      In<-1> reaction, Out<-1, -1, FLOWN> path) {
-  check_rows(t.size(), speeds, states);
+                      In<-1, FLOWN> states, Ints<-1> starts, double period, Bools aloft,
+                      double spread, bool keeps_velocity, In<-1> reaction,
+                      Out<-1, -1, FLOWN> path) {
+  check_rows(t.size(), speeds, states, aloft);
   check_rows(starts.size(), path);
   for (std::size_t k = 0; k < starts.size(); k++)
     if (starts.data()[k] < 0 || std::size_t(starts.data()[k]) + 1 >= t.size())
@@ -60,7 +62,7 @@ void write_prediction(std::uintptr_t model, In<-1> t, In<-1, 4> speeds, In<-1> v
     throw nb::value_error("predict_flight: expected 9 numbers of a reaction, or none");
   auto *loop = reaction.size() ? reinterpret_cast<const LoopReaction *>(reaction.data()) : nullptr;
   predict_flight(model_at(model), rotors_of(speeds, voltage), t.data(), rows(states), starts.data(),
-                 std::int64_t(starts.size()), period, keeps_velocity, loop,
+                 std::int64_t(starts.size()), period, aloft.data(), spread, keeps_velocity, loop,
                  std::int64_t(path.shape(1)), reinterpret_cast<double (*)[FLOWN]>(path.data()));
 }
 
@@ -94,42 +96,57 @@ void run_causal_filter(std::uintptr_t model, double period, In<-1, 4> speeds, In
                 track);
 }
 
+using Strided = nb::ndarray<const double, nb::device::cpu>;
+using Product = std::tuple<double, Strided, Strided, int>;
+
+// columns of n rows, as scale, x (n,), y (n, width) and their first channel
+std::vector<ProductColumn> columns_of(const std::vector<Product> &products, std::size_t n) {
+  std::vector<ProductColumn> out;
+  for (const auto &[scale, x, y, first] : products) {
+    if (x.ndim() != 1 || y.ndim() != 2 || first < 0 || y.shape(1) + first > 6)
+      throw nb::value_error("sensitivities: expected products of (n,) and (n, k) in six channels");
+    check_rows(n, x, y);
+    out.push_back(
+        {scale, x.data(), y.data(), x.stride(0), y.stride(0), y.stride(1), int(y.shape(1)), first});
+  }
+  return out;
+}
+
 void write_sensitivities(double period, In<6, 3, 2> gain, In<6> keep, In<-1, 2> heading,
-                         In<-1, 3, 2> pull, In<-1, 3> rate, In<-1, 3, 3> gyration,
-                         std::vector<In<-1, 6>> acting, std::vector<In<-1, 6>> moved,
-                         In<-1, 6, -1> jumps, Ints<-1> jump_state, In<6, 7, -1> slopes,
-                         In<-1, 6> innovations, In<-1, 6> disturbance, In<6, 6> whiten,
-                         Out<6, 3, -1> state, Out<-1, 6, -1> out) {
+                         In<-1, 3, 3> rotation, In<-1, 4> rotor_wrenches, In<-1, 3> rate,
+                         In<3, 3, 3> twist, std::vector<Product> acting, std::vector<Product> moved,
+                         In<-1, 6, 3> jumps, In<6, 3, -1> shares, Ints<-1> jump_state,
+                         In<6, 7, -1> slopes, In<-1, 6> innovations, In<-1, 6> disturbance,
+                         In<6, 6> whiten, Bools counted, Out<6, 3, -1> state, Out<-1, 6, -1> out) {
   const std::size_t n = heading.shape(0),
-                    columns = acting.size() + jumps.shape(2) + slopes.shape(2);
-  check_rows(n, pull, rate, gyration, jumps, innovations, disturbance, out);
+                    columns = acting.size() + shares.shape(2) + slopes.shape(2);
+  check_rows(n, rotation, rotor_wrenches, rate, jumps, innovations, disturbance, counted);
+  check_rows(std::size_t(std::count(counted.data(), counted.data() + n, true)), out);
   if (state.shape(2) != columns || out.shape(2) != columns + 1 ||
-      jump_state.size() != jumps.shape(2) || moved.size() > acting.size())
+      jump_state.size() != shares.shape(2) || moved.size() > acting.size())
     throw nb::value_error("sensitivities: the columns do not match");
   for (std::size_t j = 0; j < jump_state.size(); j++)
     if (jump_state.data()[j] < 0 || jump_state.data()[j] > 2)
       throw nb::value_error("sensitivities: expected a state of 0, 1 or 2");
-  std::vector<const double *> first, last;
-  for (const auto &x : acting) check_rows(n, x), first.push_back(x.data());
-  for (const auto &x : moved) check_rows(n, x), last.push_back(x.data());
   SteadyGains steady = {period, reinterpret_cast<const double (*)[3][2]>(gain.data()), keep.data()};
   SensitivityInput input = {std::int64_t(n),
-                            int(acting.size()),
-                            int(moved.size()),
-                            int(jumps.shape(2)),
+                            int(shares.shape(2)),
                             int(slopes.shape(2)),
                             rows(heading),
-                            rows(pull),
+                            rows(rotation),
+                            rows(rotor_wrenches),
                             rows(rate),
-                            rows(gyration),
-                            first.data(),
-                            last.data(),
-                            jumps.data(),
+                            reinterpret_cast<const double (*)[3][3]>(twist.data()),
+                            columns_of(acting, n),
+                            columns_of(moved, n),
+                            rows(jumps),
+                            shares.data(),
                             jump_state.data(),
                             slopes.data(),
                             rows(innovations),
                             rows(disturbance),
-                            reinterpret_cast<const double (*)[6]>(whiten.data())};
+                            reinterpret_cast<const double (*)[6]>(whiten.data()),
+                            counted.data()};
   sensitivities(steady, input, state.data(), out.data());
 }
 
@@ -207,11 +224,15 @@ void bind_diagnosis(nb::module_ &m) {
         "Bring samples (n, 11), rotor speeds and pose, back to the truth in place; rows `seen` "
         "have\n"
         "a pose.");
-  m.def("predict_flight", &write_prediction, "model"_a, "t"_a, "speeds"_a, "voltage"_a, "states"_a,
-        "starts"_a, "period"_a, "keeps_velocity"_a, "reaction"_a, "path"_a.noconvert(),
-        "Run a model along a flight of states (n, 13), and a copy of it from each start, a row;\n"
-        "write the copy's states (starts, ahead, 13), a period (s) apart. With keeps_velocity no\n"
-        "force acts. The reaction (9) of a flight loop turns the body, too; (0): none.");
+  m.def(
+      "predict_flight", &write_prediction, "model"_a, "t"_a, "speeds"_a, "voltage"_a, "states"_a,
+      "starts"_a, "period"_a, "aloft"_a, "spread"_a, "keeps_velocity"_a, "reaction"_a,
+      "path"_a.noconvert(),
+      "Run a model along a flight of states (n, 13), and a copy of it from each start, a row;\n"
+      "write the copy's states (starts, ahead, 13), a period (s) apart. The rows `aloft` before "
+      "tell\n"
+      "the thrust, known to a share of `spread`; 0: as the model's. With keeps_velocity no force\n"
+      "acts. The reaction (9) of a flight loop turns the body, too; (0): none.");
   m.def("choose_likeliest", &choose_states, "last"_a, "posed"_a, "numbers"_a, "innovations"_a,
         "states"_a.noconvert(), "best"_a.noconvert(),
         "Write the state (n, 13) after the `last` of a filter's calls of each row, and the\n"
@@ -225,13 +246,14 @@ void bind_diagnosis(nb::module_ &m) {
         "model_alone"_a.noconvert(), "predicted"_a.noconvert(), "heading"_a.noconvert(),
         "innovations"_a.noconvert(), "disturbance"_a.noconvert(),
         "Run the causal filter of a model over poses; write the fields of its track.");
-  m.def("sensitivities", &write_sensitivities, "period"_a, "gain"_a, "keep"_a, "heading"_a,
-        "pull"_a, "rate"_a, "gyration"_a, "acting"_a, "moved"_a, "jumps"_a, "jump_state"_a,
-        "slopes"_a, "innovations"_a, "disturbance"_a, "whiten"_a, "state"_a.noconvert(),
-        "out"_a.noconvert(),
-        "Write rows (n, 6, c + 1): the whitened change of the innovations' predictions with a unit "
-        "of\n"
-        "each column, and the innovations, whitened by a lower triangle.");
+  m.def(
+      "sensitivities", &write_sensitivities, "period"_a, "gain"_a, "keep"_a, "heading"_a,
+      "rotation"_a, "rotors"_a, "rate"_a, "twist"_a, "acting"_a, "moved"_a, "jumps"_a, "shares"_a,
+      "jump_state"_a, "slopes"_a, "innovations"_a, "disturbance"_a, "whiten"_a, "counted"_a,
+      "state"_a.noconvert(), "out"_a.noconvert(),
+      "Write rows (m, 6, c + 1) of the counted samples: the whitened change of the innovations'\n"
+      "predictions with a unit of each column, and the innovations. Columns are products: scale,\n"
+      "x (n,), y (n, k), and their first channel.");
   m.def("evidence", &write_evidence, "normal"_a, "right"_a, "low"_a, "high"_a, "mode"_a.noconvert(),
         "std"_a.noconvert(),
         "Return the logarithm of the evidence of n columns of a quadratic log-likelihood; write "

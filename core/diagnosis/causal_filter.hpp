@@ -6,6 +6,7 @@
 #pragma once
 #include <algorithm>
 #include <cstring>
+#include <vector>
 
 #include "flights.hpp"
 
@@ -175,94 +176,145 @@ class CausalFilter {
   }
 };
 
+// A column of accelerations, or of shifts of a pose: scale x y at each row, in `width` channels
+// from `first` on, and zero in the others; arrays with their strides
+struct ProductColumn {
+  double scale;
+  const double *x, *y;
+  int64_t x_step, y_step, y_across;
+  int width, first;
+
+  // write rows `begin` to `end` into one lane
+  template <class T> void put(int64_t begin, int64_t end, T (*out)[6], int lane) const {
+    double *to = reinterpret_cast<double *>(out[0] + first) + lane;
+    if (width == 6) put_some<6>(begin, end, to, 6 * lanes_of<T>);
+    else if (width == 3) put_some<3>(begin, end, to, 6 * lanes_of<T>);
+    else
+      for (int i = 0; i < width; i++)
+        ProductColumn{scale, x, y + i * y_across, x_step, y_step, 0, 1, 0}.put_some<1>(
+            begin, end, to + i * lanes_of<T>, 6 * lanes_of<T>);
+  }
+
+ private:
+  template <int WIDTH> void put_some(int64_t begin, int64_t end, double *to, int step) const {
+    const int across = step / 6;
+    for (int64_t k = begin; k < end; k++, to += step) {
+      const double by = scale * x[k * x_step], *row = y + k * y_step;
+      for (int i = 0; i < WIDTH; i++) to[i * across] = by * row[i * y_across];
+    }
+  }
+};
+
 // What sensitivities are asked of, c = acting + jumping + sloping columns. Row k of the flight:
-// heading; pull (3, 2), the derivative of the acceleration (world) by an error of the attitude
-// about body x and y; rate; gyration (3, 3), of the angular acceleration by the rate. Of each of
-// the first columns acting (n, 6), the model's acceleration by a unit; of the last `moving` of
-// these moved (n, 6), the shift of the measured pose. jumps (6, jumping) of the state `jump_state`
-// of each axis by a unit of the next columns, before the pose is read. slopes (6, 7, sloping):
-// change of gains and `keep` of each axis by a unit of the last columns. Innovations and
-// disturbances are the filter's; whiten (6, 6) is the inverse of the root of their covariance, a
-// lower triangle
+// heading; rotation; rotors, the accelerations by their thrust and torques; rate. twist (3, 3, 3):
+// derivative of the angular acceleration by the rate, for a rate of one about each axis. Of the
+// first columns, acting: the model's acceleration by a unit; of the last of these, moved: the shift
+// of the measured pose. jumps (6, 3) by each of three causes; the next columns have shares
+// (6, 3, jumping) of them, of the state `jump_state` of each axis, before the pose is read. slopes
+// (6, 7, sloping): change of gains and `keep` of each axis by a unit of the last columns.
+// Innovations and disturbances are the filter's; whiten (6, 6) is the inverse of the root of their
+// covariance: no axis is linked but with its partner. Rows of the answer are counted ones alone
 struct SensitivityInput {
   int64_t n;
-  int acting_count, moving, jumping, sloping;
-  const double (*heading)[2], (*pull)[3][2], (*rate)[3], (*gyration)[3][3];
-  const double *const *acting, *const *moved, *jumps;
+  int jumping, sloping;
+  const double (*heading)[2], (*rotation)[3][3], (*rotors)[4], (*rate)[3], (*twist)[3][3];
+  std::vector<ProductColumn> acting, moved;
+  const double (*jumps)[6][3], *shares;
   const int64_t *jump_state;
   const double *slopes, (*innovations)[6], (*disturbance)[6], (*whiten)[6];
+  const bool *counted;
+
+  int columns() const { return int(acting.size()) + jumping + sloping; }
+};
+
+// What a row says to all columns: the derivatives of the acceleration (world) by an error of the
+// attitude about body x and y, and of the angular acceleration by the rate; the disturbance
+struct SensitivityRow {
+  double pull[3][2], gyration[3][3], disturbance[6];
+
+  SensitivityRow(const SensitivityInput &in, int64_t k) {
+    const double thrust = in.rotors[k][0], *w = in.rate[k], *d = in.disturbance[k];
+    for (int i = 0; i < 3; i++) {
+      pull[i][0] = -thrust * in.rotation[k][i][1], pull[i][1] = thrust * in.rotation[k][i][0];
+      for (int j = 0; j < 3; j++)
+        gyration[i][j] =
+            w[0] * in.twist[0][i][j] + w[1] * in.twist[1][i][j] + w[2] * in.twist[2][i][j];
+    }
+    std::copy_n(d, 6, disturbance);
+    LevelAxes(in.heading[k]).to_level(d[3], d[4], disturbance[3], disturbance[4]);
+  }
 };
 
 // Some columns side by side: columns are independent, so their state stays in registers
 class SideBySide {
  public:
-  static constexpr int LANES = 8;
+  static constexpr int LANES = 8, TILE = 32;  // columns, and rows that are read at once
   using T = Lanes<double, LANES>;
 
   SideBySide(const SteadyGains &steady, const SensitivityInput &in, int first)
-      : steady_(steady),
-        in_(in),
-        first_(first),
-        c_(in.acting_count + in.jumping + in.sloping),
-        jump0_(in.acting_count),
-        slope0_(in.acting_count + in.jumping) {
+      : steady_(steady), in_(in), first_(first), c_(in.columns()) {
+    const int acting = int(in.acting.size()), moved = acting - int(in.moved.size());
     for (int j = 0; j < LANES; j++) {
-      int at = first + j, later = at - slope0_;
-      bool acts = at < in.acting_count, moves = acts && at >= in.acting_count - in.moving;
-      acting_[j] = acts ? in.acting[at] : NOTHING;
-      moved_[j] = moves ? in.moved[at - in.acting_count + in.moving] : NOTHING;
-      each_acting_[j] = acts ? 6 : 0, each_moved_[j] = moves ? 6 : 0;
-      acts_ |= acts, moves_ |= moves;
-      if (at >= jump0_ && at < slope0_) jumps_ = true;
-      if (later < 0 || later >= in.sloping) continue;
-      slopes_ = true;
-      for (int i = 0; i < 42; i++) slope_[i / 7][i % 7][j] = in.slopes[i * in.sloping + later];
+      const int at = first + j, jump = at - acting, slope = jump - in.jumping;
+      acts_ |= at < acting, moves_ |= at < acting && at >= moved;
+      if (jump >= 0 && jump < in.jumping) {
+        jumps_ = true;
+        state_[in.jump_state[jump]][j] = 1;
+        for (int i = 0; i < 18; i++) share_[i / 3][i % 3][j] = in.shares[i * in.jumping + jump];
+      } else if (slope >= 0 && slope < in.sloping) {
+        slopes_ = true;
+        for (int i = 0; i < 42; i++) slope_[i / 7][i % 7][j] = in.slopes[i * in.sloping + slope];
+      }
     }
   }
 
-  // Write these columns of the rows out (n, 6, c + 1), and carry their state (6, 3, c)
-  void run(double *state, double *out) {
+  // Write these columns of the counted rows out (m, 6, c + 1), and carry their state (6, 3, c)
+  void run(const SensitivityRow *rows, double *state, double *out) {
+    const int last = std::min(LANES, c_ - first_);
     for (int i = 0; i < 18; i++)
-      for (int j = 0; j < LANES && first_ + j < c_; j++)
-        x_[i / 3][i % 3][j] = state[i * c_ + first_ + j];
-    for (int64_t k = 0; k < in_.n; k++) step(k, out + 6 * (c_ + 1) * k + first_);
+      for (int j = 0; j < last; j++) x_[i / 3][i % 3][j] = state[i * c_ + first_ + j];
+    out += first_;
+    for (int64_t begin = 0; begin < in_.n; begin += TILE) {
+      const int64_t end = std::min(in_.n, begin + TILE);
+      if (acts_) read(in_.acting, first_, begin, end, acting_);
+      if (moves_)
+        read(in_.moved, first_ - int(in_.acting.size() - in_.moved.size()), begin, end, moved_);
+      for (int64_t k = begin; k < end; k++) {
+        step(k, rows[k], acting_[k - begin], moved_[k - begin], out);
+        if (in_.counted[k]) out += 6 * (c_ + 1);
+      }
+    }
     for (int i = 0; i < 18; i++)
-      for (int j = 0; j < LANES && first_ + j < c_; j++)
-        state[i * c_ + first_ + j] = x_[i / 3][i % 3][j];
+      for (int j = 0; j < last; j++) state[i * c_ + first_ + j] = x_[i / 3][i % 3][j];
   }
 
  private:
-  static constexpr double NOTHING[6] = {};
   const SteadyGains steady_;
   const SensitivityInput &in_;
-  const int first_, c_, jump0_, slope0_;
-  const double *acting_[LANES], *moved_[LANES];
-  int64_t each_acting_[LANES], each_moved_[LANES];
+  const int first_, c_;
   bool acts_ = false, moves_ = false, jumps_ = false, slopes_ = false;
-  T slope_[6][7] = {}, x_[6][3] = {};
+  T slope_[6][7] = {}, share_[6][3] = {}, state_[3] = {}, x_[6][3] = {};
+  T acting_[TILE][6] = {}, moved_[TILE][6] = {};
 
-  static T gathered(const double *const *from, const int64_t *each, int64_t k, int i) {
-    T all;
-    for (int j = 0; j < LANES; j++) all[j] = from[j][each[j] * k + i];
-    return all;
+  static void read(const std::vector<ProductColumn> &from, int first, int64_t begin, int64_t end,
+                   T (*out)[6]) {
+    for (int j = std::max(0, -first); j < LANES && first + j < int(from.size()); j++)
+      from[first + j].put(begin, end, out, j);
   }
 
-  void jump(int64_t k, const LevelAxes &heading) {
-    for (int j = 0; j < LANES; j++) {
-      int at = first_ + j - jump0_;
-      if (at < 0 || at >= in_.jumping) continue;
-      const double *jumps = in_.jumps + 6 * in_.jumping * k + at;
-      double now[6];
-      for (int i = 0; i < 6; i++) now[i] = jumps[in_.jumping * i];
-      heading.to_body(now[3], now[4], now[3], now[4]);
-      for (int i = 0; i < 6; i++) x_[i][in_.jump_state[at]][j] += now[i];
-    }
+  void jump(const double by[6][3], const LevelAxes &heading) {
+    T now[6];
+    for (int i = 0; i < 6; i++)
+      now[i] = share_[i][0] * by[i][0] + share_[i][1] * by[i][1] + share_[i][2] * by[i][2];
+    heading.to_body(now[3], now[4], now[3], now[4]);
+    for (int i = 0; i < 6; i++)
+      for (int s = 0; s < 3; s++) x_[i][s] += state_[s] * now[i];
   }
 
   void store(const T *seen, double *out) const {
     for (int i = 0; i < 6; i++) {
-      T white = in_.whiten[i][0] * seen[0];
-      for (int j = 1; j <= i; j++) white += in_.whiten[i][j] * seen[j];
+      T white = in_.whiten[i][i] * seen[i];
+      if (PARTNER[i] < i) white += in_.whiten[i][PARTNER[i]] * seen[PARTNER[i]];
       double *row = out + (c_ + 1) * i;
       if (first_ + LANES <= c_) std::memcpy(row, &white, sizeof(white));
       else
@@ -270,17 +322,17 @@ class SideBySide {
     }
   }
 
-  void step(int64_t k, double *out) {
+  void step(int64_t k, const SensitivityRow &at, const T *acting, const T *moved, double *out) {
     const double period = steady_.period, half = 0.5 * period * period, *keep = steady_.keep;
     const LevelAxes heading(in_.heading[k]);
     T seen[6], said[6][3], mid[3], turned[3], x, y;
-    if (jumps_) jump(k, heading);
+    if (jumps_) jump(in_.jumps[k], heading);
     for (int i = 0; i < 6; i++) {
       seen[i] = x_[i][0];
-      if (moves_) seen[i] -= gathered(moved_, each_moved_, k, i);
+      if (moves_) seen[i] -= moved[i];
     }
     heading.to_level(seen[3], seen[4], seen[3], seen[4]);
-    store(seen, out);
+    if (in_.counted[k]) store(seen, out);
     for (int i = 0; i < 6; i++) {
       const int other = PARTNER[i];
       const double own = in_.innovations[k][i], partner = in_.innovations[k][other];
@@ -296,15 +348,15 @@ class SideBySide {
     }
     for (int i = 0; i < 3; i++) mid[i] = x_[3 + i][0] + 0.5 * period * x_[3 + i][1];
     for (int i = 0; i < 3; i++) {
-      T g = x_[i][2] + in_.pull[k][i][0] * mid[0] + in_.pull[k][i][1] * mid[1];
-      if (acts_) g += gathered(acting_, each_acting_, k, i);
+      T g = x_[i][2] + at.pull[i][0] * mid[0] + at.pull[i][1] * mid[1];
+      if (acts_) g += acting[i];
       x_[i][0] += period * x_[i][1] + half * g;
       x_[i][1] += period * g;
     }
     for (int i = 0; i < 3; i++) {
-      const double *by = in_.gyration[k][i];
+      const double *by = at.gyration[i];
       turned[i] = x_[3 + i][2] + by[0] * x_[3][1] + by[1] * x_[4][1] + by[2] * x_[5][1];
-      if (acts_) turned[i] += gathered(acting_, each_acting_, k, 3 + i);
+      if (acts_) turned[i] += acting[3 + i];
     }
     for (int i = 0; i < 3; i++) {
       int u = (i + 1) % 3, v = (i + 2) % 3;
@@ -318,24 +370,27 @@ class SideBySide {
     x_[3][2] = x, x_[4][2] = y;
     for (int i = 0; i < 6; i++) {
       x_[i][2] *= keep[i];
-      if (slopes_) x_[i][2] += slope_[i][6] * in_.disturbance[k][i];
+      if (slopes_) x_[i][2] += slope_[i][6] * at.disturbance[i];
     }
     heading.to_body(x_[3][2], x_[4][2], x_[3][2], x_[4][2]);
   }
 };
 
-// Whitened change of the innovations' predictions out (n, 6, c + 1) with a unit of each column, and
-// the innovations last; state (6, 3, c) is carried from one call to the next
+// Whitened change of the innovations' predictions out (m, 6, c + 1) with a unit of each column, and
+// the innovations last, in the m counted rows; state (6, 3, c) is carried from one call to the next
 inline void sensitivities(const SteadyGains &steady, const SensitivityInput &in, double *state,
                           double *out) {
-  const int c = in.acting_count + in.jumping + in.sloping;
+  const int c = in.columns();
+  std::vector<SensitivityRow> rows;
+  rows.reserve(in.n);
+  for (int64_t k = 0; k < in.n; k++) rows.emplace_back(in, k);
   for (int first = 0; first < c; first += SideBySide::LANES)
-    SideBySide(steady, in, first).run(state, out);
+    SideBySide(steady, in, first).run(rows.data(), state, out);
   for (int64_t k = 0; k < in.n; k++)
-    for (int i = 0; i < 6; i++) {
-      double white = 0;
-      for (int j = 0; j <= i; j++) white += in.whiten[i][j] * in.innovations[k][j];
-      out[(6 * k + i) * (c + 1) + c] = white;
+    for (int i = 0; i < 6 && in.counted[k]; i++, out += c + 1) {
+      const double *e = in.innovations[k];
+      out[c] = in.whiten[i][i] * e[i];
+      if (PARTNER[i] < i) out[c] += in.whiten[i][PARTNER[i]] * e[PARTNER[i]];
     }
 }
 

@@ -116,13 +116,46 @@ inline void react(Model<double> &m, const LoopReaction &loop, const double *shar
     m.effect_wrench[3 + i] += row_times(m.body.inertia[i], more[0], more[1], more[2]);
 }
 
+// The thrust that a flight shows along body axes, over the model's along z: Kalman filters of three
+// constants with slow drift, on the velocity of the rows so far. One command's thrust differs from
+// day to day, and markers lean against the rotors' axis
+struct ShownThrust {
+  static constexpr double PUSHES = 0.1;  // m2/s3, density of other accelerations
+  static constexpr double DRIFT = 200;   // s, in which the variance grows by the prior's
+  static constexpr double LEAN = 0.02;   // rad, standard deviation
+
+  double prior[3], along[3] = {0, 0, 1}, variance[3];
+
+  explicit ShownThrust(double spread) {
+    for (int i = 0; i < 3; i++) {
+      double size = spread > 0 ? i == 2 ? spread : LEAN : 0;
+      prior[i] = variance[i] = size * size;
+    }
+  }
+
+  // Take in a change of velocity without the other forces' part, body axes, and the model's
+  // `thrust` over the mass, both over dt s
+  void see(const double *change, double thrust, double dt) {
+    for (int i = 0; i < 3; i++) {
+      double &sure = variance[i];
+      sure = std::min(prior[i], sure + prior[i] * dt / DRIFT);
+      double gain = sure * thrust / (thrust * thrust * sure + PUSHES * dt + TINY);
+      along[i] += gain * (change[i] - along[i] * thrust);
+      sure *= 1 - gain * thrust;
+    }
+  }
+};
+
 // Move a state on by dt s; where `keeps_velocity`, no force acts
 inline void fly(Model<double> &m, double *x, double dt, bool keeps_velocity,
-                const LoopReaction *loop, const double *shares) {
+                const LoopReaction *loop, const double *shares, const double *thrust) {
   double R[3][3], after[STATE], effects[6];
   matrix_of(x + QUATERNION, R);
   apply_effects(m, x, R);
   std::copy_n(m.effect_wrench, 6, effects);
+  for (int i = 0; i < 3; i++)
+    m.effect_wrench[i] +=
+        (R[i][0] * thrust[0] + R[i][1] * thrust[1]) / thrust[2] * m.rotor_wrench[0];
   if (loop) react(m, *loop, shares, x, R);
   move(m.body, x, R, m.rotor_wrench, m.effect_wrench, dt, after);
   std::copy_n(effects, 6, m.effect_wrench);
@@ -137,7 +170,7 @@ inline void fly(Model<double> &m, double *x, double dt, bool keeps_velocity,
 // step call `moved` with the period's number
 template <class Moved>
 void drive_ahead(Model<double> &m, const LoggedRotors &rotors, const double *t, int64_t k,
-                 double period, int64_t ahead, int steps, Moved moved) {
+                 double period, int64_t ahead, int steps, double thrust, Moved moved) {
   double between[4];
   int64_t row = k;
   for (int64_t i = 0; i < ahead; i++) {
@@ -149,6 +182,7 @@ void drive_ahead(Model<double> &m, const LoggedRotors &rotors, const double *t, 
     double volts = (1 - share) * rotors.voltage[row] + share * rotors.voltage[row + 1];
     for (int j = 0; j < steps; j++) {
       drive(m, between, period / steps, volts);
+      for (double &wrench : m.rotor_wrench) wrench *= thrust;
       moved(i);
       m.time += period / steps;
     }
@@ -157,24 +191,34 @@ void drive_ahead(Model<double> &m, const LoggedRotors &rotors, const double *t, 
 
 // Run a model along a flight, for the memory of rotors and effects; let a copy of it go at each
 // start, a row, and write the copy's states path (starts, ahead, 13), a period apart. The shares of
-// measured moments are of mean squares over the horizon, at the start's state
+// measured moments are of mean squares over the horizon, at the start's state. The thrust is
+// as the rows `aloft` so far show, from a share's standard deviation `spread` on; 0: the model's
 inline void predict_flight(Model<double> &along, const LoggedRotors &rotors, const double *t,
                            const double (*states)[FLOWN], const int64_t *starts, int64_t count,
-                           double period, bool keeps_velocity, const LoopReaction *loop,
-                           int64_t ahead, double (*path)[FLOWN]) {
+                           double period, const bool *aloft, double spread, bool keeps_velocity,
+                           const LoopReaction *loop, int64_t ahead, double (*path)[FLOWN]) {
   const int steps = rotor_steps(period);
+  ShownThrust thrust(spread);
   int64_t at = 0;
   for (int64_t k = 0; k < rotors.n && at < count; k++) {
     double R[3][3];
     if (k > 0) {
       double length = t[k] - t[k - 1];
       int parts = rotor_steps(length);
+      double lift = 0, dt = length / parts, change[3], shown[3];
+      for (int i = 0; i < 3; i++) change[i] = states[k][VELOCITY + i] - states[k - 1][VELOCITY + i];
       matrix_of(states[k - 1] + QUATERNION, R);
       for (int i = 0; i < parts; i++) {
-        drive(along, rotors.speeds[k], length / parts, rotors.voltage[k]);
+        drive(along, rotors.speeds[k], dt, rotors.voltage[k]);
         apply_effects(along, states[k - 1], R);
-        along.time += length / parts;
+        lift += along.rotor_wrench[0] / along.body.mass * dt;
+        for (int i = 0; i < 3; i++) change[i] -= along.effect_wrench[i] / along.body.mass * dt;
+        change[2] += along.body.gravity * dt;
+        along.time += dt;
       }
+      for (int i = 0; i < 3; i++)
+        shown[i] = R[0][i] * change[0] + R[1][i] * change[1] + R[2][i] * change[2];
+      if (aloft[k]) thrust.see(shown, lift, length);
     }
     if (starts[at] != k) continue;
     double x[STATE] = {}, shares[2] = {};
@@ -183,7 +227,7 @@ inline void predict_flight(Model<double> &along, const LoggedRotors &rotors, con
       Model<double> m = along;
       double squares[2] = {}, least = double(ahead * steps) * std::pow(loop->unmeasured, 2) + TINY;
       matrix_of(x + QUATERNION, R);
-      drive_ahead(m, rotors, t, k, period, ahead, steps, [&](int64_t) {
+      drive_ahead(m, rotors, t, k, period, ahead, steps, thrust.along[2], [&](int64_t) {
         double model[3], across[2];
         apply_effects(m, x, R);
         measured_turning(m, x, R, model, across);
@@ -193,9 +237,9 @@ inline void predict_flight(Model<double> &along, const LoggedRotors &rotors, con
       for (int i = 0; i < 2; i++) shares[i] = squares[i] / (squares[i] + least);
     }
     Model<double> m = along;
-    drive_ahead(m, rotors, t, k, period, ahead, steps, [&](int64_t i) {
+    drive_ahead(m, rotors, t, k, period, ahead, steps, thrust.along[2], [&](int64_t i) {
       for (int part = 0; part < MOTION_STEPS; part++)
-        fly(m, x, period / steps / MOTION_STEPS, keeps_velocity, loop, shares);
+        fly(m, x, period / steps / MOTION_STEPS, keeps_velocity, loop, shares, thrust.along);
       std::copy_n(x, FLOWN, path[at * ahead + i]);
     });
     at++;

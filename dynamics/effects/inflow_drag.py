@@ -13,8 +13,8 @@ EFFECT = Effect(
     kind="wrench",
     coefficients=(Coefficient("kl", "N/(m/s)^2", (3.5e-3, 2e-4), "per rotor"),),
     source="blade-element theory, the rotor's H-force with inflow: Bramwell, Done and Balmford, "
-    "Bramwell's Helicopter Dynamics, 2001; size: least squares on a 0.77 kg racer at 3 to 14 m/s "
-    "(docs/trust.md), in proportion to the disc area",
+    "Bramwell's Helicopter Dynamics, 2001; size: least squares on a 0.77 kg racer at 3 to 14 m/s, "
+    "in proportion to the disc area",
     excitation="climbs and descents of 3 m/s and more together with 5 m/s and more across the disc",
     model="inflow_drag",
     family=Family.FAST_FLIGHT,

@@ -26,7 +26,7 @@ EFFECT = Effect(
     ),
     source="form: rotors in tandem, Leishman, Principles of Helicopter Aerodynamics, 2006; inflow "
     "of a wake that is blown back, Coleman, Feingold and Stempin, NACA ARR L5E10, 1945; size: "
-    "least squares on a 0.77 kg racer at 3 to 14 m/s (docs/trust.md), as a share of thrust at "
+    "least squares on a 0.77 kg racer at 3 to 14 m/s, as a share of thrust at "
     "airspeed over induced velocity",
     excitation="flight at 5 m/s and more along both body axes, with turns that set the rotors "
     "apart; in hover it does nothing",

@@ -1,5 +1,9 @@
 """``python -m evidence.probabilities`` flies and diagnoses flights whose truth is known, and keeps
 what ``docs/trust.md`` shows of their probabilities.
+
+Flights are of two simulators: this project's plant, and one that was written apart from it, with
+another plant, vehicle, controller and trajectories. *Something unknown* is a cause outside the
+library. An effect counts as one if the library lacks the effect and all that can stand for it.
 """
 
 from pathlib import Path
@@ -7,86 +11,57 @@ from typing import Annotated
 
 import typer
 
+from windwrench import __version__
 from windwrench.evidence.kept_results import DOCS
 from windwrench.evidence.probabilities.calibration import RESULTS
 from windwrench.evidence.probabilities.flights import OF_TEN, WAYS_TO_LOG, recorded
 from windwrench.evidence.runner import Jobs, Task, code_stamp, run_tasks, start
-from windwrench.runtime.errors import unknown_name
 from windwrench.runtime.page_files import write_json
+from windwrench.runtime.provenance import commit
 
-_FIRST = {
-    "first": (800_000, 3000),
-    "later": (850_000, 5000),
-    "other logs": (910_000, 170_000),
-    "latest": (960_000, 7000),
-}
+_OWN, _OTHER = 960_000, 7000  # the first flight of either simulator
+_OTHER_LOGS = 970_000
 _MODULES = "logged_poses", "outsiders", "practice_flights"
 # the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
 _STRIDE, _CATALOGUE = 7, 33
 
 
-def plan(own: int, other: int, first: int, catalogue: int, simulator: str) -> list[Task]:
-    """Return the flights of a run whose pose is logged: simulator, kind and number each."""
+def plan(count: int, simulator: str) -> list[Task]:
+    """Return so many flights of either simulator whose pose is logged, and as many whose pose is
+    not: simulator, kind, number and way to log each.
+    """
     out: list[Task] = []
-    # in turn, so that a run that is stopped has both
-    for i in range(max(own, other)):
-        if i < own:
-            out.append(("own", OF_TEN[i % len(OF_TEN)], first + i))
-        if i >= other:
-            continue
-        place = i * _STRIDE % _CATALOGUE + _CATALOGUE * (catalogue + i // _CATALOGUE)
+    for i in range(count):
+        out.append(("own", OF_TEN[i % len(OF_TEN)], _OWN + i))
+        place = i * _STRIDE % _CATALOGUE + _CATALOGUE * (_OTHER + i // _CATALOGUE)
         out.append((simulator, "catalogue", place))
         if i % 4 == 0:
             out.append((simulator, "left out", place))
-    return out
-
-
-def plan_of_other_logs(flights: int, first: int, catalogue: int, simulator: str) -> list[Task]:
-    """Return so many flights of each way to log but the pose; half of the filtered ones are of the
-    other simulator.
-    """
-    out: list[Task] = []
-    for i in range(flights):
-        for j, way in enumerate(WAYS_TO_LOG[1:]):
-            k = i // 2 if way == "filtered" else i
-            if way != "filtered" or i % 2 == 0:
-                out.append(("own", OF_TEN[k % len(OF_TEN)], first + flights * j + k, way))
-            else:
-                kind = "catalogue" if k % 5 else "left out"
-                out.append((simulator, kind, catalogue + 7 * k, way))
+        way = WAYS_TO_LOG[1 + i % (len(WAYS_TO_LOG) - 1)]
+        out.append(("own", OF_TEN[i % len(OF_TEN)], _OTHER_LOGS + i, way))
     return out
 
 
 def study(
-    flights: Annotated[
-        str, typer.Option(help=f"Which are flown and replace the kept ones: {', '.join(RESULTS)}.")
-    ],
-    count: Annotated[int, typer.Option(min=1, help="Flights of either simulator.")] = 350,
-    simulator: Annotated[
-        str, typer.Option(help="File of the other simulator.")
-    ] = "../shared/generator/make_flights.py",
+    count: Annotated[int, typer.Option(min=1, help="Flights of either simulator.")] = 12,
+    simulator: Annotated[Path, typer.Option(help="File of the other simulator.")] = Path(
+        "../shared/generator/make_flights.py"
+    ),
     jobs: Jobs = 1,
     out: Annotated[Path, typer.Option(help="Folder of what is done.")] = Path(
         "results/probabilities"
     ),
 ) -> None:
     """Fly, diagnose and keep flights."""
-    if flights not in RESULTS:
-        raise unknown_name("set of flights", flights, RESULTS)
-    own, other = _FIRST[flights]
-    wanted = (
-        plan_of_other_logs(count, own, other, simulator)
-        if flights == "other logs"
-        else plan(count, count, own, other, simulator)
-    )
-    code = code_stamp("probabilities/flights", *(f"trials/{name}" for name in _MODULES))
-    done = run_tasks(recorded, wanted, out / f"{flights}.jsonl", jobs, code)
-    kept = [
+    code = commit()
+    stamp = code_stamp("probabilities/flights", *(f"trials/{name}" for name in _MODULES))
+    done = run_tasks(recorded, plan(count, str(simulator)), out / "flights.jsonl", jobs, stamp)
+    flights = [
         {"task": ["own" if task[0] == "own" else "other", *task[1:]], "result": result}
         for task, result in done.items()
     ]
-    write_json(kept, DOCS / RESULTS[flights])
-    print(DOCS / RESULTS[flights])
+    write_json({"version": __version__, "commit": code, "flights": flights}, DOCS / RESULTS)
+    print(DOCS / RESULTS)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from windwrench.evidence.scoring import EQUIVALENTS
-from windwrench.identification.diagnosis.unknown import UnknownSettings, signs
+from windwrench.identification.diagnosis.unknown import clipped
 
 Array = NDArray[np.float64]
 
@@ -56,12 +56,14 @@ def _misled(flight: dict[str, Any]) -> bool:
     return any(e["worth"] >= 1.0 and not is_right(flight, e["name"]) for e in flight["named"])
 
 
-def fit(flights: Sequence[dict[str, Any]]) -> UnknownSettings:
-    """Return the weights of signs at maximum posterior; the Bayes factor counts as one."""
-    kept = (flight["signs"] for flight in flights)
-    x = np.array([signs(sign["structure"], sign["push"]) for sign in kept])
+def fit(flights: Sequence[dict[str, Any]]) -> list[float]:
+    """Return the weights of no sign and of a push at maximum posterior; the Bayes factor counts as
+    one.
+    """
+    kept = [flight["signs"] for flight in flights]
+    x = np.array([(1.0, sign["push"]) for sign in kept])
+    given = np.array([clipped(sign["structure"]) for sign in kept])
     y = np.array([acts_unknown(f) or _misled(f) for f in flights])
-    given, x = x[:, 1], np.delete(x, 1, axis=1)
     scale = np.array(_WEIGHT_STD)
 
     def loss(w: Array) -> float:
@@ -70,5 +72,5 @@ def fit(flights: Sequence[dict[str, Any]]) -> UnknownSettings:
             np.sum(np.logaddexp(0.0, odds) - y * odds) + 0.5 * np.sum(np.square(w / scale))
         )
 
-    found = minimize(loss, np.zeros(len(scale))).x.round(_DECIMALS).tolist()
-    return UnknownSettings(*found)
+    weights: list[float] = minimize(loss, np.zeros(len(scale))).x.round(_DECIMALS).tolist()
+    return weights

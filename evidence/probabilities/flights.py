@@ -172,7 +172,12 @@ def _own(kind: str, number: int, imu: bool) -> Flown:
 
 
 @cache
-def _simulator(path: Path) -> ModuleType:
+def simulator_at(path: Path) -> ModuleType:
+    """Return the other simulator.
+
+    Raises:
+        InputError: no such file.
+    """
     spec = importlib.util.spec_from_file_location("other_simulator", path)
     if spec is None or spec.loader is None or not path.exists():
         raise InputError(f"{path}: expected the other simulator's Python file")
@@ -183,7 +188,7 @@ def _simulator(path: Path) -> ModuleType:
 
 
 def _other(path: Path, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any], str, str]:
-    simulator = _simulator(path)
+    simulator = simulator_at(path)
     catalogue = simulator.catalogue()
     kind, settings, said = catalogue[number % len(catalogue)]
     rng = np.random.default_rng((number, 1))
@@ -204,12 +209,7 @@ def _other(path: Path, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any],
         flown["vbat"],
         name=f"{kind} {number}",
     )
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "vehicle.yaml"
-        # its vehicle's file describes the pose's noise in words
-        text = simulator.VEHICLE.replace("nominal ", "")
-        file.write_text(text, encoding="utf-8")
-        vehicle = load_vehicle(str(file))
+    vehicle = vehicle_of(simulator)
     truth: dict[str, Any] = {}
     outsider = ""
     for effect in said:
@@ -219,3 +219,13 @@ def _other(path: Path, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any],
         # a law that its catalogue gives another form than the library's
         outsider = outsider or (effect.get("law", "") if what in ("", *_KNOWN, *_GUSTS) else what)
     return log, vehicle, truth, outsider, kind
+
+
+def vehicle_of(simulator: ModuleType) -> Vehicle:
+    """Return the vehicle declared by the other simulator."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "vehicle.yaml"
+        # its vehicle's file describes the pose's noise in words
+        text = simulator.VEHICLE.replace("nominal ", "")
+        file.write_text(text, encoding="utf-8")
+        return load_vehicle(str(file))

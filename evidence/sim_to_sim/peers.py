@@ -53,7 +53,7 @@ class Peer(Protocol):
         """
 
 
-def _simulator(module: str, install: str) -> Any:
+def simulator(module: str, install: str) -> Any:
     """Return a simulator's module.
 
     Raises:
@@ -63,9 +63,7 @@ def _simulator(module: str, install: str) -> Any:
         return import_module(module)
     except (ImportError, RuntimeError) as error:
         package = module.partition(".")[0]
-        raise InputError(
-            f"sim_to_sim: {package} cannot be imported ({error}); expected {install}"
-        ) from error
+        raise InputError(f"{package} cannot be imported ({error}); expected {install}") from error
 
 
 def vehicle_of(name: str) -> Vehicle:
@@ -87,7 +85,7 @@ class Crazyflow:
     """
 
     def __init__(self, motor_lag: float | None = None) -> None:
-        package = _simulator("crazyflow.sim.sim", "pip install 'crazyflow==0.4.0' 'jax<0.10.2'")
+        package = simulator("crazyflow.sim.sim", "pip install 'crazyflow==0.4.0' 'jax<0.10.2'")
         jax = import_module("jax")
         self.vehicle = vehicle_of(VEHICLES["crazyflow"])
         hz = round(_CRAZYFLOW_STEPS / TICK)
@@ -155,7 +153,7 @@ class PyBulletDrones:
             "pip install 'pybullet==3.2.7' transforms3d 'setuptools<80', and a checkout of "
             "github.com/learnsyslab/gym-pybullet-drones on PYTHONPATH"
         )
-        package = _simulator("gym_pybullet_drones.envs.CtrlAviary", install)
+        package = simulator("gym_pybullet_drones.envs.CtrlAviary", install)
         self._bullet = import_module("pybullet")
         self.vehicle = vehicle_of(VEHICLES["pybullet"])
         hz = round(_PYBULLET_STEPS / TICK)

@@ -411,7 +411,6 @@ OUTSIDERS: dict[str, ModelMaker] = {
     )
 }
 # Drawn for no study: each led to a rule of the diagnosis, which a test flies again.
-# docs/diagnosis-trials.md names the commit that has the eleven others.
 HELD_BACK: dict[str, ModelMaker] = {
     model.__name__: model for model in (failing_cell, loose_gimbal, winding_cord, passing_wash)
 }

@@ -6,7 +6,7 @@ from another), and a disturbance outside the library. All are flown in MuJoCo an
 """
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -16,9 +16,11 @@ from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics.effects import get, names
 from windwrench.dynamics.vehicle import EffectSetting, Mocap, Vehicle
+from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.envs.recording import background, draw_trajectory, record_flight
 from windwrench.evidence.trials.outsiders import HELD_BACK, OUTSIDERS, wrench_input
+from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
@@ -138,6 +140,7 @@ def fly_practice(
     gust_time: float | None = None,
     seen: float = 1.0,
     outsider_rng: np.random.Generator | None = None,
+    push: Callable[[ClosedLoop], Array] | None = None,
 ) -> FlightLog:
     """Fly a vehicle with effects that it does not declare and with a disturbance; return the log,
     with the true wrench.
@@ -158,6 +161,7 @@ def fly_practice(
             sees more than a log of poses holds: with a small share it answers a gust before the
             log shows it.
         outsider_rng: of what the disturbance draws; default: one of ``seed``.
+        push: wrench (6,) of each tick in place of an outsider's, as of ``record_flight``.
 
     Raises:
         InputError: an unknown name, a number out of range, or a crash.
@@ -176,7 +180,7 @@ def fly_practice(
     settings = replace(background(vehicle, turbulence), sensor_noise=sensor > 0.0)
     if gust_time is not None:
         settings = replace(settings, disturbance_time=gust_time)
-    disturbance = None
+    disturbance = push
     if outsider is not None:
         t = TICK * np.arange(max(round(seconds / TICK), 1) + 1, dtype=np.float64)
         path = draw_trajectory(trajectory, np.random.default_rng(seed), t, vehicle.ceiling_z)[:, :3]
@@ -255,8 +259,8 @@ def draw_effect(name: str, vehicle: Vehicle, size: str, rng: np.random.Generator
     like = replace(vehicle, mass=_TYPICAL_MASSES[column])
     coefficients = {
         c.name: c.typical[column]
-        * typical_size((name, c.name), vehicle)
-        / typical_size((name, c.name), like)
+        * typical_size(Column(name, c.name), vehicle)
+        / typical_size(Column(name, c.name), like)
         for c in get(name).coefficients
     }
     if name == "rotor_efficiency":

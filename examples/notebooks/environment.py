@@ -70,7 +70,7 @@ for (name, offsets), colour in zip(flights.items(), (GREY, SERIES[1]), strict=Tr
     label = f"{name}: {rmse[name]:.2f} m RMSE"
     ax.plot([k / 12.5 for k in range(len(offsets))], offsets, color=colour, label=label)
     print(f"{name}: {rmse[name]:.3f} m")
-ax.set(xlabel="time (s)", ylabel="distance from the axis (m)", title="One episode, two controllers")
+ax.set(xlabel="time (s)", ylabel="offset from the axis (m)", title="One episode, two controllers")
 ax.legend()
 ax.grid(alpha=0.3)
 figure.savefig("environment.png", dpi=110)

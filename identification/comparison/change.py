@@ -163,9 +163,8 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
 def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
     """Return how the four numbers move if something changed by ``amount``."""
     if kind == "weaker":
-        rotor = list(_ROTORS).index(place)
         thrust = shares.copy()
-        thrust[rotor] /= 1.0 - min(amount, 0.9)
+        thrust[list(_ROTORS).index(place)] /= 1.0 - min(amount, 0.9)
         return features_of(thrust) - features_of(shares)
     left, front = {**_ROTORS, **_SIDES}[place]
     # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there

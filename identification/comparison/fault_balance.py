@@ -43,17 +43,16 @@ class FaultBalance:
         self.thrust = thrust = samples.thrust(lag, bend, dead)  # (N, 4)
         self.ramps = [_ramp(part, late) for late in (0.0, lag) for part in PARTS]
         gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, 1, axis=1)
-        one = np.ones(len(w))
-        free = [[one, *own] for own in zip(w.T, gyroscopic.T, strict=True)]
+        free = [[np.ones(len(w)), *own] for own in zip(w.T, gyroscopic.T, strict=True)]
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
         free[2].extend(turning.T[:2])
         free.append([])
-        measured = [*turning.T, samples.specific_force]
-        moments = (thrust @ _SIGNS.T).T
         # each channel's measurement, moment and free columns
         self.columns = [
-            np.column_stack([y, moment, *own])
-            for y, moment, own in zip(measured, moments, free, strict=True)
+            np.column_stack([y, thrust @ signs, *own])
+            for y, signs, own in zip(
+                [*turning.T, samples.specific_force], _SIGNS, free, strict=True
+            )
         ]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
         away += _TURNING * np.square(w).sum(axis=1) + samples.between

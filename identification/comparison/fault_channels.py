@@ -98,8 +98,7 @@ def read_channels(
     Raises:
         InputError: the file cannot be read, or lacks one of the three.
     """
-    own_rates = log_map is None and reader in (None, _PX4)
-    if not own_rates or reader_by_content(path) is not READERS[_PX4]:
+    if log_map or reader not in (None, _PX4) or reader_by_content(path) is not READERS[_PX4]:
         log = log or read_log(path, reader, vehicle, log_map)
         return channels_of_log(log), log.notes
     (log_map_of, channels, _, notes), _ = px4_ulog.channels(path, has_ranges=False)

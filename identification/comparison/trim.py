@@ -21,7 +21,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from ..logs.flight_phases import FLIGHT, flight_phases, flying
+from ..logs.flight_phases import FLIGHT, flight_phases, flying, usual_thrust
 from ..logs.table import median_step
 from ..motion.smoothing import runs_of
 
@@ -128,12 +128,9 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
         if len(at) < 3:
             raise InputError(f"{name}: fewer than three poses; expected a flight")
         speeds = log.rotor_speeds
-        if (
-            not log.has_rotor_speeds
-        ):  # then scaled: while the rotors are high, they carry the weight
-            carried = total[flying(total)]
-            scale = vehicle.weight / np.median(carried) if len(carried) else 0.0
-            speeds = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
+        if not log.has_rotor_speeds:  # scaled: usually the rotors carry the weight
+            newton = thrust * (vehicle.weight / usual_thrust(total))
+            speeds = np.sqrt(np.maximum(newton, 0.0) / vehicle.k)
         phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
         flown = [(t >= start) & (t <= end) for phase, start, end in phases if phase == FLIGHT]
         speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)

@@ -50,17 +50,13 @@ def _undecided(chances: Values) -> str:
 def change_headline(change: Change) -> str:
     """Return a sentence on the change, with its probability."""
     place = change.place
-    chance = change.places[place]
+    chance = f"{change.places[place]:.2f}"
+    if not change.sure:
+        told = _undecided(change.places)
+        return told if place == NOWHERE else f"{told} If the first: {_kind(change)}"
     if place == NOWHERE:
-        if change.sure:
-            return f"Nothing changed (probability {chance:.2f})."
-        other = sorted(change.places, key=change.places.__getitem__, reverse=True)[1]
-        where = f"{other} ({change.places[other]:.2f})"
-        return f"Undecided: nothing changed (probability {chance:.2f}), or likeliest {where}."
-    kind = _kind(change)
-    if change.sure:
-        return f"Changed: {place}, probability {chance:.2f}; {kind}"
-    return f"{_undecided(change.places)} If the first: {kind}"
+        return f"Nothing changed (probability {chance})."
+    return f"Changed: {place}, probability {chance}; {_kind(change)}"
 
 
 def _kind(change: Change) -> str:
@@ -71,11 +67,9 @@ def _kind(change: Change) -> str:
         return (
             f"all rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
         )
-    if not change.place.startswith("rotor"):
-        return f"the vehicle carries {size} of its weight more at that side."
-    if change.weaker >= 0.95:
+    if change.weaker >= SURE:
         return f"that rotor delivers {size} less for what it is asked."
-    if change.carries_more >= 0.95:
+    if change.carries_more >= SURE:
         return f"the vehicle carries {size} of its weight more there."
     return (
         f"the rotor delivers {size} less (probability {change.weaker:.2f}), or the vehicle carries "
@@ -219,7 +213,7 @@ def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path
     Raises:
         InputError: a file cannot be written.
     """
-    data = list(map(fault_data, faults))
+    data = [*map(fault_data, faults)]
     return _written(folder / "rotor_faults.json", data, _draw_faults(faults))
 
 
@@ -242,6 +236,6 @@ def _draw_faults(faults: Sequence[RotorFault]) -> Any:
                 panel.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
                 panel.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
         left.set_title(Path(channels.name).name)
-        chance = fault.probabilities[fault.likeliest]
-        right.set_title(f"{_finding(fault, fault.likeliest)}: {chance:.3f}")
+        likeliest = fault.likeliest
+        right.set_title(f"{_finding(fault, likeliest)}: {fault.probabilities[likeliest]:.3f}")
     return figure

@@ -10,11 +10,12 @@ import numpy as np
 
 from ...dynamics.effects import Need, Role, get, needing, playing
 from ...dynamics.vehicle import Vehicle
-from ..findings import NamedEffect
+from ..findings import CHANNELS, NamedEffect
 from ..logs.table import Array, Pair, Values
 from ..motion.inertial_signals import pose_rate
+from .column import Column
 from .log_offsets import ROTOR_TIME_OFFSET
-from .regression import CENTRAL, RegressedFlights, Setting, moves_time, unit_of_change
+from .regression import CENTRAL, RegressedFlights, moves_time, unit_of_change
 from .worth import BY_CHANCE
 
 FILTERED = (
@@ -34,22 +35,21 @@ OUTSIDE = 0.05
 FEW = 3  # effects whose flights an advice describes
 
 
-def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str]:
-    """Yield the single effect as a possible cause of two effects of a setting.
+def composites(vehicle: Vehicle, found: Mapping[str, tuple[Values, Values]]) -> Iterator[str]:
+    """Yield the single effect as a possible cause of two found effects.
 
     Only the ratios of thrust to mass and to inertia show. So of mass, inertia and a scale of thrust
     any two with like changes equal the third with the opposite change.
 
     Args:
         vehicle: as declared.
-        setting: coefficients of effects.
-        std: their standard deviations.
+        found: coefficients of effects, and their standard deviations.
     """
     roles = (Role.MASS, Role.THRUST, Role.INERTIA)
     for third in roles:
-        pair = [playing(role, among=setting) for role in roles if role != third]
+        pair = [playing(role, among=found) for role in roles if role != third]
         for a, b in itertools.product(*pair):
-            (x, dx), (y, dy) = (_relative(vehicle, e, setting[e], std[e]) for e in (a, b))
+            (x, dx), (y, dy) = (_relative(vehicle, e, *found[e]) for e in (a, b))
             off = np.subtract.outer(x, y)
             alike = SHARE * np.maximum.outer(np.abs(x), np.abs(y))
             if np.all(np.abs(off) < MOST_APART * np.sqrt(np.add.outer(dx**2, dy**2) + alike**2)):
@@ -57,11 +57,35 @@ def composites(vehicle: Vehicle, setting: Setting, std: Setting) -> Iterator[str
                 yield f"{a} and {b} change alike: {other} may be the one cause"
 
 
+def cancelling(parts: Mapping[str, Array], left: Array) -> Iterator[str]:
+    """Yield each two effects whose mean forces or torques cancel to a third of either, with their
+    sum, which alone the flight identifies.
+
+    Args:
+        parts: (rows, 6) wrench of each effect.
+        left: (rows, 6) residual beside them. Means within its RMS do not count.
+    """
+    for channel, least, *means in zip(
+        CHANNELS, left.std(axis=0), *(x.mean(axis=0) for x in parts.values()), strict=True
+    ):
+        for (a, x), (b, y) in itertools.combinations(zip(parts, means, strict=True), 2):
+            if min(abs(x), abs(y)) > max(least, BY_CHANCE * abs(x + y)):
+                unit = "N" if channel.startswith("F") else "Nm"
+                yield (
+                    f"{a} and {b} cancel in {channel}, {x:.3g} and {y:.3g} {unit}: the flight "
+                    f"identifies their sum, {x + y:.2g} {unit}"
+                )
+
+
 def _relative(vehicle: Vehicle, effect: str, values: Values, std: Values) -> Array:
     """Return the relative changes by an effect, and their standard deviations."""
-    names = [c.name for c in get(effect).coefficients if c.name in values and c.name != CENTRAL]
-    unit = np.array([unit_of_change((effect, name), vehicle) for name in names])
-    return np.asarray(np.array([[values[name], std.get(name, 0.0)] for name in names]).T / unit)
+    changes = (
+        np.array([values[c.name], std.get(c.name, 0.0)])
+        / unit_of_change(Column(effect, c.name), vehicle)
+        for c in get(effect).coefficients
+        if c.name in values and c.name != CENTRAL
+    )
+    return np.transpose([*changes])
 
 
 def outside_the_fit(flights: RegressedFlights) -> Iterator[str]:
@@ -111,7 +135,7 @@ def late_rotors(
     """Yield the delay of the rotor speeds against their log, unless an effect covers it;
     ``sensors``: time offsets and their standard deviations.
     """
-    offset, std = sensors.get(ROTOR_TIME_OFFSET[1], (0.0, math.inf))
+    offset, std = sensors.get(ROTOR_TIME_OFFSET.coefficient, (0.0, math.inf))
     least = max(LEAST_ROTOR_TIME_OFFSET, BY_CHANCE * std)
     if flights.inertial or any(map(moves_time, effects)) or abs(offset) < least:
         return

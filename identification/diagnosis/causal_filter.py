@@ -8,36 +8,47 @@ gains, and linear recursions give the derivatives of its innovations, exactly bu
 Rotor speeds move linearly between samples.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from ... import _core
 from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array
+from ..logs.table import Array, Mask, Rows
 from ..motion.residual import loaded_model
 from .steady_filter import SteadyFilter
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """An unbroken piece of a flight as measured, evenly spaced (n samples)."""
+    """Unbroken pieces of flights as measured, one after the other, evenly spaced (n samples)."""
 
     t: Array  # (n,) s
-    period: float  # s
     position: Array  # (n, 3) m
     quaternion: Array  # (n, 4), of continuous sign
     rotor_speeds: Array  # (n, 4) rad/s, at the samples
     voltage: Array  # (n,) V; 0 where unknown
-    velocity: Array  # (3,) m/s, at the start
-    angular_velocity: Array  # (3,) rad/s, body, at the start
-    log: int = 0  # index among the flights
+    start: Array  # (p, 6) m/s, and rad/s, body: the velocities at the start of each piece
+    sample: Rows  # (n,) number of the sample in its piece
+    log: Rows  # (n,) index of its log among the flights
+    counted: Mask  # (n,) whether it is in the fit
+
+    @property
+    def begins(self) -> Rows:
+        """Where each piece begins (p,)."""
+        return np.flatnonzero(self.sample == 0)
+
+    @property
+    def pieces(self) -> list[slice]:
+        """The samples of each piece."""
+        return [slice(*ends) for ends in pairwise([*self.begins, len(self.t)])]
 
 
 @dataclass(frozen=True, eq=False)
 class FlightState:
-    """A piece of flight (n samples)."""
+    """Pieces of flights, one after the other (n samples)."""
 
     t: Array  # (n,) s
     position: Array  # (n, 3) m, world
@@ -50,7 +61,7 @@ class FlightState:
 
 @dataclass(frozen=True, eq=False)
 class Track(FlightState):
-    """A piece of a flight as the filter saw it, half a step on from sample k.
+    """Pieces of flights as the filter saw them, half a step on from sample k.
 
     Row k describes the step from sample k to k + 1; its predictions are of sample k. The
     acceleration includes the disturbance.
@@ -72,33 +83,35 @@ def level(heading: Array, x: Array) -> Array:
     return np.column_stack([c * ahead - s * left, s * ahead + c * left, up])
 
 
-def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
-    """Return a piece as the filter with a vehicle's model sees it.
+def run(poses: Poses, period: float, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
+    """Return the pieces as the filter with a vehicle's model sees them.
 
     Args:
-        poses: the piece.
+        poses: the pieces.
+        period: s.
         vehicle: the model.
         steady: the filter's gains.
         known: (n, 6, 3) corrections of pose, rate and disturbance of each axis before the pose of
             sample k is read, in the directions of ``Track.innovations``.
     """
-    n = len(poses.t)
     shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
-    out = Track(poses.t, *(np.empty((n, *shape)) for shape in shapes))
-    models = loaded_model(vehicle)[0].copy()
-    _core.run_causal_filter(
-        models.ctypes.data,
-        poses.period,
-        poses.rotor_speeds,
-        poses.voltage,
-        poses.position,
-        poses.quaternion,
-        np.append(poses.velocity, poses.angular_velocity),
-        steady.gain,
-        steady.keep,
-        known,
-        *(getattr(out, field.name) for field in fields(out)[1:]),
-    )
-    raise_errors()
-    np.divide(out.rotors, [vehicle.mass, *np.diagonal(vehicle.inertia)], out=out.rotors)
+    written = [np.empty((len(poses.t), *shape)) for shape in shapes]
+    for at, start in zip(poses.pieces, poses.start, strict=True):
+        models = loaded_model(vehicle)[0].copy()
+        _core.run_causal_filter(
+            models.ctypes.data,
+            period,
+            poses.rotor_speeds[at],
+            poses.voltage[at],
+            poses.position[at],
+            poses.quaternion[at],
+            start,
+            steady.gain,
+            steady.keep,
+            known[at],
+            *(x[at] for x in written),
+        )
+        raise_errors()
+    out = Track(poses.t, *written)
+    out.rotors[:] /= [vehicle.mass, *np.diagonal(vehicle.inertia)]
     return out

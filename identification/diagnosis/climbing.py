@@ -57,16 +57,15 @@ def linearised(
     within the limits of the coefficients.
     """
     m = base.marginal(base.asked, base.plain, power)
-    every = range(len(m.at))
-    size = base.size[m.at]
+    size = base.size[base.at(m.place)]
     z = from_declared(base.asked, flights, setting)
-    value = 0.5 * (float(z @ z) - m.quadratic.explained(every, z)) - m.quadratic.constant
+    value = 0.5 * (float(z @ z) - m.explained(m.index(m.place), z)) - m.constant
 
     def target() -> Setting:
         out = {e: dict(values) for e, values in setting.items()}
-        best = m.evidence(every).mode * size
+        best = m.evidence(m.place).mode * size
         for c, x in zip(base.asked, best.tolist(), strict=True):
-            out[c[0]][c[1]] = changed(c, x, flights)
+            out[c.effect][c.coefficient] = changed(c, x, flights)
         return out
 
     return value, target

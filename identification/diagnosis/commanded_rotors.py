@@ -11,7 +11,7 @@ import numpy as np
 
 from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
-from ..logs.flight_log import FlightLog, Logs, with_rows
+from ..logs.flight_log import FlightLog, with_rows
 from ..logs.flight_phases import FLIGHT, flight_phases, usual_thrust
 from ..motion.signals import Signals
 from ..motion.smoothing import CUTOFFS, low_pass
@@ -36,12 +36,10 @@ def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     if not seen.any():
         return log
     height = np.interp(log.t, log.t[seen], log.position[seen, 2])
-    flight = [
-        p for p in flight_phases(log.t, height, log.rotor_speeds, vehicle) if p.name == FLIGHT
-    ]
-    if not flight:
-        return log
-    return with_rows(log, (log.t >= flight[0].start) & (log.t <= flight[0].end))
+    for phase in flight_phases(log.t, height, log.rotor_speeds, vehicle):
+        if phase.name == FLIGHT:
+            return with_rows(log, (log.t >= phase.start) & (log.t <= phase.end))
+    return log
 
 
 def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
@@ -55,8 +53,8 @@ def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     if not carried.size:
         return log
     first, last = carried[[0, -1]]
-    end = log.t[last] - TAKE_OFF * (last < len(thrust) - 1)
     begin = log.t[first] + TAKE_OFF * (first > 0)
+    end = log.t[last] - TAKE_OFF * (last < len(thrust) - 1)
     keep = (log.t >= begin) & (log.t <= end)
     return with_rows(log, keep) if keep.any() else log
 
@@ -69,10 +67,3 @@ def downsampled(signals: Signals) -> Signals:
     smooth = np.maximum(low_pass(signals.rotor_speeds, CUTOFFS.pose_hz, signals.period), 0.0)
     every = replace(signals, rotor_speeds=smooth).at(slice(None, None, step))
     return replace(every, period=step * signals.period)
-
-
-def thrust_is_assumed(logs: Logs, vehicle: Vehicle) -> bool:
-    """Return whether rotor speeds come from commands, and no curve (``motor_curve``) of the vehicle
-    states a command's thrust.
-    """
-    return vehicle.motor_curve is None and any(log.commanded for log in logs)

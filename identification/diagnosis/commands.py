@@ -12,7 +12,7 @@ from .commanded_rotors import THRUST_FACTORS
 from .regression import CENTRAL, RegressedFlights
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Given:
     """Facts without need of evidence."""
 
@@ -20,7 +20,7 @@ class Given:
     first: dict[str, NamedNumbers]  # in every set; with coefficients where a fit begins
     fixed: dict[str, NamedNumbers]  # known from elsewhere, with their coefficients
     # the delay of commands, from the vehicle's turns and not from a force; None if unknown
-    late: NamedEffect | None = None
+    late: NamedEffect | None
 
 
 def what_commands_show(flights: RegressedFlights, library: Sequence[str]) -> Given:
@@ -33,7 +33,7 @@ def what_commands_show(flights: RegressedFlights, library: Sequence[str]) -> Giv
     """
     library = list(library)
     if not flights.commanded:
-        return Given(library, {}, {})
+        return Given(library, {}, {}, None)
     late = None
     seen = [p.signals for p in flights.pieces({}) if flights.fit_rows[flights.log == p.log].any()]
     delays = playing(Role.DELAY, among=library)

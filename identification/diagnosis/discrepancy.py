@@ -5,17 +5,18 @@ The columns are of the filter's predicted state: none holds the noise of the pos
 
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from typing import NamedTuple
 
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array, ArrayMap, NamedArrays, median_step
+from ..logs.table import Array, ArrayMap, NamedArrays, Rows, median_step
 from ..motion.signals import in_body
 from ..motion.smoothing import filtered
 from .causal_filter import FlightState
-from .priors import UNKNOWN
-from .regression import Column, RegressedFlights
+from .column import Column, Part
+from .regression import RegressedFlights
 
 TORQUE_ARM = 0.25  # of the arm: times the weight, the unit of a torque
 HEIGHTS = (0.2, 0.6)  # m above the lowest place: where a bump falls off
@@ -26,51 +27,53 @@ DAMPING_RATIO = 0.08  # of both
 # times ``sets.UNKNOWN_SIZES``: change of an effect's coefficients, as a share of its own wrench,
 # with one standard deviation of a variable
 SHARE_OF_EFFECT = 30.0
-CHANGING = f"{UNKNOWN}changing coefficient: "
 
 
-@dataclass(frozen=True, eq=False)
-class Product:
+class Product(NamedTuple):
     """A column (n, 6), multiplied out a part at a time: ten minutes of 150 columns would take 0.9
     GB.
     """
 
     scale: float
     x: Array  # (n,)
-    y: Array | None  # (n, k); None: one
-    channels: slice | None = None  # k of six, the others zero; None: all six
+    y: Array  # (n, k)
+    first: int = 0  # channel of y's first column; the other channels are zero
 
-    def __getitem__(self, rows: slice) -> Array:
-        """Return some rows (m, 6)."""
-        part = self.scale * self.x[rows, None]
-        part = part if self.y is None else part * self.y[rows]
-        if self.channels is None:
-            return part
-        out = np.zeros((len(part), 6))
-        out[:, self.channels] = part
+    @staticmethod
+    def ones(*shape: int) -> Array:
+        """Return ones without memory of their own."""
+        return np.broadcast_to(1.0, shape)
+
+    def part(self, rows: slice) -> "Product":
+        """Return some rows."""
+        return Product(self.scale, self.x[rows], self.y[rows], self.first)
+
+    @property
+    def whole(self) -> Array:
+        """All of it (n, 6)."""
+        out = np.zeros((len(self.x), 6))
+        out[:, self.first : self.first + self.y.shape[1]] = self.scale * self.x[:, None] * self.y
         return out
 
 
-Columns = dict[Column, Array | Product]
+Columns = dict[Column, Product]
 
 
-def along_axis(axis: int, rotation: Array) -> tuple[Array | None, slice]:
+def along_axis(axis: int, rotation: Array) -> tuple[Array, int]:
     """Return the last two fields of a product along an axis of the body, three of force and three
     of torque.
     """
-    if axis < 3:
-        return rotation[:, :, axis], slice(3)
-    return None, slice(axis, axis + 1)
+    return (rotation[:, :, axis], 0) if axis < 3 else (Product.ones(len(rotation), 1), axis)
 
 
-def weight_and_torque(vehicle: Vehicle) -> Array:
+def weight_and_torque(vehicle: Vehicle, arm: float = TORQUE_ARM) -> Array:
     """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
-    quarter of the arm.
+    share of the arm.
     """
-    return vehicle.weight * np.repeat([1.0, TORQUE_ARM * vehicle.arm_l], 3)
+    return vehicle.weight * np.repeat([1.0, arm * vehicle.arm_l], 3)
 
 
-def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Array]:
+def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Rows]:
     """Return all pieces, one after the other, and their ends without the last."""
     columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(FlightState))
     return FlightState(*columns), np.cumsum([len(track.position) for track in tracks])[:-1]
@@ -82,7 +85,7 @@ def _scaled(x: Array) -> Array:
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFlights) -> Columns:
+def discrepancy_columns(whole: FlightState, ends: Rows, flights: RegressedFlights) -> Columns:
     """Return accelerations (n, 6) by column, each of a standard deviation of the weight, or of the
     weight times the arm.
 
@@ -97,7 +100,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
     # from the sample before: later samples hold the poses' noise
     change = np.diff(rotors, axis=0, prepend=rotors[:1])
     size = weight_and_torque(flights.vehicle) / flights.inertias
-    one = np.ones(len(t))
+    one = Product.ones(len(t))
     torques = range(3, 6)
     out: Columns = {}
 
@@ -105,7 +108,7 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
         z = _scaled(x)
         for i in channels if z.any() else ():
             column = Product(size[i], z, *along_axis(i, rotation))
-            out["", f"{UNKNOWN}{group}: {name} in {i}"] = column
+            out[Column("", name, Part.UNKNOWN, i, group)] = column
 
     for i, axis in enumerate("xyz"):
         along = body[:, i]
@@ -138,12 +141,13 @@ def discrepancy_columns(whole: FlightState, ends: Array, flights: RegressedFligh
         swing = _resonance(rotors[:, 1 + i], hertz, period, ends)
         add("resonance", f"a part that swings at {hertz:g} Hz", swing, (3 + i,))
     for i in range(6):
-        made = Product(size[i], one, None, slice(i, i + 1))
-        out["", f"{UNKNOWN}constant: a constant in {i}"] = made
+        made = Product(size[i], one, one[:, None], i)
+        out[Column("", "a constant", Part.UNKNOWN, i, "constant")] = made
     for hertz in LOAD_HZ:
         swing = _resonance(whole.acceleration[:, :2], hertz, period, ends)
-        made = Product(size[0] / max(swing.std(), 1e-9), one, swing, slice(2))
-        out["", f"{UNKNOWN}resonance: a load that swings at {hertz:g} Hz in 0"] = made
+        made = Product(size[0] / max(swing.std(), 1e-9), one, swing)
+        load = f"a load that swings at {hertz:g} Hz"
+        out[Column("", load, Part.UNKNOWN, 0, "resonance")] = made
     return out
 
 
@@ -152,7 +156,7 @@ def heading_of(rotation: Array) -> Array:
     return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
 
 
-def _resonance(drive: Array, hertz: float, period: float, ends: Array) -> Array:
+def _resonance(drive: Array, hertz: float, period: float, ends: Rows) -> Array:
     """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base."""
     # s'' = -a - rate^2 s - 2 damping rate s'; the pull is rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
@@ -196,6 +200,8 @@ def changing_columns(parts: ArrayMap, followed: ArrayMap) -> Columns:
     """
     shares = {effect: SHARE_OF_EFFECT * part for effect, part in parts.items()}
     return {
-        ("", f"{CHANGING}{effect} with {name}"): Product(1.0, x, share)
+        Column("", f"{effect} with {name}", Part.CHANGING, 0, "changing coefficient"): Product(
+            1.0, x, share
+        )
         for (effect, share), (name, x) in itertools.product(shares.items(), followed.items())
     }

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from ..logs.table import Array, Pair
+from .column import Column
 from .evidence import Marginal, marginal, set_evidence
 from .priors import Base
-from .regression import Column
 
 CONFIDENCE = 0.95  # that a gain is above its bound
 

@@ -6,6 +6,7 @@ innovations are white. Sums of products then give the log-likelihood of any set 
 the setting.
 """
 
+import functools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -20,22 +21,23 @@ from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
 from ..findings import CHANNELS, Disturbance
-from ..logs.flight_log import FlightLog, Logs
-from ..logs.table import Array, ArrayPair, Mask
+from ..logs.flight_log import FlightLog
+from ..logs.table import Array
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import sensor_noise
 from ..motion.signals import Signals, in_body, log_signals
 from ..motion.smoothing import continuous, filtered, turn_between
-from .causal_filter import Poses, Track, level, run
+from .causal_filter import Poses, level, run
+from .column import Column, Part
 from .discrepancy import (
     Columns,
     Product,
     along_axis,
     changing_columns,
     discrepancy_columns,
-    joined,
     variables,
 )
+from .gusty_wind import gusts
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
     LAG_ASYMMETRY,
@@ -44,16 +46,11 @@ from .log_offsets import (
 )
 from .noise_search import FIRST_TIME, SETTLING_TIME, NoiseSearch
 from .priors import (
-    BETWEEN,
-    GAIN,
+    GAINS,
     MODEL_ERROR,
-    PRIORS,
-    UNKNOWN,
-    WHOLE_PREFIX,
     Base,
     Setting,
     Starts,
-    bare,
     in_prior_units,
     variants_of,
 )
@@ -61,7 +58,6 @@ from .regression import (
     BLOCK,
     CENTRAL,
     STEP,
-    Column,
     RegressedFlights,
     is_delay,
     typical_size,
@@ -74,8 +70,15 @@ STATES = (0, 1, 2)  # pose, rate and disturbance of an axis
 # rad of tilt for a rad/s2 of roll or pitch: the unit of gains of sideways states
 SIDEWAYS = 0.01
 FIRST_DISTURBANCE = 0.3  # m/s2 and rad/s2, where the search for the noise begins
+# shares of thrust, torque and turn in the jumps of an axis, by a unit of the gains: (6, 3, 9) of
+# each pair on each of the three, and (6, 3, 4) of the axes driven by thrust and torques
+OF_PAIRS = np.einsum("ap,kl->akpl", OWN, np.eye(3)).reshape(6, 3, -1)
+OF_DRIVEN = np.zeros((6, 3, len(DRIVEN)))
+OF_DRIVEN[:3, 0, 0] = OF_DRIVEN[[3, 4, 5], 1, [1, 2, 3]] = 1.0
+NO_SLOPES = np.empty((6, 7, 0))
 # the state that jumps, by the gains of a pair on the rotors' innovations: thrust, torque, turn
 JUMP_STATE = np.tile(STATES, 3)
+HELD = np.array(GAINS)[JUMP_STATE]  # standard deviations of these gains
 
 
 class Likelihood:
@@ -87,6 +90,7 @@ class Likelihood:
         near: the likelihood of the same flights near another setting. The search for the noise
             begins at its noise; default: at the sensor noise of the first log.
         same_noise: take that noise without a search, and the columns any flight may have.
+        gusty: a wind changes beside its mean; with ``same_noise`` as near.
     """
 
     def __init__(
@@ -95,40 +99,34 @@ class Likelihood:
         setting: Setting,
         near: "Likelihood | None" = None,
         same_noise: bool = False,
+        gusty: bool = False,
     ) -> None:
-        self.flights = flights
-        self.setting = setting
-        self.vehicle = flights.amended(setting)
-        # of each piece: the rounding error of its logged rotor speeds (n, 4), which is added back,
-        # and the rotors' innovations, by a filter that follows the pose closely
+        # the rounding error of the logged rotor speeds of each piece (n, 4), which is added back
         self.finer: list[Array] = []
         if near:
-            self.finer = near.finer
-            self.answers: list[Array] = near.answers
-            self.tracks: list[Track] = near.tracks
-            self.pieces: list[Poses] = near.pieces
-            self.noise: PoseNoise = near.noise
-            self.gains: Array = near.gains  # on the rotors' innovations
+            vars(self).update(vars(near))
+        self.flights = flights
+        self.gusty: bool = near.gusty if near and same_noise else gusty
+        self.setting = setting
+        self.vehicle = flights.amended(setting)
         if not near or sensing_of(near.vehicle) != sensing_of(self.vehicle):
-            finer = iter(self.finer)
-            self.pieces = [
-                piece
-                for log in np.unique(flights.log[flights.fit_rows]).tolist()
-                for piece in _read_poses(flights.logs, log, self.vehicle, finer)
-            ]
-        self.period = self.pieces[0].period
-        self._counts = [self._counted(piece) for piece in self.pieces]  # samples in the fit
+            self.poses = self._read_poses()
+        # the states (3,) after a period of one m/s2 or rad/s2
+        self._units = np.array([self.period**2, self.period, 1.0])
         if not near:
             self.noise = self._first_noise()
-            self.gains = np.zeros((len(PAIRS), len(JUMP_STATE)))
+            # on the rotors' innovations
+            self.gains: Array = np.zeros((len(PAIRS), len(JUMP_STATE)))
+            self.steady = steady_filter(self.noise, self.period, self.vehicle.gravity)
             self._see_rotors()
-        if near and same_noise:
-            self._run(self.steady, self._jumps(), self.gains)
-            if np.isnan([track.predicted[-1] for track in self.tracks]).any():
+        self.jumps = self._jumps()
+        if near and (same_noise or gusty):
+            self._run()
+            if np.isnan(self.track.predicted).any():
                 raise np.linalg.LinAlgError("the filter diverges with these effects")
         else:
             self._search_noise()
-        self.signals = [_signals(piece, track) for piece, track in self._seen]
+        self.signals = self._signals()
         self._base = self._accelerations(setting, self.signals)
         # the effect of a unit of each column on the accelerations, or on the measured pose (n, 6),
         # of all pieces in turn, kept once computed. Columns any flight may have change little with
@@ -137,48 +135,106 @@ class Likelihood:
         self._posed: Columns = {}
         if near and same_noise:
             self._acting, self._posed = (
-                {c: x for c, x in part.items() if not c[0] and not c[1].startswith(UNKNOWN)}
+                {c: x for c, x in part.items() if not c.effect and not c.is_unknown}
                 for part in (near._acting, near._posed)
             )
         else:
             self._add_what_any_flight_may_have()
+        if self.gusty:
+            self._add_gusts()
+            if not same_noise:
+                base = self.base((), {})
+                drawn = base.mode(base.plain, draw=True).items()
+                blown = {c: x for c, (x, _) in drawn if c.part == Part.GUST}
+                self._search_noise(self._explained(blown))
 
-    @property
-    def _seen(self) -> list[tuple[Poses, Track]]:
-        return list(zip(self.pieces, self.tracks, strict=True))
+    def _read_poses(self) -> Poses:
+        """Return the unbroken pieces of the flights in the fit as measured. The vehicle's sensing
+        effects are undone, and the rotor speeds of each are made finer.
+
+        For late or early poses, rotor speeds are moved instead: moved poses would lose noise.
+        """
+        flights = self.flights
+        late = [e for e in sensing_of(self.vehicle) if is_delay(e.name)]
+        offset = sum(x for e in late for x in e.coefficients.values())
+        on_time = replace(
+            self.vehicle, effects=tuple(e for e in self.vehicle.effects if e not in late)
+        )
+        finer = iter(self.finer)
+        out = []
+        for at in np.unique(flights.log[flights.fit_rows]).tolist():
+            rows = np.flatnonzero(flights.log == at)
+            undone = undo_log_sensing(flights.logs[at], on_time)
+            for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
+                raw = replace(raw, rotor_speeds=raw.rotor_speeds + next(finer, 0.0))
+                raw = with_time_offsets(raw, {ROTOR_TIME_OFFSET.coefficient: offset})
+                q = Rotation.from_matrix(raw.rotation).as_quat(scalar_first=True)
+                n = len(raw.t)
+                near = np.searchsorted(flights.t[rows], raw.t).clip(max=len(rows) - 1)
+                counted = flights.fit_rows[rows[near]]
+                counted[: round(SETTLING_TIME / raw.period)] = False
+                out.append(
+                    (
+                        raw.t,
+                        raw.position,
+                        continuous(q),
+                        raw.rotor_speeds,
+                        np.zeros(n) if raw.voltage is None else raw.voltage,
+                        np.hstack([smooth.velocity[:1], smooth.angular_velocity[:1]]),
+                        np.arange(n),
+                        np.full(n, at),
+                        counted,
+                    )
+                )
+        self.period = raw.period
+        return Poses(*map(np.concatenate, zip(*out, strict=True)))
+
+    def _signals(self) -> list[Signals]:
+        """Return each piece as the filter sees it between samples, for the effect models."""
+        out = []
+        for at in self.poses.pieces:
+            speeds = self.poses.rotor_speeds[at]
+            voltage = self.poses.voltage[at]
+            seen = self.track
+            out.append(
+                Signals(
+                    seen.t[at],
+                    self.period,
+                    seen.position[at],
+                    seen.rotation[at],
+                    seen.velocity[at],
+                    seen.acceleration[at, :3],
+                    seen.angular_velocity[at],
+                    seen.acceleration[at, 3:],
+                    0.5 * (speeds + np.vstack([speeds[1:], speeds[-1:]])),
+                    voltage if voltage.any() else None,
+                )
+            )
+        return out
 
     def _see_rotors(self) -> None:
-        nothing = [np.zeros((len(piece.t), 6, 3)) for piece in self.pieces]
-        self._run(self.steady, nothing, self.gains)
+        """Take the rotors' innovations by a filter that follows the pose closely."""
+        self.jumps = np.zeros((len(self.poses.t), 6, 3))
+        self._run()
         if self._rounding_std:
-            self.finer = unrounded(self._seen, self.vehicle.omega_lsb)
-            self.pieces = [
-                replace(piece, rotor_speeds=piece.rotor_speeds + x)
-                for piece, x in zip(self.pieces, self.finer, strict=True)
-            ]
-            self._run(self.steady, nothing, self.gains)
-        self.answers = rotor_innovations(self._seen)
+            finer = unrounded(self.poses, self.track, self.vehicle.omega_lsb)
+            self.finer = np.split(finer, self.poses.begins[1:])
+            self.poses = replace(self.poses, rotor_speeds=self.poses.rotor_speeds + finer)
+            self._run()
+        self.answers = rotor_innovations(self.poses, self.track)
 
-    @property
-    def steady(self) -> SteadyFilter:
-        """The filter."""
-        return steady_filter(self.noise, self.period, self.vehicle.gravity)
-
-    def _run(self, steady: SteadyFilter, jumps: Iterable[Array], gains: Array) -> None:
-        each = (OWN @ gains).reshape(6, -1, len(STATES)) * self._units
-        # of each piece, the jumps of the states (n, 6, 3) by the rotors' innovations
-        self.known = [(x.swapaxes(0, 1) @ each).swapaxes(0, 1) for x in jumps]
-        self.tracks = [
-            run(piece, self.vehicle, steady, x)
-            for piece, x in zip(self.pieces, self.known, strict=True)
-        ]
+    def _run(self) -> None:
+        each = (OWN @ self.gains).reshape(6, -1, len(STATES)) * self._units
+        # the jumps of the states (n, 6, 3) by the rotors' innovations
+        self.known = (self.jumps.swapaxes(0, 1) @ each).swapaxes(0, 1)
+        self.track = run(self.poses, self.period, self.vehicle, self.steady, self.known)
 
     # Noise
 
     def _first_noise(self) -> PoseNoise:
         floor = sensor_noise(self.flights.logs[0], self.vehicle)
         return PoseNoise(
-            np.repeat([max(floor.position, 1e-6), max(floor.attitude, 1e-6)], 3),
+            np.repeat(np.maximum([floor.position, floor.attitude], 1e-6), 3),
             np.repeat([FIRST_DISTURBANCE, 10.0 * FIRST_DISTURBANCE], 3),
             np.full(6, FIRST_TIME),
             self._rounding(),
@@ -187,76 +243,55 @@ class Likelihood:
     @property
     def _rounding_std(self) -> float:
         """Standard deviation of the rounding of a rotor speed, rad/s."""
-        known = self.vehicle.omega_source == "measured"
-        return self.vehicle.omega_lsb / math.sqrt(12.0) if known else 0.0
+        return (self.vehicle.omega_source == "measured") * self.vehicle.omega_lsb / math.sqrt(12.0)
 
     def _rounding(self) -> Array:
         """Return the standard deviation of the accelerations (6,) by the rounding of rotor
         speeds: m/s2 and rad/s2.
         """
-        speeds = np.concatenate([p.rotor_speeds for p in self.pieces]).mean(axis=0)
-        off = self._rounding_std * np.vstack([np.zeros(4), np.eye(4)])
-        wrenches = self.vehicle.rotor_wrench(speeds + off)
+        speeds = self.poses.rotor_speeds.mean(axis=0)
+        # of no rotor, and of each
+        wrenches = self.vehicle.rotor_wrench(speeds + self._rounding_std * np.eye(5, 4, -1))
         # between two samples the mean of both counts
-        wrench = np.sqrt(np.sum(np.square(wrenches[1:] - wrenches[0]), axis=0) / 2.0)
+        wrench = np.sqrt(np.square(wrenches[1:] - wrenches[0]).sum(axis=0) / 2.0)
         return np.maximum(np.array([0.0, 0.0, *wrench]) / self.flights.inertias, 1e-9)
 
-    def _search_noise(self, explained: Sequence[Array] | None = None) -> None:
+    def _search_noise(self, explained: Array | None = None) -> None:
         """Take the likeliest noise, and the likeliest gains on the rotors' innovations.
 
         Args:
-            explained: (n, 2, 6) of each piece: known changes of the pose and of the acceleration
-                beside the model.
+            explained: (2, n, 6) known changes of the pose and of the acceleration beside the model.
         """
-        jumps = self._jumps()
 
-        def see(steady: SteadyFilter, gains: Array, slopes: Array | None) -> Iterator[ArrayPair]:
-            self._run(steady, jumps, gains)
-            for i, (track, counts) in enumerate(zip(self.tracks, self._counts, strict=True)):
-                if explained is not None:
-                    pose, force = explained[i].swapaxes(0, 1)
-                    begun = np.zeros((6, 3, 1))
-                    rows = self._changes(track, steady, slice(None), begun, [force], [pose])
-                    left = (rows[:, :, 1] - rows[:, :, 0]) @ np.linalg.inv(steady.whitening).T
-                    track = replace(track, innovations=left)
-                if slopes is None:
-                    yield track.innovations[counts], track.innovations
-                    continue
-                state = np.zeros((6, 3, gains.size + slopes.shape[2]))
-                for at in self._blocks(track):
-                    each = jumps[i][at, :, None, :, None] * self._units
-                    own = (each * OWN[:, :, None, None]).reshape(-1, 6, gains.size)
-                    rows = self._changes(track, steady, at, state, (), (), own, slopes)
-                    if counts[at].any():
-                        yield track.innovations[at][counts[at]], rows[counts[at]]
+        def see(steady: SteadyFilter, gains: Array) -> Array:
+            self.steady = steady
+            self.gains = gains
+            self._run()
+            if explained is not None:
+                pose, force = map(_whole, explained)
+                each = self._changes([force], [pose], every=True)
+                left = np.diff(np.concatenate([x for _, x in each])).reshape(-1, 6)
+                left = left @ np.linalg.inv(steady.whitening).T
+                self.track = replace(self.track, innovations=left)
+            return self.track.innovations[self.poses.counted]
 
-        held = np.array(PRIORS.gains)[JUMP_STATE]
-        search = NoiseSearch(see, held, self.period, self.vehicle.gravity)
+        def products(slopes: Array) -> Array:
+            each = self._changes(shares=OF_PAIRS, slopes=slopes)
+            return functools.reduce(np.add, (x.T @ x for _, x in each))
+
+        search = NoiseSearch(see, products, HELD, self.period, self.vehicle.gravity)
         self.noise, self.gains = search.likeliest(self.noise, self.gains)
-        self._run(self.steady, jumps, self.gains)
-
-    def _blocks(self, track: Track) -> Iterator[slice]:
-        """Return the parts of a piece. One part's columns are in memory at a time."""
-        length = round(BLOCK / self.period)
-        n = len(track.t)
-        return (slice(begin, min(begin + length, n)) for begin in range(0, n, length))
-
-    def _counted(self, piece: Poses) -> Mask:
-        """Return the samples of a piece in the fit, like the rows of their block."""
-        rows = np.flatnonzero(self.flights.log == piece.log)
-        at = np.searchsorted(self.flights.t[rows], piece.t).clip(max=len(rows) - 1)
-        out: Mask = self.flights.fit_rows[rows[at]]
-        out[: round(SETTLING_TIME / self.period)] = False
-        return out
+        self.steady = steady_filter(self.noise, self.period, self.vehicle.gravity)
+        self._run()
 
     def gusts(self) -> tuple[Disturbance, ...]:
         """Return the disturbance of each channel. The rotors show a part: a flight loop on a gyro
         answers most of a gust's torque before the pose shows any.
         """
-        keep = self.steady.keep.tolist()
+        jumps = np.split(self.known[:, :, 2], self.poses.begins[1:])
         shown = [
-            np.concatenate([filtered(x[:, i, 2], (1, 0, 0, 1, -keep[i], 0)) for x in self.known])
-            for i in range(6)
+            np.concatenate([filtered(x[:, i], (1, 0, 0, 1, -keep, 0)) for x in jumps])
+            for i, keep in enumerate(self.steady.keep.tolist())
         ]
         size = self.flights.inertias * self.noise.disturbance
         whole = np.hypot(size, self.flights.inertias * np.std(shown, axis=1))
@@ -267,54 +302,57 @@ class Likelihood:
 
     def _accelerations(self, setting: Setting, signals: Iterable[Signals]) -> Array:
         """Return the accelerations (n, 6) of a setting along the pieces' signals."""
-        wrench = np.concatenate([self.flights.acting(s, setting) for s in signals])
-        wrench[:, :3] /= self.flights.vehicle.mass
-        wrench[:, 3:] = wrench[:, 3:] @ np.linalg.inv(self.flights.vehicle.inertia).T
-        return wrench
+        unit = replace(self.flights.vehicle, mass=1.0, inertia=np.eye(3))
+        return np.concatenate([self.flights.acting(s, setting, body=unit) for s in signals])
 
-    def _change(self, setting: Setting) -> Array:
-        """Return the change of the acceleration (n, 6) with another setting."""
-        return self._accelerations(setting, self.signals) - self._base
+    def _change(self, setting: Setting, units: float = 1.0) -> Array:
+        """Return the change of the acceleration (n, 6) with a setting so many units away."""
+        return (self._accelerations(setting, self.signals) - self._base) / units
 
     def _add(self, column: Column) -> None:
         """Add a coefficient's column, unless it is there already or no such vehicle is possible."""
-        effect, name = column
+        effect = column.effect
         if column in self._acting or column in self._posed:
             return
         if effect and is_delay(effect):
             self._acting[column] = self._acting[ROTOR_TIME_OFFSET]
             return
         if effect and get(effect).kind == "sensing":
-            self._posed[column] = self._moved(column)
+            self._posed[column] = _whole(self._moved(column))
             return
-        own = dict(self.flights.coefficients(self.setting, effect))
-        if name.startswith(WHOLE_PREFIX):
-            own[CENTRAL] = 1.0
-        effect, name = bare(column)
-        value, delta = self.flights.step(self.setting, (effect, name))
-        there = {**self.setting, effect: {**own, name: value + delta}}
         with suppress(InputError, np.linalg.LinAlgError):
-            change = self._change(there) / delta
+            change = self._slope(column)
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
-            self._acting[column] = _without_zeros(change)
+            self._acting[column] = _whole(change)
+
+    def _slope(self, column: Column) -> Array:
+        """Return the change of the acceleration (n, 6) by a unit of a coefficient."""
+        own = dict(self.flights.coefficients(self.setting, column.effect))
+        if column.part == Part.AT_CENTRE:
+            own[CENTRAL] = 1.0
+        value, delta = self.flights.step(self.setting, column)
+        own[column.coefficient] = value + delta
+        return self._change({**self.setting, column.effect: own}, delta)
 
     def _moved(self, column: Column) -> Array:
         """Return how far a unit of a sensing effect moves the pose (n, 6), at the filter's
         predicted pose. So the column holds no noise of the measured pose.
         """
-        effect, name = column
         delta = STEP * typical_size(column, self.flights.vehicle)
-        vehicle = replace(self.flights.vehicle, effects=(EffectSetting(effect, {name: delta}),))
-        out = []
-        for piece, track in self._seen:
+        setting = EffectSetting(column.effect, {column.coefficient: delta})
+        vehicle = replace(self.flights.vehicle, effects=(setting,))
+        position, quaternion = np.hsplit(self.track.predicted, [3])
+        out = np.zeros((len(position), 6))
+        for at in self.poses.pieces:
             log = FlightLog(
-                piece.t, track.predicted[:, :3], track.predicted[:, 3:], piece.rotor_speeds
+                self.track.t[at], position[at], quaternion[at], self.poses.rotor_speeds[at]
             )
             undone = undo_log_sensing(log, vehicle)
-            turn = turn_between(track.predicted[:, 3:], undone.quaternion)
-            out.append(np.column_stack([undone.position - track.predicted[:, :3], turn]) / delta)
-        return np.concatenate(out)
+            out[at, :3] = undone.position - log.position
+            if (undone.quaternion != log.quaternion).any():
+                out[at, 3:] = turn_between(log.quaternion, undone.quaternion)
+        return out / delta
 
     def base(self, library: Iterable[str], starts: Starts, unknown: bool = False) -> Base:
         """Return the likelihood of the coefficients of effects, and of everything any flight may
@@ -328,12 +366,12 @@ class Likelihood:
         acting = self._acting
         if playing(Role.LAG, among=self.setting):
             self._add(LAG_ASYMMETRY)
-        if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
-            acting |= discrepancy_columns(*joined(self.tracks), self.flights)
+        if unknown and not any(c.is_unknown for c in acting):
+            acting |= discrepancy_columns(self.track, self.poses.begins[1:], self.flights)
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in acting:
-                acting[c] = _without_zeros(self._change({**self.setting, c[0]: dict(start)}))
+                acting[c] = _whole(self._change({**self.setting, c.effect: dict(start)}))
         for effect in library:
             for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
@@ -342,36 +380,43 @@ class Likelihood:
 
     def _add_changing_coefficients(self) -> None:
         """Add the dictionary's columns: effects of the setting with changing coefficients."""
-        parts = {}
-        poses = {}
+        followed = variables(self.track)
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
-                moved = [x * self._moved((effect, name)) for name, x in own.items()]
-                poses[effect] = np.sum(moved, axis=0)
+                moved = [x * self._moved(Column(effect, name)) for name, x in own.items()]
+                self._posed |= changing_columns({effect: np.sum(moved, axis=0)}, followed)
             else:
-                parts[effect] = -self._change(without(self.setting, effect))
-        followed = variables(joined(self.tracks)[0])
-        self._acting |= changing_columns(parts, followed)
-        self._posed |= changing_columns(poses, followed)
+                change = -self._change(without(self.setting, effect))
+                self._acting |= changing_columns({effect: change}, followed)
 
     def _add_what_any_flight_may_have(self) -> None:
         """Add the columns of time offsets, of rotors between samples and of the model's error."""
         self._add(ROTOR_TIME_OFFSET)
-        bent = []  # away from the straight line, by the second difference
-        for s in self.signals:
-            # the speeds are of k + 1/2: nothing later than sample k + 1
-            u = np.pad(np.diff(s.rotor_speeds, 2, axis=0), ((2, 0), (0, 0)))
-            bent.append(replace(s, rotor_speeds=s.rotor_speeds + u))
-        self._acting["", BETWEEN] = self._accelerations(self.setting, bent) - self._base
+        # away from the straight line, by the second difference. The speeds are of k + 1/2: nothing
+        # later than sample k + 1
+        bent = [
+            replace(s, rotor_speeds=s.rotor_speeds + np.pad(u, ((2, 0), (0, 0))))
+            for s in self.signals
+            for u in [np.diff(s.rotor_speeds, 2, axis=0)]
+        ]
+        change = self._accelerations(self.setting, bent) - self._base
+        self._acting[Column("", "", Part.BETWEEN_SAMPLES)] = _whole(change)
         self._add_model_errors()
         self._add_answers()
-        moved = []
-        for track in self.tracks:
-            # the rate before the sample is read: the rate after holds the sample's noise
-            rate = track.angular_velocity + 0.5 * self.period * track.acceleration[:, 3:]
-            rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
-            moved.append(np.column_stack([np.zeros_like(rate), -rate]))
-        self._posed[ATTITUDE_TIME_OFFSET] = np.concatenate(moved)
+        # the rate before the sample is read: the rate after holds the sample's noise
+        after = self.track.angular_velocity + 0.5 * self.period * self.track.acceleration[:, 3:]
+        rate = np.roll(after, 1, axis=0)
+        rate[self.poses.begins] = self.track.angular_velocity[self.poses.begins]
+        self._posed[ATTITUDE_TIME_OFFSET] = _whole(np.hstack([np.zeros_like(rate), -rate]))
+
+    def _add_gusts(self) -> None:
+        """Add the columns of a wind's changes."""
+        t = self.period * np.arange(len(self._base), dtype=np.float64)
+        for wind, shape in gusts(t, self.setting, self.flights).items():
+            slope = self._slope(wind)[:, :3]
+            for k, x in enumerate(shape.T):
+                column = Column("", wind.coefficient, Part.GUST, k)
+                self._acting[column] = Product(1.0, x, slope)
 
     def quieter(self, coefficients: Mapping[Column, float], starts: Starts) -> Base:
         """Return the likelihood of the same columns, with the likeliest noise beside them all at
@@ -382,29 +427,25 @@ class Likelihood:
         """
         out = copy(self)
         out._search_noise(self._explained(coefficients))
-        out.tracks = [
-            replace(
-                track,
-                heading=x.heading,
-                innovations=x.innovations,
-                disturbance=x.disturbance,
-            )
-            for track, x in zip(self.tracks, out.tracks, strict=True)
-        ]
+        out.track = replace(
+            self.track,
+            heading=out.track.heading,
+            innovations=out.track.innovations,
+            disturbance=out.track.disturbance,
+        )
         return out._products(starts)
 
-    def _explained(self, coefficients: Mapping[Column, float]) -> list[Array]:
-        """Return the change of the pose and of the acceleration (n, 2, 6) of each piece."""
-        whole, ends = joined(self.tracks)
-        x = np.zeros((len(whole.t), 2, 6))
-        for i, columns in enumerate((self._posed, self._acting)):
+    def _explained(self, coefficients: Mapping[Column, float]) -> Array:
+        """Return the change of the pose and of the acceleration (2, n, 6)."""
+        turn = self.track.rotation
+        pose, force = x = np.zeros((2, len(turn), 6))
+        for change, columns in ((pose, self._posed), (force, self._acting)):
             for c, column in columns.items():
                 if c in coefficients:
-                    x[:, i] += coefficients[c] * column[:]
-        x[:, 1, :3] += whole.rotors[:, :1] * (
-            x[:, 0, 4:5] * whole.rotation[:, :, 0] - x[:, 0, 3:4] * whole.rotation[:, :, 1]
-        )
-        return np.split(x, ends)
+                    change += coefficients[c] * column.whole
+        tilt = pose[:, 4:5] * turn[:, :, 0] - pose[:, 3:4] * turn[:, :, 1]
+        force[:, :3] += self.track.rotors[:, :1] * tilt
+        return x
 
     def _swing(self, column: Column, change: Array) -> None:
         """Have a centre of mass move the measured point like a marker as far on the other side; its
@@ -415,9 +456,10 @@ class Likelihood:
         poses' own noise. With equal offsets of both, only the torque of the thrust remains.
         """
         change[:, :3] = 0.0
-        axis = [c.name for c in get(column[0]).coefficients].index(column[1])
+        axis = [c.name for c in get(column.effect).coefficients].index(column.coefficient)
         (marker,) = playing(Role.MARKER)
-        self._posed[column] = -self._moved((marker, get(marker).coefficients[axis].name))
+        moved = -self._moved(Column(marker, get(marker).coefficients[axis].name))
+        self._posed[column] = _whole(moved)
 
     def _add_model_errors(self) -> None:
         """Add the columns of slightly larger forces and torques, and of the torques expected from
@@ -427,19 +469,19 @@ class Likelihood:
         a hover holds little torque, and rounding hides it.
         """
         rounded = 2.0 * np.square(self._rounding()[3:])
-        whole, _ = joined(self.tracks)
-        expected = whole.rotors[:, 1:] - np.concatenate(self.answers)[:, 1:]
-        share = rounded / np.maximum(expected.var(axis=0), rounded)
-        scale = np.hypot(1.0, share / PRIORS.model_error)
-        for i, axis in enumerate("xyz"):
-            own = along_axis(3 + i, whole.rotation)
+        rotation = self.track.rotation
+        thrust, *torques = self.track.rotors.T
+        for i, torque in enumerate(torques):
+            expected = torque - self.answers[:, 1 + i]
+            share = rounded[i] / max(expected.var(), rounded[i])
+            own = along_axis(3 + i, rotation)
             errors = {
-                "force": Product(1.0, whole.rotors[:, 0], *along_axis(i, whole.rotation)),
-                "torque": Product(1.0, whole.rotors[:, 1 + i], *own),
-                "expected torque": Product(scale[i], expected[:, i], *own),
+                "force": Product(1.0, thrust, *along_axis(i, rotation)),
+                "torque": Product(1.0, torque, *own),
+                "expected torque": Product(math.hypot(1.0, share / MODEL_ERROR), expected, *own),
             }
             for name, x in errors.items():
-                self._acting["", f"{MODEL_ERROR} of {name} {axis}"] = x
+                self._acting[Column("", f"{name} {'xyz'[i]}", Part.MODEL_ERROR)] = x
 
     def _add_answers(self) -> None:
         """Add the columns of a flight loop's answers to disturbances: along thrust and torques,
@@ -450,16 +492,11 @@ class Likelihood:
         signals may have a share of the part, at most the disturbance's share of the variance.
         (Unknown linear feedback: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
         """
-        whole, _ = joined(self.tracks)
-        rate = whole.angular_velocity
-        body = in_body(whole.velocity, whole.rotation)
-        tilt = whole.rotation[:, 2]
-        states = (
-            (body[:, 2],),
-            (rate[:, 0], rate[:, 1] * rate[:, 2], tilt[:, 1], body[:, 1]),
-            (rate[:, 1], rate[:, 2] * rate[:, 0], tilt[:, 0], body[:, 0]),
-            (rate[:, 2], rate[:, 0] * rate[:, 1]),
-        )
+        whole = self.track
+        p, q, r = whole.angular_velocity.T
+        ahead, left, up = in_body(whole.velocity, whole.rotation).T
+        pitch, roll, _ = whole.rotation[:, 2].T
+        states = (up,), (p, q * r, roll, left), (q, r * p, pitch, ahead), (r, p * q)
         disturbed = np.array([gust.rms for gust in self.gusts()]) / self.flights.inertias
         for axis, rotors, own in zip(DRIVEN, whole.rotors.T, states, strict=True):
             size = max(rotors.std(), 1e-9)
@@ -468,185 +505,110 @@ class Likelihood:
             along = along_axis(axis, whole.rotation)
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
                 column = Product(answer / max(x.std(), 1e-9), x, *along)
-                self._acting["", f"answer {i} of axis {axis}"] = column
+                self._acting[Column("", f"answer {i} of axis {axis}", Part.NUISANCE)] = column
 
-    def _jumps(self) -> list[Array]:
-        """Return the accelerations (n, 6, 3) of each piece for a unit of the gains of a pair of
-        axes on thrust, on torque and on the turn; ``_units`` makes jumps of the states.
+    def _jumps(self) -> Array:
+        """Return the accelerations (n, 6, 3) for a unit of the gains of a pair of axes on thrust,
+        on torque and on the turn. ``_units`` makes jumps of the states.
 
         Thrust and torques inform about the axes they drive. A loop that rolls or pitches the
         vehicle has seen its position and the force aside.
         """
-        out = []
-        tilt = SIDEWAYS * self.flights.vehicle.gravity
-        for answer, track in zip(self.answers, self.tracks, strict=True):
-            # the innovation of sample k changes the state after k: the jump is before sample k + 1
-            answer = np.pad(answer[:-1], ((1, 0), (0, 0)))
-            x = np.zeros((len(answer), 6, 3))
-            x[:, :3, 0] = answer[:, :1] * track.rotation[:, :, 2]
-            x[:, 3:, 1] = level(track.heading, answer[:, 1:])
-            x[:, :2, 2] = tilt * x[:, 4:2:-1, 1]
-            out.append(x)
-        return out
-
-    @property
-    def _units(self) -> Array:
-        """The states (3,) after a period of one m/s2 or rad/s2."""
-        return np.array([self.period**2, self.period, 1.0])
+        # the innovation of sample k changes the state after k: the jump is before sample k + 1
+        answer = np.roll(self.answers, 1, axis=0)
+        answer[self.poses.begins] = 0.0
+        x = np.zeros((len(answer), 6, 3))
+        x[:, :3, 0] = answer[:, :1] * self.track.rotation[:, :, 2]
+        x[:, 3:, 1] = level(self.track.heading, answer[:, 1:])
+        x[:, :2, 2] = SIDEWAYS * self.flights.vehicle.gravity * x[:, 4:2:-1, 1]
+        return x
 
     def _products(self, starts: Starts) -> Base:
+        self.jumps = self._jumps()
         moved = self._posed
-        steady = self.steady
         asked = (*(c for c in self._acting if c not in moved), *moved)
         # the gains on axes the rotors do not drive stay as fitted
-        drives = [("", f"{GAIN} axis {axis} {state}") for axis in DRIVEN for state in STATES]
+        drives = [
+            Column("", f"axis {axis}", Part.GAIN, state) for axis in DRIVEN for state in STATES
+        ]
+        n = len(self._base)
+        still = Product(0.0, Product.ones(n), Product.ones(n, 1))
+        x = [self._acting.get(c, still) for c in asked]
+        each = self._changes(x, [*moved.values()], OF_DRIVEN)
+        blocks = ((log, rows.T @ rows) for log, rows in each)
+        penalty = float(self.poses.counted.sum() * np.linalg.slogdet(self.steady.covariance)[1])
         names = (*asked, *drives)
-        first = 0
-        still = np.zeros_like(self._base)
-        most = sum(len([*self._blocks(track)]) for track in self.tracks)
-        products = np.empty((most, len(names) + 1, len(names) + 1))
-        flown: list[int] = []
-        for piece, track, jumps, counts in zip(
-            self.pieces, self.tracks, self._jumps(), self._counts, strict=True
-        ):
-            state = np.zeros((6, 3, len(names)))
-            for at in self._blocks(track):
-                rows = at.stop - at.start
-                here = slice(first + at.start, first + at.stop)
-                x = [self._acting.get(c, still)[here] for c in asked]
-                y = [column[here] for column in moved.values()]
-                driven = np.zeros((rows, 6, len(DRIVEN)))
-                driven[:, :3, 0] = jumps[at, :3, 0]
-                driven[:, [3, 4, 5], [1, 2, 3]] = jumps[at, 3:, 1]
-                own = (driven[..., None] * self._units).reshape(rows, 6, -1)
-                out = self._changes(track, steady, at, state, x, y, own)
-                kept = out[counts[at]].reshape(-1, out.shape[2])
-                if len(kept):
-                    np.matmul(kept.T, kept, out=products[len(flown)])
-                    flown.append(piece.log)
-            first += len(track.position)
-        samples = np.concatenate(self._counts).sum()
-        penalty = float(samples * np.linalg.slogdet(steady.covariance)[1])
-        blocks = products[: len(flown)]
-        return in_prior_units(
-            self.flights, names, blocks, np.array(flown), penalty, self.setting, starts
-        )
+        return in_prior_units(self.flights, names, blocks, penalty, self.setting, starts)
 
     def _changes(
         self,
-        track: Track,
-        steady: SteadyFilter,
-        at: slice,
-        state: Array,
-        acting: Sequence[Array] = (),
-        moved: Sequence[Array] = (),
-        jumps: Array | None = None,
-        slopes: Array | None = None,
-    ) -> Array:
-        """Return the change of the predictions of a part of a piece with each of c columns, and the
-        innovations, whitened (n, 6, c + 1).
+        acting: Sequence[Product] = (),
+        moved: Sequence[Product] = (),
+        shares: Array = OF_DRIVEN[:, :, :0],
+        slopes: Array = NO_SLOPES,
+        every: bool = False,
+    ) -> Iterator[tuple[int, Array]]:
+        """Yield for each block of flight the index of its log, and the change of its predictions
+        with each of c columns. The innovations stand last; all are whitened (6 m, c + 1), of the m
+        samples in the fit.
 
         Args:
-            track: the piece.
-            steady: the filter.
-            at: the part.
-            state: (6, 3, c) carried from one part to the next.
-            acting: acceleration of the model (n, 6) by a unit of each of the first columns.
-            moved: shift of the measured pose (n, 6) by a unit of the last of these.
-            jumps: (n, 6, e) jump of one state of each axis, of the states in turn, by a unit of
-                the next columns, before the pose of a sample is read; default: none.
+            acting: acceleration of the model by a unit of each of the first columns.
+            moved: shift of the measured pose by a unit of the last of these.
+            shares: (6, 3, e) ``OF_PAIRS`` or ``OF_DRIVEN``: of the jumps by a unit of the next 3 e
+                columns, of the states in turn, before the pose of a sample is read.
             slopes: (6, 7, m) change of the gains of each axis, in the order of
-                ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns; default:
-                none.
+                ``SteadyFilter.gain``, and of ``keep``, by a unit of the last columns.
+            every: all samples count.
         """
-        rate = track.angular_velocity[at]
-        jumps = np.empty((len(rate), 6, 0)) if jumps is None else jumps
-        slopes = np.empty((6, 7, 0)) if slopes is None else slopes
-        disturbance = track.disturbance[at].copy()
-        disturbance[:, 3:] = level(track.heading[at], disturbance[:, 3:])
-        out = np.empty((len(rate), 6, state.shape[2] + 1))
-        _core.sensitivities(
-            self.period,
-            steady.gain,
-            steady.keep,
-            track.heading[at],
-            track.rotors[at, :1, None] * track.rotation[at, :, 1::-1] * [-1.0, 1.0],
-            rate,
-            _gyration(self.vehicle, rate),
-            acting,
-            moved,
-            jumps,
-            np.resize(STATES, jumps.shape[2]),
-            slopes,
-            track.innovations[at],
-            disturbance,
-            steady.whitening,
-            state,
-            out,
-        )
-        return out
+        shares = (shares[..., None] * self._units).reshape(6, 3, -1)
+        count = len(acting) + shares.shape[2] + slopes.shape[2]
+        length = round(BLOCK / self.period)
+        track = self.track
+        counted = self.poses.counted | every
+        for piece in self.poses.pieces:
+            state = np.zeros((6, 3, count))
+            # one block's columns are in memory at a time
+            for begin in range(piece.start, piece.stop, length):
+                at = slice(begin, min(begin + length, piece.stop))
+                out = np.empty((counted[at].sum(), 6, count + 1))
+                _core.sensitivities(
+                    self.period,
+                    self.steady.gain,
+                    self.steady.keep,
+                    track.heading[at],
+                    track.rotation[at],
+                    track.rotors[at],
+                    track.angular_velocity[at],
+                    _twist(self.vehicle),
+                    [x.part(at) for x in acting],
+                    [x.part(at) for x in moved],
+                    self.jumps[at],
+                    shares,
+                    np.resize(STATES, shares.shape[2]),
+                    slopes,
+                    track.innovations[at],
+                    track.disturbance[at],
+                    self.steady.whitening,
+                    counted[at],
+                    state,
+                    out,
+                )
+                if len(out):
+                    yield int(self.poses.log[begin]), out.reshape(-1, count + 1)
 
 
-def _without_zeros(column: Array) -> Array | Product:
-    """Return a column (n, 6); without the torque's zeros, half of the memory, if a force alone."""
-    if column[:, 3:].any():
-        return column
-    return Product(1.0, np.broadcast_to(1.0, len(column)), column[:, :3].copy(), slice(3))
+def _whole(column: Array) -> Product:
+    """Return a column (n, 6), without channels of zeros before and after the others."""
+    used = np.flatnonzero(column.any(axis=0)).tolist() or [0]
+    some = column[:, used[0] : used[-1] + 1].copy()
+    return Product(1.0, Product.ones(len(column)), some, used[0])
 
 
-def _gyration(vehicle: Vehicle, rate: Array) -> Array:
-    """Return the derivative of the angular acceleration (n, 3, 3) by the angular velocity."""
+def _twist(vehicle: Vehicle) -> Array:
+    """Return the derivative (3, 3, 3) of the angular acceleration by the angular velocity, for a
+    velocity of one about each axis.
+    """
     # -u x J v over the inertia J, of all pairs of axes u and v
     twist = -np.cross(np.eye(3)[:, None], vehicle.inertia) @ np.linalg.inv(vehicle.inertia)
-    both: Array = (twist + twist.swapaxes(0, 1)).swapaxes(1, 2)
-    return (rate @ both.reshape(3, 9)).reshape(-1, 3, 3)
-
-
-def _read_poses(logs: Logs, at: int, vehicle: Vehicle, finer: Iterator[Array]) -> list[Poses]:
-    """Return the unbroken pieces of a log as measured, with the vehicle's sensing effects undone;
-    ``finer`` is added to the rotor speeds (n, 4) of each.
-
-    For late or early poses, rotor speeds are moved instead: moved poses would lose noise.
-    """
-    late = [e for e in sensing_of(vehicle) if is_delay(e.name)]
-    offset = sum(sum(e.coefficients.values()) for e in late)
-    undone = undo_log_sensing(
-        logs[at], replace(vehicle, effects=tuple(e for e in vehicle.effects if e not in late))
-    )
-    out = []
-    for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
-        q = Rotation.from_matrix(raw.rotation).as_quat(scalar_first=True)
-        raw = replace(raw, rotor_speeds=raw.rotor_speeds + next(finer, 0.0))
-        raw = with_time_offsets(raw, {ROTOR_TIME_OFFSET[1]: offset})
-        out.append(
-            Poses(
-                raw.t,
-                raw.period,
-                raw.position,
-                continuous(q),
-                raw.rotor_speeds,
-                np.zeros(len(raw.t)) if raw.voltage is None else raw.voltage,
-                smooth.velocity[0],
-                smooth.angular_velocity[0],
-                at,
-            )
-        )
-    return out
-
-
-def _signals(piece: Poses, track: Track) -> Signals:
-    """Return the flight as the filter sees it between samples, for the effect models."""
-    speeds = piece.rotor_speeds
-    between = 0.5 * (speeds + np.vstack([speeds[1:], speeds[-1:]]))
-    return Signals(
-        piece.t,
-        piece.period,
-        track.position,
-        track.rotation,
-        track.velocity,
-        track.acceleration[:, :3],
-        track.angular_velocity,
-        track.acceleration[:, 3:],
-        between,
-        piece.voltage if piece.voltage.any() else None,
-    )
+    return np.swapaxes(twist + twist.swapaxes(0, 1), 1, 2)

@@ -5,8 +5,8 @@ signals of the axis' states than the pose.
 """
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import astuple, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,21 +33,24 @@ class NoiseSearch:
     """A search.
 
     Attributes:
-        see: returns the innovations (n, 6) of a flight's parts through a filter with gains (3, e)
-            of each pair. With slopes (6, 7, m) of the filter's gains and ``keep`` by a noise, also
-            the whitened changes (n, 6, 3 e + m + 1) of the predictions, behind the changes by the
-            gains of each pair in turn; the innovations last.
+        see: returns the innovations (n, 6) of the flights through a filter with gains (3, e) of
+            each pair.
+        products: returns sums of products (c + 1, c + 1) for the filter of the last ``see``. The
+            columns are whitened changes of the predictions: by the 3 e gains of each pair in turn,
+            and by slopes (6, 7, m) of the filter's gains and ``keep``. The innovations stand last.
         held: (e,) standard deviations of the gains' prior. Without it nearly predicted rotor speeds
             would have unlimited gains.
         period: s.
         gravity: m/s2.
     """
 
-    see: Callable[[SteadyFilter, Array, Array | None], Iterable[ArrayPair]]
+    see: Callable[[SteadyFilter, Array], Array]
+    products: Callable[[Array], Array]
     held: Array
     period: float
     gravity: float
 
+    @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
     def likeliest(self, near: PoseNoise, gains: Array) -> tuple[PoseNoise, Array]:
         """Return the noise and the gains (3, e) at maximum likelihood, by damped steps.
 
@@ -56,27 +59,27 @@ class NoiseSearch:
             gains: (3, e) at its start.
         """
         x = _free(near)
-        low = x - 16.0
-        high = x + 16.0
-        low[:, 0] = math.log(LEAST_POSE)
-        low[:, 2:] = (math.log(TIMES[0]), 0.0)
-        high[:, 2:] = (math.log(TIMES[1]), 1e4)
+        ends = np.array([x - 16.0, x + 16.0])
+        ends[0, :, 0] = math.log(LEAST_POSE)
+        ends[:, :, 2:] = np.transpose([np.log(TIMES), [0.0, 1e4]])[:, None]
         none = np.full(gains.size, np.inf)
-        low = np.append(-none, low)
-        high = np.append(none, high)
+        low, high = np.hstack([[-none, none], ends.reshape(2, -1)])
         at = np.clip(np.append(gains, x), low, high)
-        height, normal, right = self._slopes(at)
+        height, seen = self._height(at)
+        normal, right = self._slopes(at, seen)
         damping = DAMPING
         for _ in range(STEPS):
             damped = normal + np.diag(damping * np.diagonal(normal) + 1e-9)
             step = bounded_mode(damped, right, low - at, high - at)
             if 0.5 * right @ step < TOLERANCE:
                 break
-            better = self._height(at + step) < height
+            there, seen = self._height(at + step)
+            better = there < height
             damping *= 0.2 if better else 8.0
             if better:
                 at = at + step
-                height, normal, right = self._slopes(at)
+                height = there
+                normal, right = self._slopes(at, seen)
         return _noise(at), self._gains(at)
 
     def _gains(self, at: Array) -> Array:
@@ -85,55 +88,38 @@ class NoiseSearch:
     def _filter(self, at: Array) -> SteadyFilter:
         return steady_filter(_noise(at), self.period, self.gravity)
 
-    def _height(self, at: Array) -> float:
-        """Return minus the logarithm of the likelihood and the prior, up to a constant."""
+    def _height(self, at: Array) -> tuple[float, Array]:
+        """Return minus the logarithm of the likelihood and the prior, up to a constant, and the
+        innovations (n, 6).
+        """
         steady = self._filter(at)
-        e = np.concatenate([e for e, _ in self.see(steady, self._gains(at), None)])
-        return self._deviance(e.T @ e, steady.covariance, at, len(e))
-
-    def _deviance(self, products: Array, covariance: Array, at: Array, n: int) -> float:
-        square = np.trace(np.linalg.solve(covariance, products))
+        seen = self.see(steady, self._gains(at))
+        square = np.trace(np.linalg.solve(steady.covariance, seen.T @ seen))
         square += np.square(self._gains(at) / self.held).sum()
-        return float(0.5 * (square + n * np.linalg.slogdet(covariance)[1]))
+        size = np.linalg.slogdet(steady.covariance)[1]
+        return float(0.5 * (square + len(seen) * size)), seen
 
-    @np.errstate(over="ignore", invalid="ignore")  # a filter that diverges has no mode: an error
-    def _slopes(self, at: Array) -> tuple[float, Array, Array]:
-        """Return the height, Fisher's information (c, c), and minus the height's gradient (c,)."""
+    def _slopes(self, at: Array, seen: Array) -> ArrayPair:
+        """Return Fisher's information (c, c), and minus the height's gradient (c,), at the
+        innovations ``seen`` last. The filter's derivatives are differences.
+        """
         steady = self._filter(at)
-        slopes, change = self._filter_slopes(at, steady)
-        size = len(at)
-        n = 0
-        whole = np.zeros((size + 1, size + 1))
-        own = np.zeros((6, 6))
-        for e, changes in self.see(steady, self._gains(at), slopes):
-            rows = changes.reshape(-1, size + 1)
-            whole += rows.T @ rows
-            own += e.T @ e
-            n += len(e)
+        there = self._filter(at + STEP * np.eye(len(at))[-SEARCHED:])
+        gain = (there.gain - steady.gain).reshape(SEARCHED, 6, 6)
+        slopes = np.concatenate([gain, (there.keep - steady.keep)[..., None]], axis=2) / STEP
+        change = (there.covariance - steady.covariance) / STEP  # (m, 6, 6)
+        whole = self.products(np.moveaxis(slopes, 0, -1))
         normal = whole[:-1, :-1]
         right = whole[:-1, -1]
-        held = np.tile(self.held, len(PAIRS))
-        count = len(held)
-        normal[range(count), range(count)] += held**-2
-        right[:count] -= at[:count] / held**2
+        prior = np.append(np.tile(self.held**-2, len(PAIRS)), np.zeros(SEARCHED))
+        normal += np.diag(prior)
+        right -= prior * at
         # by the innovations' covariance
         share = np.linalg.solve(steady.covariance, change)  # (m, 6, 6)
-        left = np.linalg.solve(steady.covariance, own) - n * np.eye(6)
-        normal[count:, count:] += 0.5 * n * np.einsum("mij,lji->ml", share, share)
-        right[count:] += 0.5 * np.einsum("mij,ji->m", share, left)
-        return self._deviance(own, steady.covariance, at, n), normal, right
-
-    def _filter_slopes(self, at: Array, here: SteadyFilter) -> ArrayPair:
-        """Return the change of the gains and of ``keep`` of the axes (6, 7, m), and of the
-        covariance of the innovations (m, 6, 6), by a unit of each number of the noise.
-        """
-        noise = [_noise(at + STEP * np.eye(len(at))[i - SEARCHED]) for i in range(SEARCHED)]
-        moved = PoseNoise(*(np.stack(each) for each in zip(*map(astuple, noise), strict=True)))
-        there = steady_filter(moved, self.period, self.gravity)
-        gain = (there.gain - here.gain).reshape(SEARCHED, 6, 6)
-        slopes = np.concatenate([gain, (there.keep - here.keep)[..., None]], axis=2) / STEP
-        change = (there.covariance - here.covariance) / STEP
-        return np.moveaxis(slopes, 0, -1), change
+        left = np.linalg.solve(steady.covariance, seen.T @ seen) - len(seen) * np.eye(6)
+        normal[-SEARCHED:, -SEARCHED:] += 0.5 * len(seen) * np.einsum("mij,lji->ml", share, share)
+        right[-SEARCHED:] += 0.5 * np.einsum("mij,ji->m", share, left)
+        return normal, right
 
 
 def _free(noise: PoseNoise) -> Array:
@@ -146,6 +132,9 @@ def _free(noise: PoseNoise) -> Array:
 
 
 def _noise(at: Array) -> PoseNoise:
-    x = at[-SEARCHED:].reshape(6, 4)
-    pose, disturbance, time = np.exp(x[:, :3]).T
-    return PoseNoise(pose, disturbance, time, disturbance * np.sqrt(x[:, 3]))
+    """Return the noise whose searched numbers are the last of each row (..., c)."""
+    pose, disturbance, time, share = np.moveaxis(
+        at[..., -SEARCHED:].reshape(*at.shape[:-1], 6, 4), -1, 0
+    )
+    white = np.exp(disturbance) * np.sqrt(share)
+    return PoseNoise(np.exp(pose), np.exp(disturbance), np.exp(time), white)

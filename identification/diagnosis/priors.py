@@ -12,11 +12,10 @@ import numpy as np
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
 from ..logs.table import Array, NamedNumbers, Pair, Values
+from .column import Column, Part
 from .evidence import Index, Marginal, SetEvidence, marginal, set_evidence
 from .regression import (
     CENTRAL,
-    START_PREFIX,
-    Column,
     Effects,
     RegressedFlights,
     coefficient,
@@ -29,37 +28,25 @@ Setting = dict[str, NamedNumbers]
 # columns of whole effects, with the coefficients of each
 Starts = Mapping[Column, Values]
 
-WHOLE_PREFIX = "whole "  # a coefficient of an effect acting at the centre, without a moment
-# columns without an effect: nuisances of any flight, and effects outside the library
-BETWEEN = "rotors between samples"
-MODEL_ERROR, GAIN, UNKNOWN, NUISANCE = "model error", "rotor gain of", "unknown ", "nuisance "
 
-
-@dataclass(frozen=True)
-class _PriorSettings:
-    """Beliefs before a flight is seen."""
-
-    expected: float = 1.0  # number of effects missing in a model
-    # typical sizes: every effect acts a little, and none up to this size is worth a name. The
-    # standard deviation of any coefficient of an unnamed effect
-    negligible: float = 0.03
-    any_size: float = 3.0  # typical sizes, of effects of any size; of others one
-    most_missing_mass: float = 0.9  # share of the declared mass a vehicle may lack
-    # times a column's own lag or delay: range in which the column stands for it
-    near_start: Pair = (0.5, 1.5)
-    # error of any model as a share of an axis' force or torque: of thrust along its axis and across
-    # it, and of the torques. Propellers and bearings are not stable to less
-    model_error: float = 0.003
-    # standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
-    # units of one period of such an acceleration. They leave the gains free: a loop that shows the
-    # tilt it sees has gains of some 3,000, 100 and 1
-    gains: tuple[float, float, float] = (1e4, 1e3, 1e2)
-    # second differences of the rotor speeds: standard deviation of their path between samples from
-    # a straight line
-    between_samples: float = 0.5
-
-
-PRIORS = _PriorSettings()
+EXPECTED = 1.0  # number of effects missing in a model, before a flight is seen
+# typical sizes: every effect acts a little, and none up to this size is worth a name. The standard
+# deviation of any coefficient of an unnamed effect
+NEGLIGIBLE = 0.03
+ANY_SIZE = 3.0  # typical sizes, of effects of any size; of others one
+MOST_MISSING_MASS = 0.9  # share of the declared mass a vehicle may lack
+# times a column's own lag or delay: range in which the column stands for it
+NEAR_START = (0.5, 1.5)
+# error of any model as a share of an axis' force or torque: of thrust along its axis and across it,
+# and of the torques. Propellers and bearings are not stable to less
+MODEL_ERROR = 0.003
+# standard deviations of the gains of pose, rate and disturbance on the rotors' innovations, in
+# units of one period of such an acceleration. They leave the gains free: a loop that shows the tilt
+# it sees has gains of some 3,000, 100 and 1
+GAINS = (1e4, 1e3, 1e2)
+# second differences of the rotor speeds: standard deviation of their path between samples from a
+# straight line
+BETWEEN_SAMPLES = 0.5
 # columns of one variant of an effect: all coefficients, or one of its starting points
 Variant = tuple[Column, ...]
 Variants = tuple[Variant, ...]  # of a set, one of each effect
@@ -98,7 +85,7 @@ class Base:
     @property
     def asked(self) -> list[Column]:
         """The columns of effects."""
-        return [c for c in self.columns if c[0]]
+        return [c for c in self.columns if c.effect]
 
     def marginal(
         self,
@@ -113,15 +100,27 @@ class Base:
         products = power * self.total
         products[-1, -1] += power * self.penalty
         at = self.at(asked)
-        return _Asked(self, asked, at, marginal(products, at, others, size))
+        return _Asked(
+            **vars(marginal(products, at, others, size)),
+            place={c: i for i, c in enumerate(asked)},
+            low=self.low[at],
+            high=self.high[at],
+        )
 
-    def mode(self, chosen: Index, power: float = 1.0) -> dict[Column, Pair]:
-        """Return the coefficients of some columns at the mode without all others, and their
-        standard deviations.
+    def mode(self, chosen: Index, power: float = 1.0, draw: bool = False) -> dict[Column, Pair]:
+        """Return the coefficients of some columns at the mode without all others, or a draw about
+        it, and their standard deviations.
+
+        A noise beside a mode would be too small: beside a draw it is true (G. Celeux and J.
+        Diebolt, Computational Statistics Quarterly 2 (1985), 73-82).
         """
         total = power * self.total
         normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
-        mode = np.linalg.solve(normal, total[chosen, -1]) * self.size[chosen]
+        right = total[chosen, -1]
+        if draw:
+            off = np.random.default_rng(0).standard_normal(len(chosen))
+            right += np.linalg.cholesky(normal) @ off
+        mode = np.linalg.solve(normal, right) * self.size[chosen]
         std = np.sqrt(np.diag(np.linalg.inv(normal))) * self.size[chosen]
         modes = zip(chosen, mode.tolist(), std.tolist(), strict=True)
         return {self.names[i]: (x, s) for i, x, s in modes}
@@ -152,8 +151,7 @@ class Base:
         there[free] = -power * inverse @ (self.total[free] @ there)
         kept = np.append(self.single, len(self.names))
         each = power * self.blocks[:, np.searchsorted(self.single, free)] @ there[kept] @ inverse
-        stated = np.diagonal(inverse)
-        largest = stated.copy()
+        largest = stated = np.diagonal(inverse)
         by_prior = np.square(inverse).sum(axis=0)
         by_flight = [each[self.flight == i].sum(axis=0) for i in np.unique(self.flight)]
         for sums in (each, by_flight):
@@ -166,31 +164,24 @@ class Base:
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Asked(Marginal):
     """The likelihood of some columns of a base, with all others integrated out."""
 
-    base: Base
-    columns: Sequence[Column]
-    at: Index  # in the base
-    quadratic: Marginal
+    place: dict[Column, int]  # the index of each column
+    low: Array
+    high: Array
 
-    @cached_property
-    def place(self) -> dict[Column, int]:
-        """The index of each column."""
-        return {c: i for i, c in enumerate(self.columns)}
+    def index(self, columns: Iterable[Column]) -> list[int]:
+        """Return the indices of some of the columns."""
+        return [self.place[c] for c in columns]
 
-    def evidence(self, index: Sequence[int]) -> SetEvidence:
-        """Return the evidence of some of the columns, by their index."""
-        return set_evidence(self.quadratic, index, self.base.low[self.at], self.base.high[self.at])
+    def evidence(self, columns: Iterable[Column]) -> SetEvidence:
+        """Return the evidence of some of the columns."""
+        return set_evidence(self, self.index(columns), self.low, self.high)
 
-    def explained(self, index: Sequence[int]) -> float:
-        """Return the deviance explained by some of the columns, by their index."""
-        return self.quadratic.explained(index, self.evidence(index).mode)
-
-
-def bare(column: Column) -> Column:
-    """Return a column's coefficient, without the mark of a whole effect."""
-    return column[0], column[1].removeprefix(WHOLE_PREFIX)
+    def gain(self, columns: Sequence[Column]) -> float:
+        """Return the deviance explained by some of the columns."""
+        return self.explained(self.index(columns), self.evidence(columns).mode)
 
 
 def variants_of(
@@ -200,7 +191,7 @@ def variants_of(
     by the vehicle's file.
     """
     own = tuple(flights.columns_of([effect]))
-    wholes = [(c,) for c in starts if c[0] == effect]
+    wholes = [(c,) for c in starts if c.effect == effect]
     if moves_time(effect) and effect not in setting:
         return [own, *wholes]
     if flights.is_nonlinear(effect) and effect not in setting:
@@ -208,54 +199,46 @@ def variants_of(
     if all(c.name != CENTRAL for c in get(effect).coefficients):
         return [own]
     if effect in setting:
-        return [(*own, (effect, CENTRAL))]
-    return [own, tuple((effect, WHOLE_PREFIX + name) for _, name in own)]
+        return [(*own, Column(effect, CENTRAL))]
+    return [own, tuple(c._replace(part=Part.AT_CENTRE) for c in own)]
 
 
 def prior_size(column: Column, flights: RegressedFlights) -> float:
     """Return the standard deviation of a column's coefficient before a flight is seen."""
-    effect, name = column
-    if not effect:
-        if name == BETWEEN:
-            return PRIORS.between_samples
-        if name.startswith(GAIN):
-            return PRIORS.gains[int(name[-1])]
-        is_error = name.startswith(MODEL_ERROR)
-        return PRIORS.model_error if is_error else typical_size(column, flights.vehicle)
-    if name.startswith(START_PREFIX) or name == CENTRAL:
-        return 1.0
-    factor = PRIORS.any_size if get(effect).any_size else 1.0
-    size = factor * typical_size(bare(column), flights.vehicle)
-    return math.hypot(size, flights.thrust_std) if get(effect).role == Role.THRUST else size
+    match column.part:
+        case Part.BETWEEN_SAMPLES:
+            return BETWEEN_SAMPLES
+        case Part.GAIN:
+            return GAINS[column.number]
+        case Part.MODEL_ERROR:
+            return MODEL_ERROR
+    size = typical_size(column, flights.vehicle)
+    if not column.effect or column.part == Part.START or column.coefficient == CENTRAL:
+        return size
+    effect = get(column.effect)
+    size *= ANY_SIZE if effect.any_size else 1.0
+    return math.hypot(size, flights.thrust_std) if effect.role == Role.THRUST else size
 
 
 def _bounds(column: Column, flights: RegressedFlights) -> Pair:
-    effect, name = column
-    if not effect:
+    if not column.effect:
         return -math.inf, math.inf
-    if name.startswith(START_PREFIX):
-        return PRIORS.near_start if moves_time(effect) else (0.0, math.inf)
-    c = coefficient(bare(column))
+    if column.part == Part.START:
+        return NEAR_START if moves_time(column.effect) else (0.0, math.inf)
+    c = coefficient(column)
     low = c.minimum
     high = min(c.maximum, c.plausible)
-    if get(effect).role == Role.MASS:
-        low = max(low, -PRIORS.most_missing_mass * unit_of_change(column, flights.vehicle))
-    own = declared(column, flights)
+    if get(column.effect).role == Role.MASS:
+        low = max(low, -MOST_MISSING_MASS * unit_of_change(column, flights.vehicle))
+    own = flights.value({}, column)
     return min(low - own, 0.0), max(high - own, 0.0)
-
-
-def declared(column: Column, flights: RegressedFlights) -> float:
-    """Return a column's coefficient by the vehicle's file, the zero of the likelihood's
-    coefficient; 0 if not stated.
-    """
-    return flights.value({}, bare(column))
 
 
 def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting: Setting) -> Array:
     """Return the coefficients (c,) of a setting, in standard deviations of their priors."""
     return np.array(
         [
-            (flights.value(setting, c) - declared(c, flights)) / prior_size(c, flights)
+            (flights.value(setting, c) - flights.value({}, c)) / prior_size(c, flights)
             for c in columns
         ]
     )
@@ -263,15 +246,14 @@ def from_declared(columns: Iterable[Column], flights: RegressedFlights, setting:
 
 def changed(column: Column, change: float, flights: RegressedFlights) -> float:
     """Return a column's coefficient by the vehicle's file, changed as far as its limits allow."""
-    limits = coefficient(bare(column))
-    return min(max(declared(column, flights) + change, limits.minimum), limits.maximum)
+    limits = coefficient(column)
+    return min(max(flights.value({}, column) + change, limits.minimum), limits.maximum)
 
 
 def in_prior_units(
     flights: RegressedFlights,
     names: Sequence[Column],
-    blocks: Array,
-    flight: Index,
+    blocks: Iterable[tuple[int, Array]],
     penalty: float,
     setting: Setting,
     starts: Starts,
@@ -282,41 +264,43 @@ def in_prior_units(
     Args:
         flights: the vehicle's flights.
         names: (c,) columns.
-        blocks: (blocks, c + 1, c + 1) sums of products, of columns and of the residual at the
-            setting (last), whitened. They are changed in place: ten minutes take 0.2 GB.
-        flight: (blocks,) index of the log of each block.
+        blocks: of each block of flight the index of its log, and (c + 1, c + 1) sums of products,
+            of columns and of the residual at the setting (last), whitened.
         penalty: twice the sum over samples of the logarithm of the standard deviations.
         setting: the setting of effects.
         starts: columns of whole effects.
     """
     size = np.array([prior_size(c, flights) for c in names])
-    # about zero: the residual without all effects of the setting
-    own = [*map(bare, names)]
-    back = np.append([flights.value(setting, c) - declared(c, flights) for c in own], 1.0)
-    whole = blocks @ back
-    blocks[:, :, -1] = blocks[:, -1, :] = whole
-    blocks[:, -1, -1] = whole @ back
     scale = np.append(size, 1.0)
-    blocks *= scale[:, None]
-    blocks *= scale
-    low, high = np.array([_bounds(c, flights) for c in names]).T / size
-    typical = np.array([typical_size(c, flights.vehicle) for c in own])
-    total = blocks.sum(axis=0)
-    single = np.flatnonzero([not name.startswith(UNKNOWN) for _, name in names])
+    # about zero: the residual without all effects of the setting
+    back = np.append([flights.value(setting, c) - flights.value({}, c) for c in names], 1.0)
+    single = np.flatnonzero([not c.is_unknown for c in names])
     held = np.append(single, len(names))
+    total = np.zeros((len(scale), len(scale)))
+    kept, flight = [], []
+    for log, products in blocks:
+        products[:, -1] = products[-1] = products @ back
+        products[-1, -1] = products[-1] @ back
+        products *= scale[:, None]
+        products *= scale
+        total += products
+        kept.append(products[np.ix_(held, held)])
+        flight.append(log)
+    low, high = np.array([_bounds(c, flights) for c in names]).T / size
+    typical = np.array([typical_size(c, flights.vehicle) for c in names])
     return Base(
         names,
         size,
         low,
         high,
         total + np.diag(1e-12 * np.diagonal(total)),
-        blocks[:, held[:, None], held],
-        flight,
+        np.array(kept),
+        np.array(flight),
         single,
         penalty,
         frozenset(k for k in setting if k),
-        single[[not names[i][0] for i in single.tolist()]],
+        single[[not names[i].effect for i in single.tolist()]],
         typical / size,
-        [c for c in names if c[1].startswith(UNKNOWN)],
+        [c for c in names if c.is_unknown],
         starts,
     )

@@ -12,20 +12,20 @@ a fitted one.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
 from ...dynamics.effects import get
-from ..findings import Disturbance, Ranking
-from ..logs.table import Array, Names, Pair, Values
+from ..findings import LEAST_RIVAL, Disturbance, Ranking
+from ..logs.table import Names, Pair, Values
 from .climbing import Height, linearised, mode
+from .column import Column, Part
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts, prior_size
 from .regression import (
-    START_PREFIX,
-    Column,
     Effects,
     RegressedFlights,
     moves_time,
@@ -39,9 +39,6 @@ from .starting_points import starting_points
 Report = Callable[[str], None]  # takes a line of progress
 # typical sizes of the trials of a lag or a delay as a whole: their columns change with them
 TIME_STARTS = (0.3, 0.6, 1.2)
-# share of the likeliest set's probability from which flights do not tell another effect from one of
-# its own: a likelihood of 20 to 1
-LEAST_RIVAL = 0.05
 ROUNDS = 6  # of fitting the noise beside the best set
 # standard deviations of its prior: largest step of a coefficient in the last of these rounds
 CLOSE = 0.1
@@ -49,27 +46,26 @@ MOST_STARTS = 2  # likeliest starts of an effect with nonlinear coefficients, fi
 
 
 @dataclass(frozen=True, eq=False)
-class _FittedPosterior:
+class FittedPosterior:
     """The posterior of flights, and the fit of the likeliest set."""
 
     posterior: Posterior
     ranking: Ranking
-    setting: Setting  # coefficients of the likeliest set's needed effects
-    std: Setting  # their standard deviations
+    needed: Setting  # coefficients of the likeliest set's needed effects
     gains: Mapping[str, Pair]  # as of ``Posterior.leave_out_needless``
     # of each channel, for a likelihood with a noise of the motion; none for a force balance
-    gusts: tuple[Disturbance, ...] = ()
+    gusts: tuple[Disturbance, ...]
     # biases and time offsets of the sensors, with their standard deviations
-    sensors: Mapping[str, Pair] = field(default_factory=dict)
+    sensors: Mapping[str, Pair]
     # for each effect of the set: effects hidden in these logs that do as well in its place
-    behind: Mapping[str, Names] = field(default_factory=dict)
+    behind: Mapping[str, Names]
 
 
 def rank(
     flights: RegressedFlights,
     library: Sequence[str],
-    report: Report = lambda text: None,
-) -> _FittedPosterior:
+    report: Report,
+) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -79,22 +75,29 @@ def rank(
     """
 
     def height(x: Setting, near: Likelihood) -> Height:
-        return linearised(flights, Likelihood(flights, x, near, same_noise=True).base(x, {}), x)
+        here = near if x is near.setting else Likelihood(flights, x, near, same_noise=True)
+        return linearised(flights, here.base(x, {}), x)
 
     def fitted(setting: Setting, near: Likelihood) -> Likelihood:
         report(f"trying {', '.join(setting)}")
         tried[frozenset(setting)] = setting
+        steady = settled(setting, near)
+        if not any(get(e).sets_wind for e in setting):
+            return steady
+        return max(steady, settled(steady.setting, steady, gusty=True), key=alone)
+
+    def settled(setting: Setting, near: Likelihood, gusty: bool = False) -> Likelihood:
         # a slow disturbance does much of what a steady effect does: each is fitted beside the other
         for _ in range(ROUNDS):
             try:
-                near = Likelihood(flights, setting, near)
+                near = Likelihood(flights, setting, near, gusty=gusty)
             except np.linalg.LinAlgError:  # the filter diverges: halfway to the declared vehicle
                 setting = {e: {n: 0.5 * x for n, x in own.items()} for e, own in setting.items()}
                 continue
             begun = setting
             setting = mode(begun, partial(height, near=near))
             moved = (
-                abs(x - begun[e].get(n, 0.0)) / prior_size((e, n), flights)
+                abs(x - begun[e].get(n, 0.0)) / prior_size(Column(e, n), flights)
                 for e, own in setting.items()
                 for n, x in own.items()
             )
@@ -102,62 +105,59 @@ def rank(
                 break
         return Likelihood(flights, setting, near, same_noise=True)
 
-    def around(best: Likelihood) -> tuple[Starts, Posterior]:
-        starts = starts_of(flights, library, best.setting, {})
-        return starts, Posterior(flights, library, (loud, best.base(library, starts)))
+    def starts(setting: Setting) -> Starts:
+        return _starts_of(flights, library, setting, *([{}] if setting else []))
+
+    def around(best: Likelihood) -> Posterior:
+        return Posterior(flights, library, (loud, best.base(library, starts(best.setting))))
 
     def alone(best: Likelihood) -> float:
         bases = [best.base(best.setting, {})] * 2
         scores = Posterior(flights, [*best.setting], bases).scores
         return scores.get(frozenset(best.setting), -math.inf)
 
-    def first() -> tuple[Likelihood, Starts, Base]:
-        nothing = Likelihood(flights, {})
-        starts = starts_of(flights, library, {})
-        return nothing, starts, nothing.base(library, starts)
-
     # made anew at the end if no set is likeliest: its columns of ten minutes take 0.5 GB
-    best, starts, loud = first()
+    best = Likelihood(flights, {})
+    begun = starts({})
+    loud = best.base(library, begun)
     everything = loud.mode(np.append(loud.plain, loud.at(loud.asked)))
-    quiet = best.quieter({c: x for c, (x, _) in everything.items()}, starts)
-    posterior = Posterior(flights, library, (loud, quiet))
+    beside = {c: x for c, (x, _) in everything.items()}
+    posterior = Posterior(flights, library, (loud, best.quieter(beside, begun)))
     # settings as asked for: beside the end of a fit, a little of other effects moves the request
     tried: dict[Effects, Setting] = {frozenset(): {}}
     # the best effect first, alone: another set's columns are of the model with that effect
     if setting := posterior.best_setting(1):
         best = fitted(setting, best)
-        score = alone(best)
-        starts, posterior = around(best)
+        posterior = around(best)
         # a similar effect counts as a disturbance beside it: each is judged beside its own noise
-        rivals = {alone(x): x for x in (fitted(y, best) for y in posterior.rivals(setting))}
-        if max(rivals, default=score) > score:
-            best = rivals[max(rivals)]
-            starts, posterior = around(best)
-        del rivals  # each holds a tenth of a diagnosis' memory
+        # one after the other: each holds a tenth of a diagnosis' memory
+        each = (fitted(rival, best) for rival in posterior.rivals(setting))
+        best = max(chain([best], each), key=alone)
+        if best.setting.keys() != setting.keys():
+            posterior = around(best)
     for _ in range(ROUNDS):
         # the columns of the same set change with its coefficients, if these have moved far
         setting = posterior.best_setting()
         if not posterior.is_elsewhere(setting, tried):
             break
         best = fitted(setting, best)
-        starts, posterior = around(best)
+        posterior = around(best)
     # once more, with the dictionary's costly columns, beside the likeliest set
     setting = posterior.best_setting()
     if setting.keys() != best.setting.keys():
-        best = Likelihood(flights, setting, best) if setting else first()[0]
-        starts = starts_of(flights, library, setting, *([{}] if setting else []))
-    whole = best.base(library, starts, unknown=True)
+        near = best if setting else None
+        best = Likelihood(flights, setting, near, gusty=near is not None and near.gusty)
+    begun = starts(best.setting)
+    whole = best.base(library, begun, unknown=True)
     posterior = Posterior(flights, library, (loud, whole), posterior.tempering())
     column, size, gained = posterior.strangest()
     # among so many columns one explains as much by chance, and no noise beside it is likelier
     by_chance = 2.0 * math.log(len(whole.dictionary))
-    quieter = best.quieter({column: size}, starts) if gained > by_chance else None
+    quieter = best.quieter({column: size}, begun) if gained > by_chance else None
     ranking = posterior.ranking(quieter)
-    gains = posterior.leave_out_needless(ranking.probability)
-    late = {c[1]: x for c, x in posterior.nuisances().items() if c in flights.offsets}
-    return _FittedPosterior(
-        posterior, ranking, *posterior.likeliest_setting(), gains, best.gusts(), late
-    )
+    setting, gains = posterior.leave_out_needless(ranking.probability)
+    late = {c.coefficient: x for c, x in posterior.nuisances().items() if c in flights.offsets}
+    return FittedPosterior(posterior, ranking, setting, gains, best.gusts(), late, {})
 
 
 def rank_by_rows(
@@ -165,8 +165,8 @@ def rank_by_rows(
     library: Sequence[str],
     first: Setting,
     fixed: Setting,
-    report: Report = lambda text: None,
-) -> _FittedPosterior:
+    report: Report,
+) -> FittedPosterior:
     """Return the posterior over sets of effects of a library.
 
     Args:
@@ -182,7 +182,7 @@ def rank_by_rows(
     first = {e: x for e, x in first.items() if e in library}
     given = frozenset(first)
     first = likelihood.fitted(first)
-    starts = starts_of(flights, library, first)
+    starts = _starts_of(flights, library, first)
     fitted = {given: first}
     bases = {given: likelihood.base(first, starts)}
     idle = set()
@@ -191,7 +191,7 @@ def rank_by_rows(
         lags = {
             c: x
             for c, x in starts.items()
-            if not flights.is_nonlinear(c[0]) and c[0] not in setting
+            if not flights.is_nonlinear(c.effect) and c.effect not in setting
         }
         return likelihood.base(setting, lags, unknown=unknown)
 
@@ -214,7 +214,7 @@ def rank_by_rows(
         if not flights.is_nonlinear(effect) or effect in given:
             continue
         report(f"trying {effect}")
-        each = ({**first, effect: dict(x)} for c, x in starts.items() if c[0] == effect)
+        each = ({**first, effect: dict(x)} for c, x in starts.items() if c.effect == effect)
         if own := sorted(each, key=likelihood.objective):
             near = map(likelihood.fitted, own[:MOST_STARTS])
             add(min(near, key=likelihood.objective))
@@ -245,18 +245,17 @@ def rank_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     last = posterior()
-    ranking = last.ranking()
-    gains = last.leave_out_needless(ranking.probability)
-    setting, std = last.likeliest_setting()
+    ranking = last.ranking(None)
+    setting, gains = last.leave_out_needless(ranking.probability)
     setting = best if setting.keys() == best.keys() else likelihood.fitted(setting)
-    return _FittedPosterior(
+    return FittedPosterior(
         last,
         ranking,
         setting,
-        std,
         gains,
-        sensors=likelihood.sensors(setting),
-        behind=_behind(likelihood, setting),
+        (),
+        likelihood.sensors(setting),
+        _behind(likelihood, setting),
     )
 
 
@@ -273,14 +272,14 @@ def _behind(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
     m = base.marginal(base.asked, base.plain, likelihood.power)
 
     def explained(effects: set[str]) -> float:
-        return m.explained([i for c, i in m.place.items() if c[0] in effects])
+        return m.gain([c for c in m.place if c.effect in effects])
 
     # up to the deviance of a rival's likelihood
     whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
     return {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
 
 
-def starts_of(
+def _starts_of(
     flights: RegressedFlights, library: Sequence[str], setting: Setting, *others: Setting
 ) -> Starts:
     """Return columns of whole effects outside a setting, with the coefficients of each: lags and
@@ -288,19 +287,17 @@ def starts_of(
     of the setting, and of ``others``: an effect may act in the place of another.
     """
     out: dict[Column, Values] = {}
-    residuals: list[Array] = []
     beside = [*setting, *(e.name for e in flights.vehicle.effects)]
     for effect in (e for e in library if e not in setting):
         own = []
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
-            typical = typical_size((effect, name), flights.vehicle)
+            typical = typical_size(Column(effect, name), flights.vehicle)
             own = [{name: share * typical} for share in TIME_STARTS]
         elif flights.is_nonlinear(effect):
-            residuals = residuals or [flights.residual(x) for x in (setting, *others)]
             stated = flights.stated(effect)
-            for y in residuals:
-                starts = starting_points(effect, flights, y, stated, beside)
+            for x in (setting, *others):
+                starts = starting_points(effect, flights, flights.residual(x), stated, beside)
                 own += [{**start, **stated} for start in starts]
-        out |= {(effect, f"{START_PREFIX}{i}"): start for i, start in enumerate(own)}
+        out |= {Column(effect, "", Part.START, i): start for i, start in enumerate(own)}
     return out

@@ -9,9 +9,9 @@ columns share the low-pass.
 import math
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -21,20 +21,30 @@ from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.arrays import Index
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog, Logs, excerpt
-from ..logs.table import Array, ArrayPair, Mask, Pair, Rows, Values, finite_rows, median_step
+from ..logs.table import (
+    Array,
+    ArrayPair,
+    Mask,
+    NamedNumbers,
+    Pair,
+    Rows,
+    Values,
+    finite_rows,
+    median_step,
+)
 from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import LONGEST_GAP, Signals, log_signals
-from ..motion.smoothing import CUTOFFS, low_pass, mean_square, resampled
+from ..motion.smoothing import CUTOFFS, even_times, low_pass, mean_square, resampled
+from .column import Column, Part
 from .commanded_rotors import (
     UNSTATED_THRUST_STD,
     downsampled,
     in_flight,
     in_flight_by_thrust,
-    thrust_is_assumed,
 )
 from .log_offsets import (
     ATTITUDE_TIME_OFFSET,
@@ -50,7 +60,6 @@ from .log_offsets import (
     with_uneven_lag,
 )
 
-K = TypeVar("K")
 V = TypeVar("V")
 
 
@@ -65,7 +74,7 @@ LEAST_STEPS_OF_ROTOR_SPEED = 1.4
 BLOCK = 3.0  # s of flight held out, or left out in cross-validation, in one piece
 SHORT_BLOCK = 1.0  # s, the same of commanded flights of fewer than eight blocks
 BLOCKS_PER_HELD_OUT = 4  # one of so many blocks is held out
-MEMORY = 2**28  # bytes of cached pieces
+MEMORY = 2**26  # bytes of cached pieces
 # not known where rotor speeds come from commands: torque is left out, the thrust curve is a guess,
 # and commands do not tell small differences between rotors
 NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
@@ -78,11 +87,7 @@ LARGE_STEP = 0.5
 Setting = Mapping[str, Values]
 _Residual = Callable[[Setting], Array]  # of flights with a setting (rows, channels)
 Effects = frozenset[str]
-# an effect's coefficient
-Column = tuple[str, str]
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
-# a whole effect at coefficients of its own; the column is a multiple of it
-START_PREFIX = "start "
 
 
 def without(setting: Mapping[str, V], effect: str) -> dict[str, V]:
@@ -120,7 +125,7 @@ def is_nonlinear(effect: str) -> bool:
 
 def coefficient(column: Column) -> Coefficient:
     """Return the declaration of a column's coefficient."""
-    return next(c for c in get(column[0]).coefficients if c.name == column[1])
+    return next(c for c in get(column.effect).coefficients if c.name == column.coefficient)
 
 
 def unit_of_change(column: Column, vehicle: Vehicle) -> float:
@@ -134,32 +139,34 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the
     library's two.
     """
-    if not column[0]:
-        return TIMINGS[column].size if column in TIMINGS else 1.0
-    if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
+    if not column.effect:
+        return TIMINGS.get(column, Offset(1.0)).size
+    if column.part == Part.START or column.coefficient == CENTRAL:
         return 1.0
     c = coefficient(column)
     if not all(c.typical):
-        same_unit = (o for o in get(column[0]).coefficients if o.unit == c.unit)
-        return max(abs(o.typical[0]) for o in same_unit) or 1.0
+        every = get(column.effect).coefficients
+        return max(abs(o.typical[0]) for o in every if o.unit == c.unit) or 1.0
     large, small = np.abs(c.typical)
     share = min(max(math.log(vehicle.mass / 0.03) / math.log(0.45 / 0.03), 0.0), 1.3)
     return float(small * (large / small) ** share)
 
 
-@dataclass(frozen=True, eq=False)
-class _FlightPiece:
+def typical_sizes(effect: str, vehicle: Vehicle) -> NamedNumbers:
+    """Return the typical sizes of an effect's coefficients, by name."""
+    columns = [Column(effect, c.name) for c in get(effect).coefficients]
+    return {c.coefficient: typical_size(c, vehicle) for c in columns}
+
+
+class _FlightPiece(NamedTuple):
     """One unbroken piece of a flight, with its rows."""
 
     log: int  # index of the log
     signals: Signals
     rows: Index  # samples used as rows
+    smooth: Callable[[Array], Array]  # samples (n, ...) to rows, through the residual's low-pass
     needed: Array  # (rows, 6) wrench of the motion, N and Nm, by the declared mass and inertia
     felt: Array | None  # (rows, 3) as of ``RegressedFlights.felt``, with an accelerometer
-
-    def smooth(self, x: Array) -> Array:
-        """Return samples (n, ...) at the rows, through the residual's low-pass."""
-        return _smooth(x, self.signals)[self.rows]
 
 
 class RegressedFlights:
@@ -173,7 +180,7 @@ class RegressedFlights:
 
     def __init__(self, logs: Logs, vehicle: Vehicle, test: Logs = ()) -> None:
         self.vehicle = vehicle
-        self._declared: Setting = {e.name: e.coefficients for e in vehicle.effects}
+        self._declared = {e.name: e.coefficients for e in vehicle.effects}
         self.logs = (*logs, *test)
         # without a pose, or with a slow one, the motion is read from an IMU
         self.inertial = any(map(reads_imu, self.logs))
@@ -185,27 +192,27 @@ class RegressedFlights:
                 )
         # torque is left out, and only the time in the air counts
         self.commanded = any(log.commanded for log in self.logs)
-        if self.inertial:  # no log shows a height, and a ground that carries is no effect
-            self.logs = tuple(in_flight_by_thrust(log, vehicle) for log in self.logs)
-        elif self.commanded:
-            self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
-        # relative standard deviation of the assumed thrust
-        self.thrust_std = UNSTATED_THRUST_STD if thrust_is_assumed(self.logs, vehicle) else 0.0
+        posed = not (self.commanded or self.inertial)
+        if not posed:  # an IMU shows no height, and a ground that carries is no effect
+            flown_part = in_flight_by_thrust if self.inertial else in_flight
+            self.logs = tuple(flown_part(log, vehicle) for log in self.logs)
+        # relative standard deviation of a command's thrust, which no curve of the vehicle states
+        assumed = self.commanded and vehicle.motor_curve is None
+        self.thrust_std = UNSTATED_THRUST_STD if assumed else 0.0
         # a filtered pose hides its own noise, and the filter's delay and bandwidth take more away
-        self.filtered = not (self.commanded or self.inertial) and any(
-            pose_was_filtered(log) for log in self.logs
-        )
+        self.filtered = posed and any(map(pose_was_filtered, self.logs))
+        periods = [log.period for log in self.logs]
         # poses and rotor speeds as measured, for one filter of all logs
-        self.has_raw_poses = not (self.commanded or self.inertial or self.filtered) and np.allclose(
-            [log.period for log in self.logs], self.logs[0].period, rtol=0.01
+        self.has_raw_poses = (
+            posed and not self.filtered and np.allclose(periods, periods[0], rtol=0.01)
         )
-        seconds = sum(log.t[-1] - log.t[0] for log in self.logs)
+        seconds = sum(np.ptp(log.t) for log in self.logs)
         self.logs = tuple(excerpt(log, seconds) for log in self.logs)
         self._fit_logs = len(logs)
         self._drift: np.random.Generator | None = None  # of a copy with other errors of the fusion
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
-        self._forget()
         self._first: list[_FlightPiece] = []
+        self._forget()
         self._lay_rows()
         # errors of accelerometers from which the motion is read, and time offsets of all signals
         self.biases = self._biases()
@@ -213,11 +220,12 @@ class RegressedFlights:
         # in a log read by its IMU: effects without any trace, and effects a pose would show
         self.without_trace = self.needs_pose = Effects()
         # the noise is added to the logs once more; the change is the effect of noise
-        noisy = self._noisier()
-        self.visible_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
+        noisy = self._of(noisy_logs(self.logs, vehicle))
+        self.visible_noise = noisy.residual({}) - self.residual({})  # (rows, 6), as logged
         # identifiability depends on all noise, visible or hidden
-        noisy = self._noisier(hidden=True) if self.filtered else noisy
-        self.sensor_noise: Array = noisy.residual({}) - self.residual({})  # (rows, 6)
+        if self.filtered:
+            noisy = self._of(noisy_logs(self.logs, vehicle, hidden=True))
+        self.sensor_noise = noisy.residual({}) - self.residual({})  # (rows, 6)
         # effects whose columns are sensor noise to a large part
         self.not_identifiable = self._lost_in_noise(noisy)
         rotors = self.rotor_wrench({})
@@ -227,21 +235,21 @@ class RegressedFlights:
 
     def _forget(self) -> None:
         """Clear all caches."""
-        self._pieces: dict[tuple[object, ...], list[_FlightPiece]] = {}
-        self._residuals: dict[tuple[object, ...], Array] = {}
+        self._pieces: dict[str, list[_FlightPiece]] = {}
+        self._residuals: dict[str, Array] = {}
+        # wrenches of starting points at some samples, by effect and coefficients
+        self.started: dict[str, Array] = {}
 
-    def _noisier(self, hidden: bool = False) -> "RegressedFlights":
-        """Return the same rows of louder logs; ``hidden``: with the noise hidden by a filter."""
+    def _of(self, logs: Iterable[FlightLog]) -> "RegressedFlights":
+        """Return the same rows of other logs."""
         out = copy(self)
         out._forget()
-        out.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden))
+        out.logs = tuple(logs)
         return out
 
     def of_the_fit(self) -> "RegressedFlights":
         """Return the flights without the test logs."""
-        out = copy(self)
-        out._forget()
-        out.logs = self.logs[: self._fit_logs]
+        out = self._of(self.logs[: self._fit_logs])
         out._first = [piece for piece in self._first if piece.log < self._fit_logs]
         kept = self.log < self._fit_logs
         for name in ("log", "block", "fit_rows", "start", "t", "visible_noise", "sensor_noise"):
@@ -252,20 +260,20 @@ class RegressedFlights:
         """Cut the flights into pieces, and choose the samples for rows."""
         self._first = pieces = self.pieces({})
         times = [piece.signals.t[piece.rows] for piece in pieces]
-        self.t: Array = np.concatenate(times)  # (rows,) s
-        self.start: Mask = np.concatenate([t == t[0] for t in times])  # first row of a piece
+        self.t = np.concatenate(times)  # (rows,) s
+        self.start = np.concatenate([t == t[0] for t in times])  # first row of a piece
         # (rows,) index of the log
-        self.log: Index = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
+        self.log = np.repeat([piece.log for piece in pieces], [len(t) for t in times])
         self.period = median_step(self.t)  # s, from row to row
         # s of unbroken flight
-        self.seconds = sum(float(x.signals.t[-1] - x.signals.t[0]) for x in pieces)
+        self.seconds = float(sum(np.ptp(piece.signals.t) for piece in pieces))
         short = self.commanded and self.seconds < 8 * BLOCK
-        self.block: Index = blocks(self.t, self.start, SHORT_BLOCK if short else BLOCK)  # (rows,)
-        self.fit_rows: Mask  # (rows,)
-        if len(self.logs) > self._fit_logs:
-            self.fit_rows = self.log < self._fit_logs
-        else:
-            self.fit_rows = self.block % BLOCKS_PER_HELD_OUT != held_out(self.block)
+        self.block = blocks(self.t, self.start, SHORT_BLOCK if short else BLOCK)  # (rows,)
+        self.fit_rows: Mask = (  # (rows,)
+            self.log < self._fit_logs
+            if len(self.logs) > self._fit_logs
+            else self.block % BLOCKS_PER_HELD_OUT != held_out(self.block)
+        )
         if self.fit_rows.all() and self.block[-1] > 0:  # fewer than four blocks
             self.fit_rows = self.block < self.block[-1]
 
@@ -275,17 +283,14 @@ class RegressedFlights:
         A fit of such an effect would come out too small, or remove noise of the pose to explain
         noise of the residual. With a causal filter, the effect would mend the filter's gains.
         """
-        linear = [e for e in names() if not is_nonlinear(e)]
-        lost, _ = self._noisy_columns(noisy, linear)
+        lost, _ = self._noisy_columns(noisy, [e for e in names() if not is_nonlinear(e)])
         unsaid: Effects = needing(*NOT_COMMANDED) if self.commanded else frozenset()
         if self.inertial:
             # a column also depends on states the IMU hardly shows
             quietly = lost  # lost in sensor noise alone
             noisy._forget()
             noisy._drift = np.random.default_rng(1)
-            lost, self.without_trace = self._noisy_columns(
-                noisy, [*linear, *filter(is_nonlinear, names())]
-            )
+            lost, self.without_trace = self._noisy_columns(noisy, names())
             lacking = unsaid  # effects a pose would not show either
             if all(log.voltage is None for log in self.logs):
                 lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
@@ -324,12 +329,12 @@ class RegressedFlights:
         """Return the columns of an effect (rows, 6) at typical coefficients, one by one, or as one
         where the force is not linear in them.
         """
-        own = [(effect, c.name) for c in get(effect).coefficients]
+        typical = typical_sizes(effect, self.vehicle)
         if is_nonlinear(effect):
-            setting = {effect: {c[1]: typical_size(c, self.vehicle) for c in own}}
-            return [self.residual({}) - self.residual(setting)]
-        columns = self.columns({}, (c for c in own if c[1] != CENTRAL), self.residual, LARGE_STEP)
-        return [typical_size(c, self.vehicle) * x for c, x in columns.items()]
+            return [self.residual({}) - self.residual({effect: typical})]
+        own = [Column(effect, name) for name in typical if name != CENTRAL]
+        columns = self.columns({}, own, self.residual, LARGE_STEP)
+        return [typical[c.coefficient] * x for c, x in columns.items()]
 
     def _in_own_axes(self, x: Array, noisy: "RegressedFlights") -> Array:
         """Return a column (rows, 6) of a copy with other errors of the fusion, its force turned
@@ -367,7 +372,7 @@ class RegressedFlights:
     @cached_property
     def speed(self) -> float:
         """RMS of the speed, m/s."""
-        return math.sqrt(np.mean(np.sum(np.square(self.at_rows("velocity")), axis=1)))
+        return math.sqrt(mean_square(self.at_rows("velocity")).sum())
 
     @property
     def inertias(self) -> Array:
@@ -383,10 +388,9 @@ class RegressedFlights:
     def pieces(self, setting: Setting) -> list[_FlightPiece]:
         """Return the pieces, with the vehicle's sensing effects undone in the logs."""
         vehicle = self.amended(setting)
-        sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in sensing_of(vehicle))
         size = 400 * max(sum(len(p.signals.t) for p in self._first), 1)  # bytes
-        most = min(max(MEMORY // size, 1), 40)
-        return _kept(self._pieces, sensing, lambda: self._cut(vehicle), most)
+        sensing = str(sensing_of(vehicle))
+        return _kept(self._pieces, sensing, lambda: self._cut(vehicle), max(MEMORY // size, 1))
 
     def _cut(self, vehicle: Vehicle) -> list[_FlightPiece]:
         cut = [
@@ -404,23 +408,22 @@ class RegressedFlights:
         pieces = []
         for first in self._first:
             wanted = first.signals.t[first.rows]
-            s = next(
-                s
-                for i, s in cut
-                if i == first.log and s.t[0] <= wanted[0] and s.t[-1] >= wanted[-1]
-            )
+            s = next(s for i, s in cut if i == first.log and s.t[0] <= wanted[0] <= s.t[-1])
             rows = np.rint((wanted - s.t[0]) / s.period).astype(np.int64)
             pieces.append(self._piece(first.log, s, rows))
         return pieces
 
     def _piece(self, log: int, signals: Signals, rows: Index) -> _FlightPiece:
-        needed = _smooth(needed_wrench(signals, self.vehicle), signals)[rows]
+        def smooth(x: Array) -> Array:
+            return low_pass(x, CUTOFFS.residual_hz, signals.period)[rows]
+
+        needed = smooth(needed_wrench(signals, self.vehicle))
         felt = None
         if not self.inertial and (read := _accelerometer(self.logs[log])):
             at = resampled(signals.t, *read)
             force = self.vehicle.mass * np.einsum("nij,nj->ni", signals.rotation, at)
-            felt = _smooth(force, signals)[rows] - needed[:, :3]
-        return _FlightPiece(log, signals, rows, needed, felt)
+            felt = smooth(force) - needed[:, :3]
+        return _FlightPiece(log, signals, rows, smooth, needed, felt)
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
         # no effect of the library changes an IMU's readings: each log is fused once
@@ -434,7 +437,7 @@ class RegressedFlights:
         """Return the possible time offsets of the signals: none where commands stand for rotors."""
         if self.commanded:
             return {}
-        others = (ROTOR_SPREAD,) if self.inertial else (ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
+        others = ATTITUDE_TIME_OFFSET, ROTOR_SPREAD if self.inertial else VELOCITY_TIME_OFFSET
         rotors = BEHIND_A_FILTER if self.filtered else TIMINGS[ROTOR_TIME_OFFSET]
         return {ROTOR_TIME_OFFSET: rotors, **{c: TIMINGS[c] for c in others}}
 
@@ -445,7 +448,7 @@ class RegressedFlights:
             if isinstance(s := piece.signals, InertialSignals) and piece.log < self._fit_logs:
                 for axis, std in enumerate(s.bias_std.tolist()):
                     c = bias_column(piece.log, axis)
-                    out[c] = Offset(max(std, out[c].size if c in out else 0.0))
+                    out[c] = Offset(max(std, out.get(c, Offset(0.0)).size))
         return out
 
     def amended(self, setting: Setting) -> Vehicle:
@@ -456,11 +459,11 @@ class RegressedFlights:
 
     def coefficients(self, setting: Setting, effect: str) -> Values:
         """Return an effect's coefficients at a setting; outside the setting, the vehicle's own."""
-        return setting[effect] if effect in setting else self._declared.get(effect, {})
+        return {**self._declared, **setting}.get(effect, {})
 
     def value(self, setting: Setting, column: Column) -> float:
         """Return one of these coefficients; 0 if nothing states it."""
-        return self.coefficients(setting, column[0]).get(column[1], 0.0)
+        return self.coefficients(setting, column.effect).get(column.coefficient, 0.0)
 
     def stated(self, effect: str) -> Values:
         """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
@@ -474,7 +477,7 @@ class RegressedFlights:
         ``central``, without a force of its own.
         """
         return [
-            (e, c.name)
+            Column(e, c.name)
             for e in effects
             for c in get(e).coefficients
             if c.name != CENTRAL and c.name not in self.stated(e)
@@ -492,7 +495,6 @@ class RegressedFlights:
         It is an acceleration by the *declared* mass and inertia. A force would vanish with the
         mass, noise and all. Nor does a coefficient multiply the noise of differentiation.
         """
-        key = tuple((name, *sorted(values.items())) for name, values in setting.items())
 
         def made() -> Array:
             out = np.concatenate(
@@ -507,22 +509,25 @@ class RegressedFlights:
             return out
 
         # a fit asks several times for the residual at its setting
-        return _kept(self._residuals, key, made, 16)
+        return _kept(self._residuals, str(setting), made, 16)
 
-    def acting(self, signals: Signals, setting: Setting, log: int = 0) -> Array:
+    def acting(
+        self, signals: Signals, setting: Setting, log: int = 0, body: Vehicle | None = None
+    ) -> Array:
         """Return these effects' force and torque (n, 6) on the vehicle along signals of a log.
 
         Force is in the world frame, without the weight; both are by the declared mass and inertia,
-        like the residual.
+        like the residual, or by a body's.
         """
+        body = body or self.vehicle
         vehicle = self.amended(setting)
         offsets = setting.get("", {})
         s = with_time_offsets(signals, offsets)
-        s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
-        wrench, _ = acting_wrench(s, vehicle, self.vehicle)
-        off = np.array([offsets.get(bias_column(log, i)[1], 0.0) for i in range(3)])
+        s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY.coefficient, 0.0))
+        wrench, _ = acting_wrench(s, vehicle, body)
+        off = np.array([offsets.get(bias_column(log, i).coefficient, 0.0) for i in range(3)])
         if off.any():
-            wrench[:, :3] += self.vehicle.mass * np.einsum("nij,j->ni", s.rotation, off)
+            wrench[:, :3] += body.mass * np.einsum("nij,j->ni", s.rotation, off)
         return wrench
 
     def felt(self, setting: Setting) -> Array | None:
@@ -538,10 +543,11 @@ class RegressedFlights:
         """
         value = self.value(setting, column)
         delta = size * typical_size(column, self.vehicle)
-        if column[0]:
+        if column.effect:
             c = coefficient(column)
             delta = math.copysign(delta, c.typical[0])
-            delta = delta if c.minimum <= value + delta <= c.maximum else -delta
+            if not c.minimum <= value + delta <= c.maximum:
+                delta = -delta
         return value, delta
 
     def columns(
@@ -559,24 +565,23 @@ class RegressedFlights:
         return {column: self._slope(setting, column, residual, step) for column in wanted}
 
     def _slope(self, setting: Setting, column: Column, residual: _Residual, step: float) -> Array:
-        effect, name = column
+        effect = column.effect
         own = self.coefficients(setting, effect)
         value, delta = self.step(setting, column, step)
 
         def at(moved: float) -> Array:
-            return residual({**setting, effect: {**own, name: moved}})
+            return residual({**setting, effect: {**own, column.coefficient: moved}})
 
         # moving signals in time moves their noise too, and a one-sided step would seem to reduce
         # the noise: the difference is two-sided
         if effect and moves_time(effect) and abs(value) > abs(delta):
             c = coefficient(column)
-            far = abs(delta)
-            if c.minimum <= value - far and value + far <= c.maximum:
+            if c.minimum <= value - delta <= c.maximum:
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
         return (residual(setting) - at(value + delta)) / delta
 
 
-def _kept(memory: dict[K, V], key: K, make: Callable[[], V], most: int) -> V:
+def _kept(memory: dict[str, V], key: str, make: Callable[[], V], most: int) -> V:
     """Return the cached value of a key, or make it; beyond ``most`` values the one unused for
     longest goes.
     """
@@ -596,15 +601,11 @@ def _accelerometer(log: FlightLog) -> ArrayPair | None:
     read = finite_rows(log.accelerometer)
     times = log.t[read]
     ends = np.concatenate([log.t[:1], times, log.t[-1:]])
-    if not len(times) or np.diff(ends).max() >= LONGEST_GAP:
+    if np.diff(ends).max() >= LONGEST_GAP:
         return None
     period = median_step(times)
-    even = np.arange(times[0], times[-1], period)
+    even = even_times(times, period)
     return even, low_pass(resampled(even, times, log.accelerometer[read]), CUTOFFS.pose_hz, period)
-
-
-def _smooth(x: Array, signals: Signals) -> Array:
-    return low_pass(x, CUTOFFS.residual_hz, signals.period)
 
 
 def blocks(t: Array, begins: Mask, seconds: float) -> Index:
@@ -622,7 +623,7 @@ def held_out(number: Index) -> Index:
     """
     golden = 0.5 * (5.0**0.5 - 1.0)
     turn = (0.75 + golden * (number // BLOCKS_PER_HELD_OUT)) % 1.0
-    return np.asarray(BLOCKS_PER_HELD_OUT * turn, dtype=np.int64)
+    return np.asarray(BLOCKS_PER_HELD_OUT * turn, np.int64)
 
 
 def _rows(signals: Signals) -> Index:

@@ -8,7 +8,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Disturbance, TransientDisturbance
 from ..logs.table import Array, Pair
-from ..motion.smoothing import CUTOFFS, mean_square
+from ..motion.smoothing import CUTOFFS
 from .discrepancy import weight_and_torque
 from .regression import RegressedFlights, Setting
 
@@ -25,7 +25,7 @@ MARGIN = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Balance:
+class Balance:
     """The residual of flights (rows, 6), by the declared vehicle and by the amended one."""
 
     before: Array
@@ -37,30 +37,24 @@ class _Balance:
     better: bool  # whether the mean square of force and torque on held-out blocks falls
 
 
-def balance(flights: RegressedFlights, setting: Setting) -> _Balance:
+def balance(flights: RegressedFlights, setting: Setting) -> Balance:
     """Return the residual with a setting of effects. A sensor's bias is no error of the model: the
     residual before is without it, too.
     """
-    sensors = {k: x for k, x in setting.get("", {}).items() if ("", k) in flights.biases}
-    before = flights.residual({"": sensors} if sensors else {})
+    biases = {c.coefficient for c in flights.biases}
+    sensors = {k: x for k, x in setting.get("", {}).items() if k in biases}
+    before = flights.residual({"": sensors})
     after = flights.residual(setting)
     held_out = ~flights.fit_rows
     floor = _rms(flights.visible_noise)
     error = _rms(after[held_out])
     # an IMU's own noise, and the rest of a filtered pose's noise, are below a countable disturbance
-    quiet = CALM * weight_and_torque(flights.vehicle)[[0, 3]]
-    least = np.hypot(floor, quiet) if flights.inertial or flights.filtered else np.array(floor)
-    noisy = bool(np.any(np.array(error) > MOST_FLOOR_RATIO * least))
-    new, old = (mean_square(x[held_out]) for x in (after, before))
-    return _Balance(
-        before,
-        after,
-        floor,
-        _rms(before[held_out]),
-        error,
-        noisy,
-        bool(np.mean(new / (old + 1e-30)) < 1.0),
-    )
+    calm = CALM if flights.inertial or flights.filtered else 0.0
+    least = np.hypot(floor, calm * weight_and_torque(flights.vehicle)[[0, 3]])
+    noisy = bool(np.any(error > MOST_FLOOR_RATIO * least))
+    old = _rms(before[held_out])
+    better = bool(np.square(error / np.maximum(old, 1e-15)).mean() < 1.0)
+    return Balance(before, after, floor, old, error, noisy, better)
 
 
 def is_beyond_calm(disturbances: Sequence[Disturbance], vehicle: Vehicle) -> bool:
@@ -85,8 +79,8 @@ def transient_disturbances(
     inner = np.concatenate([rows[edge : len(rows) - edge] for rows in flights.runs])
     if not inner.size:
         return []
-    least = LEAST_TRANSIENT * flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
-    largest: dict[str, tuple[float, TransientDisturbance]] = {}
+    least = LEAST_TRANSIENT * weight_and_torque(flights.vehicle, 1.0)
+    found = []
     for cutoff in CUTOFFS.transient_hz:
         slow = flights.low_passed(residual, cutoff)
         size = np.abs(slow[inner])
@@ -95,12 +89,14 @@ def transient_disturbances(
             row = inner[np.argmax(size[:, i])]
             peak = float(slow[row, i])
             above = abs(peak) / max(std[i], 1e-30)
-            before, _ = largest.get(channel, (LEAST_SIGNIFICANCE, None))
-            if above > before and abs(peak) > least[i]:
+            if above > LEAST_SIGNIFICANCE and abs(peak) > least[i]:
                 log = flights.logs[flights.log[row]].name
                 push = TransientDisturbance(channel, log, float(flights.t[row]), peak)
-                largest[channel] = above, push
-    return [transient for _, transient in sorted(largest.values(), key=lambda x: -x[0])]
+                found.append((above, push))
+    largest: dict[str, TransientDisturbance] = {}
+    for _, push in sorted(found, key=lambda x: -x[0]):
+        largest.setdefault(push.channel, push)
+    return [*largest.values()]
 
 
 def _rms(wrench: Array) -> Pair:

@@ -2,7 +2,6 @@
 settings.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -12,10 +11,11 @@ from ..logs.table import Array, ArrayMap, Pair
 from ..motion.smoothing import mean_square
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
+from .column import Column, Part
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
+from .gusty_wind import gusts
 from .log_offsets import LAG_ASYMMETRY
 from .priors import (
-    NUISANCE,
     Base,
     Setting,
     Starts,
@@ -23,16 +23,15 @@ from .priors import (
     in_prior_units,
     prior_size,
 )
-from .regression import Column, Effects, RegressedFlights, delivered, without
+from .regression import Effects, RegressedFlights, delivered, without
 from .row_noise import ROUNDS, RowNoise, fitted_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
-# a wind beside its mean: standard deviation, relative to the mean, correlation time, s, and fastest
-# change, Hz, outside the rows' noise
-GUST_STD = 0.2
-GUST_TIME = 2.0
-GUST_HZ = 0.4
+# prior standard deviations of a rate loop's answers, beside which the noise is fitted: a column
+# shares with disturbances all that any answer can hold
+FREE = 30.0
+DRAWS = 64  # of the posterior of gusts, for the noise beside them
 GUSTY_ROUNDS = 2  # fits of the noise beside gusts, each with a fit of the wind
 
 
@@ -57,7 +56,7 @@ class RowLikelihood:
         self.nuisances = _named(row_nuisances(self.rows))
         self.power = 1.0
         self._gusty: dict[Effects, RowNoise] = {}  # sets with a gusty wind, and their noise
-        self.noise: RowNoise = self._noise(first)
+        self.noise = self._noise(first)
         self._use = self.rows.fit & self.noise.known
 
     def _noise(self, first: Setting) -> RowNoise:
@@ -65,9 +64,9 @@ class RowLikelihood:
         y = rows.residual(first)
         linear = [e for e in self.library if not self.flights.is_nonlinear(e)]
         columns = rows.columns(first, self.flights.columns_of(linear))
-        traced = {c[0] for c, x in columns.items() if x.any()}
+        traced = {c.effect for c, x in columns.items() if x.any()}
         self.library = [e for e in self.library if e in traced or e not in linear]
-        own = [x * prior_size(c, self.flights) for c, x in columns.items() if c[0] in traced]
+        own = [x * prior_size(c, self.flights) for c, x in columns.items() if c.effect in traced]
         signals = followers(rows)
         explained = np.zeros_like(y)
         without_memory = np.zeros((0, rows.channels, rows.channels))
@@ -75,79 +74,60 @@ class RowLikelihood:
         begun = RowNoise(without_memory, np.diag(size), rows.begins)
         # first as if a signal were all disturbances that it follows
         for _ in range(ROUNDS):
-            answers = _named(answered(rows, signals, y - explained))
-            X = np.stack([*own, *self.nuisances.values(), *answers.values()], axis=2)
-            noise, z = self._noise_beside(y, X, X.shape[2] - len(answers), begun)
-            explained = X[:, :, : len(own)] @ z[: len(own)]
-        self.nuisances |= answers
+            self._answers = _named(answered(rows, signals, y - explained))
+            noise, z = self._noise_beside(y, [*own, *self.nuisances.values()], begun)
+            explained = sum(map(np.multiply, own, z), np.zeros_like(y))
         self._own = own
         return noise
 
     def _gusts(self, setting: Setting) -> dict[Column, Array]:
-        """Return the columns of a wind's change beside its mean: an Ornstein-Uhlenbeck process, as
-        cosines over the flight.
-
-        A gust acts like the wind, through each drag and by the flight's airspeed. As a force of its
-        own, or as a noise, the gusts of a periodic flight pass for more drag and less wind.
-        """
-        whole = {**self.rows.fixed, **setting}
-        winds = [
-            (e, c.name)
-            for e in whole
-            if get(e).sets_wind
-            for c in get(e).coefficients
-            if c.unit == "m/s"
-        ]
-        std = GUST_STD * math.hypot(*(self.flights.value(whole, c) for c in winds))
+        """Return the columns of a wind's changes."""
         t = np.concatenate([[0.0], np.cumsum(np.diff(self.rows.t) * ~self.rows.begins[1:])])
-        rate = np.arange(1, int(2.0 * GUST_HZ * t[-1]) + 1) * math.pi / t[-1]
-        size = std * np.sqrt(4.0 * GUST_TIME / t[-1] / (1.0 + np.square(rate * GUST_TIME)))
-        shape = np.cos(np.outer(t, rate)) * size
-        slopes = self.rows.columns(setting, winds)
+        each = gusts(t, {**self.rows.fixed, **setting}, self.flights)
         return _named(
             {
-                f"gust {k} of {name}": x[:, None] * slope
-                for (_, name), slope in slopes.items()
-                for k, x in enumerate(shape.T)
+                f"gust {k} of {c.coefficient}": x[:, None] * slope
+                for c, slope in self.rows.columns(setting, each).items()
+                for k, x in enumerate(each[c].T)
             }
         )
 
-    def _noise_beside_gusts(self, setting: Setting) -> RowNoise:
-        """Return the noise of a set with a gusty wind, by a draw of the gusts' posterior: their
-        mode would leave too little noise.
-
-        Source: G. Celeux and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82.
-        """
-        columns = self.nuisances | self._gusts(setting)
-        X = np.stack([*self._own, *columns.values()], axis=2)
-        count = X.shape[2]
-        draw = np.random.default_rng(0).standard_normal(count)
-        return self._noise_beside(self.rows.residual(setting), X, count, self.noise, draw)[0]
-
     def _noise_beside(
-        self, y: Array, X: Array, known: int, noise: RowNoise, draw: Array | float = 0.0
+        self,
+        y: Array,
+        known: Sequence[Array],
+        noise: RowNoise,
+        rng: np.random.Generator | None = None,
     ) -> tuple[RowNoise, Array]:
         """Return the noise of the residual ``y`` (n, channels), and the coefficients beside it.
 
-        A signal that follows disturbances explains them without making them less: they stay noise.
+        A signal that follows disturbances explains them without making them less: they stay noise,
+        and so does all that a column shares with such signals.
 
         Args:
             y: with the given effects of every set.
-            X: (n, channels, c) columns, in standard deviations of their priors.
-            known: number of the first columns; the others follow disturbances.
+            known: (n, channels) each, columns in standard deviations of their priors.
             noise: at the start.
-            draw: (c,) standard deviations of the posterior from its mode.
+            rng: of draws from the posterior; none: its mode.
         """
         rows = self.rows
+        free = FREE if rows.with_torques else 1.0
+        X = np.stack([*known, *(free * x for x in self._answers.values())], axis=2)
+        # a single draw moves the noise, and a wind of 6 m/s beside it by 1 m/s
+        draws = (
+            np.zeros((X.shape[2], 1)) if rng is None else rng.standard_normal((X.shape[2], DRAWS))
+        )
+        begins, fit = (np.tile(x, draws.shape[1]) for x in (rows.begins, rows.fit))
         for _ in range(ROUNDS):
             use = rows.fit & noise.known
             x = noise.white(X)[use].reshape(-1, X.shape[2])
             factor = np.linalg.cholesky(x.T @ x + np.eye(x.shape[1]))
             right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
-            z = np.linalg.solve(factor.T, right + draw)
-            left = y - X[:, :, :known] @ z[:known]
-            noise = fitted_noise(left, rows.begins, rows.fit, rows.least)
-        return noise, z
+            z = np.linalg.solve(factor.T, right[:, None] + draws)
+            left = [y - X[:, :, : len(known)] @ x for x in z[: len(known)].T]
+            noise = fitted_noise(np.concatenate(left), begins, fit, rows.least)
+            noise = noise._replace(begins=rows.begins)
+        return noise, z[:, 0]
 
     def base(
         self,
@@ -170,15 +150,15 @@ class RowLikelihood:
         if effects is None:
             effects = [e for e in self.library if not flights.is_nonlinear(e) or e in setting]
         noise = self._gusty.get(frozenset(setting), self.noise)
-        columns = dict(self.nuisances)
+        columns = self.nuisances | self._answers
         if noise is not self.noise:
             columns |= self._gusts(setting)
-        if not flights.commanded and playing(Role.LAG, among=list(setting)):
+        if not flights.commanded and playing(Role.LAG, among=setting):
             # lagging rotors may speed up sooner than they slow down
             columns |= rows.columns(setting, [LAG_ASYMMETRY])
         columns |= rows.columns(setting, flights.columns_of(effects))
         for c, start in starts.items():
-            columns[c] = residual - rows.residual({**setting, c[0]: dict(start)})
+            columns[c] = residual - rows.residual({**setting, c.effect: dict(start)})
         if unknown:
             columns |= self._dictionary(setting)
         x = noise.white(np.stack([*columns.values(), residual], axis=2))[self._use]
@@ -186,10 +166,8 @@ class RowLikelihood:
         ends = np.flatnonzero(np.diff(rows.block[self._use])) + 1
         flight = flights.log[rows.at[self._use]][np.append(0, ends)]
         parts = (p.reshape(-1, x.shape[2]) for p in np.split(x, ends))
-        blocks = np.array([p.T @ p for p in parts])
-        return in_prior_units(
-            flights, list(columns), blocks, flight, len(x) * sizes, setting, starts
-        )
+        blocks = zip(flight.tolist(), (p.T @ p for p in parts), strict=True)
+        return in_prior_units(flights, list(columns), blocks, len(x) * sizes, setting, starts)
 
     def _dictionary(self, setting: Setting) -> dict[Column, Array]:
         """Return the dictionary's columns, changing coefficients among them."""
@@ -198,7 +176,7 @@ class RowLikelihood:
         pieces = flights.pieces({})
         states = []
         for s in (p.signals for p in pieces):
-            rotors = delivered(s, self.flights.vehicle) / flights.inertias[2:]
+            rotors = delivered(s, flights.vehicle) / flights.inertias[2:]
             # the acceleration is the rotors' alone, without disturbances
             push = rotors[:, :1] * s.rotation[:, :, 2]
             states.append(
@@ -209,7 +187,7 @@ class RowLikelihood:
         whole, ends = joined(states)
         out = {}
         for column, made in discrepancy_columns(whole, ends, flights).items():
-            x = made[:]
+            x = made.whole
             if rows.with_torques or x[:, :3].any():
                 parts = zip(np.split(x, ends), pieces, strict=True)
                 out[column] = rows.from_world(np.concatenate([p.smooth(part) for part, p in parts]))
@@ -217,7 +195,8 @@ class RowLikelihood:
         own = {e: rows.residual(without(setting, e)) - here for e in setting}
         at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
         followed = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
-        return out | {column: x[:] for column, x in changing_columns(own, followed).items()}
+        changing = changing_columns(own, followed)
+        return out | {column: made.x[:, None] * made.y for column, made in changing.items()}
 
     # Fits
 
@@ -226,7 +205,7 @@ class RowLikelihood:
         integrated out.
         """
         base = self.base(setting, {}, ())
-        m = base.marginal((), base.plain, self.power).quadratic
+        m = base.marginal((), base.plain, self.power)
         off = from_declared(self.flights.columns_of(setting), self.flights, setting)
 
         def target() -> Setting:
@@ -252,7 +231,15 @@ class RowLikelihood:
             return steady
         least = self.objective(steady)
         for _ in range(GUSTY_ROUNDS):
-            self._gusty[key] = self._noise_beside_gusts(setting)
+            # by draws of the gusts' posterior: their mode would leave too little noise (G. Celeux
+            # and J. Diebolt, Computational Statistics Quarterly 2 (1985), 73-82)
+            columns = self.nuisances | self._gusts(setting)
+            if not self.rows.with_torques:  # a tilt is an answer to gusts, and no rate loop's
+                columns |= self._answers
+            known = [*self._own, *columns.values()]
+            rng = np.random.default_rng(0)
+            y = self.rows.residual(setting)
+            self._gusty[key], _ = self._noise_beside(y, known, self.noise, rng)
             setting = mode(setting, self._height)
         if self.objective(setting) <= least:
             return setting
@@ -266,9 +253,12 @@ class RowLikelihood:
         base = self.base(setting, {}, ())
         modes = base.mode(base.plain, self.power)
         out = {}
-        for (_, name), offset in self.flights.offsets.items():
-            mode, std = modes["", NUISANCE + name]
-            out[name] = float(np.clip(offset.size * mode, *offset.range)), offset.size * std
+        for c, offset in self.flights.offsets.items():
+            mode, std = modes[c._replace(part=Part.NUISANCE)]
+            out[c.coefficient] = (
+                float(np.clip(offset.size * mode, *offset.range)),
+                offset.size * std,
+            )
         return out
 
     def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
@@ -283,4 +273,4 @@ class RowLikelihood:
 
 
 def _named(columns: ArrayMap) -> dict[Column, Array]:
-    return {("", f"{NUISANCE}{name}"): x for name, x in columns.items()}
+    return {Column("", name, Part.NUISANCE): x for name, x in columns.items()}

@@ -6,7 +6,7 @@ effects if fitted first. So the fit begins with white noise, and the noise is th
 the whole library.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ ROWS_PER_NUMBER = 12  # and channel, for each lag
 LOADING = 0.01
 
 
-@dataclass(frozen=True, eq=False)
-class RowNoise:
+class RowNoise(NamedTuple):
     """Noise of rows with c channels.
 
     Attributes:
@@ -37,8 +36,7 @@ class RowNoise:
     @property
     def known(self) -> Mask:
         """The rows (n,) with all earlier rows of the autoregression."""
-        since = np.arange(len(self.begins))
-        return np.asarray(since - since[self.begins][np.cumsum(self.begins) - 1] >= len(self.lags))
+        return _with_earlier(self.begins, len(self.lags))
 
     def white(self, x: Array) -> Array:
         """Return rows (n, c, ...) with white noise of variance one; rows outside ``known`` are
@@ -51,6 +49,11 @@ class RowNoise:
         return np.asarray(np.einsum("ij,nj...->ni...", root, out))
 
 
+def _with_earlier(begins: Mask, count: int) -> Mask:
+    first = np.flatnonzero(begins)[np.cumsum(begins) - 1]
+    return np.asarray(np.arange(len(begins)) - first >= count)
+
+
 def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     """Return the noise of rows ``x`` (n, c) from its sample ``fit`` (n,): least squares, with a
     little white noise added, and white noise of ``least`` (c,).
@@ -59,11 +62,12 @@ def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
     lags = min(max(int(fit.sum()) // (ROWS_PER_NUMBER * channels), 1), MOST_LAGS)
     size = np.sqrt(mean_square(x[fit]) + np.square(least))
     z = x / size
-    use = fit & RowNoise(np.zeros((lags, channels, channels)), np.eye(channels), begins).known
-    for k in range(1, lags + 1):
+    use = fit & _with_earlier(begins, lags)
+    each_lag = range(1, lags + 1)
+    for k in each_lag:
         use[k:] &= fit[:-k]
     at = np.flatnonzero(use)
-    past = np.column_stack([z[at - k] for k in range(1, lags + 1)])
+    past = np.column_stack([z[at - k] for k in each_lag])
     now = z[at]
     loading = len(at) * (LOADING + np.square(least / size))
     fitted = np.linalg.solve(past.T @ past + np.diag(np.tile(loading, lags)), past.T @ now)

@@ -9,10 +9,11 @@ import numpy as np
 
 from ...dynamics.effects import Role, get
 from ..logs.table import Array, NamedArrays
+from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .log_offsets import ROTOR_TIME_OFFSET
-from .priors import MODEL_ERROR, PRIORS
-from .regression import Column, RegressedFlights, coefficient, unit_of_change
+from .priors import MODEL_ERROR
+from .regression import RegressedFlights, coefficient, unit_of_change
 from .rows import Rows
 
 # standard deviations of the differences from flight to flight
@@ -36,7 +37,7 @@ def between_flights(column: Column, value: float, flights: RegressedFlights) -> 
     """Return the standard deviation of a coefficient from flight to flight, of the mean of these
     flights, in its unit; 0 if unknown. With measured rotors these flights may be of one session.
     """
-    role = get(column[0]).role
+    role = get(column.effect).role
     each = math.sqrt(len(flights.logs))
     load = role == Role.SUSPENDED_LOAD
     unit = coefficient(column).unit
@@ -57,22 +58,18 @@ def row_nuisances(rows: Rows) -> NamedArrays:
     flights = rows.flights
     out: NamedArrays = {}
     rotors = flights.rotor_wrench({}) / flights.inertias[2:]
+    of_thrust = _of_commands if flights.commanded else _of_rotors
     numbers = np.unique(flights.log).tolist()
     for i in numbers:
         here = (flights.log == i)[:, None].astype(float)
-        thrust = here * rotors[:, :1]
-        turning = here * rotors[:, 1:]
-        own = _of_accelerometers(rows, here, thrust) if rows.has_accelerometer else {}
-        if flights.commanded:
-            own |= _of_commands(rows, here, thrust)
-        else:
-            own |= _of_rotors(rows, here, thrust, turning)
+        own = _of_accelerometers(rows, here, here * rotors[:, :1]) if rows.has_accelerometer else {}
+        own |= of_thrust(rows, here, here * rotors)
         out |= {f"{name} {i}": x for name, x in own.items()}
     if flights.commanded:
         shared = np.mean([out[f"thrust {i}"] for i in numbers], axis=0)
         out |= {f"thrust {i}": out[f"thrust {i}"] - shared for i in numbers}
     offsets = rows.columns({}, flights.offsets)
-    return out | {c[1]: flights.offsets[c].size * x for c, x in offsets.items()}
+    return out | {c.coefficient: flights.offsets[c].size * x for c, x in offsets.items()}
 
 
 def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
@@ -89,7 +86,7 @@ def _of_accelerometers(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     return {f"accelerometer {name}": rows.from_body(none, x) for name, x in read.items()}
 
 
-def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
+def _of_commands(rows: Rows, here: Array, wrench: Array) -> NamedArrays:
     """Return the differences between flights with rotors known by commands.
 
     From one sample to the next rotors may be held or not, and lag: half a period is not known. The
@@ -97,9 +94,10 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     answers vertical motion.
     """
     flights = rows.flights
+    thrust = wrench[:, :1]
     up = thrust * AXES["z"]
     t = flights.t[here[:, 0] > 0.0]
-    w = 2.0 * (flights.t[:, None] - t[0]) / max(t[-1] - t[0], 1e-9) - 1.0
+    w = 2.0 * (flights.t[:, None] - t[0]) / max(np.ptp(t), 1e-9) - 1.0
     out = {
         "thrust": rows.from_body(THRUST_STD * up),
         "drift": rows.from_body(DRIFT_STD * w * up),
@@ -116,22 +114,23 @@ def _of_commands(rows: Rows, here: Array, thrust: Array) -> NamedArrays:
     return out
 
 
-def _of_rotors(rows: Rows, here: Array, thrust: Array, turning: Array) -> NamedArrays:
-    """Return the errors of the model of measured rotors; ``turning`` (samples, 3): angular
-    acceleration by the rotors, rad/s2.
+def _of_rotors(rows: Rows, here: Array, wrench: Array) -> NamedArrays:
+    """Return the errors of the model of measured rotors; ``wrench`` (samples, 4): accelerations by
+    the rotors, m/s2 and rad/s2.
 
     Noise of the rotor speeds biases a torque's gain low, by its share of the column (errors in
     variables).
     """
     noise = rows.flights.rotor_noise
+    thrust = wrench[:, :1]
     varying = noise[0] * (thrust - here * thrust[here > 0.0].mean())
-    out = {f"{MODEL_ERROR} of thrust's changes": rows.from_body(varying * AXES["z"])}
-    gains = np.hypot(PRIORS.model_error, noise[1:]).tolist()
+    out = {"model error of thrust's changes": rows.from_body(varying * AXES["z"])}
+    gains = np.hypot(MODEL_ERROR, noise[1:]).tolist()
     for (name, along), gain in zip(AXES.items(), gains, strict=True):
-        force = PRIORS.model_error * thrust * along
-        torque = gain * turning * along
-        out[f"{MODEL_ERROR} of force {name}"] = rows.from_body(force)
-        out[f"{MODEL_ERROR} of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)
+        force = MODEL_ERROR * thrust * along
+        torque = gain * wrench[:, 1:] * along
+        out[f"model error of force {name}"] = rows.from_body(force)
+        out[f"model error of torque {name}"] = rows.from_body(np.zeros_like(force), torque=torque)
     return out
 
 
@@ -141,11 +140,10 @@ def followers(rows: Rows) -> Followers:
     the disturbances.
 
     A flight loop answers a sideways disturbance by tilting, and the noise of a measured tilt looks
-    like such an answer: in hover, tilt is hardly anything else. The loop answers the velocity of a
-    vertical disturbance by thrust, and its acceleration by a change of thrust. The change has the
-    size of thrust's own variation. An angular velocity is taken as the acceleration to make it
-    within the loop's stopping time. With commands only tilt is a follower: with thrust beside it,
-    NanoBench flights were predicted worse than by constant thrust (.28 for .14 m/s2).
+    like such an answer: in hover, tilt is hardly anything else. The loop answers a vertical
+    disturbance by thrust. An angular velocity is taken as the acceleration to make it within the
+    loop's stopping time. With commands only tilt is a follower: with thrust beside it, NanoBench
+    flights were predicted worse than by constant thrust (.28 for .14 m/s2).
     """
     flights = rows.flights
     torque = rows.channels - 3 * rows.with_torques
@@ -154,13 +152,10 @@ def followers(rows: Rows) -> Followers:
     out: Followers = {f"tilt {x}": (tilt[:, i], forces[i]) for i, x in enumerate("xy")}
     if not rows.with_torques:
         return out
-    delivered = flights.rotor_wrench({}) / flights.inertias[2:]
-    change = np.concatenate([np.gradient(delivered[run, 0]) for run in flights.runs])
-    change *= delivered[:, 0].std() / max(change.std(), 1e-12)
-    wrench = rows.at_rows(np.column_stack([delivered, change]))
+    wrench = rows.at_rows(flights.rotor_wrench({}) / flights.inertias[2:])
     turned = [p.smooth(p.signals.angular_velocity) for p in flights.pieces({})]
     rates = rows.at_rows(np.concatenate(turned) / STOPPED_WITHIN)
-    out |= {"thrust": (wrench[:, 0], forces[2]), "change of thrust": (wrench[:, 4], forces[2])}
+    out["thrust"] = wrench[:, 0], forces[2]
     for i, x in enumerate("xyz"):
         out[f"torque {x}"] = wrench[:, 1 + i], [torque + i]
         out[f"rate {x}"] = rates[:, i], [torque + i]
@@ -170,8 +165,11 @@ def followers(rows: Rows) -> Followers:
 def answered(rows: Rows, signals: Followers, disturbance: Array) -> NamedArrays:
     """Return the disturbances in signals that follow them: a share of each signal.
 
-    A signal that follows a disturbance ``d`` explains the share ``var(d) / var(signal)`` of itself
-    as one, whatever the loop: all of it in hover, and next to nothing far from a hover.
+    With measured rotors a rate loop answers with a gain and a phase of its own at each frequency:
+    the signal and its change are in bands. A signal explains no more than all of a disturbance,
+    ``std(d) / std(signal)`` of itself: by an IMU the coherence of torques with gusts was .9 from 0
+    to 3 Hz, with a gain of up to 2. With commands a tilt is the answer itself: the share is
+    ``var(d) / var(signal)``.
 
     Args:
         rows: the flights' rows.
@@ -179,10 +177,15 @@ def answered(rows: Rows, signals: Followers, disturbance: Array) -> NamedArrays:
         disturbance: (n, channels) the known disturbance.
     """
     out = {}
+    own = [x[rows.fit].var(axis=0) for x in rows.bands(disturbance)]
     for name, (signal, channels) in signals.items():
-        size = signal - signal[rows.fit].mean()
-        own = disturbance[rows.fit][:, channels]
-        share = min(own.var(axis=0).max() / max(size[rows.fit].var(), 1e-12), 1.0)
-        column = out[f"answer by {name}"] = np.zeros((len(size), rows.channels))
-        column[:, channels] = share * size[:, None]
+        for i, band in enumerate(rows.bands(signal - signal[rows.fit].mean())):
+            over = own[i][channels].max() / max(band[rows.fit].var(), 1e-12)
+            change = np.concatenate([np.gradient(x) for x in rows.pieces(band)])
+            change *= band.std() / max(change.std(), 1e-12)
+            share = math.sqrt(over) if rows.with_torques else min(over, 1.0)
+            parts = {"": band, "change of ": change} if rows.with_torques else {"": band}
+            for what, x in parts.items():
+                column = out[f"answer by {what}{name} {i}"] = np.zeros((len(x), rows.channels))
+                column[:, channels] = share * x[:, None]
     return out

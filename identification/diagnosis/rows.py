@@ -11,11 +11,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...runtime.arrays import Index
-from ..logs.table import Array, Mask
+from ..logs.table import Array
 from ..motion.signals import in_body
-from ..motion.smoothing import CUTOFFS
+from ..motion.smoothing import CUTOFFS, low_pass
+from .column import Column
 from .discrepancy import weight_and_torque
-from .regression import Column, RegressedFlights, Setting, blocks
+from .regression import RegressedFlights, Setting, blocks
 
 COMMANDED_CUTOFF_HZ = 3.5  # for rotors known by commands
 FILTERED_CUTOFF_HZ = 2.0  # for a filtered pose: well below any filter
@@ -24,6 +25,7 @@ ROWS_PER_CUTOFF = 25.0 / 10.5  # rows in a period of the cut-off
 # simulator's log may have no noise
 LEAST = 1e-4
 BLOCK = 4.0  # s, of the sums for the likelihood's scatter
+BANDS_HZ = (2.5, 1.2, 0.6)  # edges of the bands in which a flight loop has one gain and phase
 
 
 class Rows:
@@ -43,7 +45,6 @@ class Rows:
         at: (n,) rows of ``flights``.
         begins: (n,) first row of an unbroken piece.
         block: (n,) number of the block of 4 s.
-        log: (n,) index of the log.
         t: (n,) s.
         channels: 3, 6 or 9.
         least: (channels,) best accuracy of a motion.
@@ -53,17 +54,17 @@ class Rows:
 
     def __init__(self, flights: RegressedFlights, fixed: Setting) -> None:
         self.with_torques = not flights.commanded
-        self._cutoff = FILTERED_CUTOFF_HZ if flights.filtered else np.inf
-        if flights.commanded:
-            self._cutoff = COMMANDED_CUTOFF_HZ
+        slow = FILTERED_CUTOFF_HZ if flights.filtered else np.inf
+        self._cutoff = COMMANDED_CUTOFF_HZ if flights.commanded else slow
         cutoff = min(self._cutoff, CUTOFFS.residual_hz)
         step = max(1, round(1.0 / (ROWS_PER_CUTOFF * cutoff * flights.period)))
+        self._period = step * flights.period
         self.flights = flights
         self.fixed = fixed
         self.at: Index = np.concatenate([rows[::step] for rows in flights.runs])
-        self.begins: Mask = flights.start[self.at]
-        self.t: Array = flights.t[self.at]
-        self.fit: Mask = flights.fit_rows[self.at]
+        self.begins = flights.start[self.at]
+        self.t = flights.t[self.at]
+        self.fit = flights.fit_rows[self.at]
         self.block = blocks(self.t, self.begins, BLOCK)
         self.has_accelerometer = flights.felt({}) is not None
         self.channels = 3 * (1 + self.has_accelerometer + self.with_torques)
@@ -101,6 +102,21 @@ class Rows:
     def at_rows(self, x: Array) -> Array:
         """Return samples of ``flights`` at the rows (n, ...), low-passed."""
         return self.flights.low_passed(x, self._cutoff)[self.at]
+
+    def pieces(self, x: Array) -> list[Array]:
+        """Return the unbroken pieces of rows ``x`` (n, ...)."""
+        return np.split(x, np.flatnonzero(self.begins)[1:])
+
+    def bands(self, x: Array) -> list[Array]:
+        """Return rows ``x`` (n, ...), and, with torques, their parts in bands of frequency."""
+        if not self.with_torques:
+            return [x]
+        out = [x]
+        for edge in BANDS_HZ:
+            slow = np.concatenate([low_pass(part, edge, self._period) for part in self.pieces(x)])
+            out.append(x - slow)
+            x = slow
+        return [*out, x]
 
     def residual(self, setting: Setting) -> Array:
         """Return the residual (n, channels) with these effects.

@@ -1,41 +1,39 @@
 """The posterior over sets of effects, from sums of products beside some of the sets."""
 
 import math
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from scipy.special import logsumexp, softmax
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
-from ..findings import RankedSet, Ranking
+from ..findings import LEAST_RIVAL, RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
-from .discrepancy import CHANGING, SHARE_OF_EFFECT
+from .column import Column, Part
+from .discrepancy import SHARE_OF_EFFECT
 from .evidence import Index, Marginal, SetEvidence, evidence_of_one_more, tempering
 from .left_out import LeftOut
 from .priors import (
-    PRIORS,
-    WHOLE_PREFIX,
+    EXPECTED,
+    NEGLIGIBLE,
     Base,
     Setting,
     Variant,
     Variants,
-    bare,
     changed,
     variants_of,
 )
 from .regression import (
     CENTRAL,
-    START_PREFIX,
-    Column,
     Effects,
     RegressedFlights,
     coefficient,
     moves_time,
-    typical_size,
+    typical_sizes,
 )
 
 MOST_EFFECTS = 5  # in a set, beside the given ones
@@ -61,6 +59,11 @@ class _Candidate:
     @property
     def columns(self) -> list[Column]:
         return [c for columns in self.variants for c in columns]
+
+    @property
+    def fitted(self) -> Index:
+        """The indices of the nuisances and of the set's columns."""
+        return np.append(self.base.plain, self.base.at(self.columns))
 
 
 def is_possible(
@@ -89,7 +92,7 @@ def is_possible(
         Found(
             own,
             {name: std.get(name, 0.0) for name in own},
-            {c.name: typical_size((effect, c.name), vehicle) for c in words.coefficients},
+            typical_sizes(effect, vehicle),
             flights.speed,
             frozenset(get(name).family for name in beside),
         )
@@ -123,7 +126,7 @@ class Posterior:
         self.idle = idle
         self.given = given or frozenset()
         self.one_noise = given is not None
-        inclusion = min(PRIORS.expected / max(len(library) - len(self.given), 1), 0.5)
+        inclusion = min(EXPECTED / max(len(library) - len(self.given), 1), 0.5)
         self.odds = math.log(inclusion / (1.0 - inclusion))  # before the flight, of an effect
         self.known: dict[Effects, _Candidate] = {}
         self.scores: dict[Effects, float] = {}
@@ -133,16 +136,22 @@ class Posterior:
         for i in range(0 if self.one_noise else 1, len(bases)):
             self._search(i)
         if not self.one_noise:
-            likeliest = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-            self._search(0, [self.known[k].variants for k in likeliest[:KEPT_ASKED]])
+            self._search(0, [self.known[k].variants for k in self._ranked[:KEPT_ASKED]])
 
-    def _likeliest(self) -> tuple[Base, _Candidate]:
-        best = self._needed or self.known[max(self.scores, key=self.scores.__getitem__)]
-        return best.base, best
+    @property
+    def _ranked(self) -> list[Effects]:
+        """The sets, the likeliest first."""
+        return sorted(self.scores, key=self.scores.__getitem__, reverse=True)
 
-    def leave_out_needless(self, probability: Values) -> dict[str, Pair]:
-        """Put the likeliest set's needed effects in its place, and return each effect's gain
-        together with the effects already left out: nats, and its standard error.
+    @property
+    def _likeliest(self) -> _Candidate:
+        return self._needed or self.known[self._ranked[0]]
+
+    def leave_out_needless(self, probability: Values) -> tuple[Setting, dict[str, Pair]]:
+        """Put the likeliest set's needed effects in its place, and return their coefficients.
+
+        Return each effect's gain, too, together with the effects already left out: nats, and its
+        standard error.
 
         A gain must exceed the odds against these effects before the flight. The least probable
         effect goes first: another may need its place.
@@ -150,91 +159,85 @@ class Posterior:
         Args:
             probability: each effect's probability.
         """
-        base, best = self._likeliest()
+        best = self._likeliest
+        base = best.base
         columns = best.columns
         left_out = LeftOut(base, columns, self.power)
         m = base.marginal(columns, base.plain, self.power)
-        every = {e for e, _ in columns} - self.given
-        gains: dict[str, Pair] = {}
+        every = {c.effect for c in columns} - self.given
+        gains = {}
         while True:
             weak = {}
             for variant in best.variants:
-                effect = variant[0][0]
+                effect = variant[0].effect
                 rest = tuple(x for x in best.variants if x != variant)
-                kept = {v[0][0] for v in rest}
-                less = [i for i, (e, _) in enumerate(columns) if e in kept]
-                gained, std = gains[effect] = left_out.gain(less)
-                smaller = _Candidate(base, rest, m.evidence(less))
+                kept = {v[0].effect for v in rest}
+                gained, std = gains[effect] = left_out.gain(m.index(chain.from_iterable(rest)))
+                smaller = _Candidate(base, rest, m.evidence(chain.from_iterable(rest)))
                 least = left_out.least * std - self.odds * len(every - kept)
                 if gained < least and self._possible(smaller):
                     weak[probability[effect], gained / (std + 1e-9)] = smaller
             if not weak:
-                return gains
+                return self._at_mode(best)[0], gains
             self._needed = best = weak[min(weak)]
 
     def tempering(self) -> float:
         """Return the power of the likelihood by the scatter beside the likeliest set."""
-        base, best = self._likeliest()
-        fitted = np.sort(np.append(base.plain, base.at(best.columns)))
-        return tempering(base.blocks, np.searchsorted(base.single, fitted))
+        best = self._likeliest
+        return tempering(best.base.blocks, np.searchsorted(best.base.single, best.fitted))
 
     def _of_any_flight(self, base: Base) -> tuple[Index, Array]:
         """Return the columns of everything any flight may have, and of a little of every effect,
         with standard deviations.
         """
         at = base.at(base.asked)
-        little = PRIORS.negligible * base.typical[at]
+        little = NEGLIGIBLE * base.typical[at]
         # a start of another base is no small effect
         if self.one_noise:
-            little[[name.startswith(START_PREFIX) for _, name in base.asked]] = 0.0
+            little[[c.part == Part.START for c in base.asked]] = 0.0
         return np.append(base.plain, at), np.append(np.ones(len(base.plain)), little)
 
-    def _variants(self, base: Base) -> list[Variant]:
-        out = []
+    def _variants(self, base: Base) -> dict[str, list[Variant]]:
+        """Return the variants of each effect with columns in a base."""
+        out = {}
         for effect in self.library:
-            for columns in variants_of(self.flights, effect, base.effects, base.starts):
-                known = tuple(c for c in columns if c in base.columns)
-                # a balance does not see the point of action
-                if known and (self.one_noise or known == columns):
-                    out.append(known)
+            every = variants_of(self.flights, effect, base.effects, base.starts)
+            seen = (tuple(c for c in v if c in base.columns) for v in every)
+            # a balance does not see the point of action
+            if own := [v for v in seen if v and (self.one_noise or v in every)]:
+                out[effect] = own
         return out
 
     def _search(self, number: int, asked: Sequence[Variants] = ()) -> None:
         base = self.bases[number]
         others, little = self._of_any_flight(base)
         m = base.marginal(base.asked, others, self.power, little)
-        variants = self._variants(base)
-        ways = Counter(v[0][0] for v in variants)
-        before = {e: self.odds - math.log(count) for e, count in ways.items()}
+        ways = self._variants(base)
+        variants = [*chain.from_iterable(ways.values())]
         tried = base.tried.setdefault(self.power, {})
 
         def score(some: Variants) -> float:
-            key = frozenset(v[0][0] for v in some)
-            if self.one_noise:
-                most = max(len(x.effects) for x in self.bases if x.effects <= key)
-                judged = key not in self.idle and len(base.effects) == most
-            else:  # another base has the columns of this set
-                judged = number > 0 or not any(
-                    x.effects and key >= x.effects for x in self.bases[1:]
-                )
-            if len(key) < len(some) or not judged:
+            key = frozenset(v[0].effect for v in some)
+            most = max((len(x.effects) for x in self.bases if x.effects <= key), default=0)
+            # else another base has more of the columns of this set
+            judged = len(base.effects) == most or (number > 0 and not self.one_noise)
+            if len(key) < len(some) or key in self.idle or not judged:
                 return -math.inf
             if some not in tried:
                 tried[some] = None
                 with suppress(np.linalg.LinAlgError):
-                    index = [m.place[c] for v in some for c in v]
-                    new = _Candidate(base, some, m.evidence(index))
+                    new = _Candidate(base, some, m.evidence(chain.from_iterable(some)))
                     if self._possible(new):
                         tried[some] = new.evidence
             if (evidence := tried[some]) is None:
                 return -math.inf
-            total = evidence.log_evidence + sum(before[e] for e in key)
+            total = evidence.log_evidence + sum(self.odds - math.log(len(ways[e])) for e in key)
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
                 self.known[key] = _Candidate(base, some, evidence)
             return total
 
-        first = tuple(v for v in variants if self.one_noise and v[0][0] in base.effects)
+        first = tuple(v for v in variants if self.one_noise and v[0].effect in base.effects)
         score(first)
         for some in asked:
             if all(c in m.place for v in some for c in v):
@@ -243,8 +246,8 @@ class Posterior:
         more = 1 if asked else max(MOST_EFFECTS + len(self.given) - len(first), 1)
         for size in range(more):
             level.sort(key=score, reverse=True)
-            grown: dict[frozenset[Variant], Variants] = {}
             kept = level[: KEPT_SETS if size else 2 * KEPT_SETS]
+            grown: dict[frozenset[Variant], Variants] = {}
             for new in ((*some, v) for some in kept for v in variants):
                 grown.setdefault(frozenset(new), new)
             level = list(grown.values())
@@ -252,15 +255,14 @@ class Posterior:
     def _possible(self, candidate: _Candidate) -> bool:
         """Return whether a vehicle can have the coefficients of a set at its mode."""
         asked = [
-            e
-            for (e, name), *_ in candidate.variants
-            if get(e).possible or (self.one_noise and get(e).implausible)
-            if not name.startswith(START_PREFIX)
+            c.effect
+            for c, *_ in candidate.variants
+            if c.part != Part.START and (get(c.effect).possible or get(c.effect).implausible)
         ]
         setting, std = self._at_mode(candidate) if asked else ({}, {})
         return all(is_possible(self.flights, setting, std[e], e, self.one_noise) for e in asked)
 
-    def structure(self, quieter: Base | None = None) -> float:
+    def structure(self, quieter: Base | None) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set.
 
         Each group of the dictionary is equally likely to have the column, and so is each column of
@@ -270,7 +272,7 @@ class Posterior:
             quieter: the last base with the likeliest noise beside the strangest column. The set,
                 and the set with one more column, have the likelier noise of both.
         """
-        group = np.array([name.split(": ")[0] for _, name in self.bases[-1].dictionary])
+        group = np.array([c.group for c in self.bases[-1].dictionary])
         none = []
         more = []
         for base in filter(None, (self.bases[-1], quieter)):
@@ -298,25 +300,26 @@ class Posterior:
         """Return the log-likelihood ratio of the likeliest set with an effect to the likeliest
         without it, less the prior odds.
         """
-        value = {key: x - self.odds * len(key) for key, x in self.scores.items()}
-        have = max(x for key, x in value.items() if effect in key)
-        return have - max((x for key, x in value.items() if effect not in key), default=-math.inf)
+        value = {False: -math.inf}
+        for key, x in self.scores.items():
+            has = effect in key
+            value[has] = max(value.get(has, -math.inf), x - self.odds * len(key))
+        return value[True] - value[False]
 
     def factor_in_set(self, effect: str) -> float:
         """Return the logarithm of the Bayes factor of the likeliest set over the same without an
         effect, with nothing in its place.
         """
-        base, best = self._likeliest()
-        m = base.marginal(base.asked, base.plain, self.power)
-        whole, rest = (
-            m.evidence([m.place[c] for c in best.columns if c[0] != out]) for out in ("", effect)
-        )
-        return whole.log_evidence - rest.log_evidence
+        best = self._likeliest
+        m = best.base.marginal(best.columns, best.base.plain, self.power)
+        rest = m.evidence(c for c in best.columns if c.effect != effect)
+        return m.evidence(best.columns).log_evidence - rest.log_evidence
 
     def left(self) -> float:
         """Return the deviance left by the likeliest set, with the nuisances integrated out."""
-        base, best = self._likeliest()
-        m = base.marginal(best.columns, base.plain, self.power).quadratic
+        best = self._likeliest
+        base = best.base
+        m = base.marginal(best.columns, base.plain, self.power)
         whole = m.deviance - self.power * base.penalty
         return whole - m.explained(range(len(m.right)), best.evidence.mode)
 
@@ -325,52 +328,51 @@ class Posterior:
         the deviance of all effects together.
         """
         base = next(x for x in self.bases if x.effects == self.given)
-        asked = [c for c in base.asked if c[0] not in self.given]
-        always = base.at(c for c in base.asked if c[0] in self.given)
+        asked = [c for c in base.asked if c.effect not in self.given]
+        always = base.at(c for c in base.asked if c.effect in self.given)
         m = base.marginal(asked, np.append(base.plain, always), self.power)
-        right = m.quadratic.right
-        normal = m.quadratic.normal + np.eye(len(asked))
+        right = m.right
+        normal = m.normal + np.eye(len(asked))
         whole = max(float(right @ np.linalg.solve(normal, right)), 1e-12)
-        out: NamedNumbers = {}
-        for v in self._variants(base):
-            if (effect := v[0][0]) not in self.given:
-                gained = m.explained([m.place[c] for c in v])
-                out[effect] = max(out.get(effect, 0.0), gained / whole)
-        return out
+        return {
+            e: max(map(m.gain, own)) / whole
+            for e, own in self._variants(base).items()
+            if e not in self.given
+        }
 
     def nuisances(self) -> dict[Column, Pair]:
         """Return the nuisances of any flight at the mode beside the likeliest set: values and
         standard deviations.
         """
-        base, best = self._likeliest()
-        fitted = base.mode(np.append(base.plain, base.at(best.columns)), self.power)
-        return {c: x for c, x in fitted.items() if not c[0]}
+        best = self._likeliest
+        modes = best.base.mode(best.fitted, self.power)
+        return {c: x for c, x in modes.items() if not c.effect}
 
     def shown(self, known: Sequence[Column] = ()) -> NamedNumbers:
         """Return the change of the deviance by a typical size of each effect outside the likeliest
         set; ``known``: nuisances taken as fully known.
         """
-        base, best = self._likeliest()
-        others = np.append(np.setdiff1d(base.plain, base.at(known)), base.at(best.columns))
-        m = base.marginal(base.asked, others, self.power)
+        best = self._likeliest
+        base = best.base
+        m = base.marginal(base.asked, np.setdiff1d(best.fitted, base.at(known)), self.power)
         out: NamedNumbers = {}
-        for columns in self._variants(base):
-            (effect, name), *_ = columns
-            if name.startswith(START_PREFIX) or effect in {e for e, _ in best.columns}:
+        for columns in chain.from_iterable(self._variants(base).values()):
+            effect = columns[0].effect
+            if columns[0].part == Part.START or effect in {c.effect for c in best.columns}:
                 continue
-            sign = np.sign([coefficient(bare(c)).typical[0] for c in columns])
+            sign = np.sign([coefficient(c).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
-            i = [m.place[c] for c in columns]
-            out[effect] = max(float(z @ m.quadratic.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
+            i = m.index(columns)
+            out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
         return out
 
     def _dictionary_beside_best(self, base: Base) -> Marginal:
         """Return the likelihood of a base's dictionary beside the base's columns of the likeliest
         set.
         """
-        own = base.at(c for c in self._likeliest()[1].columns if c in base.columns)
+        own = base.at(c for c in self._likeliest.columns if c in base.columns)
         # an effect of the set is true to some per cent, whatever makes it change
-        changing = base.at(c for c in base.columns if c[1].startswith(CHANGING))
+        changing = base.at(c for c in base.columns if c.part == Part.CHANGING)
         others, little = self._of_any_flight(base)
         wrong = np.repeat([1.0, EFFECT_ERROR / SHARE_OF_EFFECT], [len(own), len(changing)])
         varied = self.flights.commanded or self.flights.rotor_speeds_vary
@@ -379,32 +381,21 @@ class Posterior:
             np.concatenate([others, own, changing]),
             self.power if varied else ROUNDED * self.power,
             np.append(little, wrong),
-        ).quadratic
+        )
 
     def best_setting(self, most: float = math.inf) -> Setting:
         """Return the coefficients of the likeliest set of at most ``most`` effects."""
-        key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
+        key = next(k for k in self._ranked if len(k) <= most)
         return self._at_mode(self.known[key])[0]
-
-    def likeliest_setting(self) -> tuple[Setting, Setting]:
-        """Return the coefficients of the likeliest set, or of its needed effects, and their
-        standard deviations. These contain the changes by needless effects left out.
-        """
-        whole = self.best_setting()
-        setting, std = self._at_mode(self._likeliest()[1])
-        wide = {
-            e: {n: math.hypot(x, setting[e][n] - whole[e][n]) for n, x in own.items()}
-            for e, own in std.items()
-        }
-        return setting, wide
 
     def rivals(self, setting: Setting) -> list[Setting]:
         """Return the coefficients of the likeliest other effects with, each alone, at least half of
         a setting's gain.
         """
         least = 0.5 * (self.scores.get(frozenset(setting), -math.inf) + self.scores[frozenset()])
-        keys = [k for k, x in self.scores.items() if len(k) == 1 and x > least and k - {*setting}]
-        keys.sort(key=self.scores.__getitem__, reverse=True)
+        keys = [
+            k for k in self._ranked if len(k) == 1 and self.scores[k] > least and k - {*setting}
+        ]
         return [self._at_mode(self.known[k])[0] for k in keys[:MOST_RIVALS]]
 
     def is_elsewhere(self, new: Setting, tried: Mapping[Effects, Setting]) -> bool:
@@ -429,31 +420,34 @@ class Posterior:
         mode, deviations = candidate.evidence.mode, candidate.evidence.std
         if widened:
             deviations = deviations * base.scatter(columns, mode, self.power)
-        setting = {e: dict(self.flights.coefficients({}, e)) for e, _ in columns}
+        setting = {e: dict(self.flights.coefficients({}, e)) for e, *_ in columns}
         std: Setting = {e: {} for e in setting}
         size = base.size[base.at(columns)]
         sized = zip(columns, (mode * size).tolist(), (deviations * size).tolist(), strict=True)
         for c, x, deviation in sized:
-            effect, name = bare(c)
-            own = setting[effect]
-            if name.startswith(START_PREFIX):
+            own = setting[c.effect]
+            if c.part == Part.START:
                 own |= base.starts[c]
-                if moves_time(effect):
-                    own[get(effect).coefficients[0].name] *= x
+                if moves_time(c.effect):
+                    own[get(c.effect).coefficients[0].name] *= x
                 continue
-            own[name] = changed(c, x, self.flights)
-            std[effect][name] = deviation
-            if c[1].startswith(WHOLE_PREFIX):
+            own[c.coefficient] = changed(c, x, self.flights)
+            std[c.effect][c.coefficient] = deviation
+            if c.part == Part.AT_CENTRE:
                 own[CENTRAL] = 1.0
         return setting, std
 
-    def ranking(self, quieter: Base | None = None) -> Ranking:
+    def ranking(self, quieter: Base | None) -> Ranking:
         """Return probabilities; ``quieter`` as of ``structure``."""
         p = dict(zip(self.scores, softmax([*self.scores.values()]).tolist(), strict=True))
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
-        best = sorted(p, key=p.__getitem__, reverse=True)
+        best = self._ranked
         sets = tuple(
-            RankedSet(tuple(sorted(key)), p[key], *self._at_mode(self.known[key], key == best[0]))
+            RankedSet(
+                tuple(sorted(key)),
+                p[key],
+                *self._at_mode(self.known[key], p[key] >= LEAST_RIVAL * p[best[0]]),
+            )
             for key in best
             if p[key] >= LEAST_PROBABILITY
         )

@@ -15,7 +15,7 @@ from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Coefficients, Unexplained
 from ..logs.table import Array
 from ..motion.smoothing import mean_square
-from .regression import RegressedFlights, Setting, typical_size
+from .regression import RegressedFlights, Setting, typical_sizes
 
 MOST_TRIED = 12  # starts; no more are tried all
 KEPT_OF_MORE = 4  # starts of more, the most like the residual
@@ -45,10 +45,7 @@ def starting_points(
     starts = declared(
         Unexplained(
             flights.vehicle,
-            {
-                c.name: typical_size((effect, c.name), flights.vehicle)
-                for c in get(effect).coefficients
-            },
+            typical_sizes(effect, flights.vehicle),
             stated,
             frozenset(get(e).family for e in beside),
             position.mean(axis=0),
@@ -77,8 +74,12 @@ def starting_points(
     scale = 1.0 / np.maximum(np.sqrt(mean_square(target)), 1e-12)
 
     def acting(setting: Setting) -> Array:
-        parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
-        return np.asarray(np.concatenate(parts)[used] * scale)
+        # the same starts are tried beside several sets
+        key = str(setting) + effect
+        if key not in flights.started:
+            parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
+            flights.started[key] = np.concatenate(parts)[used]
+        return np.asarray(flights.started[key] * scale)
 
     # share of the residual along each start's wrench; the later one of equals, and none without a
     # wrench

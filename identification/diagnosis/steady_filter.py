@@ -69,9 +69,9 @@ def steady_filter(noise: PoseNoise, period: float, gravity: float) -> SteadyFilt
     F[..., :3, 3:6] = pull[..., None, None] * np.outer(half, [1.0, 0.5, 0.0])
     P = _riccati(F, Q)
     S = P[..., ::3, ::3] + np.eye(2)
-    K = P[..., :, ::3] @ np.linalg.inv(S)
+    K = P[..., ::3] @ np.linalg.inv(S)
     one, other = pose[..., :, None], pose[..., None, :]
-    units = np.array([1.0, 1.0 / period, 1.0 / period**2])
+    units = period ** -np.arange(3.0)
     gain = K.reshape(*pose.shape, 3, 2) * (one / other)[..., None, :] * units[:, None]
     gain[..., 1, :, :] = gain[..., 1, :, ::-1].copy()  # its own first
     gain = gain.reshape(*keep.shape, 3, 2).take(np.argsort(PAIRS.ravel()), axis=-3)
@@ -89,10 +89,11 @@ def _riccati(F: Array, Q: Array) -> Array:
     G = np.broadcast_to(np.diag([1.0, 0.0, 0.0] * 2), F.shape)
     for _ in range(40):
         W = np.linalg.inv(np.eye(F.shape[-1]) + G @ X)
-        further = np.swapaxes(A, -1, -2) @ X @ W @ A
-        G = G + A @ W @ G @ np.swapaxes(A, -1, -2)
+        transposed = np.swapaxes(A, -1, -2)
+        further = transposed @ X @ W @ A
+        G = G + A @ W @ G @ transposed
         A = A @ W @ A
         X = X + further
-        if np.abs(further).max(initial=0.0) <= 1e-10 * np.abs(X).max(initial=0.0):
+        if np.abs(further).max() <= 1e-10 * np.abs(X).max():
             break
     return X

@@ -16,7 +16,7 @@ from ..findings import CHANNELS, Signature
 from ..logs.table import Array, Names
 from ..motion.signals import Signals, in_body
 from ..motion.smoothing import mean_square
-from .discrepancy import heading_of
+from .discrepancy import heading_of, weight_and_torque
 from .regression import RegressedFlights, Setting, without
 
 # least shares for a channel to carry an effect: of its deviance, in the forces or in the torques,
@@ -59,16 +59,20 @@ def signature(
 
 def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[tuple[str, Array]]:
     """Return the explanatory variables of a force at the rows, named with their units."""
-    position, rotation, velocity = (
-        flights.at_rows(name, setting) for name in ("position", "rotation", "velocity")
-    )
+    position = flights.at_rows("position", setting)
+    rotation = flights.at_rows("rotation", setting)
     pieces = flights.pieces(setting)
     rate = np.concatenate([p.smooth(p.signals.angular_velocity) for p in pieces])
-    body = in_body(velocity, rotation)
+    body = in_body(flights.at_rows("velocity", setting), rotation)
     speed = np.linalg.norm(body, axis=1)
     heading = heading_of(rotation)
+    in_axes = (("body velocity", "m/s", body), ("angular velocity", "rad/s", rate))
     named = {
-        **{f"body velocity {a} (m/s)": body[:, i] for i, a in enumerate("xyz")},
+        f"{name} {axis} ({unit})": along
+        for name, unit, x in (*in_axes, ("world position", "m", position[:, :2]))
+        for axis, along in zip("xyz", x.T, strict=False)
+    }
+    named |= {
         "speed (m/s)": speed,
         "squared speed (m2/s2)": speed**2,
         "height (m)": position[:, 2],
@@ -78,8 +82,6 @@ def _explanatory_variables(flights: RegressedFlights, setting: Setting) -> list[
     }
     if flights.rotor_speeds_vary:
         named["thrust (N)"] = flights.rotor_wrench(setting)[:, 0]
-    named |= {f"angular velocity {a} (rad/s)": rate[:, i] for i, a in enumerate("xyz")}
-    named |= {f"world position {a} (m)": position[:, i] for i, a in enumerate("xy")}
     if all(p.signals.voltage is not None for p in pieces):
         named["battery voltage (V)"] = flights.at_rows("voltage", setting)
     return [(name, x) for name, x in named.items() if x.std() > 1e-9]
@@ -93,11 +95,12 @@ def carrying_channels(flights: RegressedFlights, setting: Setting, effect: str) 
     noise = mean_square(flights.sensor_noise) + 1e-30
     force, torque = (mean_square(part) / noise).reshape(2, 3).sum(axis=1)
     least = LEAST_SHARE * max(force + torque, 1e-30)
+    place, turn = ("accelerometer", "gyro") if flights.inertial else ("position", "attitude")
     carrying = {*_read(flights, setting, effect)}
     if force > least:
-        carrying.add("accelerometer" if flights.inertial else "position")
+        carrying.add(place)
     if torque > least and not flights.commanded:
-        carrying.add("gyro" if flights.inertial else "attitude")
+        carrying.add(turn)
     return tuple(channel for channel in ORDER if channel in carrying)
 
 
@@ -107,7 +110,7 @@ def _read(flights: RegressedFlights, setting: Setting, effect: str) -> Iterator[
         yield from ("position", "attitude")
         return
     less = without(setting, effect)
-    unit = flights.vehicle.weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
+    unit = weight_and_torque(flights.vehicle, 1.0)
 
     def added(s: Signals) -> Array:
         """Return the effect's wrench (n, 6) in body axes, over the weight and the weight times the

@@ -105,8 +105,7 @@ def turning_delay(
     step = 0.005
     near = 0.1 * step
     at = min(np.arange(0.0, LONGEST_DELAY + step, step).tolist(), key=deviance)
-    bounds = max(at - step, 0.0), at + step
-    seconds = fminbound(deviance, *bounds, xtol=1e-5).item()
+    seconds = fminbound(deviance, max(at - step, 0.0), at + step, xtol=1e-5).item()
     least = deviance(seconds)
     bend = (deviance(seconds + near) - 2.0 * least + deviance(seconds - near)) / near**2
     # an answer of the loop lasts longer than a segment, and a delay differs from flight to flight:
@@ -141,5 +140,5 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> _Spectra:
     )
     share = len(moments) / length / len(x)
     moment, turning = np.square(np.abs(x)), np.square(np.abs(y)) + 1e-300
-    omega = np.asarray(2.0 * np.pi * f[band, None], dtype=np.float64)
+    omega = np.asarray(2.0 * np.pi * f[band, None], np.float64)
     return _Spectra(omega, moment, turning, np.conj(x) * y, share)

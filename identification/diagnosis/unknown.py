@@ -6,42 +6,30 @@ fitted to flights with known truth. A gust is neither: the likelihood has a dist
 """
 
 import math
-from dataclasses import dataclass
 
 MOST_STRUCTURE = 15.0  # nats, beyond which a Bayes factor counts no more
+# the weights, in nats: log odds before the flight, one in ten. Stated, not fitted: 29 % of the kept
+# flights have such a cause by design
+NOTHING = -2.2
+PUSH = 2.24  # ``tests/evidence/test_numbers.py`` fits this weight anew
+# odds of the share of such a cause explained by effects of the library: 98 % in the mean. Stated,
+# not fitted: most kept causes are twins of effects, and their share is larger
+ABSORBED = 50.0
 
 
-@dataclass(frozen=True)
-class UnknownSettings:
-    """The weights, in nats. ``tests/evidence/test_numbers.py`` fits them anew."""
-
-    # log odds before the flight: one in ten. Stated, not fitted: 29 % of the kept flights have such
-    # a cause by design
-    nothing: float = -2.2
-    push: float = 2.24
-    # odds of the share of such a cause explained by effects of the library: 98 % in the mean.
-    # Stated, not fitted: most kept causes are twins of effects, and their share is larger
-    absorbed: float = 50.0
+def clipped(structure: float) -> float:
+    """Return the logarithm of the Bayes factor of a cause outside, as far as a sign counts."""
+    return min(max(structure, -MOST_STRUCTURE), MOST_STRUCTURE)
 
 
-UNKNOWN = UnknownSettings()
-
-
-def signs(structure: float, push: bool) -> tuple[float, float, float]:
-    """Return the factors of the weights.
+def unknown(structure: float, push: bool) -> float:
+    """Return the probability of a cause outside the likeliest set.
 
     Args:
         structure: logarithm of the Bayes factor of a cause outside beside the likeliest set.
         push: whether there is a transient disturbance.
     """
-    return 1.0, min(max(structure, -MOST_STRUCTURE), MOST_STRUCTURE), float(push)
-
-
-def unknown(structure: float, push: bool) -> float:
-    """Return the probability of a cause outside the likeliest set; arguments as of ``signs``."""
-    _, clipped, pushed = signs(structure, push)
-    odds = UNKNOWN.nothing + clipped + UNKNOWN.push * pushed
-    return 1.0 / (1.0 + math.exp(-odds))
+    return 1.0 / (1.0 + math.exp(-NOTHING - clipped(structure) - PUSH * push))
 
 
 def beside_unknown(probability: float, factor: float, structure: float, strange: float) -> float:
@@ -55,8 +43,8 @@ def beside_unknown(probability: float, factor: float, structure: float, strange:
     Args:
         probability: given the library.
         factor: logarithm of the Bayes factor of the set over the set without this name.
-        structure: as of ``signs``.
+        structure: as of ``unknown``.
         strange: probability of a cause outside.
     """
     least = 1.0 / (1.0 + max(structure, 0.0) / max(factor, 1e-9))
-    return probability * (1.0 - strange * (1.0 - math.pow(least, UNKNOWN.absorbed)))
+    return probability * (1.0 - strange * (1.0 - math.pow(least, ABSORBED)))

@@ -51,7 +51,8 @@ def worth(
         own = [
             x * prior_size(c, flights)
             for c, x in others.items()
-            if c[0] != effect and (c[0] in first or get(c[0]).family != get(effect).family)
+            if c.effect != effect
+            and (c.effect in first or get(c.effect).family != get(effect).family)
         ]
         X = np.stack([*nuisances, *own], axis=2)[fit] / size[:, None]
         y = part[fit] / size

@@ -35,6 +35,7 @@ from .table import (
     SomeArray,
     Table,
     finite_rows,
+    lengths,
 )
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
@@ -140,25 +141,25 @@ def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
     whatever their length.
     """
     out = np.full((len(t), 4), nan)
-    good = np.linalg.norm(attitude.values, axis=1) > 0.5  # False where NaN
+    good = lengths(attitude.values) > 0.5  # False where NaN
     times, values = attitude.t[good], attitude.values[good]
     after = np.searchsorted(times, t)
     exact = np.isin(t, times)
     if exact.all():
-        return np.asarray(values[after])
+        return values[after]
     if len(times) < 2:
         return out
     inside = (t >= times[0]) & (t <= times[-1])
     inside &= exact | (np.diff(times)[after.clip(1, len(times) - 1) - 1] <= longest)
     if inside.any():
-        turn = Slerp(times, Rotation.from_quat(values, scalar_first=True))(t[inside])
-        out[inside] = turn.as_quat(scalar_first=True)
+        turn = Slerp(times, Rotation.from_quat(values, scalar_first=True))
+        out[inside] = turn(t[inside]).as_quat(scalar_first=True)
     return out
 
 
 def scaled(part: Columns, values: Array) -> Array:
     """Return columns (N, k), with the section's signs and scale."""
-    return np.asarray(values * (part.signs or 1) * part.scale)
+    return values * (part.signs or 1) * part.scale
 
 
 def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) -> Array:
@@ -199,7 +200,7 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
     if log_map.world == "enu" and log_map.body == "flu":
         return attitude
     if log_map.world == "ned" and log_map.body == "frd":  # quaternions of any length, NaN included
-        return np.asarray(attitude * [1.0, 1.0, -1.0, -1.0])
+        return attitude * [1.0, 1.0, -1.0, -1.0]
     matrix = Rotation.from_quat(attitude, scalar_first=True).as_matrix()
     turn = Rotation.from_matrix(WORLD_TURNS[log_map.world] @ matrix @ BODY_TURNS[log_map.body].T)
     return np.asarray(turn.as_quat(scalar_first=True))
@@ -209,10 +210,6 @@ def in_kit_axes(log_map: LogMap, part: Attitude, attitude: Array) -> Array:
 ROLLOVER = 2.0**32 * 1e-6  # s, of a counter of 32 bits of microseconds
 _JITTER = 1.0  # s, of the stamps at both ends of a rollover
 _RESET = 1.0  # s, the least step back of a restart; late rows are late by less
-_WINDOW, _LEAST_WINDOW = 5, 3  # stamps, whose median is compared; one decides nothing
-_HOLE = 1.5  # median steps: the least hole that a late row fills
-_ALONE = 100.0  # median steps, and at least ``jitter``: a lone first or last stamp
-# this far off all others is wrong
 
 
 def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Groups]:
@@ -229,12 +226,11 @@ def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Gro
     groups = []
     notes = []
     for samples in recorded:
-        over = (np.abs(np.diff(samples.t, prepend=nan) + ROLLOVER) < _JITTER).cumsum()
+        over = (abs(np.diff(samples.t, prepend=nan) + ROLLOVER) < _JITTER).cumsum()
         groups.append(replace(samples, t=samples.t + ROLLOVER * over))
         if over.any():
             notes.append("the clock of 32 bits rolled over in the log; later times go on behind it")
-    groups, said = _of_piece(path, groups, piece)
-    notes += said
+    groups = _of_piece(path, groups, piece, notes)
     for i, samples in enumerate(groups):
         rows, late = in_order(samples.t)
         name, count = samples.topic or next(iter(samples.columns), "rows"), len(samples.t)
@@ -250,8 +246,8 @@ def on_one_clock(path: Path, recorded: Groups, piece: Piece = None) -> Noted[Gro
     return groups, list(dict.fromkeys(notes))
 
 
-def _of_piece(path: Path, groups: Groups, piece: Piece) -> Noted[Groups]:
-    """Return each group's rows of one piece, and a note on the number of pieces.
+def _of_piece(path: Path, groups: Groups, piece: Piece, notes: Lines) -> Groups:
+    """Return each group's rows of one piece; ``notes`` get one on the number of pieces.
 
     A group with another number of pieces was not written in each of them. Such a group stays whole,
     without rows of earlier times.
@@ -260,19 +256,19 @@ def _of_piece(path: Path, groups: Groups, piece: Piece) -> Noted[Groups]:
     many = mode([len(cut) for _, cut in cuts if len(cut)] or [0]) + 1
     check_piece(path, piece, many)
     if many == 1:
-        return groups, []
+        return groups
     parts = [
         (samples, np.split(np.arange(len(samples.t)), cut) if len(cut) + 1 == many else [])
         for samples, cut in cuts
     ]
     seconds = np.max([[np.ptp(s.t[rows]) for rows in part] for s, part in parts if part], axis=0)
     chosen = seconds.argmax() if piece is None else piece - 1
-    lengths = ", ".join(f"{x:.3g}" for x in seconds)
-    note = (
-        f"the clock starts anew {many - 1} time(s): the file holds {many} pieces of {lengths} s; "
-        f"piece {chosen + 1} was read (default: the longest; --piece reads another)"
+    notes.append(
+        f"the clock starts anew {many - 1} time(s): the file holds {many} pieces of "
+        f"{', '.join(f'{x:.3g}' for x in seconds)} s; piece {chosen + 1} was read (default: the "
+        "longest; --piece reads another)"
     )
-    return [samples.cut(part[chosen]) if part else samples for samples, part in parts], [note]
+    return [samples.cut(part[chosen]) if part else samples for samples, part in parts]
 
 
 def check_piece(path: Path, piece: Piece, many: int) -> None:
@@ -291,9 +287,9 @@ def _resets(t: Array) -> Rows:
     """
     resets = []
     for i in np.flatnonzero(np.diff(t) < -_RESET) + 1:
-        before, after = t[max(i - _WINDOW, 0) : i], t[i : i + _WINDOW]
-        enough = min(len(before), len(after)) >= _LEAST_WINDOW
-        if enough and np.median(after) < np.median(before) - _RESET:
+        before, after = t[max(i - 5, 0) : i], t[i : i + 5]
+        # one stamp decides nothing
+        if min(len(before), len(after)) > 2 and np.median(after) < np.median(before) - _RESET:
             resets.append(i)
     return np.array(resets, np.intp)
 
@@ -308,7 +304,7 @@ def in_order(t: Array) -> tuple[Rows, int]:
     rows = np.arange(len(t)) if increases else _longest_increase(t)
     if len(rows) > 3:  # a first or a last one far off all others is left out
         steps = np.diff(t[rows])
-        first, last = steps[[0, -1]] > max(_ALONE * np.median(steps), _JITTER)
+        first, last = steps[[0, -1]] > max(100.0 * np.median(steps), _JITTER)
         rows = rows[int(first) : len(rows) - int(last)]
     if increases or len(rows) < 2:
         return rows, 0
@@ -316,7 +312,8 @@ def in_order(t: Array) -> tuple[Rows, int]:
     late = np.setdiff1d(np.flatnonzero((t > t[rows[0]]) & (t < t[rows[-1]])), rows)
     late = late[np.unique(t[late], return_index=True)[1]]
     after = np.searchsorted(t[rows], t[late])
-    late = late[(steps[after - 1] > _HOLE * np.median(steps)) & (t[rows[after]] != t[late])]
+    # a late row fills a hole
+    late = late[(steps[after - 1] > 1.5 * np.median(steps)) & (t[rows[after]] != t[late])]
     together = np.concatenate([rows, late])
     return together[t[together].argsort(kind="stable")], len(late)
 
@@ -340,35 +337,27 @@ def _longest_increase(t: Array) -> Rows:
 
 
 # A table's rows: their times, empty fields, and gaps of the motors.
-_STRAY_GAP = 5.0  # median time steps; shorter gaps leave no stray rows
-# s to interpolate: the lag of a small vehicle's motors, with hardly a change of speed. And steps of
-# the channel's own: a slow channel has longer gaps by nature
-_LONGEST_GAP = 0.06
-LONGEST_STEPS = 3.5
+LONGEST_STEPS = 3.5  # of a channel to interpolate: a slow one has longer gaps by nature
 _FINITE = "a finite number"
-_BACK = 0.2  # share of steps back; more are no times
-_ROUNDED = 0.2  # share of repeated times: more were rounded
 _DENSE = 0.5  # share of the rows; a channel with more counts as one of every row
-_FEWEST = 10  # samples of a channel to decide on its rows
 
 
-def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGroup]:
-    """Return the map's columns, as written, and notes.
+def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> ChannelGroup:
+    """Return the map's columns, as written; ``notes`` get further ones.
 
     Raises:
         InputError: many times go back, times cannot be told apart, or are fewer than two. Of whole
             rows: one time goes back, or a row lacks a number.
     """
     clock, is_whole = log_map.time, log_map.rows == "whole"
-    where, unit, notes = f"{table.path}: column {clock.column}", clock.unit, []
-    repeated = [name for name, count in Counter(table.header).items() if count > 1]
-    if repeated:
+    where, unit = f"{table.path}: column {clock.column}", clock.unit
+    if repeated := [name for name, count in Counter(table.header).items() if count > 1]:
         notes.append(f"columns that stand there more than once were not used: {repeated[:10]}")
     rows = np.arange(table.rows)
     if not clock.column:
         t = rows / clock.rate_hz + (clock.offset or 0.0)
         notes.append(f"time: rows at {clock.rate_hz:g} Hz, as the map says")
-        return ChannelGroup(t, columns, table=table, rows=rows), notes
+        return ChannelGroup(t, columns, table=table, rows=rows)
     samples = ChannelGroup(clock.raw(columns), columns, table=table, rows=rows)
     if is_whole:
         _refuse(samples, clock.column, samples.t, ~np.isfinite(samples.t))
@@ -388,15 +377,15 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGr
         )
     step = np.diff(raw)
     back = np.flatnonzero(step <= 0.0 if is_whole else step < 0.0)
-    if back.size > (0.0 if is_whole else _BACK * len(step)):
+    if back.size > (0.0 if is_whole else 0.2 * len(step)):  # more are no times
         i = back[0]
         raise InputError(
             f"{where}, {samples.place(i + 1)}: {raw[i + 1]:.9g} {unit} "
             f"{'goes back from' if step[i] else 'repeats the time'} {raw[i]:.9g} {unit} of the row "
             f"before; expected {'strictly ' if is_whole else ''}increasing times"
         )
-    begin = raw[0] if clock.offset is None else 0.0
-    t = (raw - begin) * UNITS["time"][unit] + (clock.offset or 0.0)
+    t = raw - raw[0] if clock.offset is None else raw
+    t = t * UNITS["time"][unit] + (clock.offset or 0.0)
     if not np.isfinite(t).all() or ((np.diff(t) <= 0.0) & (step > 0.0)).any():
         raise InputError(
             f"{where}: times of {raw[0]:.6g} to {raw[-1]:.6g} {unit} cannot be told apart; "
@@ -406,23 +395,24 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap) -> Noted[ChannelGr
     if is_whole:
         _check_whole(samples, log_map)
         step = np.diff(t)
-        gaps = np.flatnonzero(step[: log_map.stray_rows] > _STRAY_GAP * np.median(step)) + 1
+        gaps = np.flatnonzero(step[: log_map.stray_rows] > 5.0 * np.median(step)) + 1
         for stray in gaps[-1:]:
             notes.append(
                 f"dropped {stray} stray sample(s) before a gap of {step[stray - 1]:.2g} s at the "
                 "start"
             )
             samples = samples.cut(slice(stray, None))
-        return samples, notes
+        return samples
     begins = np.flatnonzero(np.diff(raw, prepend=nan) != 0.0)
     if len(begins) < len(t):
         notes.append(f"{len(t) - len(begins)} row(s) repeat a time and were joined to the one row")
-        joined = {}
-        for name, column in samples.columns.items():  # the last value of each
-            there = np.where(np.isnan(column), -1, np.arange(len(t)))
-            joined[name] = column[np.maximum.reduceat(there, begins).clip(begins)]
+        each = np.arange(len(t))
+        joined = {  # the last value of each
+            name: x[np.maximum.reduceat(np.where(np.isnan(x), -1, each), begins).clip(begins)]
+            for name, x in samples.columns.items()
+        }
         samples = replace(samples.cut(np.append(begins[1:], len(t)) - 1), columns=joined)
-    return samples, notes
+    return samples
 
 
 def _even_times(raw: Array) -> SomeArray:
@@ -430,11 +420,11 @@ def _even_times(raw: Array) -> SomeArray:
     a time repeats in fewer than a fifth of them.
     """
     step = np.diff(raw)
-    if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < _ROUNDED:
+    if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < 0.2:
         return None
     rows = np.arange(len(raw))
     even = np.polynomial.Polynomial.fit(rows, raw, 1)(rows)
-    return even if np.abs(raw - even).max() <= step[step > 0.0].min() else None
+    return even if abs(raw - even).max() <= step[step > 0.0].min() else None
 
 
 def _refuse(
@@ -478,17 +468,15 @@ def rows_apart(samples: ChannelGroup, log_map: LogMap) -> bool:
     are in all rows alike.
     """
     there = {n: samples.there(part) for n, part in log_map.sections.items() if samples.has(part)}
-    base = "position" if "position" in there else "gyro"
-    if base not in there:
+    placed = there.pop("position", there.get("gyro", np.zeros(0, bool)))
+    if not placed.any():
         return False
-    placed = there.pop(base)
     turned = there.get("attitude", placed)
     if 0.0 < min(placed.mean(), turned.mean()) < _DENSE and (placed != turned).any():
         return True
     return any(
-        x.sum() >= _FEWEST and x[~placed].sum() > (1.0 - 0.5 * placed.mean()) * x.sum()
+        x.sum() >= 10 and x[~placed].sum() > (1.0 - 0.5 * placed.mean()) * x.sum()
         for x in there.values()
-        if placed.any()
     )
 
 
@@ -526,11 +514,11 @@ def check_rows(samples: ChannelGroup, log_map: LogMap) -> Lines:
                 slow.append(f"{name} {count} of {len(column)}")
             elif count < len(column):
                 filled.append(f"{name} {len(column) - count} (over up to {gap:.3g} s)")
-    listed = {
-        "missing values interpolated": filled,
-        "interpolated to the other rows, since they have values in": slow,
-    }
-    return [f"{what}: {', '.join(columns)}" for what, columns in listed.items() if columns]
+    listed = (
+        ("missing values interpolated", filled),
+        ("interpolated to the other rows, since they have values in", slow),
+    )
+    return [f"{what}: {', '.join(columns)}" for what, columns in listed if columns]
 
 
 def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
@@ -546,7 +534,8 @@ def _longest_gap(samples: ChannelGroup, name: str, column: Array) -> float:
         return 0.0
     t = samples.t
     steps = np.diff(t[read])
-    limit = max(_LONGEST_GAP, LONGEST_STEPS * np.median(steps) if len(steps) else 0.0)
+    # s: the lag of a small vehicle's motors, with hardly a change of speed
+    limit = max(0.06, LONGEST_STEPS * np.median(steps) if len(steps) else 0.0)
     gaps = np.diff(t[read], prepend=t[0], append=t[-1])
     at = gaps.argmax()
     is_long = not len(read) or gaps[at] > limit * (1.0 + 1e-9)

@@ -105,10 +105,10 @@ def groups_of(names: Sequence[Name], endings: Sequence[str]) -> list[Group]:
         if more and {key + more, f"{key}_{more}"} & bases:
             continue  # three of four, or four of five
         if len(members) == len(endings) and not re.search(unwanted, key):
-            named = [members[ending] for ending in endings]
-            units = {name.unit for name in named}
+            columns = tuple(members[ending].column for ending in endings)
+            units = {name.unit for name in members.values()}
             unit = units.pop() if len(units) == 1 else ""
-            out.append(Group(tuple(name.column for name in named), key, unit, tuple(endings)))
+            out.append(Group(columns, key, unit, tuple(endings)))
     return list(dict.fromkeys(out))
 
 
@@ -117,6 +117,8 @@ def named_alone(names: Sequence[Name], part: str) -> list[Name]:
     battery's voltage.
     """
     known = WORDS[part]
-    whole = [name for word in known for name in names if name.base == word]
     tails = [word if len(word) > 3 else f"_{word}" for word in known]
-    return [*whole, *(name for tail in tails for name in names if name.base.endswith(tail))]
+    return [
+        *(name for word in known for name in names if name.base == word),
+        *(name for tail in tails for name in names if name.base.endswith(tail)),
+    ]

@@ -17,7 +17,7 @@ import numpy as np
 from ..motion.smoothing import resampled, second_difference
 from .column_names import WORDS, Group, Name, groups_of, named_alone
 from .magnitudes import likely_unit
-from .table import Array, ArrayMap, ArrayPair, Names, finite_rows
+from .table import Array, ArrayMap, ArrayPair, Names, finite_rows, lengths
 
 Verdict = tuple[float, str]  # how well columns obey a part's physics, and in words
 Judge = Callable[[Names], Verdict]
@@ -25,7 +25,6 @@ Judge = Callable[[Names], Verdict]
 
 # When numbers speak for a part, and their score beside a name's (4 for the likeliest).
 _NUMBERS = 4.0  # score of numbers by the part's physics
-CERTAIN_LEAD = 2.0  # lead over the next candidate
 _MOST_ROWS = 20_000  # at most, from the middle of the flight
 _MOST_SAMPLES = 4000  # at most, of the rows compared
 _FEWEST = 30  # for a decision
@@ -81,20 +80,20 @@ class Numbers:
         if len(columns) == 3:
             return 0.0, ""
         x = self.some(columns)
-        length = np.linalg.norm(x, axis=1)
-        off = np.abs(length[length > 0.5] - 1.0)  # zeros stand for a missing quaternion
+        length = lengths(x)
+        off = abs(length[length > 0.5] - 1.0)  # zeros stand for a missing quaternion
         # median error of a quaternion's length, and of 98 %
-        if len(off) < max(2, 0.5 * len(x)) or np.any(np.quantile(off, [0.5, 0.98]) >= (2e-3, 0.02)):
+        if len(off) < max(2, 0.5 * len(x)) or (np.quantile(off, [0.5, 0.98]) >= (2e-3, 0.02)).any():
             return -np.inf, ""
         return 1.0, "their length is 1"
 
     def gravity(self, columns: Names) -> Verdict:
         """Return 1 where gravity lies along the third of three columns, 0.8 along another."""
         x = self.some(columns)
-        length = np.linalg.norm(x, axis=1)
-        size, middle = float(np.median(length)), np.abs(np.median(x, axis=0))
+        length = lengths(x)
+        size, middle = np.median(length), abs(np.median(x, axis=0))
         unit, is_gravity = likely_unit("accelerometer", size)
-        if not is_gravity or np.std(length) < 1e-6 * size or middle.max() < 0.8 * size:
+        if not is_gravity or length.std() < 1e-6 * size or middle.max() < 0.8 * size:
             return 0.0, ""  # another size, a direction, or a turning vector
         return (1.0 if middle.argmax() == 2 else 0.8), f"their size is gravity's, in {unit}"
 
@@ -102,7 +101,7 @@ class Numbers:
         """Return 1 where four columns are of one size and move with the specific force."""
         x = self.some(columns)
         x = x[x.any(axis=1)]
-        if len(x) < _FEWEST or np.mean(x < 0.0) > 0.01 or not np.ptp(x, axis=0).all():
+        if len(x) < _FEWEST or (x < 0.0).mean() > 0.01 or not np.ptp(x, axis=0).all():
             return 0.0, ""
         middle, total = np.median(x, axis=0), self.between(self.clock, columns).sum(axis=1)
         together = any(_correlation(total, felt) > 0.5 for felt in self.felt)
@@ -112,7 +111,7 @@ class Numbers:
     def feel(self, accelerometer: Group | None, position: Group | None) -> None:
         """Keep likely specific forces: an accelerometer's size, else accelerations."""
         if accelerometer:
-            self.felt = [np.linalg.norm(self.between(self.clock, accelerometer.columns), axis=1)]
+            self.felt = [lengths(self.between(self.clock, accelerometer.columns))]
         elif position:
             force = second_difference(self.clock, 0.2, *self.rows(position.columns)).T
             self.felt = [*force, *-force]
@@ -130,7 +129,7 @@ class Numbers:
         x, y = np.log(mean[there]), np.log(felt[there])
         if len(x) < _FEWEST or _correlation(x, y) < 0.85:
             return np.nan
-        return float(np.std(y) / np.std(x))
+        return float(y.std() / x.std())
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +158,8 @@ def named_columns(names: Sequence[Name]) -> set[str]:
     """Return the columns with a part's name."""
     endings = [e for ways in WORDS["parts"].values() for way in ways for e in way["endings"]]
     groups = [group for ending in endings for group in groups_of(names, ending) if _named(group)]
-    alone = [name.column for part in ("time", "battery") for name in named_alone(names, part)]
-    return {*alone, *(column for group in groups for column in group.columns)}
+    found = {name.column for part in ("time", "battery") for name in named_alone(names, part)}
+    return found.union(*(group.columns for group in groups))
 
 
 def candidates(
@@ -192,7 +191,7 @@ def candidates(
                 continue
             else:
                 ways.append((group, -1.0, "their names go together"))
-            named |= set(group.columns)
+            named.update(group.columns)
     if part != "commands" and not commanded:
         width = 4 if part in ("attitude", "motors") else 3
         # with more than a few values: no counter's and no switch's

@@ -20,13 +20,7 @@ from .flight_log import FlightLog, SomeVehicle
 from .flight_phases import flying
 from .log_map import Commands
 from .magnitudes import within
-from .table import Array, Noted, SomeArray
-
-# s, the longest dip of thrust in flight: a vehicle falls 5 m meanwhile. Without dips, high thrusts
-# alone would remain, with a mean above the weight
-_DIP = 1.0
-_SATURATED = 0.9995  # share of the full command
-_FELT = 6.0, 16.0  # m/s2: the median of most flights; outside a unit may be another
+from .table import Array, Lines, Noted, SomeArray, lengths
 
 
 def with_commanded_speeds(
@@ -78,17 +72,17 @@ def _speeds(
             "battery's voltage. A constant factor on thrust and the mass cannot be found from this "
             "log"
         ]
-        if saturated := (command.max(axis=1) >= _SATURATED).mean():
+        if saturated := (command.max(axis=1) >= 0.9995).mean():
             notes.append(f"a motor is at full command in {100.0 * saturated:.1f} % of the samples")
         return np.sqrt(np.where(command > 0.0, np.maximum(thrust, 0.0), 0.0) / vehicle.k), notes
     least, most = model.thrust_span
     share = ((command - least) / (most - least)).clip(0.0, None)
     factor, rest = model.thrust_factor, 1.0 - model.thrust_factor
-    relative = factor * np.square(share) + rest * share
+    relative = factor * share**2 + rest * share
     total = relative.sum(axis=1)
     x, felt = log.accelerometer, None
-    if x is not None:  # beside a pose, an unusual size counts as unknown
-        usual = within(float(np.nanmedian(np.linalg.norm(x, axis=1))), _FELT)
+    if x is not None:  # beside a pose, an unusual size counts as unknown: a unit may be another
+        usual = within(np.nanmedian(lengths(x)), (6.0, 16.0))
         felt = x[:, 2] if usual or not log.has_pose else None
     where = "a pose" if felt is None else "an accelerometer"
     if felt is None and not log.has_pose:
@@ -117,24 +111,23 @@ def _speeds(
     ]
 
 
-def speeds_of_wrench(wrench: Array, vehicle: Vehicle) -> Noted[Array]:
-    """Return rotor speeds (N, 4) in rad/s of commanded collective thrusts and torques (N, 4), and
-    notes.
+def speeds_of_wrench(wrench: Array, vehicle: Vehicle, notes: Lines) -> Array:
+    """Return rotor speeds (N, 4) in rad/s of commanded collective thrusts and torques (N, 4);
+    ``notes`` get further ones.
     """
     square = np.linalg.solve(vehicle.mixing, wrench.T).T
-
-    notes = [
+    notes.append(
         "no rotor speeds in the log: commanded thrust and torques were converted into rotor speeds "
         f"by the inverse of the rotor mixing of {vehicle.name}, clipped at zero and at omega_max. "
         "What the firmware's thrust curve, the battery and the motors made of the command is not "
         "in the log; a constant factor on thrust remains unknown"
-    ]
+    )
     within_reach = square.clip(0.0, vehicle.omega_max**2)
     if clipped := (square != within_reach).any(axis=1).sum():
         notes.append(
             f"the commands of {clipped} sample(s) were out of the rotors' reach and were clipped"
         )
-    return np.sqrt(within_reach), notes
+    return np.asarray(np.sqrt(within_reach))
 
 
 def _polynomial(coefficients: Sequence[float]) -> str:
@@ -151,14 +144,16 @@ def _scale(log: FlightLog, total: Array, felt: SomeArray, vehicle: Vehicle) -> f
     rows = log.valid if felt is None else np.isfinite(felt)
     t, total = log.t[rows], total[rows]
     aloft = flying(total)
-    for run in unbroken(t, np.flatnonzero(aloft), _DIP):
+    # a vehicle falls 5 m in a dip of 1 s. Without dips, high thrusts alone would remain, with a
+    # mean above the weight
+    for run in unbroken(t, np.flatnonzero(aloft), 1.0):
         aloft[run[0] : run[-1]] = True
     if felt is not None:
         felt = felt[rows]
         usable = aloft & (total > 0.0) & (felt > 0.0)
         share = felt[usable] / total[usable]
-        return vehicle.mass * float(np.median(share)) if len(share) else None
+        return vehicle.mass * np.median(share) if len(share) else None
     _, x, y, _ = log.quaternion[rows].T
     vertical = (total * (1.0 - 2.0 * (x * x + y * y)))[aloft]
-    mean = float(vertical.mean()) if len(vertical) else 0.0
+    mean = vertical.mean() if len(vertical) else 0.0
     return vehicle.weight / mean if mean > 0.0 else None

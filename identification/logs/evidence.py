@@ -48,7 +48,7 @@ from .readings import (
     as_written,
     log_readings,
 )
-from .table import Array, ArrayPair, Rows, finite_rows, median_step
+from .table import Array, ArrayPair, Pair, Rows, finite_rows, lengths, median_step
 
 # Filters, and when a reading is certain.
 _FEWEST = 60  # samples in flight for a decision
@@ -65,9 +65,6 @@ _MOST_SHARE = 2.0  # larger shares count the same
 GOOD = 0.5  # share: a reading below is believed
 GOOD_TORQUE = 0.65  # the same of torques without a vehicle
 _CERTAIN_LEAD = 3.4  # log-likelihood ratio over the next best: 30 to 1
-# rad/s of roll and pitch in the band of turning: in hovers (0.03 in a simulated one) rotors
-# answer disturbances more than they turn the body, and the mirrored order may explain more
-TURNING_RATE = 0.06
 _G = 9.81
 # roll and pitch of rotors 1 to 4, whatever the vehicle
 SIDES = np.array([[1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]])
@@ -81,12 +78,12 @@ def likelihood(left: ArrayLike) -> Array:
     return np.asarray(-10.0 * np.log(np.clip(left, 0.01, _MOST_SHARE)).sum(axis=-1))
 
 
-def shares(total: Array, power: Array, cross: Array, gain: ArrayLike) -> Array:
+def _shares(total: Array, power: Array, cross: Array, gain: Array | Pair) -> Array:
     """Return the shares of variances ``total`` (...) left by signals of variance ``power`` and
     covariance ``cross``, times a gain in range: ``gain`` (2, ...).
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # all of a zero variance is left
-        factor = np.clip(cross / power, *np.asarray(gain))
+        factor = np.clip(cross / power, *gain)
         left = np.minimum(1.0 - factor * (2.0 * cross - factor * power) / total, _MOST_SHARE)
     return np.where((total > 0.0) & (power > 0.0), left, 1.0)
 
@@ -139,9 +136,8 @@ class Evidence:
         if np.isfinite(thrusts).any():
             # more than 1.5 of the 99th percentile is a wrong reading of a sensor
             self._thrusts = np.minimum(thrusts, 1.5 * np.nanquantile(thrusts, 0.99))
-        moving = (x for x in (t[:, None], position, attitude, gyro) if x is not None)
-        there = np.all([finite_rows(x) for x in moving], axis=0)
-        self._compared = self._laid_out(np.flatnonzero(there))
+        moving = [x for x in (t[:, None], position, attitude, gyro) if x is not None]
+        self._compared = self._laid_out(np.flatnonzero(finite_rows(np.hstack(moving))))
         self.enough = len(self._compared) >= _FEWEST  # whether the flight is long enough
         self._motion, self._delayed = lru_cache(self._moving), lru_cache(2)(self._pushes)
         self._moved = lru_cache(2)(self._balances)
@@ -149,7 +145,7 @@ class Evidence:
     @classmethod
     def of_log(cls, log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False) -> "Evidence":
         """Return the evidence of a log: by its pose, or by its IMU."""
-        squares = np.square(log.rotor_speeds)
+        squares = log.rotor_speeds**2
         if by_imu:
             assert log.accelerometer is not None
             force = log.accelerometer[:, 2]
@@ -165,13 +161,16 @@ class Evidence:
         """
         step = median_step(self._t[rows]) if len(rows) > 1 else 0.0
         self._period = period = max(step, 0.005)
-        runs = unbroken(self._t, rows, max(LONGEST_GAP, 3.5 * step), 8, SHORTEST_PIECE)
         known = finite_rows(self._thrusts)
-        runs = [run for run in runs if known[run[0] : run[-1] + 1].any()]
+        runs = [
+            run
+            for run in unbroken(self._t, rows, max(LONGEST_GAP, 3.5 * step), 8, SHORTEST_PIECE)
+            if known[run[0] : run[-1] + 1].any()
+        ]
         if not runs:
             return rows[:0]
         ends = np.array([self._t[run[[0, -1]]] for run in runs])
-        before = np.append(0.0, np.cumsum(np.diff(ends)[:-1, 0] + 2.0))
+        before = np.append(0.0, (np.diff(ends)[:-1, 0] + 2.0).cumsum())
         laid = before[:, None] + ends - ends[:, :1]
         # of the rows; NaN outside the runs
         self._times = np.interp(self._t, ends.ravel(), laid.ravel(), left=np.nan, right=np.nan)
@@ -181,8 +180,8 @@ class Evidence:
         aloft = total > 0.5 * usual_thrust(total[clock <= end])
         aloft &= (clock >= begin + 0.3) & (clock <= end - 0.3)  # the filters' start
         # 20 a second, at most 2000: of longer flights every second one, or third ...
-        every = np.ceil(len(rows) * step * 20.0 / 2000) / (20.0 * period)
-        return np.flatnonzero(aloft & (np.arange(len(clock)) % max(1, round(every)) == 0))
+        every = max(1, round(np.ceil(len(rows) * step * 20.0 / 2000) / (20.0 * period)))
+        return np.flatnonzero(aloft & (np.arange(len(clock)) % every == 0))
 
     def _even(self, x: Array) -> Array:
         """Return columns (N, k) on the even clock, (m, k); NaN: there are none."""
@@ -282,11 +281,11 @@ class Evidence:
         force += np.array([0.0, 0.0, _G])
         needed, given = (np.ravel(x[:, :2] - x[:, :2].mean(axis=0)) for x in (force, push))
         mean = push.mean(axis=0)
-        along = np.sum(force * push, axis=1) / np.maximum(np.linalg.norm(push, axis=1), 1e-9)
+        along = (force * push).sum(axis=1) / np.maximum(lengths(push), 1e-9)
         # log-likelihood ratios against a flight on its side, and below its origin
         cost = 60.0 * (mean[2] <= GOOD * np.linalg.norm(mean))
         cost += 3.0 * ((frames.position @ middle)[2] < 0.0)
-        left = shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
+        left = _shares(needed @ needed, given @ given, needed @ given, _FORCE_GAIN)
         return float(left), cost, self._needed(along, reading)
 
     def fit(self, reading: Convention, torques: bool = True) -> Fit:
@@ -321,21 +320,21 @@ class Evidence:
         needed = needed[: len(rows)]
         there, thrusts = self._delayed(*delays)
         given = rows @ thrusts
-        left = shares(  # (d, 1 + torques)
-            there @ np.square(needed).T,
+        left = _shares(  # (d, 1 + torques)
+            there @ (needed**2).T,
             (given * given).sum(axis=2),
             (given * needed).sum(axis=2),
             np.transpose(self._gains[: len(rows)]),
         )
         left[there.sum(axis=1) < _FEWEST] = _MOST_SHARE
-        best = np.argmax(likelihood(left))
+        best = likelihood(left).argmax()
         score = likelihood([horizontal, horizontal, *left[best]]) - cost - reading.unlikely
-        torque = float(np.mean(left[best, 1:])) if len(mixing) else 1.0
-        return Fit(reading, horizontal, torque, float(score), delays[best], float(left[best, 0]))
+        torque = left[best, 1:].mean() if len(mixing) else 1.0
+        return Fit(reading, horizontal, torque, float(score), delays[best], left[best, 0])
 
     def turns(self, reading: Convention) -> float:
         """Return the root mean square of roll and pitch rates in the band of turning, rad/s."""
-        return float(np.sqrt(np.mean(np.square(self._motion(reading.attitude)[1][:, 0, :2]))))
+        return float(np.sqrt((self._motion(reading.attitude)[1][:, 0, :2] ** 2).mean()))
 
 
 class RankedFits:

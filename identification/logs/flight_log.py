@@ -61,7 +61,6 @@ REQUIRED = ("t", *POSE, *ROTORS)
 VEHICLE = re.compile(r"vehicle=([A-Za-z0-9][A-Za-z0-9_.+ -]{0,63})")  # a column's name
 
 NORM_TOLERANCE = 0.02  # tolerance of a quaternion's length
-_GAP = 3.0  # median time steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +169,7 @@ def time_notes(t: Array) -> Names:
     """Return a note on the gaps in times (N,) in s: steps of more than 3 median ones."""
     step = np.diff(t)
     usual = np.median(step) if step.size else inf
-    gaps = (step > _GAP * usual).sum()
+    gaps = (step > 3.0 * usual).sum()
     if not gaps:
         return ()
     longest = step.argmax()
@@ -185,25 +184,17 @@ def time_notes(t: Array) -> Names:
 # judged up to 3.5 Hz. Torques turn a vehicle within a tenth of a second: they need the rate of a
 # pose and a gyro.
 FORCE_HZ, TORQUE_HZ = 20.0, 45.0
-_JITTER = 1.1  # tolerance of a rate, as a factor
 
 
 def serves(rate: float, least: float) -> bool:
     """Return whether a rate is high enough, Hz."""
-    return rate * _JITTER >= least
+    return 1.1 * rate >= least  # a rate jitters
 
 
 # When values repeat because nothing was measured, and not because they were rounded.
 # share of the median spacing of changes: rounded values change at any spacing, held ones at
 # their own
 _LEAST_SPACING = 0.6
-_LEAST_ROWS = 2.0  # median spacing in rows; below, each row is a sample
-_EARLY = 0.05  # quantile of spacings compared with the median
-# share of the RMS distance from the line between both neighbours: on the line
-_ON_LINE = 1e-3
-_ROUNDED = 1.001  # rounding steps by which three rounded values leave a line, at most
-_MOST_CORNERS = 2 / 3  # of the rows; with more no two corners can be told apart
-_LEAST_CHANGES = 8  # for a spacing
 _MOST_ROWS = 100_000  # from the middle of a long flight
 
 
@@ -246,13 +237,14 @@ def _corners(t: Array, values: Array) -> Rows:
     if len(t) < 3:
         return np.empty(0, np.intp)
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
-    steps = np.abs(np.diff(values, axis=0))
+    steps = abs(np.diff(values, axis=0))
     rounding = steps.min(axis=0, where=steps > 0.0, initial=inf)
     line = values[:-2] + share * (values[2:] - values[:-2])
-    off = np.abs(values[1:-1] - line)
-    least = np.maximum(_ON_LINE * np.sqrt(mean_square(off)), _ROUNDED * rounding)
+    off = abs(values[1:-1] - line)
+    # three rounded values leave a line by at most one rounding step
+    least = np.maximum(1e-3 * np.sqrt(mean_square(off)), 1.001 * rounding)
     is_corner = (off > least).any(axis=1)
-    if is_corner.mean() > _MOST_CORNERS:
+    if is_corner.mean() > 2 / 3:  # no two corners can be told apart
         return np.empty(0, np.intp)
     return np.flatnonzero(is_corner & ~np.append(False, is_corner[:-1]))
 
@@ -260,12 +252,13 @@ def _corners(t: Array, values: Array) -> Rows:
 def _spacing(events: Rows) -> float:
     """Return the usual number of rows between regular events; else 1."""
     spacing = np.diff(events)
-    if len(spacing) < _LEAST_CHANGES:
+    if len(spacing) < 8:
         return 1.0
     median = np.median(spacing)
-    beat = np.quantile(spacing, _EARLY) >= _LEAST_SPACING * median
+    beat = np.quantile(spacing, 0.05) >= _LEAST_SPACING * median
     usual = spacing[spacing < median / _LEAST_SPACING]  # no gap
-    return float(usual.mean()) if beat and median >= _LEAST_ROWS else 1.0
+    # with a spacing of less than two rows each row is a sample
+    return float(usual.mean()) if beat and median >= 2.0 else 1.0
 
 
 def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
@@ -293,8 +286,7 @@ def excerpt(log: FlightLog, seconds: float = 0.0) -> FlightLog:
     if share == 1.0 or length <= _WINDOW:
         return log
     count, spare = max(1, round(share * length / _WINDOW)), length - _WINDOW
-    first = 0.0 if count > 1 else 0.5 * spare
-    begins = log.t[0] + np.linspace(first, spare, count)
+    begins = log.t[0] + np.linspace(0.0 if count > 1 else 0.5 * spare, spare, count)
     keep = np.any([(log.t >= at) & (log.t <= at + _WINDOW) for at in begins], axis=0)
     note = (
         f"of {length:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "
@@ -305,21 +297,20 @@ def excerpt(log: FlightLog, seconds: float = 0.0) -> FlightLog:
 
 def parts_of(log: FlightLog) -> list[tuple[Names, Array]]:
     """Return a log's channels (N, k), with their columns' names in a file."""
-    speeds, command, force, torque = log.rotor_speeds, log.command, log.force, log.torque
-    accelerometer, gyro, pose = log.accelerometer, log.gyro, log.position
-    is_whole = log.has_pose or accelerometer is None or gyro is None
+    command, force, torque, pose = log.command, log.force, log.torque, log.position
+    is_whole = log.has_pose or log.accelerometer is None or log.gyro is None
     if is_whole:
         pose = np.column_stack([pose, log.quaternion])
         pose[~log.valid] = nan
     parts: list[tuple[Names, SomeArray]] = [
         (("t",), log.t),
         (POSE[: pose.shape[1]], pose if is_whole or np.isfinite(pose).any() else None),
-        (ROTORS, speeds if log.has_rotor_speeds or command is None else None),
+        (ROTORS, log.rotor_speeds if log.has_rotor_speeds or command is None else None),
         (COMMANDS, command),
         (("vbat",), log.voltage),
         (TRUTH, None if force is None or torque is None else np.column_stack([force, torque])),
-        (ACCELEROMETER, accelerometer),
-        (GYRO, gyro),
+        (ACCELEROMETER, log.accelerometer),
+        (GYRO, log.gyro),
     ]
     return [(names, values) for names, values in parts if values is not None]
 

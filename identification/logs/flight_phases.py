@@ -10,22 +10,9 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import CUTOFFS, low_pass
 from .flight_log import FlightLog
-from .table import Array, Mask, finite_rows
+from .table import Array, Mask, finite_rows, lengths
 
 GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
-
-_TURNING = 0.1  # share of the weight: less thrust is a rotor at rest
-_CARRIED = 0.3  # share of the usual load: a vehicle below it stands on the ground
-_CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
-_WELL_ABOVE = 0.2  # of the typical height
-_CLIMB = 0.1  # m/s: slower is not climbing or sinking
-_CLIMB_WINDOW = 0.25  # s, either side, of the mean climb rate
-_MOVES = 0.1  # m of way: a vehicle at rest moves by less, whatever the noise of its pose
-_DROVE = 2.0, 0.003  # m of way, and m of height: a flight over this way changes its height by more
-_FASTEST = 200.0  # m/s: no quadrotor flies faster
-_SLOWER = 0.95  # share of the flight that is slower; a leap of the pose is no speed
-_TURNS = 0.03  # rad/s, of means over _MEAN: a vehicle at rest turns by less, whatever its vibration
-_MEAN = 0.2  # s
 
 
 def flying(total: Array) -> Mask:
@@ -54,8 +41,8 @@ def carried(rotors: Array, period: float) -> Mask:
     """Return the samples (N,), ``period`` s apart, where rotors carry a vehicle, dives included:
     by the squares of their speeds or commands (N, 4), slowly averaged.
     """
-    load = low_pass(np.mean(np.square(rotors), axis=1), CUTOFFS.flying_hz, period)
-    return load > _CARRIED * usual_thrust(load)
+    load = low_pass((rotors**2).mean(axis=1), CUTOFFS.flying_hz, period)
+    return load > 0.3 * usual_thrust(load)  # a vehicle below stands on the ground
 
 
 def flew(log: FlightLog) -> tuple[str, str]:
@@ -64,7 +51,7 @@ def flew(log: FlightLog) -> tuple[str, str]:
     without measured motion.
     """
     if log.has_rotor_speeds:
-        total = np.square(log.rotor_speeds).sum(axis=1)
+        total = (log.rotor_speeds**2).sum(axis=1)
     elif log.command is not None:
         total = np.nan_to_num(log.command).sum(axis=1)
     else:
@@ -76,23 +63,27 @@ def flew(log: FlightLog) -> tuple[str, str]:
     rows = aloft & finite_rows(log.position)
     place = log.position[rows]
     if len(place) > 1:
-        speeds = np.linalg.norm(np.diff(place, axis=0), axis=1) / np.diff(log.t[rows])
-        if (speed := np.quantile(speeds, _SLOWER)) > _FASTEST:
+        speeds = lengths(np.diff(place, axis=0)) / np.diff(log.t[rows])
+        # no quadrotor flies faster than 200 m/s; leaps of the pose, at most 5 %, are no speed
+        if (speed := np.quantile(speeds, 0.95)) > 200.0:
             return "not shown", (
                 f"the position moves by {speed:.2g} m/s: another unit, or a simulation that blew up"
             )
         x, y, z = np.ptp(np.quantile(place, [0.01, 0.99], axis=0), axis=0)
         far = np.linalg.norm((x, y, z))
         said = f"the position spans {far:.3g} m, {z:.3g} m in height"
-        drove = np.hypot(x, y) > _DROVE[0] and z < _DROVE[1]
-        return "not shown" if far < _MOVES or drove else told, said
+        # a flight over 2 m changes its height by more than 3 mm
+        drove = np.hypot(x, y) > 2.0 and z < 0.003
+        # a vehicle at rest moves by less, whatever the noise of its pose
+        return "not shown" if far < 0.1 or drove else told, said
     if log.gyro is not None:
         rates = log.gyro[aloft & finite_rows(log.gyro)]
-        count = max(1, round(_MEAN / log.period))
+        count = max(1, round(0.2 / log.period))
         means = rates[: len(rates) // count * count].reshape(-1, count, 3).mean(axis=1)
-        turns = np.std(means, axis=0).max(initial=0.0) if len(means) else 0.0
+        turns = means.std(axis=0).max(initial=0.0) if len(means) else 0.0
         said = f"the motors run, and the body turns at {turns:.2g} rad/s"
-        return "unknown" if turns < _TURNS else told, said
+        # means of a vehicle at rest turn by less, whatever its vibration
+        return "unknown" if turns < 0.03 else told, said
     return "unknown", "the motors run, and no motion was logged"
 
 
@@ -117,22 +108,21 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         rotor_speeds: (N, 4) rad/s.
         vehicle: the vehicle.
     """
-    at_rest = np.square(rotor_speeds) @ vehicle.k < _TURNING * vehicle.weight
+    at_rest = rotor_speeds**2 @ vehicle.k < 0.1 * vehicle.weight
     times, last = t.tolist(), len(t) - 1
     on = _run(at_rest)
     off = last - _run(at_rest[::-1])
     starts, lands = on > 0, off < last  # whether the log shows take-off and landing
-    before = float(np.median(height[:on])) if starts else -inf
-    after = float(np.median(height[off + 1 :])) if lands else -inf
-    clear = height > max(before, after) + _CLEARANCE
+    before = np.median(height[:on]) if starts else -inf
+    after = np.median(height[off + 1 :]) if lands else -inf
+    clear = height > max(before, after) + 0.05  # m above the place of rest
     clear[:on] = clear[off + 1 :] = False
     if not clear.any():  # the vehicle never left the ground
         return [Phase(GROUND, times[0], times[-1])]
 
     # well above the ground: a bounce on landing is no flight
-    typical = float(np.median(height[clear]))
-    rise = np.interp(t + _CLIMB_WINDOW, t, height) - np.interp(t - _CLIMB_WINDOW, t, height)
-    climb = rise / (2 * _CLIMB_WINDOW)
+    typical = np.median(height[clear])
+    climb = (np.interp(t + 0.25, t, height) - np.interp(t - 0.25, t, height)) / 0.5
     lift_off, cruise, descent, touch_down = 0, 0, last, last
     if starts:
         lift_off, cruise = _first_climb(clear, height, before, typical, climb)
@@ -144,16 +134,15 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         cruise = descent = (cruise + descent) // 2
     edges = [times[i] for i in (0, lift_off, cruise, descent, touch_down, last)]
     names = (GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND)
-    phases = map(Phase, names, edges, edges[1:])
-    return [phase for phase in phases if phase.end > phase.start]
+    return [p for p in map(Phase, names, edges, edges[1:]) if p.end > p.start]
 
 
 def _first_climb(
     clear: Mask, height: Array, ground: float, typical: float, climb: Array
 ) -> tuple[int, int]:
     """Return the first sample off the ground, and the first behind the climb (N,) from there."""
-    up = int((clear & (height >= ground + _WELL_ABOVE * (typical - ground))).argmax())
-    return up - _run(clear[up::-1]) + 1, up + _run(climb[up:] > _CLIMB)
+    up = int((clear & (height >= ground + 0.2 * (typical - ground))).argmax())
+    return up - _run(clear[up::-1]) + 1, up + _run(climb[up:] > 0.1)  # m/s
 
 
 def _run(true: Mask) -> int:

@@ -18,7 +18,6 @@ from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, running_integral, second_difference
 from .evidence import GOOD, likelihood, remedies
 from .flight_log import ACCELEROMETER, GYRO, FlightLog, excerpt
-from .magnitudes import STRONGEST
 from .readings import (
     ACCELEROMETER_READINGS,
     AS_DECLARED,
@@ -28,13 +27,14 @@ from .readings import (
     SensorReading,
     applied,
 )
-from .table import Array, Data, Names, finite_rows
+from .table import Array, Data, Names, finite_rows, lengths
 
 # How inertial sensors are compared.
 WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
 _FEWEST = 10  # comparisons for a decision
 LEAST_SAMPLES = 20  # of pose and of sensor, at least
 STILL = 0.1  # rad/s: the rate of a standing vehicle by pose noise
+_STRONGEST = 300.0  # m/s2 of specific force, above all racers and most sensors' range
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
@@ -52,10 +52,11 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
     if not (notes and log.has_pose and log.has_rotor_speeds):
         return checked, notes
     advice, is_whole = remedies(log, vehicle)
-    wrong = "the pose contradicts the inertial sensors and the rotors"
     for reading in advice if is_whole else ():
         if reading.moves != DECLARED.moves and not _agreeing(applied(log, reading), gravity)[1]:
-            return log, (f"{wrong}: {reading.says}",)
+            return log, (
+                f"the pose contradicts the inertial sensors and the rotors: {reading.says}",
+            )
     return checked, notes
 
 
@@ -76,7 +77,7 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
             shares = gyro_shares(t, measured, *pose, (AS_DECLARED, *GYRO_READINGS))
             doubt = _sensor_doubt(shares, GYRO_READINGS, "contradict the attitude's rate")
             # 70 rad/s (4000 deg/s) is the range of the fastest gyros
-            alone = GYRO_READINGS[0].says if np.quantile(np.abs(measured), 0.99) > 70.0 else ""
+            alone = GYRO_READINGS[0].says if np.quantile(abs(measured), 0.99) > 70.0 else ""
         else:
             shares, up = _force_shares(t, measured, *pose, part.position[seen], gravity)
             if up is not None:
@@ -87,8 +88,7 @@ def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
                 )
                 return checked, (*notes, *more)
             otherwise = "contradict the position's acceleration and gravity"
-            doubt = _blown_up(measured)
-            doubt = doubt or _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
+            doubt = _blown_up(measured) or _sensor_doubt(shares, ACCELEROMETER_READINGS, otherwise)
             alone = gravity_doubt(measured, gravity, is_flight=False)
         if is_stuck(measured):
             doubt = f"never change: the {field} was not read"
@@ -104,8 +104,8 @@ def _in_body_axes(log: FlightLog, up: Array) -> FlightLog:
     """Return a log with its accelerometer, in world axes and less ``up`` (3,), in body axes."""
     assert log.accelerometer is not None
     at = Slerp(log.t[log.valid], Rotation.from_quat(log.quaternion[log.valid], scalar_first=True))
-    body = at(np.clip(log.t, at.times[0], at.times[-1]))
-    return replace(log, accelerometer=body.inv().apply(log.accelerometer + up))
+    to_body = at(np.clip(log.t, at.times[0], at.times[-1])).inv()
+    return replace(log, accelerometer=to_body.apply(log.accelerometer + up))
 
 
 def is_stuck(measured: Array) -> bool:
@@ -208,8 +208,8 @@ def _force_shares(
     up = np.array([0.0, 0.0, gravity])
     needed = second_difference(middles, WINDOW, pose_times, position) / WINDOW**2
     # far above pose noise
-    moves = np.linalg.norm(needed[:, :2], axis=1) > 0.5
-    if np.count_nonzero(moves) >= _FEWEST:
+    moves = lengths(needed[:, :2]) > 0.5
+    if moves.sum() >= _FEWEST:
         in_body, in_world = (
             median_square((needed - mean_force(middles, t, x))[moves, :2])
             / median_square(needed[moves, :2])
@@ -218,11 +218,13 @@ def _force_shares(
         if in_world <= GOOD and likelihood([in_world] * 2) - likelihood([in_body] * 2) >= OTHER:
             return None, up * (np.median(measured[:, 2]) < 0.5 * gravity)
     needed += up
-    readings = AS_DECLARED, *ACCELEROMETER_READINGS
-    means = (mean_force(middles, t, body.apply(measured @ r.turn.T)) for r in readings)
+    size = median_square(needed)
     return [
-        median_square(needed - mean - r.lacks_gravity * up) / median_square(needed)
-        for mean, r in zip(means, readings, strict=True)
+        median_square(
+            needed - mean_force(middles, t, body.apply(measured @ r.turn.T)) - r.lacks_gravity * up
+        )
+        / size
+        for r in (AS_DECLARED, *ACCELEROMETER_READINGS)
     ], None
 
 
@@ -231,15 +233,15 @@ def _blown_up(force: Array) -> str:
     unit has one direction.
     """
     size = np.linalg.norm(force, axis=1, keepdims=True)
-    far = size[:, 0] > STRONGEST
-    share = np.mean(far)
+    far = size[:, 0] > _STRONGEST
+    share = far.mean()
     if len(force) < LEAST_SAMPLES or share <= 0.01:
         return ""
     # the mean direction's length: gravity's is near 1, that of a tumble far below
-    if np.linalg.norm(np.mean(force[far] / size[far], axis=0)) > 0.8:
+    if np.linalg.norm((force[far] / size[far]).mean(axis=0)) > 0.8:
         return ""
     return (
-        f"are beyond {STRONGEST:g} m/s2, in changing directions, in {share:.0%} of the "
+        f"are beyond {_STRONGEST:g} m/s2, in changing directions, in {share:.0%} of the "
         "samples: no quadrotor flies so, but a simulation that blew up does"
     )
 
@@ -252,20 +254,22 @@ def gravity_doubt(force: Array, gravity: float, is_flight: bool = True) -> str:
     length = np.linalg.norm(median)
     otherwise = (
         f"are {length:.3g} m/s2 in the median of a flight, along a"
-        f"{'xyz'[np.argmax(np.abs(median))]}; expected the specific force, which gravity makes "
+        f"{'xyz'[abs(median).argmax()]}; expected the specific force, which gravity makes "
         f"about {gravity:.3g} along az: axes forward, left, up, of the vehicle and not of the "
         "sensor's board"
     )
     if length < 0.5 * gravity:
         otherwise += " (an acceleration without gravity is none)"
-    up, readings = np.array([0.0, 0.0, gravity]), (AS_DECLARED, *_BY_GRAVITY)
-    shares = [float(np.square(up - r.turn @ median).sum()) / gravity**2 for r in readings]
+    shares = [
+        (([0.0, 0.0, gravity] - reading.turn @ median) ** 2).sum() / gravity**2
+        for reading in (AS_DECLARED, *_BY_GRAVITY)
+    ]
     return _sensor_doubt(shares, _BY_GRAVITY, otherwise if is_flight else "")
 
 
 def median_square(vectors: Array) -> float:
     """Return the median squared length of vectors (n, 3): robust to single leaps of a pose."""
-    return float(np.median(np.square(vectors).sum(axis=1)))
+    return float(np.median((vectors**2).sum(axis=1)))
 
 
 def windows(pose_times: Array, sensor_times: Array, before: float) -> Array:

@@ -77,7 +77,6 @@ OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # a field that a person must choose
 
 WORLDS: dict[str, str] = WORDS["worlds"]
-BODIES = ("flu", "frd", "y_up")
 UNITS: dict[str, NamedNumbers] = WORDS["factors"]
 COMMAND_UNITS: dict[str, Pair | None] = {
     unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()
@@ -95,7 +94,7 @@ def _known(value: Any, known: Wanted, what: str) -> str:
     raise unknown_name(what, str(value), known)
 
 
-def one_of(known: Wanted) -> BeforeValidator:
+def _one_of(known: Wanted) -> BeforeValidator:
     """Return a validator for one of some words, as ``_known``."""
     return BeforeValidator(lambda value, info: _known(value, known, info.field_name))
 
@@ -125,7 +124,7 @@ _Range = Annotated[
     AfterValidator(_two_levels),
     expected("two numbers, what stands for no and for full command, such as [1000, 2000]"),
 ]
-_Body = Annotated[str, one_of(BODIES)]
+_Body = Annotated[str, _one_of(("flu", "frd", "y_up"))]
 _Order = Annotated[Order, BeforeValidator(rotor_order)]
 
 
@@ -161,7 +160,7 @@ class TimeColumn(_Form):
     """The clock."""
 
     column: _Name = ""
-    unit: Annotated[str, one_of(UNITS["time"])] = "s"
+    unit: Annotated[str, _one_of(UNITS["time"])] = "s"
     nanoseconds: str = ""  # column of nanoseconds beyond whole seconds
     offset: Number | None = None  # s, added; None: the flight begins at 0
     rate_hz: Positive = 0.0  # of rows, without a column
@@ -191,11 +190,11 @@ class Position(Columns):
 class Attitude(Columns):
     """A quaternion, or Euler angles about x, y and z."""
 
-    order: Annotated[str, one_of(("wxyz", "xyzw"))] = "wxyz"  # order of a quaternion's columns
-    euler: Annotated[str, one_of(("xyz", "xzy", "yxz", "yzx", "zxy", "zyx"))] = (
+    order: Annotated[str, _one_of(("wxyz", "xyzw"))] = "wxyz"  # order of a quaternion's columns
+    euler: Annotated[str, _one_of(("xyz", "xzy", "yxz", "yzx", "zxy", "zyx"))] = (
         ""  # of turns; empty: a quaternion
     )
-    sense: Annotated[str, one_of(SENSES)] = "body_to_world"
+    sense: Annotated[str, _one_of(SENSES)] = "body_to_world"
     of: Names = ()  # topics of positions; empty: of all
 
 
@@ -284,7 +283,7 @@ class LogMap(_Form):
     """The meaning of a table's columns."""
 
     time: Annotated[TimeColumn, AfterValidator(_clock)]
-    world: Annotated[str, one_of(WORLDS), AfterValidator(WORLDS.__getitem__)] = "enu"
+    world: Annotated[str, _one_of(WORLDS), AfterValidator(WORLDS.__getitem__)] = "enu"
     body: _Body = "flu"
     position: _Part[Position] = None
     attitude: _Part[Attitude] = None
@@ -330,8 +329,8 @@ class LogMap(_Form):
 
     def with_order(self, order: Order) -> "LogMap":
         """Return the map with this order of rotors and commands."""
-        motors = {name: self.ways(name) for name in ("rotors", "commands")}
-        return self.with_ways({n: [replace(w, order=order) for w in x] for n, x in motors.items()})
+        motors = "rotors", "commands"
+        return self.with_ways({n: [replace(w, order=order) for w in self.ways(n)] for n in motors})
 
     @property
     def wanted(self) -> Lines:

@@ -20,7 +20,6 @@ from .table import Array, Mask, Pair, finite_rows
 # sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
 _LIKELY = {"time": (0.0002, 0.2), "battery": (2.7, 100.0), "accelerometer": (8.335, 11.278)}
 _CERTAIN = _LIKELY | {"time": (0.0004, 1.0 / 15.0), "battery": (2.7, 60.0)}
-_TIMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 # of rotors, in words, and in rad/s
 _SPEEDS = {
     "rad/s": ("", 1.0),
@@ -34,7 +33,6 @@ _LONGEST_STEP = 1.0e12
 LARGEST = 1.0e9  # SI units, all other numbers; millimetres or rpm stay far below
 # median thrust by weight; beyond, another vehicle may have flown
 DOUBTFUL = 0.5, 2.0
-STRONGEST = 300.0  # m/s2 of specific force, above all racers and most sensors' range
 # rad/s: the largest drones' rotors (1.4 m across) hover at 150; slower, the unit is wrong
 _SLOW = 100.0
 _UNEVEN = 2.0  # ratio of two rotors' medians in flight, at most
@@ -51,16 +49,17 @@ def likely_unit(section: str, size: float) -> tuple[str, bool]:
     accelerometer's median length.
     """
     sizes = {u: size * one for u, one in UNITS[section].items() if u not in ("min", "raw")}
-    likely = (unit for unit in sizes if within(sizes[unit], _LIKELY[section]))
-    unit = next(likely, next(iter(sizes)))
+    likely = [unit for unit in sizes if within(sizes[unit], _LIKELY[section])]
+    unit = [*likely, *sizes][0]
     return unit, within(sizes[unit], _CERTAIN[section])
 
 
 def time_doubt(step: float) -> str:
     """Return a doubt on the time's unit by a median step (s), or nothing."""
+    names = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
     unit, is_sure = likely_unit("time", step)
     words = (
-        f"t looks like {_TIMES[unit]}: its median step is {step:.4g}; expected seconds: "
+        f"t looks like {names[unit]}: its median step is {step:.4g}; expected seconds: "
         f"divide t by {1.0 / UNITS['time'][unit]:g}"
     )
     return words if is_sure and unit != "s" else ""
@@ -73,7 +72,7 @@ def _thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
     if not rotor_speeds.size:
         return 1.0
     with np.errstate(over="ignore"):
-        thrust = np.square(rotor_speeds) @ vehicle.k / vehicle.weight
+        thrust = rotor_speeds**2 @ vehicle.k / vehicle.weight
     return usual if np.isfinite(usual := usual_thrust(thrust)) else 1.0
 
 
@@ -119,7 +118,7 @@ def motor_doubts(log: FlightLog) -> list[str]:
         and np.count_nonzero(np.diff(motors[:, i])) >= 20
     ]
     doubts = [] if len(alike) == 2 else alike[:1]  # two pairs: a flight in one plane without noise
-    medians = np.median(motors[carrying(np.square(motors).sum(axis=1))], axis=0)
+    medians = np.median(motors[carrying((motors**2).sum(axis=1))], axis=0)
     expected = ""
     if medians.max() > _UNEVEN * medians.min():
         expected = f"a ratio of at most {_UNEVEN:g}"
@@ -142,7 +141,7 @@ def motor_unit(
     """
     # the last word of a path such as /fmu/out/esc_status/rotor_speed.00
     names = " ".join(re.sub(r"^.*/(?=.*[a-z])", "", name.lower()) for name in group.columns)
-    turning = np.abs(values[np.isfinite(values) & (values != 0.0)])
+    turning = abs(values[np.isfinite(values) & (values != 0.0)])
     if not turning.size:
         return "commands", "normalised", False, "all are zero"
     low, middle, high = np.quantile(turning, [0.01, 0.5, 1.0]).tolist()
@@ -199,9 +198,9 @@ def motor_unit(
             False,
             f"the median is {middle:.4g}: few rotors turn as fast in rad/s",
         ),
+        (True, "rotors", "rad/s", False, f"the median is {middle:.4g}; it might be rpm or Hz"),
     )
-    otherwise = f"the median is {middle:.4g}; it might be rpm or Hz"
-    return next((rule[1:] for rule in rules if rule[0]), ("rotors", "rad/s", False, otherwise))
+    return next(rule[1:] for rule in rules if rule[0])
 
 
 def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
@@ -211,7 +210,7 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
         InputError: a number is beyond any flight's; the message names the number.
     """
     step = np.diff(log.t)
-    where, longest = f"{log.source}: column", np.argmax(step)
+    where, longest = f"{log.source}: column", step.argmax()
     if not log.period >= _SHORTEST_PERIOD:
         raise InputError(
             f"{where} t: the median time step is {log.period:.3g} s; expected at least "
@@ -224,13 +223,13 @@ def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
         )
     for names, values in parts_of(log)[1:]:
         columns = values.reshape(len(log.t), -1)
-        for row, i in np.argwhere(np.abs(columns) > LARGEST)[:1]:  # False where NaN
+        for row, i in np.argwhere(abs(columns) > LARGEST)[:1]:  # False where NaN
             raise InputError(
                 f"{where} {names[i]}, row {row + 1}: {columns[row, i]:.3g}; expected a number "
                 f"within {LARGEST:g}"
             )
     doubts = [time_doubt(log.period), *motor_doubts(log)]
-    spread = np.max(np.ptp(log.position[log.valid], axis=0)) if log.has_pose else 0.0
+    spread = np.ptp(log.position[log.valid], axis=0).max() if log.has_pose else 0.0
     if spread > 300.0:
         doubts.append(
             f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres"
@@ -262,8 +261,7 @@ def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
     broken = fast & ~far[:-6] & ~far[6:]
     if not broken.any():
         return log, []
-    highest = log.rotor_speeds[broken].max()
     return interpolated(log, broken), [
-        f"{np.count_nonzero(broken)} rotor speeds are broken, up to {highest:.0f} rad/s where "
-        f"99 % are below {high.max():.0f}: they were interpolated"
+        f"{broken.sum()} rotor speeds are broken, up to {log.rotor_speeds[broken].max():.0f} rad/s "
+        f"where 99 % are below {high.max():.0f}: they were interpolated"
     ]

@@ -23,7 +23,6 @@ from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
 from .column_names import WORDS, Group, Name, named_alone, take_apart
 from .column_parts import (
-    CERTAIN_LEAD,
     SHOWN,
     ColumnCandidate,
     Judge,
@@ -32,7 +31,7 @@ from .column_parts import (
     candidates,
     named_columns,
 )
-from .evidence import GOOD, GOOD_TORQUE, TURNING_RATE, Evidence, Fit, RankedFits, likelihood
+from .evidence import GOOD, GOOD_TORQUE, Evidence, Fit, RankedFits, likelihood
 from .flight_log import LONGEST
 from .inertial import gyro_shares
 from .log_map import (
@@ -50,7 +49,7 @@ from .log_map import (
 )
 from .magnitudes import DOUBTFUL, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .table import Array, ArrayMap, Data, NamedArrays, Names, Table
+from .table import Array, ArrayMap, Data, NamedArrays, Names, Table, lengths
 from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
@@ -133,8 +132,8 @@ def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
 
 def _numbers_of(table: Table, names: Sequence[Name]) -> NamedArrays:
     """Return the columns (rows,) of numbers, without columns of later text."""
-    once = [n.column for n in names if table.header.count(n.column) == 1]
-    wanted = [column for column in once if not table.numeric or column in table.numeric]
+    numeric = table.numeric or table.header
+    wanted = [n.column for n in names if table.header.count(n.column) == 1 and n.column in numeric]
     if len(wanted) * table.rows > LIMITS.table_numbers // 2:  # columns with telling names
         named = named_columns(names)
         wanted = [column for column in wanted if column in named]
@@ -155,10 +154,16 @@ def _time_column(names: Sequence[Name], data: ArrayMap) -> Name | None:
     for name in named_alone(there, "time"):
         values = data[name.column]
         steps = np.diff(values[np.isfinite(values)])
-        if np.any(steps > 0.0) and np.mean(steps >= 0.0) > 0.9:
+        if (steps > 0.0).any() and (steps >= 0.0).mean() > 0.9:
             return name
     rises = (n for n in there if len(x := data[n.column]) > 2 and (np.diff(x) > 0.0).all())
     return next(rises, None)
+
+
+def _explained(ranking: RankedFits | None) -> float:
+    """Return the share explained by the best reading; 0: less than half, or nothing is known."""
+    left = 1.0 if ranking is None else ranking.fit.horizontal
+    return 1.0 - left if left <= GOOD else 0.0
 
 
 class _Guessing:
@@ -212,7 +217,7 @@ class _Guessing:
         self.free = [name for name in self.free if name.column not in group.columns]
         if part != "commands" and not ranked[0].why.startswith("by"):
             self.unnamed.add(part)
-        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - CERTAIN_LEAD)]
+        likely = [c for c in ranked if c.score > max(0.0, ranked[0].score - 2.0)]
         if part in _EXAMPLES and (len(likely) > 1 or part in self.unnamed):
             field = "order" if len(group.columns) == 4 else "columns"
             self.say(part, field, False, "; or ".join(map(str, likely[:SHOWN])))
@@ -226,14 +231,15 @@ class _Guessing:
         """Return the fields missing for a flight log."""
         lacks: dict[str, str] = {}
         if self.clock is None:
-            why = "no column looks like a time; expected one such as t, time or timestamp"
+            lacks["time"] = "no column looks like a time; expected one such as t, time or timestamp"
             for name in named_alone(self.free, "time"):
                 x = self.data.get(name.column, np.zeros(0))
-                if len(x) > 1 and np.mean(np.diff(x) == 0.0) > 0.9:
-                    why = f"column {name.column} is {x[0]:g} in nearly every row: a program that "
-                    why += "wrote the table left out its digits; expected a time in each row"
+                if len(x) > 1 and (np.diff(x) == 0.0).mean() > 0.9:
+                    lacks["time"] = (
+                        f"column {name.column} is {x[0]:g} in nearly every row: a program that "
+                        "wrote the table left out its digits; expected a time in each row"
+                    )
                     break
-            lacks["time"] = why
         pose, imu, has = ("position", "attitude"), ("accelerometer", "gyro"), {*self.sections}
         if "position" not in has and not has.issuperset(imu):
             half = [part for part in pose if part in self.parts]
@@ -245,8 +251,9 @@ class _Guessing:
                     lacks[part] = f"no columns look like one (such as {_EXAMPLES[part]})"
         lacks |= self.further
         if not self.further and has.isdisjoint(("rotors", "commands")):
-            why = "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
-            lacks["motors"] = why
+            lacks["motors"] = (
+                "no columns look like four motors (such as rpm1 to rpm4, motor[0] to motor[3])"
+            )
         return [
             _Reason(
                 "rotors" if part in _MOTORS else part,
@@ -261,7 +268,7 @@ class _Guessing:
     def half_a_pose(self, part: str) -> None:
         """Keep a position without an attitude, or the reverse, for a person to complete."""
         columns, unit = self.parts[part].columns, self.parts[part].unit
-        most = np.max(np.abs(self.numbers.some(columns)), initial=0.0)
+        most = abs(self.numbers.some(columns)).max(initial=0.0)
         made = Columns(columns, unit or "m")
         if part == "attitude":
             made = Attitude(columns)
@@ -311,13 +318,13 @@ class _Guessing:
         t = (raw - known[0]) * units[unit]
         middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
         self.sections["time"] = TimeColumn(clock.column, unit, nanoseconds)
-        return np.where(np.abs(t - middle) <= 0.5 * LONGEST, t, np.nan)
+        return np.where(abs(t - middle) <= 0.5 * LONGEST, t, np.nan)
 
     def pose_fits(self, place: Group, group: Group) -> RankedFits:
         """Return the fits of a pose in each of a map's frames, units, orders and senses."""
         attitude = self.values(group.columns)
         units: Names = ("deg", "rad")
-        if np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
+        if np.nanmax(abs(attitude[:, :2]), initial=0.0) > np.pi:
             units = ("deg",)
         elif group.unit in units:
             units = (group.unit,)
@@ -329,7 +336,7 @@ class _Guessing:
             hint="ned" if re.search("ned|down|d$", "".join(place.columns).lower()) else "",
         )
         motors = [self.values(self.parts[part].columns) for part in _MOTORS if part in self.parts]
-        thrusts = np.square(motors[0]) if motors else np.ones((len(self.t), 4))
+        thrusts = [*motors, np.ones((len(self.t), 4))][0] ** 2
         evidence = Evidence(self.t, thrusts, self.values(place.columns), attitude)
         return RankedFits(evidence.fit(reading, torques=False) for reading in readings)
 
@@ -340,8 +347,8 @@ class _Guessing:
         attitude = self.parts.get("attitude")
         if attitude is None or len(attitude.columns) == 3:
             return 0.0, ""
-        left = self.pose_fits(Group(columns, ""), attitude).fit.horizontal
-        return (1.0 - left if left <= GOOD else 0.0), "their acceleration follows the tilt"
+        ranking = self.pose_fits(Group(columns, ""), attitude)
+        return _explained(ranking), "their acceleration follows the tilt"
 
     def pose(self, place: Group, group: Group) -> None:
         """Find frames, units, order and sense of the pose."""
@@ -372,7 +379,7 @@ class _Guessing:
     def accelerometer(self, group: Group) -> None:
         """Find unit and axes of the accelerometer by gravity."""
         values = self.values(group.columns)
-        size = max(float(np.nanmedian(np.linalg.norm(values, axis=1))), 1e-12)
+        size = max(float(np.nanmedian(lengths(values))), 1e-12)
         z = np.nanmean(values[:, 2]) / size
         # without a pose, a negative z may also be gravity in place of the specific force
         sure = bool(z > 0.8 or (z < -0.8 and self.ranking))
@@ -416,9 +423,7 @@ class _Guessing:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
         otherwise.
         """
-        ranking = self.gyro_fits(columns)
-        left = 1.0 if ranking is None else ranking.fit.horizontal
-        return (1.0 - left if left <= GOOD else 0.0), "they turn as the attitude does"
+        return _explained(self.gyro_fits(columns)), "they turn as the attitude does"
 
     def gyro(self, group: Group) -> None:
         """Find unit and axes of the gyro: from the pose's turns, or from size and accelerometer."""
@@ -434,7 +439,7 @@ class _Guessing:
             told = {(r.section, r.field) for r in self.reasons if r.certain}
             sure = self.ranking is None and ("accelerometer", "body") in told
             self.say("gyro", "body", sure, "as the accelerometer's")
-            high = float(np.nanquantile(np.abs(self.values(group.columns)), 0.995))
+            high = float(np.nanquantile(abs(self.values(group.columns)), 0.995))
             # 99.5 % of a flight's angular velocities are less than 6 rad/s; 35 rad/s
             # (2000 deg/s) is the range of usual gyros
             unit = "deg/s" if high > 6.0 else "rad/s"
@@ -445,8 +450,9 @@ class _Guessing:
     def motors(self, part: str, group: Group) -> None:
         """Find unit and order of rotor speeds or commands, unless the map has such a section."""
         values = self.values(group.columns)
-        power = self.numbers.elasticity(values)
-        kind, unit, sure, why = motor_unit(group, values, self.vehicle, power)
+        kind, unit, sure, why = motor_unit(
+            group, values, self.vehicle, self.numbers.elasticity(values)
+        )
         if more := more_rotors(group.columns, self.table):
             self.further[part] = more
             return
@@ -486,14 +492,16 @@ class _Guessing:
             motion = {
                 part: self.values(self.parts[part].columns) for part in ("position", "attitude")
             }
-        evidence = Evidence(self.t, np.square(values), **motion)
+        evidence = Evidence(self.t, values**2, **motion)
         if not motion or not evidence.enough:
             return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
         ways = [replace(best, rotors=order) for order in permutations(ROTORS)]
         ranking = RankedFits(map(evidence.fit, ways))
         left, lead, order = ranking.fit.torque, ranking.other("rotors")[1], ranking.best.motors
         names = order_names(order)
-        turns = evidence.turns(best) >= TURNING_RATE
+        # rad/s: in hovers (0.03 in a simulated one) rotors answer disturbances more than they turn
+        # the body, and the mirrored order may explain more
+        turns = evidence.turns(best) >= 0.06
         is_sure = left <= GOOD_TORQUE and ranking.certain("rotors") and turns
         if is_sure or (names and left <= 0.9 and lead >= 1.0):
             why = (
@@ -504,12 +512,14 @@ class _Guessing:
         why = f"{hint}: no order is much likelier than all others"
         # roll and pitch of a plus, by rotors at the left, rear, right and front
         sides = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])
-        evidence = Evidence(self.t, np.square(values), sides=sides, **motion)
+        evidence = Evidence(self.t, values**2, sides=sides, **motion)
         plus = RankedFits(map(evidence.fit, ways))
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
-            why = f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
-            why += "expected a vehicle file with these rotor_positions"
+            why = (
+                f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
+                "expected a vehicle file with these rotor_positions"
+            )
         return ORDERS[hint], False, why
 
     def battery(self) -> None:
@@ -521,5 +531,6 @@ class _Guessing:
         middle = float(np.nanmedian(values[values > 0.0]))
         if np.isfinite(middle):
             guessed = *likely_unit("battery", middle), f"its median is {middle:.4g}"
-            unit = self.unit("battery", named[0].unit, guessed)
-            self.sections["battery"] = Battery((column,), unit)
+            self.sections["battery"] = Battery(
+                (column,), self.unit("battery", named[0].unit, guessed)
+            )

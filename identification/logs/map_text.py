@@ -39,9 +39,12 @@ def map_yaml(guess: Guess) -> str:
             for lack in guess.missing
             if lack.section == name
         ]
-        flow = False if isinstance(value, str) else None
         text = yaml.safe_dump(
-            {name: value}, default_flow_style=flow, sort_keys=False, width=1000, allow_unicode=True
+            {name: value},
+            default_flow_style=False if isinstance(value, str) else None,
+            sort_keys=False,
+            width=1000,
+            allow_unicode=True,
         )
         lines.append(text.rstrip())
     if guess.unused:

@@ -57,15 +57,15 @@ from .log_map import (
     check_whole,
 )
 from .table import (
-    Array,
+    ArrayPair,
     Lines,
     Mask,
-    Noted,
     Piece,
     Table,
     Texts,
     Wanted,
     finite_rows,
+    lengths,
     median_step,
     stem,
 )
@@ -76,11 +76,8 @@ _MOTORS = {"rotors": "rotor speeds", "commands": "commands", "wrench": "commande
 NO_QUATERNION = 0.5  # length; shorter stands for a missing quaternion
 MOTOR_NAMES = re.compile("|".join((WORDS["motor_words"], *WORDS["command_words"])), re.IGNORECASE)
 _IMU = ("accelerometer", "gyro")
-_ATTITUDE_GAP = 0.1  # s, the longest gap for interpolating an attitude
-_OUTSIDE = 0.5  # share of commands beyond a wrong range
-# V: below, a lithium cell is empty, and above no multirotor's pack of 14 cells of 4.35 V
-LEAST_VOLTS, MOST_VOLTS = 2.5, 61.0
-_ROTOR_GAP = 0.5  # s without rotor speeds; longer gaps get a note
+# V: no multirotor's pack of 14 cells of 4.35 V has more
+MOST_VOLTS = 61.0
 # times faster than the pose: an inertial sensor has rows of its own. A pose is put to the nearest
 # row, so the pose moves by a tenth of its step at most, with its own noise
 _OWN_ROWS = 5.0
@@ -116,15 +113,14 @@ def map_table(
             )
         log_map = replace(log_map, vehicle="".join(named))
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
-    log_map = fitted(table.header, table.path, log_map, vehicle, reader)
+    log_map = _fitted(table.header, table.path, log_map, vehicle, reader)
     columns = table.read(log_map.wanted)
     if log_map.is_own and rows_apart(ChannelGroup(np.arange(float(table.rows)), columns), log_map):
         log_map = replace(log_map, rows="mixed")
-    is_plain = log_map.is_own and log_map.rows != "mixed"
-    by = "" if is_plain else f"columns: by the map {log_map.name}"
-    samples, words = rows_of(table, columns, log_map)
-    said = (by, *table.notes, *log_map.notes, log_map.time.note, *words)
-    notes = [note for note in said if note]
+    by = f"columns: by the map {log_map.name}"
+    by = "" if log_map.is_own and log_map.rows != "mixed" else by
+    notes = [*filter(None, (by, *table.notes, *log_map.notes, log_map.time.note))]
+    samples = rows_of(table, columns, log_map, notes)
     sections = sections_of(table.path, [samples], log_map, reader, notes, piece)
     del columns, samples
     table.forget()  # the streams are copies
@@ -183,8 +179,7 @@ def sections_of(
         if name == "attitude":
             continue
         if name == "position":
-            streams[name], words = _pose(path, log_map, samples, sources.get("attitude"))
-            said += words
+            streams[name] = _pose(path, log_map, samples, sources.get("attitude"), said)
             continue
         if isinstance(part, Rotors | Commands) and not flown.airframe:
             are_speeds = isinstance(part, Rotors) and samples.table is None
@@ -214,8 +209,11 @@ def sections_of(
                 f"{' and '.join(_IMU)}"
             )
         if not log_map.is_own:
-            what = ": no position that changes, with an attitude beside it, was logged"
-            said.append(f"no pose{what if poses else ' in the log'}")
+            said.append(
+                "no pose: no position that changes, with an attitude beside it, was logged"
+                if poses
+                else "no pose in the log"
+            )
         if log_map.rows == "whole":  # all rows are the log's
             t = recorded[0].t
             streams["position"] = Stream("pose", t, np.full((len(t), 7), nan))
@@ -239,26 +237,25 @@ def motors_left_out(names: Texts, used: Wanted) -> Lines:
         if MOTOR_NAMES.search(group.key) and not re.search(WORDS["sticks"], group.key)
         if not {*group.columns} & {*used}
     }
-    listed = ", ".join([*left][:_SHOWN])
-    return [f"columns named as motors' were left out: {listed}"] if left else []
+    return [f"columns named as motors' were left out: {', '.join([*left][:_SHOWN])}"] * bool(left)
 
 
 def _pose(
-    path: Path, log_map: LogMap, samples: ChannelGroup, turned: ChannelGroup | None
-) -> Noted[Stream]:
-    """Return positions in m and attitudes (N, 7) in the kit's frames, NaN where there is none, and
-    notes.
+    path: Path, log_map: LogMap, samples: ChannelGroup, turned: ChannelGroup | None, notes: Lines
+) -> Stream:
+    """Return positions in m and attitudes (N, 7) in the kit's frames, NaN where there is none.
 
     Args:
         path: the file, for errors.
         log_map: with a position.
         samples: the position's group.
         turned: the attitude's group; None: there is none.
+        notes: gets further ones.
 
     Raises:
         InputError: a quaternion's length is not 1, or no position has an attitude.
     """
-    place, turn, notes = log_map.position, log_map.attitude, []
+    place, turn = log_map.position, log_map.attitude
     assert place is not None
     keep = _kept_rows(samples, log_map, place)
     t = samples.t[keep]
@@ -283,13 +280,13 @@ def _pose(
     poses = Stream(place.label, t, pose)
     if turn is None or turned is None:
         pose[:, :3] = position
-        return poses, notes
+        return poses
     measured = turned.cut(turned.there(turn))
     turns = quaternions(turn, measured.values(turn))
     with np.errstate(over="ignore"):
-        length = np.linalg.norm(turns, axis=1)
+        length = lengths(turns)
     there = length > (-1.0 if log_map.rows == "whole" else NO_QUATERNION)
-    off = np.flatnonzero(there & ~(np.abs(length - 1.0) <= NORM_TOLERANCE))
+    off = np.flatnonzero(there & ~(abs(length - 1.0) <= NORM_TOLERANCE))
     if off.size:
         what = turn.topic or f"columns {', '.join(turn.columns)}"
         raise InputError(
@@ -300,7 +297,7 @@ def _pose(
         turns = in_kit_axes(log_map, turn, turns[there])
     attitude = Stream(turn.label, measured.t[there], turns)
     steps = np.diff(attitude.t)
-    longest = max(_ATTITUDE_GAP, LONGEST_STEPS * np.median(steps)) if len(steps) else 0.0
+    longest = max(0.1, LONGEST_STEPS * np.median(steps)) if len(steps) else 0.0
     pose[placed] = np.column_stack([position[placed], slerp(t[placed], attitude, longest)])
     if placed.any() and not finite_rows(pose).any():
         raise InputError(
@@ -319,7 +316,7 @@ def _pose(
         for name in turn.columns
         if name not in turn.named
     ]
-    return poses, notes
+    return poses
 
 
 def _kept_rows(samples: ChannelGroup, log_map: LogMap, part: Columns) -> Mask:
@@ -348,9 +345,9 @@ def _command_notes(path: Path, log_map: LogMap, part: Commands, commands: Stream
     """
     low, high = part.range or (0.0, 1.0)
     u = commands.values[np.isfinite(commands.values)]
-    if ((u < -0.01) | (u > 1.01)).sum() > _OUTSIDE * len(u):
+    if ((u < -0.01) | (u > 1.01)).sum() > 0.5 * len(u):
         raw = low + (high - low) * u
-        what, hint = ("", ": state the range in the map")
+        what, hint = "", ": state the range in the map"
         if u.max() < 0.0 and part.topic:  # an autopilot knows its range
             what, hint = "no motors that turn: ", ""
         raise InputError(
@@ -372,7 +369,7 @@ def _order_note(order: Order) -> str:
     return f"{order_words(order)}{f' ({names[0]})' if names else ''}"
 
 
-def fitted(
+def _fitted(
     names: Texts, source: object, log_map: LogMap, vehicle: SomeVehicle, reader: str
 ) -> LogMap:
     """Return a map with the ways to fill a section from a table's columns, and with the range of
@@ -387,9 +384,9 @@ def fitted(
     for section in ("time", *log_map.sections):
         ways = log_map.ways(section)
         fitting[section] = [way for way in ways if header.issuperset(way.named)]
-        absent = [name for name in ways[0].named if name not in header]
-        is_optional = ways[0].optional
-        left_out = is_optional and (len(absent) == len(ways[0].named) or reader)
+        named, is_optional = ways[0].named, ways[0].optional
+        absent = [name for name in named if name not in header]
+        left_out = is_optional and (len(absent) == len(named) or reader)
         if not fitting[section] and not left_out:
             whose = f"{section} (all or none)" if is_optional else section
             missing += [(name, whose) for name in absent]
@@ -433,11 +430,12 @@ def chosen(recorded: Groups, log_map: LogMap) -> tuple[LogMap, dict[str, Channel
     columns and measurements is taken; a position together with its attitude. Optional sections
     without columns are left out.
     """
-    stated, usable = log_map.rows == "whole" or log_map.is_own, {}
+    usable = {}
     for section in log_map.sections:
         ways = [(way, s) for way in log_map.ways(section) for s in recorded if s.has(way)]
         # the only way fills a required section
-        if len(ways) != 1 or not (stated or not ways[0][0].optional):
+        is_stated = log_map.rows == "whole" or log_map.is_own
+        if len(ways) != 1 or (ways[0][0].optional and not is_stated):
             ways = [one for one in ways if _is_measured(section, *one, log_map.rows)]
         usable[section] = ways
     places, turns = usable.get("position", []), usable.get("attitude", [])
@@ -449,10 +447,10 @@ def chosen(recorded: Groups, log_map: LogMap) -> tuple[LogMap, dict[str, Channel
     ]
     if pairs or not (log_map.is_own and places):
         usable["position"], usable["attitude"] = pairs[0] if pairs else ([], [])
-    samples = {section: ways[0][1] for section, ways in usable.items() if ways}
-    return log_map.with_ways(
-        {n: [way for way, _ in ways[:1]] for n, ways in usable.items()}
-    ), samples
+    return (
+        log_map.with_ways({n: [way for way, _ in ways[:1]] for n, ways in usable.items()}),
+        {section: ways[0][1] for section, ways in usable.items() if ways},
+    )
 
 
 def _is_measured(section: str, way: Columns, samples: ChannelGroup, rows: str) -> bool:
@@ -463,7 +461,7 @@ def _is_measured(section: str, way: Columns, samples: ChannelGroup, rows: str) -
     values = values[finite_rows(values)]
     told = values != 0.0
     if isinstance(way, Attitude) and not way.euler:
-        told = np.linalg.norm(values, axis=1) > NO_QUATERNION
+        told = lengths(values) > NO_QUATERNION
     elif section == "battery":
         told = values > 0.0
     elif section == "position" and rows != "messages" and len(values):
@@ -501,15 +499,16 @@ def flight_log(
     """
     log_map, streams, extra, said = sections
     vehicle = flown_vehicle(vehicle, log_map.vehicle)
-    made, words = _cleaned(path, streams)
-    notes = [*said, *words]
+    notes = [*said]
+    made = _cleaned(path, streams, notes)
     kind = next(name for name in _MOTORS if name in made)
-    motors, sensor = made[kind].whole(), made.get("gyro", made.get("accelerometer"))
-    t, pose, words = _rows(path, made.get("position"), motors, sensor)
-    notes += words
+    motors = made[kind].whole()
+    t, pose = _rows(
+        path, made.get("position"), motors, made.get("gyro", made.get("accelerometer")), notes
+    )
     after = np.searchsorted(motors.t, t)  # rows lie within the motors' span
     steps = np.diff(motors.t)[after[motors.t[after] != t] - 1]
-    if (longest := steps.max(initial=0.0)) > _ROTOR_GAP:
+    if (longest := steps.max(initial=0.0)) > 0.5:
         notes.append(
             f"{motors.name}: up to {longest:.2g} s between messages; the {_MOTORS[kind]} there "
             "are interpolated"
@@ -517,7 +516,7 @@ def flight_log(
     valid = finite_rows(pose)
     if np.isfinite(pose[:, 3:]).any():  # else positions without an attitude, which are kept
         pose[~valid] = nan
-    pose[valid, 3:] /= np.linalg.norm(pose[valid, 3:], axis=1)[:, None]
+    pose[valid, 3:] /= lengths(pose[valid, 3:])[:, None]
     there = {
         name: stream.between(t) if name in _IMU else stream.at(t)
         for name, stream in made.items()
@@ -526,16 +525,17 @@ def flight_log(
     measured = {name: x for name, x in there.items() if name in _IMU and np.isfinite(x).any()}
     speeds = there.get("rotors", np.full((len(t), 4), nan))
     if kind == "wrench" and vehicle is not None:
-        speeds, words = speeds_of_wrench(there["wrench"], vehicle)
-        notes += words
+        speeds = speeds_of_wrench(there["wrench"], vehicle, notes)
     times = t - t[0] if log_map.time.offset is None else t
     notes += time_notes(times)
     without = (~valid).sum() if valid.any() else 0
     if without and measured:  # the sensor may be faster than the pose
         notes += [f"of the pose: {text}" for text in time_notes(times[valid])]
     elif without:
-        first = times[valid.argmin()]
-        notes.append(f"{without} of {len(t)} rows without a pose, the first at t = {first:.6g} s")
+        notes.append(
+            f"{without} of {len(t)} rows without a pose, the first at t = "
+            f"{times[valid.argmin()]:.6g} s"
+        )
     log = FlightLog(
         times,
         pose[:, :3],
@@ -559,13 +559,13 @@ def flight_log(
     return with_commanded_speeds(log, vehicle, log_map.commands)
 
 
-def _cleaned(path: Path, streams: Streams) -> Noted[Streams]:
-    """Return the streams with values, within a flight's limits, and notes.
+def _cleaned(path: Path, streams: Streams, notes: Lines) -> Streams:
+    """Return the streams with values, within a flight's limits; ``notes`` get further ones.
 
     Raises:
         InputError: too few samples, or an infinite rotor speed.
     """
-    made, notes = {}, []
+    made = {}
     for section, stream in streams.items():
         name, values, count = stream.name, stream.values, len(stream.t)
         if section in ("position", *_MOTORS) and count < 2:
@@ -583,11 +583,12 @@ def _cleaned(path: Path, streams: Streams) -> Noted[Streams]:
         if section == "rotors":
             if (values < 0.0).any():
                 notes.append(f"{name}: negative rotor speeds were taken as positive")
-            values = np.abs(values)
+            values = abs(values)
         elif section == "commands":
             values = values.clip(0.0, 1.0)
         elif section == "battery":
-            plausible = (values >= LEAST_VOLTS) & (values <= MOST_VOLTS)
+            # below, a lithium cell is empty
+            plausible = (values >= 2.5) & (values <= MOST_VOLTS)
             wrong = values[~plausible & (values > 0.0)]
             if len(wrong):
                 notes.append(
@@ -601,14 +602,14 @@ def _cleaned(path: Path, streams: Streams) -> Noted[Streams]:
             made[section] = Stream(name, stream.t, values)
         elif section == "battery" and not (values > 0.0).any():
             notes.append(f"{name}: no positive voltage; left out")
-    return made, notes
+    return made
 
 
 def _rows(
-    path: Path, pose: Stream | None, motors: Stream, sensor: Stream | None
-) -> tuple[Array, Array, Lines]:
-    """Return the rows' times (M,) in s, the poses (M, 7) in them, NaN where there is none, and
-    notes.
+    path: Path, pose: Stream | None, motors: Stream, sensor: Stream | None, notes: Lines
+) -> ArrayPair:
+    """Return the rows' times (M,) in s, and the poses (M, 7) in them, NaN where there is none;
+    ``notes`` get further ones.
 
     Raises:
         InputError: fewer than two rows lie within the span of the motors' stream.
@@ -627,19 +628,19 @@ def _rows(
         t = stream.t[inside]
     if sensor is None:
         assert pose is not None
-        return t, pose.values[inside], []
+        return t, pose.values[inside]
     rows = f"rows are those of {sensor.name}, {1.0 / median_step(sensor.t):.4g} Hz"
     placed = np.full((len(t), 7), nan)
-    if pose is None:
-        return t, placed, [rows]
+    if pose is not None:
+        rate = f"{1.0 / median_step(pose.t):.4g} Hz"
+        rows += f"; the pose of {pose.name}, {rate}, stands in the nearest of them"
+    notes.append(rows)
     if (seen := readable(pose)) is not None:
         own, values = seen.t, seen.values
         near = np.searchsorted(t, own).clip(1, len(t) - 1)
         near -= own - t[near - 1] < t[near] - own
         reach = max(0.6 * median_step(t), 0.5 * median_step(own) / _OWN_ROWS)
-        near = np.unique(near[np.abs(t[near] - own) <= reach])
+        near = np.unique(near[abs(t[near] - own) <= reach])
         placed[near, :3] = resampled(t[near], own, values[:, :3])
         placed[near, 3:] = slerp(t[near], replace(seen, values=values[:, 3:]))
-    rate = 1.0 / median_step(pose.t)
-    rows += f"; the pose of {pose.name}, {rate:.4g} Hz, stands in the nearest of them"
-    return t, placed, [rows]
+    return t, placed

@@ -38,8 +38,6 @@ FARTHEST = 0.3  # s, of the search
 # s: smaller delays are of filters, and of stamps at a sample's end
 LEAST = 0.01
 SURE = 4.0  # standard deviations
-# s, of motors behind a command that was logged for a speed; with a delay together at most 0.1
-_LAGS = 0.01 * np.arange(11)
 _STEP = 0.001  # s, of the search
 _DELAYS = _STEP * np.arange(-300.0, 301.0)
 _SEGMENT = 2.0  # s, of a spectrum
@@ -70,14 +68,13 @@ class _Response(NamedTuple):
         best gain of each axis.
         """
         shape = np.exp(-1j * self.omega * delays[:, None, None]) / (1.0 + 1j * self.omega * lag)
-        along = np.sum(self.weight * np.real(np.conj(shape) * self.gain), axis=1)
-        power = (self.weight * np.square(np.abs(shape))).sum(axis=1)
-        explained: Array = np.sum(np.square(np.maximum(along, 0.0)) / power, axis=1)
-        return explained
+        along = (self.weight * np.real(np.conj(shape) * self.gain)).sum(axis=1)
+        power = (self.weight * abs(shape) ** 2).sum(axis=1)
+        return np.asarray((np.maximum(along, 0.0) ** 2 / power).sum(axis=1))
 
     def likeliest(self) -> float:
         """Return the likeliest delay, s."""
-        return float(_DELAYS[np.argmax(self.explained(_DELAYS))])
+        return float(_DELAYS[self.explained(_DELAYS).argmax()])
 
 
 def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
@@ -94,36 +91,38 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
         if segments is None:
             return None
         omega, noise, *both = segments
-        response = _response(omega, noise, *both)
+        response = _response(*segments)
         step = response.likeliest()
         late = float(np.clip(late + step, -FARTHEST, FARTHEST))
         if step == 0.0:
             break
     best = response.explained(np.zeros(1))[0]
-    whole = response.weight * np.square(np.abs(response.gain))
+    whole = response.weight * abs(response.gain) ** 2
     left = whole.sum() - best
     scale = max(1.0, left / (2.0 * whole.size - 3.0))  # beyond what noise leaves
     if best < 40.0 * scale:
         return None
     # gusts answered by the loop leave a response of another shape, and turn its phase by as much
-    misfit = np.sqrt(left / np.sum(np.square(response.omega) * whole))
+    misfit = np.sqrt(left / (response.omega**2 * whole).sum())
     parts = zip(*(np.array_split(x, _PARTS) for x in both), strict=True)
     scatter = np.std([_response(omega, noise, *part).likeliest() for part in parts])
     std = float(np.hypot(scatter / np.sqrt(_PARTS), misfit))
     # s: rotor speeds of flown vehicles act by up to 0.04 later (a flight loop falls over more), and
     # those that pass a filter of their own by up to 0.03 earlier
     honest = np.arange(-0.03, 0.04 + _STEP, _STEP)
+    # a lag, of motors behind a command that was logged for a speed; with a delay together 0.1
     as_good = max(
-        np.max(response.explained(honest[honest <= 0.1 - lag] - late, lag)) for lag in _LAGS
+        response.explained(honest[honest <= 0.1 - lag] - late, lag).max()
+        for lag in 0.01 * np.arange(11)
     )
     return _PoseDelay(late, std, bool(best - as_good > 9.0 * scale))
 
 
 def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> _Response:
     """Return the frequency response of some of the segments."""
-    xx, yy = (np.mean(np.square(np.abs(z)), axis=0) + 1e-300 for z in (moment, turning))
-    xy = np.mean(np.conj(moment) * turning, axis=0)
-    left = np.maximum(yy - np.square(np.abs(xy)) / xx, 1e-12 * yy)
+    xx, yy = ((abs(z) ** 2).mean(axis=0) + 1e-300 for z in (moment, turning))
+    xy = (np.conj(moment) * turning).mean(axis=0)
+    left = np.maximum(yy - abs(xy) ** 2 / xx, 1e-12 * yy)
     # a half overlapping segment counts for 0.55 independent ones
     variance = left / (1.1 * len(moment)) + noise
     return _Response(omega, xy / xx, xx / variance)
@@ -151,8 +150,7 @@ def _segments(
         # above a quarter of the poses' rate is noise alone
         noises.append(robust_std(high_pass(angles, 0.25)))
         first = max(t[0], log.t[0] + late) + period
-        last = min(t[-1], log.t[-1] + late) - period
-        at = np.arange(first, last, period)
+        at = np.arange(first, min(t[-1], log.t[-1] + late) - period, period)
         turn = _means(at, period, t, angles)
         w = (turn[2:] - turn[:-2]) / (2.0 * period)
         alpha = np.diff(turn, n=2, axis=0) / period**2
@@ -168,9 +166,9 @@ def _segments(
     band = (frequency >= 0.8) & (frequency <= min(10.0, 0.4 / step))
     frequency = frequency[band, None]
     # white noise of the angles, through the mean over a period and two differences
-    passed = np.sinc(frequency * period) * np.square(2.0 * np.sin(np.pi * frequency * period))
-    noise = np.square(passed / period**2 * np.mean(noises) * np.diag(inertia)[:2])
-    noise *= step / period * np.square(window).sum()
+    passed = np.sinc(frequency * period) * (2.0 * np.sin(np.pi * frequency * period)) ** 2
+    noise = (passed / period**2 * np.mean(noises) * np.diag(inertia)[:2]) ** 2
+    noise *= step / period * (window**2).sum()
     moment, turning = np.array(transforms)[:, :, band].swapaxes(0, 1)
     return 2.0 * np.pi * frequency, noise, moment, turning
 
@@ -185,7 +183,7 @@ def _means(at: Array, width: float, t: Array, x: Array) -> Array:
 
 def _moments(log: FlightLog, vehicle: Vehicle | None) -> Array:
     """Return the rotors' roll and pitch moments (N, 2); without a vehicle, in no unit."""
-    return np.square(log.rotor_speeds) @ (SIDES if vehicle is None else vehicle.mixing[1:3]).T
+    return log.rotor_speeds**2 @ (SIDES if vehicle is None else vehicle.mixing[1:3]).T
 
 
 def _angles(log: FlightLog, piece: Rows) -> Array:
@@ -222,7 +220,7 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
         t, angles = log.t[piece], _angles(log, piece)[:, :2]
         at = t[apart:-apart]
         noise = angles[2 * apart :] - 2.0 * angles[apart:-apart] + angles[: -2 * apart]
-        after = np.sum(noise[apart:] * noise[:-apart]) / np.sum(np.square(noise) + 1e-300)
+        after = (noise[apart:] * noise[:-apart]).sum() / (noise**2 + 1e-300).sum()
         inside = (at > t[0] + lags[-1] + width) & (at < t[-1] - lags[-1] - width)
         # the differences' correlation with the next ones: -2/3 of white noise, above 0 of motion
         if after > -0.5 or not inside.any():
@@ -234,18 +232,17 @@ def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pai
         noise -= driven @ np.linalg.lstsq(driven, noise, rcond=None)[0]
         noise = _without_size(noise)
         answers = (second_difference(at - lag, width, log.t, moments) for lag in lags)
-        products += [np.sum(noise * _without_size(answer)) for answer in answers]
+        products += [(noise * _without_size(answer)).sum() for answer in answers]
         count += noise.size
-    score = np.abs(products) / np.sqrt(max(count, 1))
-    peak = int(np.argmax(score))
-    near = np.abs(lags - lags[peak]) <= 3.0 * width
-    if score[peak] <= max(_ANSWERED, 2.0 * float(np.max(score[~near], initial=0.0))):
+    score = abs(products) / np.sqrt(max(count, 1))
+    peak = int(score.argmax())
+    near = abs(lags - lags[peak]) <= 3.0 * width
+    if score[peak] <= max(_ANSWERED, 2.0 * score[~near].max(initial=0.0)):
         return None
     seen = near & (score > 0.5 * _ANSWERED)
-    return float(np.average(lags[seen], weights=np.square(score[seen]))), width
+    return float(np.average(lags[seen], weights=score[seen] ** 2)), width
 
 
 def _without_size(x: Array) -> Array:
     """Return columns (n, k) over their standard deviation, without leaps."""
-    clipped: Array = np.clip(x / max(robust_std(x), 1e-300), -4.0, 4.0)
-    return clipped
+    return (x / max(robust_std(x), 1e-300)).clip(-4.0, 4.0)

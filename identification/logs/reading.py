@@ -33,11 +33,7 @@ from .readers import ardupilot_bin, betaflight, crazyflie_sd, px4_ulog, rosbag
 from .table import SUFFIXES, Names, Piece, Table, Texts, one_line
 from .text_table import is_table, open_table
 
-_SHOWN = 20  # columns in an error
-_HEAD = 4096  # bytes at a file's start
 _LISTED = 8  # entries of a folder in a message
-_GZIP = b"\x1f\x8b"
-_MAVLINK = b"\xfe\xfd"  # one of these follows the eight bytes of a telemetry log's first time
 _BAG_FOLDER = ("metadata.yaml", ".db3", ".mcap")  # one of these is in a ROS 2 bag's folder
 
 
@@ -179,7 +175,7 @@ def _read(
     missing = [name for name in needed if name not in header]
     raise InputError(
         f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
-        f"columns of {known}, found {', '.join(table.header[:_SHOWN])}. A table of "
+        f"columns of {known}, found {', '.join(table.header[:20])}. A table of "
         f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
         "proposes one"
     )
@@ -215,11 +211,9 @@ def reader_by_content(path: Path) -> Reader | None:
         InputError: the path is a folder, but no ROS 2 bag's.
     """
     if not os.path.isdir(path):  # False for an overlong name
-        with suppress(InputError):  # reading the file states the error
+        with suppress(InputError, StopIteration):  # reading the file states the error
             head = _head(path)
-            for reader in READERS.values():
-                if reader.begins and re.match(reader.begins, head):
-                    return reader
+            return next(x for x in READERS.values() if x.begins and re.match(x.begins, head))
         return None
     with one_line(f"{path}: cannot be read as a folder"):
         names = sorted(os.listdir(path))
@@ -234,7 +228,7 @@ def reader_by_content(path: Path) -> Reader | None:
 
 def _head(path: Path) -> bytes:
     with open_regular(path, "a flight log") as file:
-        return file.read(_HEAD)
+        return file.read(4096)
 
 
 def _unknown_content(path: Path) -> InputError:
@@ -244,11 +238,12 @@ def _unknown_content(path: Path) -> InputError:
         InputError: the file is unreadable.
     """
     head = _head(path)
-    if head.startswith(_GZIP):
+    if head.startswith(b"\x1f\x8b"):
         return InputError(
             f"{path}: is packed (gzip); expected a table, .csv.gz by name, or the log unpacked"
         )
-    if len(head) > 8 and head[8] in _MAVLINK and path.suffix.lower() in (".tlog", ".rlog"):
+    # a telemetry log begins with the eight bytes of a time
+    if head[8:9] in (b"\xfe", b"\xfd") and path.suffix.lower() in (".tlog", ".rlog"):
         return InputError(
             f"{path}: is telemetry (MAVLink), which has the motors a few times a second; expected "
             "the log that the vehicle wrote itself (.BIN, .ulg)"

@@ -18,7 +18,7 @@ from ..motion.smoothing import resampled
 from .channels import quaternions, scaled
 from .flight_log import FlightLog
 from .log_map import SENSES, UNITS, Attitude
-from .table import Array, Data, Mask, Names, finite_rows
+from .table import Array, Data, Mask, Names, finite_rows, lengths
 from .what_flew import ORDERS, Order, order_names
 
 _I = np.eye(3)
@@ -46,14 +46,12 @@ def _axes(text: str) -> Array:
     return np.array(rows) + 0.0  # no negative zeros
 
 
-def _frames(
-    says: str = "", map: Sequence[str] = ("", ""), unusual: bool = False, **axes: str
-) -> Frames:
-    turns = {name: _axes(text) for name, text in axes.items()}
-    return Frames(says, **turns, map_world=map[0], map_body=map[1], unusual=unusual)
+def _frames(stated: Data) -> Frames:
+    axes = {name: _axes(stated[name]) for name in {"position", "world", "body"} & stated.keys()}
+    return Frames(**stated | axes)
 
 
-_USUAL_FRAMES = tuple(_frames(**stated) for stated in _STATED["frames"])
+_USUAL_FRAMES = tuple(map(_frames, _STATED["frames"]))
 MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.map_world)  # with names in a map
 
 
@@ -62,14 +60,14 @@ _ALONG = [  # the 47 other directions of px, py, pz along axes of the attitude's
     " ".join(map("".join, zip(signs, axes, strict=True)))
     for axes, signs in product(permutations("xyz"), product(("", "-"), repeat=3))
 ][1:]
-_POSITIONS = tuple(
+_POSITIONS = [
     Frames(
         _FACTS.get(text, "px, py, pz lie along other axes than the attitude's world"),
         _axes(text),
         unusual=text not in _FACTS,
     )
     for text in _ALONG
-)
+]
 ROTORS: Order = ORDERS["windwrench"]
 
 
@@ -168,9 +166,10 @@ class Convention:
             "xyzw": "the quaternion is scalar last",
             "zwxy": "the quaternion is scalar first under the headers of scalar last",
         }
-        order, is_inverse = self.attitude.order, self.attitude.sense != SENSES[0]
-        sense = "world to body" if order in orders else "the quaternion is world to body"
-        facts = orders.get(order, ""), sense if is_inverse else "", self.frames.fact
+        order, sense = self.attitude.order, ""
+        if self.attitude.sense != SENSES[0]:
+            sense = "world to body" if order in orders else "the quaternion is world to body"
+        facts = orders.get(order, ""), sense, self.frames.fact
         if not any(facts):
             return []
         position = _combined(self.frames.position, ("px", "py", "pz"))
@@ -203,7 +202,7 @@ def _quaternion(reading: Convention) -> str:
     world, body = (Rotation.from_matrix(mirror * turn) for turn in (frames.world, frames.body))
     columns = as_written(np.eye(4), reading.attitude)[1]
     made = (world * columns * body).as_quat(scalar_first=True).T
-    first = made[0][np.abs(made[0]) > 0.1][0]
+    first = made[0][abs(made[0]) > 0.1][0]
     text = _combined(made * np.sign(first), ("qw", "qx", "qy", "qz"))
     return text if abs(first) > 0.9 else f"0.7071 {text}"
 
@@ -216,8 +215,9 @@ OTHER, OFFSET = 8.0, 12.0
 
 def _each(**aspects: Sequence[Any]) -> list[Convention]:
     """Return the readings of all combinations of aspects."""
-    ways = product(*aspects.values())
-    return [Convention(**dict(zip(aspects, way, strict=True))) for way in ways]
+    return [
+        Convention(**dict(zip(aspects, way, strict=True))) for way in product(*aspects.values())
+    ]
 
 
 def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convention]:
@@ -257,7 +257,7 @@ def log_readings(has_pose: bool) -> list[Convention]:
     if has_pose:
         attitudes = _quaternions(("wxyz", "xyzw", "zwxy"))
         others = _each(attitude=attitudes, frames=_USUAL_FRAMES)[1:]
-        others.append(Convention(attitudes[1], _frames(**_STATED["mirrored"])))
+        others.append(Convention(attitudes[1], _frames(_STATED["mirrored"])))
         others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
     others = [replace(reading, unlikely=OTHER) for reading in others]
     return [DECLARED, *_weighed(others), *ROTOR_READINGS]
@@ -272,14 +272,14 @@ def table_readings(orders: Names, units: Names, length: str, hint: str) -> list[
         length: unit of the position by the columns' names; others have a penalty.
         hint: the world by the columns' names; empty: none.
     """
-    ways = product(("zyx", "xyz"), units, ((), (1, -1, 1)), SENSES)
     angles = [
-        Attitude((), unit, euler=e, signs=signs, sense=sense) for e, unit, signs, sense in ways
+        Attitude((), unit, euler=euler, signs=signs, sense=sense)
+        for euler, unit, signs, sense in product(("zyx", "xyz"), units, ((), (1, -1, 1)), SENSES)
     ]
-    lengths = ("ft",) if length == "ft" else ("m", "cm", "mm")
-    readings = _each(attitude=_quaternions(orders) or angles, frames=MAP_FRAMES, length=lengths)
+    known = ("ft",) if length == "ft" else ("m", "cm", "mm")
+    readings = _each(attitude=_quaternions(orders) or angles, frames=MAP_FRAMES, length=known)
     named = [
-        replace(r, unlikely=OTHER * (length in lengths and r.length != length)) for r in readings
+        replace(r, unlikely=OTHER * (length in known and r.length != length)) for r in readings
     ]
     return _weighed(named, hint or "enu")
 
@@ -314,7 +314,7 @@ def as_written(columns: Array, attitude: Attitude) -> tuple[Mask, Rotation]:
     """Return the same, body to world, in the columns' own frames."""
     good = finite_rows(columns)
     if not attitude.euler:
-        good &= np.isclose(np.linalg.norm(columns, axis=1), 1.0, atol=0.5)
+        good &= np.isclose(lengths(columns), 1.0, atol=0.5)
     turns = quaternions(attitude, scaled(attitude, columns[good]))
     rotation = Rotation.from_quat(turns, scalar_first=True)
     return good, rotation if attitude.sense == SENSES[0] else rotation.inv()

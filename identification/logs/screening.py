@@ -27,7 +27,7 @@ from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, serves
 from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import DOUBTFUL, interpolated, motor_doubts, rotor_doubt, time_doubt, within
-from .table import Array, Mask, Names, median_step
+from .table import Array, Mask, Names, lengths, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
@@ -108,8 +108,9 @@ def screen_log(
     hear([doubt] if isinstance(doubt, _Refused) else [])
     if not by_imu:
         hear(_steps(log))
-        hear([] if least_seconds is None else _length(log, vehicle, least_seconds))
-    hear([doubt] if doubt else [])
+        if least_seconds is not None:
+            hear(_length(log, vehicle, least_seconds))
+    hear(filter(None, [doubt]))
     return log, tuple(notes)
 
 
@@ -156,14 +157,15 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
         )
     speeds = log.rotor_speeds
     with np.errstate(over="ignore"):
-        thrust = np.square(speeds) @ vehicle.k / vehicle.weight
+        thrust = speeds**2 @ vehicle.k / vehicle.weight
     most = np.quantile(thrust, 0.95)
     hover = f"rotor speeds in rad/s (about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
     zero = "is 0 while the other rotors turn{}; expected the rotor speeds of all four"
     # less of the weight is no turning rotor, in whatever unit
     if most < 0.003:
-        still = "omega1..omega4 are at rest all the time, so nothing flew"
-        yield _Refused(f"{still}; expected {hover}")
+        yield _Refused(
+            f"omega1..omega4 are at rest all the time, so nothing flew; expected {hover}"
+        )
     if not np.isfinite(most):
         yield _Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
     for rotor in np.flatnonzero(speeds[thrust > 0.3 * most].max(axis=0) <= 0.0):
@@ -176,9 +178,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
             f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
             f"{vehicle.name}: is it this vehicle, and did it fly?"
         )
-    least = FORCE_HZ if log.commanded else TORQUE_HZ
+    what, least = ("motor commands", FORCE_HZ) if log.commanded else ("rotor speeds", TORQUE_HZ)
     if not serves(log.motor_rate, least):
-        what = "motor commands" if log.commanded else "rotor speeds"
         yield _Needed(
             f"{what} come {log.motor_rate:.3g} times a second; expected at least {least:g}: what "
             "the rotors do between them is not known"
@@ -186,9 +187,9 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
     if doubt := time_doubt(median_step(times)):
         yield _Refused(doubt)
-    carried = carrying(np.square(speeds).max(axis=1))
-    for i in range(4):
-        if stopped := _stretches((speeds[:, i] == 0.0) & carried, log.t, 0.3):
+    carried = carrying((speeds**2).max(axis=1))
+    for i, speed in enumerate(speeds.T):
+        if stopped := _stretches((speed == 0.0) & carried, log.t, 0.3):
             yield _Fault(f"omega{i + 1} {zero.format(f', for {stopped}')}")
     fastest = _most_rad_s(log, vehicle)
     if (above := np.argwhere(speeds > fastest)).size:
@@ -238,7 +239,7 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
             f"{there:.3g} s of unbroken gyro and accelerometer; expected at least {least:g} s of "
             "flight, in runs of more than 3 s"
         )
-    thrust = np.square(log.rotor_speeds[rows]) @ vehicle.k
+    thrust = log.rotor_speeds[rows] ** 2 @ vehicle.k
     if doubt := gravity_doubt(log.accelerometer[rows[flying(thrust)]], vehicle.gravity):
         yield _Refused(f"ax, ay, az {doubt}")
 
@@ -248,7 +249,7 @@ def _new_poses(log: FlightLog, same: Mask) -> _Findings:
     seen = np.flatnonzero(log.valid)
     if np.ptp(log.t[seen]) > 1.0 and same[seen[1:]].all():
         yield _Refused("the pose never changes, to the last digit; expected the poses of a flight")
-    fastest = np.square(log.rotor_speeds).max(axis=1)
+    fastest = (log.rotor_speeds**2).max(axis=1)
     # 0.2 s: four of the slowest period
     if held := _stretches((same & carrying(fastest))[seen], log.t[seen], 0.2):
         yield _Note(
@@ -270,7 +271,7 @@ def _uneven_steps(log: FlightLog) -> _Findings:
     """Check for even steps of the clock."""
     step = np.diff(log.t)
     median = np.median(step)
-    uneven = np.mean((step < 0.4 * median) | (step > 2.5 * median))
+    uneven = ((step < 0.4 * median) | (step > 2.5 * median)).mean()
     words = f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s"
     if uneven > 0.25:
         yield _Refused(
@@ -287,13 +288,13 @@ def _steps(log: FlightLog) -> _Findings:
     seen = np.flatnonzero(log.valid)
     t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
     step = np.diff(t)
-    way = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    angle = np.linalg.norm(turn_between(q[:-1], q[1:]), axis=1)
+    way = lengths(np.diff(position, axis=0))
+    angle = lengths(turn_between(q[:-1], q[1:]))
     # m and rad, and m/s and rad/s over the step
     far, turned = way > 0.3 + 20.0 * step, angle > 0.8 + 60.0 * step
     leaps = far | turned
     if leaps.any():
-        first = np.argmax(leaps)
+        first = leaps.argmax()
         what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
         units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
         # with more leaps, the rest counts for nothing
@@ -324,17 +325,18 @@ def _steps(log: FlightLog) -> _Findings:
 
 def _length(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
     """Check for enough flight in unbroken runs, and note large losses."""
-    thrust = np.square(log.rotor_speeds) @ vehicle.k
-    thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
+    thrust = low_pass(log.rotor_speeds**2 @ vehicle.k, CUTOFFS.flying_hz, log.period)
     step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
     step *= carrying(thrust)
     pieces = pose_pieces(log)
     left, whole = sum(step[piece[0] : piece[-1] + 1].sum() for piece in pieces), step.sum()
-    words = f"{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of poses of more than "
-    words += f"{SHORTEST_PIECE:g} s"
-    if lost := np.count_nonzero(~log.valid):
-        runs = len(runs_of(~log.valid))
-        words = f"the pose is lost in {runs} run(s), {lost} of {len(log.t)} rows; {words}"
+    words = (
+        f"{left:.3g} of {whole:.3g} s of flight lie in unbroken runs of poses of more than "
+        f"{SHORTEST_PIECE:g} s"
+    )
+    if lost := (~log.valid).sum():
+        runs = runs_of(~log.valid)
+        words = f"the pose is lost in {len(runs)} run(s), {lost} of {len(log.t)} rows; {words}"
     if not pieces or left < least - 1e-9:
         yield _Refused(f"{words}; expected at least {least:g} s")
     if left < 0.9 * whole:
@@ -347,17 +349,17 @@ def stuck_channels(log: FlightLog, vehicle: Vehicle) -> _Findings:
     change.
     """
     rotors, seen = log.rotor_speeds, np.flatnonzero(log.valid)
-    aloft = np.square(rotors) @ vehicle.k > 0.3 * vehicle.weight
-    # a rotor at its limit stands still rightly
-    turning = (rotors > 0.0) & (rotors < (0.99 * vehicle.omega_max or np.inf))
+    aloft = rotors**2 @ vehicle.k > 0.3 * vehicle.weight
+    # a rotor at its limit, or at full command, stands still rightly
+    most = rotors.max() if log.commanded else 0.99 * vehicle.omega_max or np.inf
+    turning = (rotors > 0.0) & (rotors < most)
     place, flown = log.position[seen], aloft[seen]
-    for i in range(4):
-        rows, names = aloft & turning[:, i], "the other rotor speeds"
-        yield from _still(f"omega{i + 1}", log.t, rows, rotors, [i], names)
+    for i, rows in enumerate((aloft[:, None] & turning).T):
+        yield from _still(f"omega{i + 1}", log.t, rows, rotors, [i], "the other rotor speeds")
     for i, axis in enumerate("xyz"):
         yield from _still(f"p{axis}", log.t[seen], flown, place, [i], "the other coordinates")
-    pose, own = np.hstack([place, log.quaternion[seen]]), [3, 4, 5, 6]
-    yield from _still("the attitude", log.t[seen], flown, pose, own, "the coordinates")
+    pose = np.hstack([place, log.quaternion[seen]])
+    yield from _still("the attitude", log.t[seen], flown, pose, [3, 4, 5, 6], "the coordinates")
     said = (f"warning: {doubt}" for doubt in motor_doubts(log))
     yield from (_Note(text) for text in said if text not in log.notes)
 
@@ -368,15 +370,17 @@ def _still(name: str, t: Array, rows: Mask, x: Array, own: list[int], names: str
     """
     still = rows & ~np.diff(x[:, own], axis=0, prepend=np.nan).any(axis=1)
     sisters = np.delete(x, own, axis=1)
-    changes = np.cumsum(np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0, axis=0)
+    changes = (np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0).cumsum(axis=0)
     for first, end in runs_of(still):
         lasts = t[end - 1] - t[first] >= _STILL
         # of equally often changing channels, one without a change in 20 has a chance of exp(-20)
-        if lasts and np.min(changes[end - 1] - changes[first]) < 20:
+        if lasts and (changes[end - 1] - changes[first]).min() < 20:
             still[first:end] = False
     if stretches := _stretches(still, t, _STILL):
-        wrong = "what depends on it there is wrong if its sensor hung"
-        yield _Note(f"warning: {name} stands still for {stretches} while {names} change: {wrong}")
+        yield _Note(
+            f"warning: {name} stands still for {stretches} while {names} change: what depends on "
+            "it there is wrong if its sensor hung"
+        )
 
 
 def _stretches(rows: Mask, t: Array, least: float) -> str:
@@ -386,4 +390,4 @@ def _stretches(rows: Mask, t: Array, least: float) -> str:
     runs = [(t[end - 1] - t[first], -t[first]) for first, end in runs_of(rows)]
     count = sum(seconds >= least for seconds, _ in runs)
     seconds, begin = max(runs, default=(0.0, 0.0))
-    return f"{seconds:.3g} s from t = {-begin:.6g} s ({count} such stretch(es))" if count else ""
+    return f"{seconds:.3g} s from t = {-begin:.4g} s ({count} in all)" if count else ""

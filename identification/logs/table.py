@@ -102,6 +102,11 @@ def finite_rows(values: Array) -> Mask:
     return np.asarray(np.isfinite(values).all(axis=1))
 
 
+def lengths(vectors: Array) -> Array:
+    """Return the lengths (N,) of vectors (N, k)."""
+    return np.asarray(np.linalg.norm(vectors, axis=1))
+
+
 def median_step(t: Array) -> float:
     """Return the median step of times (N,), s."""
     return float(np.median(np.diff(t)))

@@ -30,10 +30,6 @@ from ...runtime.threads import SINGLE_THREADED
 from ...runtime.whole_files import replaced
 from .table import WHAT, Array, ArrayMap, Data, Table, Texts, file_kind, one_line
 
-_MEMORY = 7 * 2**27  # bytes of the process for MATLAB's files
-_SHOWN = 10  # arrays in a note
-_BUFFER = 2**20  # bytes of a column of Parquet, read at a time
-
 
 def write_table(columns: ArrayMap, path: Path) -> None:
     """Write columns (rows,) to a CSV, gzipped CSV or Parquet file; numbers read back exactly, NaN
@@ -107,7 +103,7 @@ def open_arrays(path: Path) -> Table:
             columns |= zip(names, flat, strict=True)
         elif array.size > 1:
             other.append(name)
-    note = f"arrays of other lengths than {rows} were left out: {', '.join(other[:_SHOWN])}"
+    note = f"arrays of other lengths than {rows} were left out: {', '.join(other[:10])}"
 
     def load(_: Table, names: Texts) -> Iterator[Array]:
         return map(columns.__getitem__, names)
@@ -131,10 +127,15 @@ def _write_matlab(path: Path, data: BinaryIO, made: BinaryIO) -> None:
             "writes, or h5py installed"
         )
     program = str(Path(__file__).with_name("matlab_arrays.py"))
-    command = [sys.executable, "-P", program, str(LIMITS.arrays), str(_MEMORY)]
-    # threads of linear algebra would take the file's share of memory
-    alone = {**os.environ, **SINGLE_THREADED}
-    ran = subprocess.run(command, stdin=data, stdout=made, stderr=PIPE, check=False, env=alone)
+    ran = subprocess.run(
+        [sys.executable, "-P", program, str(LIMITS.arrays), str(7 * 2**27)],  # bytes
+        stdin=data,
+        stdout=made,
+        stderr=PIPE,
+        check=False,
+        # threads of linear algebra would take the file's share of memory
+        env={**os.environ, **SINGLE_THREADED},
+    )
     if ran.returncode:
         said = ran.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
         raise ValueError(said.partition(": ")[2] or said or "a spoiled MATLAB file")
@@ -151,7 +152,7 @@ def open_parquet(path: Path) -> Table:
     with one_line(f"{path}: cannot be read as Parquet"):
         file = parquet.ParquetFile(
             path,
-            buffer_size=_BUFFER,
+            buffer_size=2**20,
             thrift_string_size_limit=LIMITS.parquet_footer,
             thrift_container_size_limit=LIMITS.parquet_footer,
         )
@@ -177,8 +178,14 @@ def open_parquet(path: Path) -> Table:
                     "numbers"
                 )
             if isinstance(values, pyarrow.Field):
-                most = LIMITS.table_text, LIMITS.table_numbers
-                _check_claims(path, file, [name], *most, f"in column {name}")
+                _check_claims(
+                    path,
+                    file,
+                    [name],
+                    LIMITS.table_text,
+                    LIMITS.table_numbers,
+                    f"in column {name}",
+                )
                 values = _column(path, file, name)
             if len(values) != rows:
                 raise InputError(
@@ -193,10 +200,9 @@ def open_parquet(path: Path) -> Table:
 
 def _check_claims(path: Path, file: Any, names: Texts, size: int, count: int, what: str) -> None:
     """Raise InputError where columns unpack to more bytes or numbers, by the file's metadata."""
-    groups = map(file.metadata.row_group, range(file.metadata.num_row_groups))
     claims = [
         (max(chunk.total_uncompressed_size, 0), max(chunk.num_values, 0))
-        for group in groups
+        for group in map(file.metadata.row_group, range(file.metadata.num_row_groups))
         for chunk in map(group.column, range(group.num_columns))
         if chunk.path_in_schema.split(".")[0] in names
     ]

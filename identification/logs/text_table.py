@@ -50,13 +50,8 @@ MISSING_WORDS = frozenset({"na", "n/a", "null", "none", "nil", "-", "--", "?"})
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "white space"}
 _LATIN = "windwrench-latin-1"  # name of an error handler
 _BUFFER = 2**16  # bytes read or unpacked at a time: within the cache of a core
-_UNUSED = 2**21  # packed bytes without a line yet
-
 _BLOCK = 200  # lines turned into numbers at a time; their texts stay in the cache of the processor
-_LOOKED_AT = 2**18  # characters for finding the layout
 _LINES = 600  # lines, at most; Betaflight's decoder writes 150 before the header
-_BETWEEN = 5  # lines between header and first row, at most
-_FEWEST = 2  # columns of a table
 _LIST = re.compile(  # between separators: numbers in brackets, or nothing
     r'(?:(?<=[,;\t|])|^) {0,9}"?([\[(](?: {0,9}(?:[-+.]?\d|nan)[-+.,; \w]*)?[\])])"?'
     r" {0,9}(?=[,;\t|]|$)",
@@ -188,14 +183,14 @@ def open_table(path: Path) -> Table:
     if name.endswith(".parquet"):
         return open_parquet(path)
     if is_table(path):
-        return open_text(path)
+        return _open_text(path)
     raise InputError(
         f"{path}: unknown kind of file; expected a table whose name ends in "
         f"{', '.join(dict.fromkeys((*TEXT_SUFFIXES, *SUFFIXES, *ARRAY_SUFFIXES)))}"
     )
 
 
-def open_text(path: Path) -> Table:
+def _open_text(path: Path) -> Table:
     """Open a text table.
 
     Raises:
@@ -204,7 +199,7 @@ def open_text(path: Path) -> Table:
     written: Lines = []
     for line in chain.from_iterable(map(_text_lines, _blocks(path))):
         written.append(line)
-        if len(written) == _LINES or sum(map(len, written)) > _LOOKED_AT:
+        if len(written) == _LINES or sum(map(len, written)) > 2**18:
             break
     for program, beginning in _MOTION_CAPTURE.items():
         if re.match(beginning, "\n".join(written[:8])):
@@ -266,11 +261,10 @@ def open_text(path: Path) -> Table:
         return columns
 
     units = tuple(layout.fields(between[0])) if len(between) == 1 and not layout.lists else ()
-    seen = [layout.fields(line) for line in written[first:] if line.strip()]
-    columns_seen = zip(*(fields for fields in seen if len(fields) >= len(names)), strict=False)
+    seen = [fields for fields in map(layout.fields, written[first:]) if len(fields) >= len(names)]
     numeric = tuple(
         name
-        for name, fields in zip(names, columns_seen, strict=False)
+        for name, fields in zip(names, zip(*seen, strict=False), strict=False)
         if None not in map(layout.number, fields)
     )
     return Table(
@@ -316,7 +310,7 @@ class _Packed:
         """
         piece = self.file.read(size)
         self.size += len(piece)
-        if self.size > self.unpacked + _UNUSED:
+        if self.size > self.unpacked + 2**21:  # packed bytes without a line yet
             raise InputError(
                 f"{self.path}: {self.size} packed bytes unpack to {self.unpacked}; expected a "
                 "packed table"
@@ -430,7 +424,7 @@ def _score(head: Lines, layout: _TextLayout) -> tuple[float, int]:
     # the later lines decide: before them may stand a program's settings, numbers too
     tail = rows[len(rows) // 4 :]
     width = mode([n for _, n, _ in tail] or [0])
-    if width < _FEWEST:
+    if width < 2:
         return 0.0, 0
     whole = sum(bool(line.strip()) for line in head[tail[0][0] :])
     counts = [k for _, n, k in tail if n == width]
@@ -441,8 +435,7 @@ def _score(head: Lines, layout: _TextLayout) -> tuple[float, int]:
 def _counts(layout: _TextLayout, fields: Texts) -> tuple[int, int]:
     """Return how many fields are empty, and how many hold a number (``nan`` among them)."""
     empty = sum(map(_is_missing, fields))
-    others = sum(number is None for number in map(layout.number, fields))
-    return empty, len(fields) - others - empty
+    return empty, sum(number is not None for number in map(layout.number, fields)) - empty
 
 
 def _header(path: Path, head: Lines, layout: _TextLayout, full: int) -> tuple[int | None, int]:
@@ -473,7 +466,7 @@ def _header(path: Path, head: Lines, layout: _TextLayout, full: int) -> tuple[in
                 break
         elif header is None and numbers and 2 * named <= len(layout.fields(head[i])) == width:
             first = i
-        elif first - i > _BETWEEN:
+        elif first - i > 5:
             break
     return header, first
 

@@ -80,8 +80,10 @@ class WhatFlew:
         count = WORDS["airframes"].get(self.airframe) if self.rotors is None else self.rotors
         with_rotors = "" if count in (None, 4) else f" with {count} rotors"
         if self.airframe not in ("", QUADROTOR) or with_rotors:
-            what = f"{self.airframe or 'a vehicle'}{with_rotors}"
-            raise InputError(f"{path}: {self.by} says {what}; expected a quadrotor")
+            raise InputError(
+                f"{path}: {self.by} says {self.airframe or 'a vehicle'}{with_rotors}; expected a "
+                "quadrotor"
+            )
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return the statements as rows of a table: name, value, and source."""
@@ -118,13 +120,13 @@ def more_rotors(columns: Names, source: Table | ArrayMap, are_speeds: bool = Fal
         four, fifth = rows[:, :4], rows[:, 4]
         if len(rows) < 30 or np.ptp(fifth) == 0.0:
             continue
-        size = abs(np.median(fifth) / max(np.median(np.abs(four)), 1e-12))
+        size = abs(np.median(fifth) / max(np.median(abs(four)), 1e-12))
         moves = fifth - fifth.mean()
         left = np.linalg.lstsq(four - four.mean(axis=0), moves)[1]
         is_motor = are_speeds or re.search(WORDS["motor_words"], name.lower())
         # the four explain half of its variance, and its median is like theirs. Without a residual,
         # columns depend on each other
-        if (is_motor or left.sum() / np.sum(moves**2) < 0.5) and 0.5 <= size <= 2.0:
+        if (is_motor or left.sum() / (moves**2).sum() < 0.5) and 0.5 <= size <= 2.0:
             turning.append(name)
     if len(turning) == len(columns):
         return ""
@@ -164,8 +166,8 @@ def order_by_places(places: Sequence[Pair], vehicle: Vehicle | None = None) -> O
     wanted = np.radians([45.0, 135.0, 225.0, 315.0])
     if vehicle is not None:
         wanted = np.arctan2(*vehicle.positions.T[1::-1])
-    off = np.abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
-    nearest = 1 + np.argmin(off, axis=1)
+    off = abs(np.angle(np.exp(1j * (wanted[:, None] - motors))))
+    nearest = 1 + off.argmin(axis=1)
     if np.degrees(off.min(axis=1).max()) > 30.0 or len({*nearest}) < len(nearest):
         return None
     return tuple(nearest.tolist())

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ... import _core
-from ...runtime.arrays import Array, Index
+from ...runtime.arrays import Array
 from ..logs.table import ArrayPair
 from .smoothing import resampled, second_difference
 
@@ -89,10 +89,10 @@ def _steps(
     F[:, 3:6, 0:3], F[:, 6:9, 0:3] = (np.cross(x[:, None], R) for x in (way, move))
     F[:, 3:6, 12:15], F[:, 6:9, 12:15] = -T * R, -0.5 * T * T * R
     fall = np.array([0.0, 0.0, gravity])
-    after = [velocity + before.apply(way) - T * fall]
-    after += [position + T * velocity + before.apply(move) - 0.5 * T * T * fall, b, a]
+    speed = velocity + before.apply(way) - T * fall
+    place = position + T * velocity + before.apply(move) - 0.5 * T * T * fall
     tilt = (rotation[1:].inv() * (before * turn)).as_rotvec()
-    return F, np.column_stack([tilt, np.column_stack(after) - linear[1:]])
+    return F, np.column_stack([tilt, np.column_stack([speed, place, b, a]) - linear[1:]])
 
 
 def fuse(
@@ -105,14 +105,13 @@ def fuse(
         positions: measured beside it, world.
         attitudes: likewise. Without positions and attitudes the heading is zero at the start.
     """
-    dt = (imu.t[-1] - imu.t[0]) / (len(imu.t) - 1)
+    dt = np.ptp(imu.t) / (len(imu.t) - 1)
     stride = max(1, round(0.02 / dt))  # 20 ms from state to state, of the integrated IMU
     count = (len(imu.t) - 1) // stride
     T, end = stride * dt, count * stride + 1
     moved = _integrate(imu.gyro[:end], imu.force[:end], dt, stride)
     times = imu.t[0] + T * np.arange(count + 1)
-    rates = imu.gyro[:end:stride]
-    at_knots = imu._replace(t=times, gyro=rates, force=imu.force[:end:stride])
+    at_knots = imu._replace(t=times, gyro=imu.gyro[:end:stride], force=imu.force[:end:stride])
     rotation, heading_std = _first_guess(at_knots, positions, attitudes)
     linear = np.zeros((count + 1, 12))
     if positions is None:
@@ -140,9 +139,11 @@ def fuse(
     for _ in range(6):
         change[0, :3] = (rotation[0].inv() * started).as_rotvec()
         change[0, 3:], std[0] = begun - linear[0], prior_std
-        measured = _measured(times, rates, rotation, linear, readings)
+        knots, firsts, late, off, variances = _measured(at_knots, rotation, linear, readings)
         F, defect = _steps(T, imu.gravity, rotation, linear, moved)
-        if not _core.smooth_inertial_motion(F, defect, spread, *measured, change, std):
+        if not _core.smooth_inertial_motion(
+            F, defect, spread, knots, firsts, late, off, variances, change, std
+        ):
             raise np.linalg.LinAlgError("the covariance of an inertial motion is singular")
         turn = Rotation.from_rotvec(change[:, :3])
         rotation = rotation * turn
@@ -203,18 +204,20 @@ def _turned_heading(before: Rotation, after: Rotation) -> float:
 
 
 def _measured(
-    times: Array, rates: Array, rotation: Rotation, linear: Array, readings: Mapping[int, Readings]
-) -> tuple[Index, Index, Array, Array, Array]:
-    """Return the readings by the first of their states, sorted by the nearest knot: this knot, the
-    first state, s behind the knot, the distance (3,) from a nominal motion, and its variance.
+    imu: ImuPiece, rotation: Rotation, linear: Array, readings: Mapping[int, Readings]
+) -> list[np.ndarray]:
+    """Return the readings by the first of their states, sorted by the nearest of an IMU's knots:
+    this knot, the first state, s behind the knot, the distance (3,) from a nominal motion, and its
+    variance.
     """
+    times = imu.t
     parts = []
     for first, r in readings.items():
         knots = np.rint((r.t - times[0]) / (times[1] - times[0])).astype(np.int64)
         knots = np.clip(knots, 0, len(times) - 1)
         late = r.t - times[knots]
         if first == ATTITUDE:
-            turn = Rotation.from_rotvec(rates[knots] * late[:, None])
+            turn = Rotation.from_rotvec(imu.gyro[knots] * late[:, None])
             off = ((rotation[knots] * turn).inv() * Rotation.from_matrix(r.values)).as_rotvec()
         else:
             off = r.values - linear[knots, first - 3 : first]
@@ -223,5 +226,4 @@ def _measured(
         parts.append((knots, np.full_like(knots, first), late, off, np.full(len(knots), r.std**2)))
     columns = [np.concatenate(part) for part in zip(*parts, strict=True)]
     order = np.argsort(columns[0], kind="stable")
-    knots, firsts, late, off, variances = (column[order] for column in columns)
-    return knots, firsts, late, off, variances
+    return [column[order] for column in columns]

@@ -16,7 +16,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.table import Array, Mask, Pair, Rows, finite_rows, median_step
 from .inertial_fusion import FusedMotion, ImuPiece, Readings, fuse
-from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body
+from .signals import LONGEST_GAP, SHORTEST_PIECE, Signals, in_body, voltage_at
 from .smoothing import (
     CUTOFFS,
     derivative,
@@ -69,7 +69,7 @@ def imu_rows(log: FlightLog) -> Rows:
     """Return the rows with readings of both gyro and accelerometer."""
     if log.gyro is None or log.accelerometer is None:
         return np.flatnonzero([])
-    return np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
+    return np.flatnonzero(finite_rows(np.column_stack([log.gyro, log.accelerometer])))
 
 
 def inertial_pieces(log: FlightLog) -> list[Rows]:
@@ -94,11 +94,10 @@ def inertial_signals(log: FlightLog, gravity: float) -> list[InertialSignals]:
             f"{log.name}: no unbroken piece of gyro and accelerometer is longer than "
             f"{SHORTEST_PIECE:g} s"
         )
-    noise = np.array(imu_noise(log))
-    return [_piece(log, rows, gravity, noise) for rows in pieces]
+    return [_piece(log, rows, gravity) for rows in pieces]
 
 
-def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Array) -> InertialSignals:
+def _piece(log: FlightLog, rows: Rows, gravity: float) -> InertialSignals:
     assert log.gyro is not None
     assert log.accelerometer is not None
     imu_times = log.t[rows]
@@ -115,13 +114,12 @@ def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Array) -> Inertial
     gyro, force = (sampled(imu_times, x[rows]) for x in (log.gyro, log.accelerometer))
     speeds = sampled(log.t, log.rotor_speeds)
     t = even[::thin]
-    fused = _fused(log, ImuPiece(t, gyro, force, gravity, noise / np.sqrt(thin)))
+    noise = np.array(imu_noise(log)) / np.sqrt(thin)
+    fused = _fused(log, ImuPiece(t, gyro, force, gravity, noise))
     t = t[: np.searchsorted(t, fused.t[-1] + 1e-9)]
-    std = resampled(t, fused.t, fused.std)
     velocity, position, *biases = np.split(resampled(t, fused.t, fused.linear), 4, axis=1)
     gyro, force = gyro[: len(t)] - biases[0], force[: len(t)] - biases[1]
     rotation = _dense(t, gyro, fused)
-    voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
     return InertialSignals(
         t,
         period,
@@ -132,9 +130,9 @@ def _piece(log: FlightLog, rows: Rows, gravity: float, noise: Array) -> Inertial
         gyro,
         derivative(gyro, period),
         np.maximum(speeds[: len(t)], 0.0),
-        voltage,
-        std[:, :9],
-        np.median(fused.std[:, 12:15], axis=0),
+        voltage_at(log, t),
+        resampled(t, fused.t, fused.std[:, :9]),
+        np.median(fused.std[:, 12:], axis=0),
     )
 
 

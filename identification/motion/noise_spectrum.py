@@ -61,9 +61,10 @@ def noise_spectra(log: FlightLog) -> list[_ChannelNoise]:
     out = []
     for channel, pieces, period in _channels(log):
         if (amplitude := _amplitudes(pieces)) is not None:
-            low, high = (share * 0.5 / period for share in BAND)
-            fall = _fall(amplitude, 0.5 / period)
-            out.append(_ChannelNoise(channel, _slope(amplitude), fall, (low, high)))
+            nyquist = 0.5 / period
+            band = BAND[0] * nyquist, BAND[1] * nyquist
+            fall = _fall(amplitude, nyquist)
+            out.append(_ChannelNoise(channel, _slope(amplitude), fall, band))
     return out
 
 
@@ -96,13 +97,14 @@ def _amplitudes(pieces: Sequence[Array]) -> Array | None:
     The power is the median of half overlapping segments: a leap of the pose, or a touch of the
     ground, spoils some of them.
     """
-    n = SEGMENT
     # second differences, against leakage of slow motion
     rough = [np.diff(piece, 2, axis=0) for piece in pieces]
-    segments = [x[a : a + n] for x in rough for a in range(0, len(x) - n + 1, n // 2)]
+    segments = [
+        x[a : a + SEGMENT] for x in rough for a in range(0, len(x) - SEGMENT + 1, SEGMENT // 2)
+    ]
     if len(segments) < 8:  # the slope's own error is above 0.2
         return None
-    spectra = np.fft.rfft(np.hanning(n)[:, None] * np.array(segments), axis=1)[:, 1:]
+    spectra = np.fft.rfft(np.hanning(SEGMENT)[:, None] * np.array(segments), axis=1)[:, 1:]
     power = np.median(np.square(np.abs(spectra)), axis=0)
     moving = power.max(axis=0) > 0.0
     if not moving.any():
@@ -141,7 +143,7 @@ def filtering_notes(log: FlightLog) -> Names:
     filtered = [noise for noise in noise_spectra(log) if noise.filtered]
     pose = [noise for noise in filtered if noise.channel in POSE_CHANNELS]
     groups = [pose, *([noise] for noise in filtered if noise not in pose)]
-    return tuple(_sentence(group) for group in groups if group)
+    return tuple(map(_sentence, filter(None, groups)))
 
 
 def _sentence(group: Sequence[_ChannelNoise]) -> str:

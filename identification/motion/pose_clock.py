@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..logs.flight_log import FlightLog, with_rows
-from ..logs.table import Array, Rows, median_step
+from ..logs.table import Array, Data, Rows, median_step
 
 
 def on_pose_clock(log: FlightLog) -> FlightLog:
@@ -25,26 +25,23 @@ def on_pose_clock(log: FlightLog) -> FlightLog:
     begins = np.append(rows[0], rows[:-1] + 1)
     middles = np.append(0, (rows[1:] + rows[:-1]) // 2 + 1)
     flown = with_rows(log, np.arange(len(log.t)) <= rows[-1])
-    squares = _means(np.square(flown.rotor_speeds), begins)
-    assert squares is not None
+
+    def averaged(log: FlightLog, begins: Rows, *names: str) -> Data:
+        values = {name: getattr(log, name) for name in names}
+        return {name: _means(x, begins) for name, x in values.items() if x is not None}
+
     return replace(
         with_rows(log, log.valid),
-        rotor_speeds=np.sqrt(squares),
-        command=_means(flown.command, begins),
-        voltage=_means(flown.voltage, begins),
-        force=_means(flown.force, begins),
-        torque=_means(flown.torque, begins),
-        gyro=_means(log.gyro, middles),
-        accelerometer=_means(log.accelerometer, middles),
+        rotor_speeds=np.sqrt(_means(np.square(flown.rotor_speeds), begins)),
+        **averaged(flown, begins, "command", "voltage", "force", "torque"),
+        **averaged(log, middles, "gyro", "accelerometer"),
     )
 
 
-def _means(x: Array | None, begins: Rows) -> Array | None:
+def _means(x: Array, begins: Rows) -> Array:
     """Return the means of the finite rows of x (N, ...), from each row of ``begins`` to the next;
     NaN: there are none.
     """
-    if x is None:
-        return None
     there = np.isfinite(x)
     counts = np.add.reduceat(there.astype(float), begins)
     sums = np.add.reduceat(np.where(there, x, 0.0), begins)

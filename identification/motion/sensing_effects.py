@@ -14,7 +14,7 @@ from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ..logs.flight_log import FlightLog
 from .residual import loaded_model
-from .signals import LONGEST_GAP
+from .signals import LONGEST_GAP, voltage_at
 
 
 def sensing_of(vehicle: Vehicle) -> tuple[EffectSetting, ...]:
@@ -46,13 +46,12 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     delay = delay_of(vehicle)
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan
-    voltage = None if log.voltage is None else np.interp(log.t - delay, log.t, log.voltage)
     return replace(
         log,
         rotor_speeds=samples[:, :4].copy(),
         position=samples[:, 4:7].copy(),
         quaternion=samples[:, 7:].copy(),
-        voltage=voltage,
+        voltage=voltage_at(log, log.t - delay),
         valid=valid,
     )
 

@@ -2,7 +2,8 @@
 alone.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,8 +15,7 @@ from .inertial_signals import imu_noise, pose_rate, reads_imu
 from .smoothing import CUTOFFS, high_pass, robust_std, turned
 
 
-@dataclass(frozen=True)
-class _SensorNoise:
+class _SensorNoise(NamedTuple):
     """Standard deviations of one sample, per axis."""
 
     position: float  # m
@@ -25,22 +25,28 @@ class _SensorNoise:
     accelerometer: float = 0.0  # m/s2, likewise
 
 
-def sensor_noise(log: FlightLog, vehicle: Vehicle) -> _SensorNoise:
+def sensor_noise(log: FlightLog, vehicle: Vehicle, hidden: bool = False) -> _SensorNoise:
     """Return the noise of a log. A pose's noise is the part above a quarter of the sampling rate,
-    taken as white.
+    taken as white; ``hidden``: no less than the noise of motion capture by the vehicle's file.
 
     The rotor speeds' noise is the vehicle's rounding step.
     """
+    none = Mocap(0.0, 0.0, 0.0)
     step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
     if reads_imu(log):  # the few poses beside it show no noise of their own
-        mocap = vehicle.mocap if pose_rate(log) > 0.0 else Mocap(0.0, 0.0, 0.0)
+        mocap = vehicle.mocap if pose_rate(log) > 0.0 else none
         return _SensorNoise(mocap.sigma_pos_m, mocap.sigma_att_rad, step, *imu_noise(log))
     seen = np.flatnonzero(log.valid)
     steps = np.diff(log.t[seen])
     whole = np.flatnonzero(steps < 1.5 * np.median(steps))
     position = high_pass(log.position[seen], CUTOFFS.noise_share_of_rate)[whole]
     angle = high_pass(turned(log.quaternion[seen]), CUTOFFS.noise_share_of_rate)
-    return _SensorNoise(robust_std(position), robust_std(angle), step)
+    least = vehicle.mocap if hidden else none
+    return _SensorNoise(
+        max(robust_std(position), least.sigma_pos_m),
+        max(robust_std(angle), least.sigma_att_rad),
+        step,
+    )
 
 
 def with_noise(log: FlightLog, noise: _SensorNoise, rng: np.random.Generator) -> FlightLog:
@@ -73,14 +79,4 @@ def noisy_logs(logs: Logs, vehicle: Vehicle, hidden: bool = False) -> list[Fligh
     Then the noise of motion capture by the vehicle's file is added, if larger.
     """
     rng = np.random.default_rng(0)
-    out = []
-    for log in logs:
-        noise = sensor_noise(log, vehicle)
-        if hidden:
-            noise = replace(
-                noise,
-                position=max(noise.position, vehicle.mocap.sigma_pos_m),
-                attitude=max(noise.attitude, vehicle.mocap.sigma_att_rad),
-            )
-        out.append(with_noise(log, noise, rng))
-    return out
+    return [with_noise(log, sensor_noise(log, vehicle, hidden), rng) for log in logs]

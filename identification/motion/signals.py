@@ -96,13 +96,17 @@ def longest_step(log: FlightLog) -> float:
     return max(LONGEST_GAP, 3.5 * log.period)
 
 
+def voltage_at(log: FlightLog, t: Array) -> Array | None:
+    """Return the battery's voltage (n,) at times (n,); None without any in the log."""
+    return None if log.voltage is None else np.interp(t, log.t, log.voltage)
+
+
 def _piece(log: FlightLog, rows: Rows, wide_hz: float) -> Signals:
     period = log.period
     t = even_times(log.t[rows], period)
     q = resampled(t, log.t[rows], continuous(log.quaternion[rows]))
     rotation, angular_velocity = turning(low_pass(q, wide_hz, period), period)
     position = low_pass(resampled(t, log.t[rows], log.position[rows]), wide_hz, period)
-    voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
     return Signals(
         t,
         period,
@@ -113,5 +117,5 @@ def _piece(log: FlightLog, rows: Rows, wide_hz: float) -> Signals:
         angular_velocity,
         derivative(angular_velocity, period),
         resampled(t, log.t, log.rotor_speeds),
-        voltage,
+        voltage_at(log, t),
     )

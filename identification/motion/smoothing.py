@@ -58,8 +58,8 @@ def high_pass(x: Array, share_of_rate: float) -> Array:
     the cut-off as a share of the sampling rate. White noise keeps its standard deviation.
     """
     filters = 4, 2.0 * share_of_rate, True
-    kept = np.linalg.norm(_both_ways(np.eye(201)[100], *filters))  # of white noise
-    return _both_ways(x, *filters) / kept
+    white = np.eye(201)[100]
+    return _both_ways(x, *filters) / np.linalg.norm(_both_ways(white, *filters))
 
 
 def _both_ways(x: Array, order: int, share_of_nyquist: float, high: bool = False) -> Array:
@@ -121,7 +121,7 @@ def unbroken(
     more than ``seconds`` s.
     """
     runs = np.split(rows, np.flatnonzero(np.diff(t[rows]) > gap) + 1)
-    return [run for run in runs if len(run) > count and t[run[-1]] - t[run[0]] > seconds]
+    return [run for run in runs if len(run) > count and np.ptp(t[run]) > seconds]
 
 
 def runs_of(rows: Mask) -> list[tuple[int, int]]:

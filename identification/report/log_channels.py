@@ -63,7 +63,7 @@ def log_channels(log: FlightLog) -> list[Channel]:
         t, title, drawn = log.t[rows], f"{name} ({unit})", values[rows]
         low, high = float(drawn.min()), float(drawn.max())
         if values is tilt:
-            drawn, title = axis[rows, :2], "thrust axis (x, y of 1)"
+            drawn, title = axis[rows, :2], "thrust axis (unit vector)"
         steps, step = np.diff(t), median_step(t)
         rate = min(log.rates.get(section) or np.inf, 1.0 / step)
         gaps, longest = int((steps > _GAP * step).sum()), max(float(steps.max()), 1.0 / rate)

@@ -57,8 +57,8 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: Path) -> Path:
     mean, std = scale * series.torque, scale * series.std_torque
     _draw_vectors(force, series.t, series.force, series.std_force, log.force, "f", "N")
     _draw_vectors(torque, series.t, mean, std, truth, "τ", unit)
-    force.set_ylabel("external force (N)")
-    torque.set(ylabel=f"external torque ({unit})", xlabel="time (s)")
+    force.set_ylabel("external force ± 2σ (N)")
+    torque.set(ylabel=f"external torque ± 2σ ({unit})", xlabel="time (s)")
     if GROUND in {phase.name for phase in phases}:
         force.axhline(
             vehicle.weight, color=BLACK, lw=0.8, ls=":", label=f"weight {vehicle.weight:.3g} N"
@@ -78,6 +78,7 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: Path) -> Path:
             phase.name,
             transform=height.get_xaxis_transform(),
             ha="center",
+            size="small",
         )
     write_png(figure, path)
     return path

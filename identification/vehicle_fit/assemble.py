@@ -8,9 +8,17 @@ import numpy as np
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, Vehicle
 from ..logs.flight_log import Logs
+from ..logs.table import median_step
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
-from .geometry import USUAL, Geometry
+from .geometry import (
+    COMMAND_SPREAD,
+    HOVER_SPEED,
+    QUADRANT,
+    ROTOR_RADIUS,
+    THRUST_SPREAD,
+    Geometry,
+)
 from .model import inertia_of
 from .motors import MotorResponse
 from .parameters import FURTHER
@@ -30,7 +38,7 @@ def vehicle_of(
     """Return the vehicle, ready for estimate, diagnose and the environment. Measured rotor speeds
     have the lag behind them already: then no effect of the model has one.
     """
-    arm, reach = estimates["arm_l"].value, estimates["p/k"].value
+    arm = estimates["arm_l"].value
     effects = _effects(estimates)
     curve = None
     if fit.drive.commands:
@@ -40,33 +48,31 @@ def vehicle_of(
         voltage = estimates["voltage_exponent"]
         known = voltage.value if voltage.status == IDENTIFIED else 0.0
         curve = MotorCurve(tuple(thrust.tolist()), known)
-        k = fit.model.weight / (4.0 * USUAL.hover_speed**2)
+        k = fit.model.weight / (4.0 * HOVER_SPEED**2)
     else:
         k = estimates["k"].value
         if motors is not None:  # thrust against command by way of the speed
-            steady = np.polynomial.polynomial.polypow(motors.speed, 2)
-            curve = MotorCurve(tuple(k * steady))
+            curve = MotorCurve(tuple(k * np.polynomial.polynomial.polypow(motors.speed, 2)))
     late, of_lag = "lag" in fit.model.free, effect_of(Role.LAG)
     if late:
-        value = estimates[of_lag].value
-        effects.append(EffectSetting(of_lag, {get(of_lag).coefficients[0].name: value}))
+        coefficient = get(of_lag).coefficients[0].name
+        effects.append(EffectSetting(of_lag, {coefficient: estimates[of_lag].value}))
     inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
     inertia |= {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
-    size = np.abs(geometry.positions[:, :2])
-    uneven = geometry.known and (np.ptp(size) > 1e-9 or np.any(geometry.positions[:, 2] != 0.0))
+    even = np.allclose(geometry.positions, geometry.arm * QUADRANT)
     vehicle = Vehicle(
         name=name,
         mass=fit.model.mass,
         inertia=inertia_of(inertia),
         arm_l=arm,
         k=np.full(4, k),
-        p=np.full(4, reach * k),
-        rotor_radius=USUAL.radius * arm,
+        p=np.full(4, estimates["p/k"].value * k),
+        rotor_radius=ROTOR_RADIUS * arm,
         omega_lsb=step,
         omega_source="commanded" if late else "measured",
         voltage_ref=fit.drive.voltage_ref,
         spin=fit.drive.spin.copy(),
-        rotor_positions=geometry.positions if uneven else None,
+        rotor_positions=None if even else geometry.positions,
         com=np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"]),
         effects=tuple(effects),
         motor_curve=curve,
@@ -75,8 +81,8 @@ def vehicle_of(
     posed = next((log for log in logs if log.has_pose), None)
     if posed is None:
         return vehicle
-    noise, rate = sensor_noise(posed, vehicle), 1.0 / np.median(np.diff(posed.t[posed.valid]))
-    mocap = Mocap(float(rate), max(noise.position, 1e-5), max(noise.attitude, 1e-4))
+    noise, rate = sensor_noise(posed, vehicle), 1.0 / median_step(posed.t[posed.valid])
+    mocap = Mocap(rate, max(noise.position, 1e-5), max(noise.attitude, 1e-4))
     return replace(vehicle, mocap=mocap)
 
 
@@ -93,13 +99,13 @@ def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertaint
     return Uncertainty(
         thrust=math.hypot(
             min(share("k", "thrust(0.25)", "thrust(0.5)", "thrust(0.75)"), default=0.0),
-            USUAL.thrust_spread,
+            THRUST_SPREAD,
         ),
         rotor=max((min((e.high - e.low) / 1.96 / arm, 0.99) for e in centre), default=0.0),
         torque=max(share("p/k"), default=0.0),
         inertia=max(share("Jxx", "Jyy", "Jzz"), default=0.0),
         arm_l=max(share("arm_l"), default=0.0),
-        command=USUAL.command_spread if commands else 0.0,
+        command=COMMAND_SPREAD if commands else 0.0,
     )
 
 

@@ -6,19 +6,18 @@ Rotors come as measured speeds, or as motor commands.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
 from ..logs.flight_phases import carried
 from ..logs.table import Data, Pair, median_step
-from ..motion.signals import Signals, log_signals
+from ..motion.signals import Signals, in_body, log_signals, pose_pieces, voltage_at
 from ..motion.smoothing import (
     derivative,
     low_pass,
@@ -40,8 +39,7 @@ _FASTEST_HZ = 200.0
 _FEW_VALUES = 0.2
 
 
-@dataclass(frozen=True, eq=False)
-class MotionPiece:
+class MotionPiece(NamedTuple):
     """n evenly spaced samples of one unbroken piece of a log; body axes forward, left, up."""
 
     log: int  # index of the log
@@ -70,8 +68,9 @@ class MotionPiece:
 
     def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
         """Return the piece with each of its series changed."""
-        series: Data = {n: change(x) for n, x in vars(self).items() if isinstance(x, np.ndarray)}
-        return replace(self, **series)
+        every = self._asdict().items()
+        series: Data = {n: change(x) for n, x in every if isinstance(x, np.ndarray)}
+        return self._replace(**series)
 
 
 Pieces = list[MotionPiece]
@@ -94,12 +93,6 @@ def _sources_of(logs: Logs) -> Sources:
         InputError: a log has no motion, its rotors were measured too seldom, or some logs have
             rotor speeds and others commands.
     """
-    for log in logs:
-        if not log.has_pose and log.gyro is None:
-            raise InputError(
-                f"{log.source or log.name}: has neither a pose nor a gyro (gx, gy, gz); expected "
-                "one of them"
-            )
     # each channel of the rotors must be quick enough to tell their torque
     commands = [
         log.command is not None and serves(log.rates.get("commands", np.inf), TORQUE_HZ)
@@ -124,8 +117,7 @@ def _sources_of(logs: Logs) -> Sources:
     pose = all(log.has_pose for log in logs)
     if not gyro and not pose:
         raise InputError(
-            f"{logs[0].name}: some logs have a pose and others a gyro alone; expected a gyro in "
-            "every log, or a pose"
+            f"{logs[0].name}: expected a gyro (gx, gy, gz) in every log, or a pose in every log"
         )
     return Sources(
         "accelerometer" if accelerometer else "pose" if pose else "",
@@ -190,37 +182,28 @@ def _without_bias(log: FlightLog) -> FlightLog:
     """Return a log whose accelerometer agrees with the pose on the mean of each axis: over a flight
     the mean force carries the weight, however the sensor is calibrated.
     """
-    if log.accelerometer is None or not log.has_pose:
+    if log.accelerometer is None or not pose_pieces(log):
         return log
-    weight = np.array([0.0, 0.0, GRAVITY])
-    off = [
-        _sensor(log, log.accelerometer, s.t)
-        - Rotation.from_matrix(s.rotation).inv().apply(s.acceleration + weight)
-        for s in _posed_pieces(log)
-    ]
-    return (
-        replace(log, accelerometer=log.accelerometer - np.vstack(off).mean(axis=0)) if off else log
-    )
+    off = [_sensor(log, log.accelerometer, s.t) - _felt(s) for s in log_signals(log)]
+    return replace(log, accelerometer=log.accelerometer - np.vstack(off).mean(axis=0))
 
 
-def _posed_pieces(log: FlightLog) -> Iterator[Signals]:
-    """Yield the signals of a pose, if a stretch is long enough."""
-    with suppress(InputError):
-        yield from log_signals(log)
+def _felt(s: Signals) -> Array:
+    """Return the specific force (n, 3) of a pose's motion, body axes."""
+    return in_body(s.acceleration + np.array([0.0, 0.0, GRAVITY]), s.rotation)
 
 
 def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
     """Yield motion by the pose's derivatives, with accelerometer and gyro in their place if any."""
     for s in log_signals(log, wide_hz=np.inf):
-        inverse = Rotation.from_matrix(s.rotation).inv()
-        force = inverse.apply(s.acceleration + np.array([0.0, 0.0, GRAVITY]))
+        force, velocity = _felt(s), in_body(s.velocity, s.rotation)
         rate, turning = s.angular_velocity, s.angular_acceleration
         if sources.force == "accelerometer" and log.accelerometer is not None:
             force = _sensor(log, log.accelerometer, s.t)
         if sources.rate == "gyro" and log.gyro is not None:
             rate = _sensor(log, log.gyro, s.t)
             turning = derivative(rate, s.period)
-        yield MotionPiece(number, s.t, s.period, force, turning, rate, inverse.apply(s.velocity))
+        yield MotionPiece(number, s.t, s.period, force, turning, rate, velocity)
 
 
 def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
@@ -228,8 +211,7 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
     period = median_step(log.t[read])
-    gap = max(_GAP, 3.5 * period)
-    for rows in unbroken(log.t, read, gap, 15, _SHORTEST_PIECE):
+    for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
@@ -237,24 +219,22 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
         moving = []
         if sources.velocity:
             velocity = np.full((len(t), 3), np.nan)  # in gaps of the pose
-            for s in _posed_pieces(log):
+            for s in log_signals(log) if pose_pieces(log) else ():
                 inside = (t >= s.t[0]) & (t <= s.t[-1])
-                body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
-                velocity[inside] = resampled(t[inside], s.t, body)
-            moving = _cut(replace(piece, velocity=velocity), np.isfinite(velocity[:, 0]))
+                velocity[inside] = resampled(t[inside], s.t, in_body(s.velocity, s.rotation))
+            moving = _cut(piece._replace(velocity=velocity), np.isfinite(velocity[:, 0]))
         yield from moving or [piece]
 
 
 def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
     """Return a piece with the rotors beside its motion; fast logs are thinned out."""
     t, period = piece.t, piece.period
-    piece = replace(
-        piece,
+    piece = piece._replace(
         rotor_speeds=(
             resampled(t, log.t, log.rotor_speeds) if sources.rotors == "rotor speeds" else None
         ),
         command=None if log.command is None else resampled(t, log.t, log.command),
-        voltage=None if log.voltage is None else np.interp(t, log.t, log.voltage),
+        voltage=voltage_at(log, t),
     )
     if period < 0.8 / _FASTEST_HZ:
         period = 1.0 / _FASTEST_HZ
@@ -264,12 +244,12 @@ def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
             slow = low_pass(x, 0.4 * _FASTEST_HZ, piece.period)
             return resampled(thin, t, slow) if x.ndim > 1 else np.interp(thin, t, slow)
 
-        piece = replace(piece.mapped(thinned), t=thin, period=period)
+        piece = piece.mapped(thinned)._replace(t=thin, period=period)
 
     rate, velocity = low_pass(piece.angular_velocity, _PRODUCT_HZ, period), piece.velocity
     if velocity is not None:
         velocity = low_pass(velocity, _PRODUCT_HZ, period)
-    return replace(piece, angular_velocity=rate, velocity=velocity)
+    return piece._replace(angular_velocity=rate, velocity=velocity)
 
 
 def _sensor(log: FlightLog, values: Array, t: Array) -> Array:

@@ -10,10 +10,11 @@ from dataclasses import astuple, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ...dynamics.vehicle import LoopReaction, Vehicle
-from ...runtime.arrays import Array, Index
-from ..prediction import LoggedStarts, offsets
+from ...runtime.arrays import Array
+from ..prediction import LoggedStarts, distances, offsets
 
 UNITS = {  # in the order of the coefficients
     "roll_gain": "1",
@@ -35,94 +36,71 @@ _PRIOR = 0.003
 _STARTS = 500  # predictions of a fit, spread over the flights
 _TIMES = 5  # compared in a horizon
 _ROUNDS = 15
+_AGAIN = 2  # rounds without some starts
 _SETTLED = 1e-4  # share of the loss: a smaller fall ends the search
 _LEAST = 1e-6  # of the errors where nothing changes: smaller ones count as this
 _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 
 class LoopFit(NamedTuple):
-    """The likeliest coefficients, and the normal equations of g groups of starts and the prior.
-
-    Attributes:
-        theta: (9,) in the order of ``LoopReaction``.
-        names: (g,) of the groups; -1: the prior.
-        grams: (g, 9, 9).
-        gradients: (g, 9).
+    """The likeliest loop, and the standard deviations (9,) of its coefficients, by the scatter of
+    groups of starts (a sandwich).
     """
 
-    theta: Array
-    names: Index
-    grams: Array
-    gradients: Array
-
-    def by(self, names: Index) -> LoopReaction:
-        """Return the loop by some groups alone: one step of Gauss-Newton from here."""
-        kept = np.isin(self.names, names) | (self.names < 0)
-        gram, gradient = self.grams[kept].sum(axis=0), self.gradients[kept].sum(axis=0)
-        return _loop(_moved(self.theta, gram, gradient, 0.0))
-
-    @property
-    def loop(self) -> LoopReaction:
-        """The loop by all starts."""
-        return _loop(self.theta)
-
-    @property
-    def deviations(self) -> Array:
-        """Standard deviations (9,), by the scatter of the groups (a sandwich)."""
-        inverse = np.linalg.inv(self.grams.sum(axis=0))
-        return np.sqrt(np.diag(inverse @ self.gradients.T @ self.gradients @ inverse))
-
-
-def _loop(theta: Array) -> LoopReaction:
-    return LoopReaction(*theta.tolist())
+    loop: LoopReaction
+    deviations: Array
 
 
 def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
-    """Return the coefficients after a damped step, those of one sign not beyond 0."""
-    damped = gram + damping * np.diag(np.diag(gram))
-    moved = theta - np.linalg.solve(damped, gradient)
-    return np.where(_EITHER_SIGN, moved, np.maximum(moved, 0.0))
+    """Return the coefficients after a damped step, the best one with those of one sign not beyond
+    0.
+    """
+    root = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
+    aim = root.T @ theta - np.linalg.solve(root, gradient)
+    least = np.where(_EITHER_SIGN, -np.inf, 0.0)
+    return np.asarray(lsq_linear(root.T, aim, (least, np.inf)).x)
 
 
-def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: Vehicle) -> LoopFit:
-    """Return the loop of flights with starts, one at least, each of a group.
+def fit_loop(
+    starts: Sequence[LoggedStarts],
+    vehicle: Vehicle,
+    near: LoopReaction | None = None,
+) -> LoopFit:
+    """Return the loop of flights with starts, one at least.
 
     Args:
-        starts: of each flight.
-        groups: (n,) of each flight's starts.
+        starts: of each flight; those of a segment are a group.
         vehicle: with the force, inertia and rotors that stay.
+        near: the loop by more starts: two rounds from there; None: from a usual one.
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
-    group = np.concatenate([*(numbers[::every] for numbers in groups), [-1]])
+    group = np.concatenate([*(part.segment for part in thin), [-1]])
     # mean distances (n, 1, 4, 1) of a flight at the horizon's end if nothing changes
-    scales = []
-    for part in thin:
-        far = np.linalg.norm(_compared([part], [part.unchanged])[:, -1], axis=-1)
-        scales.append(np.repeat([np.maximum(far.mean(axis=0), _LEAST)], len(far), axis=0))
-    sizes: Array = np.concatenate(scales)[:, None, :, None]
+    far = [np.maximum(distances(part.unchanged, part.seen)[:, -1], _LEAST) for part in thin]
+    sizes: Array = np.repeat(far, [len(part.rows) for part in thin], axis=0)[:, None, :, None]
 
     def off(theta: Array) -> Array:
-        model = replace(vehicle, closed_loop=_loop(theta))
-        return _compared(thin, [part.flown(model) for part in thin]) / sizes
+        model = replace(vehicle, closed_loop=LoopReaction(*theta.tolist()))
+        return np.concatenate([_compared(part, part.flown(model)) for part in thin]) / sizes
 
-    begin = np.array(astuple(_BEGIN))
     speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
     turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
-    begin[list(UNITS).index("unmeasured")] = np.sqrt(np.square(turning).mean())
-    theta, e, damping = begin, off(begin), 1e-3
-    for _ in range(_ROUNDS):
+    begin = np.array(astuple(replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))))
+    theta = begin if near is None else np.array(astuple(near))
+    e, damping = off(theta), 1e-3
+    for _ in range(_ROUNDS if near is None else _AGAIN):
         norms = np.linalg.norm(e, axis=-1)
         least = np.maximum(0.5 * np.median(norms, axis=(0, 1)), _LEAST)
         root = 1.0 / np.sqrt(np.maximum(norms, least))[..., None]
-        moves = _STEP * np.diag(_SIZES)
-        changes = [(root * (off(theta + move) - e)).reshape(len(e), -1) for move in moves]
-        slopes = np.stack(changes, axis=1) / (_STEP * _SIZES)[:, None]  # (n, 9, ..)
+        moves = _STEP * _SIZES
+        changes = [(root * (off(theta + x) - e)).reshape(len(e), -1) for x in np.diag(moves)]
+        slopes = np.stack(changes, axis=1) / moves[:, None]  # (n, 9, ..)
         residual = (root * e).reshape(len(e), -1, 1)
         strength = _PRIOR * np.square(residual).sum() / np.square(3.0 * _SIZES)
         grams = np.concatenate([slopes @ np.swapaxes(slopes, 1, 2), np.diag(strength)[None]])
         gradients = np.vstack([(slopes @ residual)[..., 0], strength * (theta - begin)])
-        before = loss = _loss(e, theta - begin)
+        before = _loss(e, theta - begin)
         for _ in range(6):
             tried = _moved(theta, grams.sum(axis=0), gradients.sum(axis=0), damping)
             there = off(tried)
@@ -133,9 +111,9 @@ def fit_loop(starts: Sequence[LoggedStarts], groups: Sequence[Index], vehicle: V
             damping *= 8.0
         if before - loss < _SETTLED * before:
             break
-    names = np.unique(group)
-    of = (group == names[:, None]).astype(np.float64)
-    return LoopFit(theta, names, np.tensordot(of, grams, 1), of @ gradients)
+    scores = (group == np.unique(group)[:, None]) @ gradients
+    deviations = np.linalg.norm(scores @ np.linalg.inv(grams.sum(axis=0)), axis=0)
+    return LoopFit(LoopReaction(*theta.tolist()), deviations)
 
 
 def _loss(e: Array, away: Array) -> float:
@@ -144,10 +122,7 @@ def _loss(e: Array, away: Array) -> float:
     return float(prior * np.linalg.norm(e, axis=-1).mean())
 
 
-def _compared(starts: Sequence[LoggedStarts], paths: Sequence[Array]) -> Array:
-    """Return the differences (n, _TIMES, 4, 3) of paths (.., m, STATE) from the flights."""
-    parts = []
-    for part, path in zip(starts, paths, strict=True):
-        at = np.rint(np.arange(1, _TIMES + 1) / _TIMES * path.shape[1]).astype(int) - 1
-        parts.append(offsets(path[:, at], part.seen[:, at]))
-    return np.concatenate(parts)
+def _compared(part: LoggedStarts, path: Array) -> Array:
+    """Return the differences (n, _TIMES, 4, 3) of paths (n, m, STATE) from the flight."""
+    at = np.rint(np.arange(1, _TIMES + 1) / _TIMES * path.shape[1]).astype(int) - 1
+    return offsets(path[:, at], part.seen[:, at])

@@ -91,8 +91,7 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
             ordered = [turn * first if name == "delay" else next(rest) for name in nonlinear]
             share = 1.0 / (1.0 + (s.frequency / ANSWERED_HZ) ** 4)[:, None]
             every_block = (x for b in (first, *ordered) for x in (b, share * b[:, :, slow]))
-            joined = np.concatenate([measured, *every_block], axis=2)
-            segments.append(s._replace(columns=joined))
+            segments.append(s._replace(columns=np.concatenate([measured, *every_block], axis=2)))
     seconds = np.array([len(p.t) * p.period for p in pieces])
     # white noise of each rotor's speed in a column: standard deviation times the root of the period
     noise = np.zeros((4, len(names)))
@@ -101,7 +100,7 @@ def balance(pieces: Pieces, drive: Drive, nonlinear: Names) -> BalanceSpectra:
         size = drive.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
         for letter, share in drive.shares.items():
             noise[:, names.index(f"{letter}0")] = size * share
-    return BalanceSpectra(drive, names, nonlinear, tuple(segments), float(seconds.sum()), noise)
+    return BalanceSpectra(drive, names, nonlinear, tuple(segments), seconds.sum(), noise)
 
 
 def rotor_columns(piece: MotionPiece, drive: Drive) -> NamedArrays:

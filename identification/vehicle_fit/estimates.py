@@ -15,7 +15,7 @@ from ...runtime.errors import InputError
 from ..logs.table import Pair, Values
 from .channels import Pieces, Sources
 from .effect_settings import effect_of, estimate_name
-from .geometry import USUAL, Geometry, Interval
+from .geometry import FLAT, GYRATION, VOLTAGE_EXPONENTS, YAW_REACH, Geometry, Interval
 from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Estimated, told
 from .solve import Function, VehicleFit
@@ -126,7 +126,7 @@ class Estimates:
             return
         known, how = fit.interval("gamma", False), f"{how} and voltage"
         why = "command and voltage change together: what the voltage does, the curve may do"
-        wide = known[2] - known[1] > USUAL.voltage_exponents
+        wide = known[2] - known[1] > VOLTAGE_EXPONENTS
         self._say("voltage_exponent", known, "1", how, doubt=why if wide else "")
         flown = np.concatenate([p.voltage for p in pieces if p.voltage is not None])
         for volts in () if wide else np.quantile(flown, [0.05, 0.95]).tolist():
@@ -137,14 +137,10 @@ class Estimates:
         fit, values = self.fit, self.fit.values
         known_arm, mass = self.geometry.known, self.fit.model.mass
         flat = values["Jz"] / (values["Jx"] + values["Jy"])
-        missing = {
-            "Jx": "the flight hardly shows roll",
-            "Jy": "the flight hardly shows pitch",
-            "Jz": "the flight does not yaw while it rolls or pitches",
-        }
+        motions = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}
         why = {
-            axis: self.doubt or text
-            for axis, text in missing.items()
+            axis: self.doubt or f"the flight hardly shows {motion}"
+            for axis, motion in motions.items()
             if self.doubt or not told(fit.interval(axis)) or (axis == "Jz" and not 0.3 < flat < 1.3)
         }
         unknown = dict.fromkeys(why[axis] for axis in ("Jx", "Jy") if axis in why)
@@ -159,16 +155,15 @@ class Estimates:
             # with rotors at unit distance the fit's inertia is inertia over arm: gyration * mass *
             # arm at a usual radius of gyration
             mean = 0.5 * (values["Jx"] + values["Jy"])
-            value, high, low = (mean / mass / g for g in USUAL.gyration)
+            value, high, low = (mean / mass / g for g in GYRATION)
             how = (
                 "turning shows arm over inertia alone; with {:g} mass arm^2 for the inertia, "
                 "{:g} to {:g}"
-            ).format(*USUAL.gyration)
+            ).format(*GYRATION)
             self._say("arm_l", (value, low, high), "m", how, ASSUMED)
             self.arm, self.arm_range = value, (low / value, high / value)
         status, given = (IDENTIFIED, "given") if known_arm else (ASSUMED, "assumed")
         rate, rotors = self.sources.rate, f"against {self.sources.rotors}"
-        motions = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}
         for axis, motion in motions.items():
             name = axis + axis[1]
             if axis not in why:
@@ -177,16 +172,16 @@ class Estimates:
                 continue
             if axis == "Jz":
                 x, y = self.said["Jxx"], self.said["Jyy"]
-                flat, low, high = USUAL.flat
+                flat, low, high = FLAT
                 known = flat * (x.value + y.value), low * (x.low + y.low), high * (x.high + y.high)
                 how = f"{flat:g} of Jxx + Jyy, {low:g} to 1"
             else:
-                known = _times(mass * self.geometry.arm**2, USUAL.gyration)
-                how = f"{USUAL.gyration[0]:g} mass arm^2"
+                known = _times(mass * self.geometry.arm**2, GYRATION)
+                how = f"{GYRATION[0]:g} mass arm^2"
             self._say(name, known, "kg m2", f"{why[axis]}; {how}", ASSUMED)
         for axis, across in (("Jx", 1), ("Jy", 0)):
             if axis not in why:
-                length = float(np.abs(fit.drive.positions[:, across]).mean())
+                length = np.abs(fit.drive.positions[:, across]).mean()
                 value, low, high = (length / x for x in fit.interval(axis))
                 how = f"{rate} {rotors}: needs no arm"
                 self._say(f"l/{axis}{axis[1]}", (value, high, low), "1/(kg m)", how)
@@ -203,7 +198,7 @@ class Estimates:
         self._say("(p/k)/Jzz", gain, "1/(kg m)", how, doubt=doubt)
         if doubt:
             length = self.geometry.arm * self.arm
-            ratio, how = _times(length, USUAL.reach), f"{doubt}; {USUAL.reach[0]:g} of the arm"
+            ratio, how = _times(length, YAW_REACH), f"{doubt}; {YAW_REACH[0]:g} of the arm"
         elif inertia.status == ASSUMED:
             # the flight tells the ratio alone: p/k carries the assumption of Jzz
             ratio = gain[0] * inertia.value, gain[1] * inertia.low, gain[2] * inertia.high
@@ -218,19 +213,18 @@ class Estimates:
             self._say("p", known, "Nm/(rad/s)^2", how, status)
 
     def _say_lag(self) -> None:
-        doubt, known = "", UNKNOWN
+        known = UNKNOWN
+        doubt = (
+            "force follows the logged rotor speeds at once: they are measured, and no command is "
+            "logged beside them"
+        )
         how = f"force and turning against {self.sources.rotors}"
         if "lag" in self.fit.model.free:
             if not self.fit.drive.commands:
                 how += ", which therefore are commanded, not measured"
             known = self.fit.interval("lag")
-            if not told(known):
-                doubt = "a time offset of the motion does nearly the same here"
-        else:
-            doubt = (
-                "force follows the logged rotor speeds at once: they are measured, and no command "
-                "is logged beside them"
-            )
+            late = "a time offset of the motion does nearly the same here"
+            doubt = "" if told(known) else late
         self._say(effect_of(Role.LAG), known, "s", how, doubt=doubt)
         offset = self.fit.interval("delay", False)
         self._say("time_offset", offset, "s", "of the motion behind the rotors")
@@ -245,7 +239,7 @@ class Estimates:
         widest = 0.5 * self.arm * self.geometry.arm
         for axis in "xy":
             known = _times(self.arm, self.fit.interval(f"c{axis}", False))
-            doubt = self.doubt or (steady if known[2] - known[1] > widest else "")
+            doubt = self.doubt or steady * (known[2] - known[1] > widest)
             status = IDENTIFIED if self.geometry.known else ASSUMED
             self._say(f"com {axis}", known, "m", how, status, doubt)
         if self.sources.force == "pose":
@@ -282,5 +276,5 @@ class Estimates:
             known = value, value - wide, value + wide
             self._say(estimate_name(role, 0), known, unit, damped, doubt=why)
         if not {"rotor drag", "linear drag", "quadratic drag"} & set(self.kept):
-            none = "none stands out of the disturbances"
-            self._say("drag", (0.0, math.nan, math.nan), "N/(m/s)", "", doubt=none)
+            why = "none stands out of the disturbances"
+            self._say("drag", (0.0, math.nan, math.nan), "N/(m/s)", "", doubt=why)

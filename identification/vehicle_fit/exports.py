@@ -35,9 +35,10 @@ _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
 _CRAZYFLIE = [3, 2, 1, 0]  # front-right, rear-right, rear-left, front-left
 
 
-def _autopilot(name: str, parameters: Names, most_ballistic: float, identified: Identified) -> str:
-    """Return an autopilot's parameters: momentum drag (1/s), ballistic coefficients along x and y
-    (kg/m2), hover thrust (share of the full one), and the square's share in the curve.
+def _autopilot(line: str, parameters: Names, most_ballistic: float, identified: Identified) -> str:
+    """Return an autopilot's parameters, each in a ``line``: momentum drag (1/s), ballistic
+    coefficients along x and y (kg/m2), hover thrust (share of the full one), and the square's share
+    in the curve.
     """
     vehicle = identified.vehicle
     linear = [drag / vehicle.mass for drag in linear_drag(vehicle)[:2]]
@@ -55,24 +56,14 @@ def _autopilot(name: str, parameters: Names, most_ballistic: float, identified: 
         values[hover] = vehicle.weight / (4.0 * thrust[-1])
         # least squares of T - u = f (u^2 - u)
         bent = u**2 - u
-        share = bent @ (thrust / thrust[-1] - u) / (bent @ bent)
-        values[bend] = np.clip(share, 0.0, 1.0)
-    missing = [p for p in parameters if p not in values]
-    doubts = [f"# not known from these logs: {', '.join(missing)}"] if missing else []
-    limits = {momentum: 1.0, **dict.fromkeys(ballistic, most_ballistic)}  # as both state
-    doubts += [
-        f"# {p}: its stated range ends at {limit:g}"
-        for p, limit in limits.items()
-        if values.get(p, 0.0) > limit
-    ]
-    full = identified.estimates.get("thrust(1)")
-    if hover in values and full is not None and full.status != IDENTIFIED:
-        doubts.append(f"# {hover} and {bend}: the full thrust was not flown; {full.how}")
-    text = page_template(__package__, f"templates/{name}.j2", html=False)
+        values[bend] = np.clip(bent @ (thrust / thrust[-1] - u) / (bent @ bent), 0.0, 1.0)
+    text = page_template(__package__, "templates/autopilot.j2", html=False)
     return text.render(
-        known=values.items(),
-        doubts="".join(f"{line}\n" for line in doubts),
-        drag_known=momentum in values,
+        line=line,
+        values=values,
+        parameters=parameters,
+        limits={momentum: 1.0, **dict.fromkeys(ballistic, most_ballistic)},  # as both state
+        full=identified.estimates.get("thrust(1)"),
     ).removesuffix("\n")
 
 
@@ -113,8 +104,8 @@ _ARDUPILOT = (
     "MOT_THST_EXPO",
 )
 EXPORTS: dict[str, Callable[[Identified], str]] = {
-    "px4": partial(_autopilot, "px4", _PX4, 200.0),
-    "ardupilot": partial(_autopilot, "ardupilot", _ARDUPILOT, 1000.0),
+    "px4": partial(_autopilot, "param set %s %.4g", _PX4, 200.0),
+    "ardupilot": partial(_autopilot, "%s,%.4g", _ARDUPILOT, 1000.0),
     "rotorpy": partial(_simulator, "rotorpy"),
     "drone-models": partial(_simulator, "drone_models"),
     "gazebo": partial(_simulator, "gazebo"),

@@ -1,6 +1,5 @@
 """The rotors' positions as a user gives them, and usual ratios of quadrotors."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,33 +13,26 @@ SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
 GRAVITY = 9.81  # m/s2
 
 
-class _Usual(NamedTuple):
-    """Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Behind
-    the value stands a range, low and high, claimed in place of an interval.
-    """
-
-    # Jz over Jx + Jy: 0.88 to 0.96 in these vehicles; 1, the largest ratio, in a flat body
-    flat: Interval = (0.9, 0.75, 1.0)
-    # (Jx + Jy) / 2 over mass times the squared arm: 0.35 to 0.58 in these vehicles
-    gyration: Interval = (0.45, 0.25, 0.8)
-    # reaction torque over thrust, as a share of the arm: 0.18 to 0.24 in these vehicles
-    reach: Interval = (0.2, 0.1, 0.4)
-    radius: float = 0.78  # rotor radius, as a share of the arm: 0.71 to 0.83
-    # standard deviations, as shares, of thrust from day to day, invisible in the logs of one day:
-    # at one rotor speed sessions differ by 0.6 to 2.4 %, at one command by 10 %
-    thrust_spread: float = 0.015
-    command_spread: float = 0.1
-    # range of a voltage's exponent: 0 if the firmware makes up for the battery, 2 if rotor speed
-    # follows the voltage
-    voltage_exponents: float = 2.0
-    hover_speed: float = 1000.0  # rad/s, for logs without rotor speeds
+# Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Behind the
+# value stands a range, low and high, claimed in place of an interval.
+# Jz over Jx + Jy: 0.88 to 0.96 in these vehicles; 1, the largest ratio, in a flat body
+FLAT = (0.9, 0.75, 1.0)
+# (Jx + Jy) / 2 over mass times the squared arm: 0.35 to 0.58 in these vehicles
+GYRATION = (0.45, 0.25, 0.8)
+# reaction torque over thrust, as a share of the arm: 0.18 to 0.24 in these vehicles
+YAW_REACH = (0.2, 0.1, 0.4)
+ROTOR_RADIUS = 0.78  # as a share of the arm: 0.71 to 0.83
+# standard deviations, as shares, of thrust from day to day, invisible in the logs of one day:
+# at one rotor speed sessions differ by 0.6 to 2.4 %, at one command by 10 %
+THRUST_SPREAD = 0.015
+COMMAND_SPREAD = 0.1
+# range of a voltage's exponent: 0 if the firmware makes up for the battery, 2 if rotor speed
+# follows the voltage
+VOLTAGE_EXPONENTS = 2.0
+HOVER_SPEED = 1000.0  # rad/s, for logs without rotor speeds
 
 
-USUAL = _Usual()
-
-
-@dataclass(frozen=True, eq=False)
-class Geometry:
+class Geometry(NamedTuple):
     """Rotor positions (4, 3) in m, front-left, rear-left, rear-right, front-right."""
 
     positions: Array

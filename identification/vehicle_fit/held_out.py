@@ -7,23 +7,20 @@ its torque, both; and where torque is refuted, the flight loop's reaction in its
 stands if no quantity is worse than the better one of no change and of thrust and drag. The one with
 the least mean of these ratios is the vehicle.
 
-One flight, or flights of commands on one day, show no other day. They are predicted with a thrust
-off by the spread between days to either side. One flight tells no reaction: on a slower flight of
-a racer the body rate was off by 3 times the error of no change.
+One flight tells no reaction: on a slower flight of a racer the body rate was off by 3 times the
+error of no change.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import LoopReaction, ModelStatus, Standing, Vehicle
-from ...runtime.arrays import Index, Mask
+from ...runtime.arrays import Array, Mask
 from ..logs.flight_log import Logs
-from ..logs.table import ArrayPair
 from ..prediction import (
     QUANTITIES,
     ErrorsByPart,
@@ -34,10 +31,9 @@ from ..prediction import (
 )
 from .channels import Pieces
 from .closed_loop import LoopFit, fit_loop
-from .geometry import USUAL
 from .model import coefficients
 from .solve import VehicleFit, refitted
-from .spectra import Segment, Spectra, edges_of
+from .spectra import Spectra, edges_of
 
 FOLDS = 3  # every third segment is held out at a time
 LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
@@ -55,15 +51,14 @@ class HeldOut(NamedTuple):
     """What predictions of held-out data say.
 
     Attributes:
-        errors: the vehicle's, by ``held_out_blocks`` and ``flights_left_out``.
-        simplest: the same of thrust and drag with an unchanged body rate.
+        errors: the vehicle's, and of thrust and drag with an unchanged body rate, by
+            ``held_out_blocks`` and ``flights_left_out``.
         stands: the model of ``models_of`` that stands.
         loop: the flight loop's reaction, where this stands in for the torque.
         why: figures of a refuted torque; else empty.
     """
 
     errors: ErrorsByPart
-    simplest: ErrorsByPart
     stands: str
     loop: LoopFit | None = None
     why: str = ""
@@ -73,23 +68,19 @@ class _HeldParts(NamedTuple):
     """Starts in the segments of a fit, and the parts held out in turn."""
 
     starts: list[LoggedStarts]  # of each log
-    segment: list[Index]  # of each log's starts
     refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
-    spreads: tuple[float, ...]  # factors of the thrust
 
-    def errors(self, models: Callable[[VehicleFit, Index], Models]) -> Errors:
-        """Return the errors of models made of each refit and the numbers of its segments."""
+    def errors(self, models: Callable[[VehicleFit, Mask], Models]) -> Errors:
+        """Return the errors of models made of each refit and the segments that it keeps."""
         errors: Errors = {}
         for where, kept, part in self.refits:
-            each = zip(self.starts, self.segment, strict=True)
-            starts = [of.those(~kept[numbers]) for of, numbers in each]
+            starts = [of.those(~kept[of.segment]) for of in self.starts]
             if any(len(of.rows) for of in starts):
-                vehicles = models(part, np.flatnonzero(kept))
+                vehicles = models(part, kept)
                 said = errors.setdefault(where, {name: [] for name in vehicles})
-                for share in self.spreads:
-                    of_day = [_with_thrust(v, share) for v in vehicles.values()]
-                    for name, off in zip(vehicles, errors_at(starts, of_day), strict=True):
-                        said[name].append(off)
+                offs = errors_at(starts, list(vehicles.values()))
+                for name, off in zip(vehicles, offs, strict=True):
+                    said[name].append(off)
         return errors
 
 
@@ -103,30 +94,17 @@ def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -
     edges = [edges_of(len(piece.t), piece.period) for piece in pieces]
     ends = [piece.t[[at[:-1], at[1:] - 1]] for piece, at in zip(pieces, edges, strict=True)]
     spans = np.concatenate(ends, axis=1).T  # s, from and to
-    starts, segment = [], []
+    starts = []
     for i, log in enumerate(logs):
         own = np.flatnonzero(number == i)
-        starts.append(logged_starts(log, vehicle, spans[own].tolist(), _HORIZON))
-        begun = log.t[starts[-1].rows] + log.period
-        segment.append(own[np.searchsorted(spans[own, 0], begun, side="right") - 1])
+        part = logged_starts(log, vehicle, spans[own].tolist(), _HORIZON)
+        starts.append(part._replace(segment=own[part.segment]))
     refits = []
     folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
     for where, fold in folds.items():
-        kept = [fold != held for held in np.unique(fold)]
-        if len(kept) > 1:
-            refits += list(zip([where] * len(kept), kept, refitted(fit, kept), strict=True))
-    commands = fit.drive.commands
-    spread = USUAL.command_spread if commands else USUAL.thrust_spread
-    one_day = commands or np.ptp(number) == 0
-    return _HeldParts(starts, segment, refits, (1.0 - spread, 1.0 + spread) if one_day else (1.0,))
-
-
-def _with_thrust(vehicle: Vehicle, share: float) -> Vehicle:
-    """Return a vehicle with a share of its thrust, by rotor speeds and by commands."""
-    curve = vehicle.motor_curve
-    if curve is not None:
-        curve = replace(curve, thrust=tuple(share * c for c in curve.thrust))
-    return replace(vehicle, k=share * vehicle.k, p=share * vehicle.p, motor_curve=curve)
+        if np.ptp(fold) > 0:
+            refits += [(where, kept, part) for kept, part in refitted(fit, fold)]
+    return _HeldParts(starts, refits)
 
 
 def held_out(
@@ -152,23 +130,27 @@ def held_out(
     parts = _held_parts(pieces, logs, fit, vehicle_of(fit, ""))
     errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
     if not errors:
-        return HeldOut({}, {}, "")
+        return HeldOut({}, "")
     stands, why = standing(errors), ""
     loop: LoopFit | None = None
     if stands not in ("torque", WHOLE):
         why = _reason(errors)
         if OTHER_FLIGHTS in errors:
-            fitted = loop = fit_loop(parts.starts, parts.segment, vehicle_of(fit, why))
-            further = parts.errors(
-                lambda part, kept: loops_of(vehicle_of(part, why), fitted.by(kept))
-            )
+            fitted = loop = fit_loop(parts.starts, vehicle_of(fit, why))
+
+            def without(part: VehicleFit, kept: Mask) -> Models:
+                vehicle = vehicle_of(part, why)
+                starts = [of.those(kept[of.segment]) for of in parts.starts]
+                return loops_of(vehicle, fit_loop(starts, vehicle, fitted.loop).loop)
+
+            further = parts.errors(without)
             errors = {where: {**each, **further[where]} for where, each in errors.items()}
             stands = standing(errors)
     pooled = {
-        name: {where: PredictionErrors.pooled(each[name]) for where, each in errors.items()}
-        for name in (stands, SIMPLEST)
+        where: [PredictionErrors.pooled(each[name]) for name in (stands, SIMPLEST)]
+        for where, each in errors.items()
     }
-    return HeldOut(pooled[stands], pooled[SIMPLEST], stands, loop, why)
+    return HeldOut(pooled, stands, loop, why)
 
 
 def models_of(vehicle: Vehicle) -> Models:
@@ -234,57 +216,34 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
     """Return what the balance of held-out segments says: the fit must leave less power of specific
     force along z, and of turning, than no model.
     """
-    segments = fit.balance.segments
-    fold = np.arange(len(segments)) % FOLDS
-    kept = [fold != held for held in np.unique(fold)]
-    left, total = np.sum(
-        [
-            powers(part, list(compress(segments, ~keep)))
-            for keep, part in zip(kept, refitted(fit, kept), strict=True)
-        ],
-        axis=0,
-    )
+    refits = refitted(fit, np.arange(len(fit.balance.segments)) % FOLDS)
+    left, total = np.sum([powers(part)[~kept].sum(axis=0) for kept, part in refits], axis=0)
     force, turning = left[2] > total[2], left[3:].sum() / total[3:].sum()
     why = (
         "not identifiable: torques leave more of the turning of held-out blocks than no model "
         f"({turning:.2f} times its power)"
     )
     if turning > 1.0:
-        return HeldOut({}, {}, NO_CHANGE if force else "force", why=why)
-    return HeldOut({}, {}, "torque" if force else WHOLE)
+        return HeldOut({}, NO_CHANGE if force else "force", why=why)
+    return HeldOut({}, "torque" if force else WHOLE)
 
 
-def powers(
-    fit: VehicleFit, segments: Sequence[Segment], spectra: Spectra | None = None
-) -> ArrayPair:
-    """Return the power (6,) that a fit leaves of specific force and turning, and all of it, from
-    ``LEAST_HZ`` on; ``spectra`` divide it, frequency by frequency.
+def powers(fit: VehicleFit, spectra: Spectra | None = None) -> Array:
+    """Return the power that a fit leaves of specific force and turning in each segment, and all
+    power (s, 2, 6), from ``LEAST_HZ`` on. ``spectra`` divide the power of each frequency.
     """
-    count = len(fit.balance.names)
-    model = coefficients(fit.model, fit.values, fit.balance.names)
-    left, total = np.zeros((2, 6))
-    for i, s in enumerate(segments):
+    names, out = fit.balance.names, []
+    model = coefficients(fit.model, fit.values, names)
+    for i, s in enumerate(fit.balance.segments):
         inside = s.frequency >= LEAST_HZ
         unit = 1.0 if spectra is None else spectra[i][inside]
         measured = s.columns[:, inside, :6]
-        residual = measured - s.columns[:, inside, 6 : 6 + count] @ model.T
-        left += (np.abs(residual) ** 2 / unit).sum(axis=(0, 1))
-        total += (np.abs(measured) ** 2 / unit).sum(axis=(0, 1))
-    return left, total
+        residual = measured - s.columns[:, inside, 6 : 6 + len(names)] @ model.T
+        both = np.abs([residual, measured])
+        out.append((both**2 / unit).sum(axis=(1, 2)))
+    return np.array(out)
 
 
 def refuted(vehicle: Vehicle) -> list[str]:
     """Return the parts of a vehicle's model that data outside its fit refuted."""
     return [part for part in ("force", "torque") if getattr(vehicle.status, part) == "refuted"]
-
-
-def warnings_of(vehicle: Vehicle) -> list[str]:
-    """Return a warning for a refuted force or torque: what predictions do in its place."""
-    kept = {"force": "keep the velocity", "torque": "keep the body rate"}
-    if vehicle.closed_loop is not None:
-        kept["torque"] = "follow the flight loop's reaction (closed_loop)"
-    return [
-        f"warning: {part}: refuted by data outside the fit. Predictions {kept[part]}; the file's "
-        "numbers of it are assumptions"
-        for part in refuted(vehicle)
-    ]

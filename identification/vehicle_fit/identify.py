@@ -9,7 +9,7 @@ are fixed by a named assumption, or left out.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from .columns import ANSWERED_HZ, Drive, balance
 from .effect_settings import effect_of
 from .estimates import Estimates, thrust_of
 from .geometry import SPIN, Geometry, Interval
-from .held_out import HeldOut, held_out, loops_of, models_of, warnings_of
+from .held_out import HeldOut, held_out, loops_of, models_of
 from .motors import motor_response
 from .parameters import BIASES, FORCE_BIAS, FURTHER, POSED_BIAS, first_model
 from .plausible import check_thrust
@@ -102,8 +102,8 @@ def identify(
             "only what is slower was used"
         )
     if sources.force == "accelerometer" and sources.velocity:
-        prior = {**fit.model.prior, **dict.fromkeys(BIASES, POSED_BIAS)}
-        fit = solve(pieces, fit.drive, replace(fit.model, prior=prior), fit.theta)
+        model = replace(fit.model, prior={**fit.model.prior, **dict.fromkeys(BIASES, POSED_BIAS)})
+        fit = solve(pieces, fit.drive, model, fit.theta)
     report(0.5, "asking what else shows")
     fit, kept, hidden = _with_optional(pieces, fit, sources)
     if "answered torque" in kept:
@@ -143,7 +143,6 @@ def identify(
             "the sum of the other two, the most that a body has: something else turns the vehicle"
         )
     vehicle = _with_status(vehicle, named, tested)
-    notes += warnings_of(vehicle)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(pieces, fit)
     if motors is not None:
@@ -161,7 +160,6 @@ def identify(
         tuple(notes),
         tuple(advice_of(named)),
         tested.errors,
-        tested.simplest,
     )
 
 
@@ -174,21 +172,21 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
         models |= loops_of(vehicle, tested.loop.loop)
         stands = IDENTIFIED if "closed loop" in tested.stands else REFUTED
         for size, (c, unit), value in zip(
-            tested.loop.deviations, UNITS.items(), tested.loop.theta, strict=True
+            tested.loop.deviations, UNITS.items(), astuple(tested.loop.loop), strict=True
         ):
             name, wide = f"closed_loop {c}", 1.96 * size
             named[name] = Estimate(name, value, value - wide, value + wide, unit, stands, LOOP)
     if not tested.stands:
         for name, e in named.items():
             if e.status == IDENTIFIED:
-                named[name] = replace(e, status=ASSUMED, how=f"{e.how}; nothing could be held out")
+                named[name] = e._replace(status=ASSUMED, how=f"{e.how}; nothing could be held out")
     flown = models.get(tested.stands, vehicle)
     for effect in vehicle.effects:
         for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
             if effect not in flown.effects and name in named:
-                named[name] = replace(named[name], status=REFUTED, how=WITHOUT_EFFECTS)
-    sources = {e.name: e.status for e in named.values() if e.status != NOTHING}
-    return replace(flown, status=replace(flown.status, coefficients=sources))
+                named[name] = named[name]._replace(status=REFUTED, how=WITHOUT_EFFECTS)
+    known = {e.name: e.status for e in named.values() if e.status != NOTHING}
+    return replace(flown, status=replace(flown.status, coefficients=known))
 
 
 def _lag_alone(pieces: Pieces, fit: VehicleFit) -> Estimate:
@@ -270,9 +268,8 @@ def _agreeing(pieces: Pieces, fit: VehicleFit) -> VehicleFit:
         slow = solve(pieces, replace(fit.drive, band=band), fit.model, fit.theta)
         wide, narrow = _hover_thrust(fit), _hover_thrust(slow)
         apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
-        bias = abs(fit.values.get("force bias z", 0.0))
-        sure = apart > _APART * math.hypot(narrow[1], _CLOSE)
-        if not sure and bias < _APART * FORCE_BIAS:
+        credible = abs(fit.values.get("force bias z", 0.0)) < _APART * FORCE_BIAS
+        if credible and apart <= _APART * math.hypot(narrow[1], _CLOSE):
             return fit
         fit = slow
     return fit
@@ -284,16 +281,15 @@ def _hover_thrust(fit: VehicleFit) -> Pair:
     """
     exponents, weight = fit.drive.exponents, fit.model.weight
     # the start's curve carries the weight here; each power carries its share
-    scale = fit.model.scale
-    u = (weight / (4.0 * scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
+    u = (weight / (4.0 * fit.model.scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
     value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, exponents, u) / weight, False)
     return value, (value - low) / (fit.width * max(abs(value), 1e-9))
 
 
 def _cost(fit: VehicleFit, parameters: int) -> float:
     """Return the least fall of twice the negative log-likelihood for further parameters."""
-    frequencies = 6 * sum(len(s.frequency) for s in fit.balance.segments)
-    return _PENALTY * parameters * math.log(frequencies)
+    frequencies = sum(len(s.frequency) for s in fit.balance.segments)
+    return _PENALTY * parameters * math.log(6 * frequencies)
 
 
 def _with_optional(

@@ -30,20 +30,17 @@ class MotorResponse(NamedTuple):
 
 def motor_response(pieces: Pieces) -> MotorResponse | None:
     """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
-    both = [p for p in pieces if p.rotor_speeds is not None]
-    known = [(p.command, p.period) for p in both if p.command is not None]
-    if len(known) < len(pieces):
-        return None
-    speeds = np.concatenate([p.rotors for p in pieces])
-    commands = np.concatenate([command for command, _ in known])
-    if commands.std() < 1e-3 or speeds.std() == 0.0:
+    known = [(p.command, p.period) for p in pieces if p.command is not None]
+    if len(known) < len(pieces) or any(p.rotor_speeds is None for p in pieces):
         return None
 
     def columns(lag: float) -> Array:
         u = [lagged(command, lag, period).ravel() for command, period in known]
         return np.vander(np.concatenate(u), _POWERS, increasing=True)
 
-    target = speeds.ravel()
+    target = np.concatenate([p.rotors.ravel() for p in pieces])
+    if columns(0.0)[:, 1].std() < 1e-3 or target.std() == 0.0:
+        return None
 
     def fitted(lag: float) -> ArrayPair:
         x = columns(lag)
@@ -62,13 +59,11 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     slope = (columns(lag + step) - columns(lag - step)) @ best / (2.0 * step)
     moves = np.column_stack([columns(lag), slope])
     inverse = np.linalg.inv(moves.T @ moves)
-    seconds = pieces[0].period * np.arange(len(speeds)).repeat(speeds.shape[1])
-    block = (seconds / _SEGMENT).astype(int)
-    count = int(block.max()) + 1
-    # errors go on within a segment: a sandwich over segments
-    scores = np.array([moves[block == b].T @ residual[block == b] for b in range(count)])
-    meat = scores.T @ scores * (count / max(count - 1, 1))
-    size = math.sqrt((inverse @ meat @ inverse)[-1, -1])
-    width = float(student.ppf(0.975, max(count - 1, 3))) * size
+    block = (pieces[0].period / _SEGMENT * (np.arange(residual.size) // 4)).astype(int)
+    # errors go on within a segment: a sandwich over segments, of the lag alone
+    scores = np.bincount(block, residual * (moves @ inverse[-1]))
+    least = max(len(scores) - 1, 1)
+    size = math.sqrt(scores @ scores * len(scores) / least)
+    width = student.ppf(0.975, max(least, 3)) * size
     interval = (lag, max(lag - width, 0.0), lag + width)
-    return MotorResponse(best, interval, float(residual.std() / target.std()))
+    return MotorResponse(best, interval, residual.std() / target.std())

@@ -14,7 +14,7 @@ from ...runtime.errors import InputError
 from ..logs.table import ArrayPair, NamedArrays, Names, Pair
 from .channels import Pieces, Sources
 from .columns import ANSWERED_HZ, Drive, rotor_columns
-from .geometry import GRAVITY, USUAL, Geometry
+from .geometry import FLAT, GRAVITY, GYRATION, Geometry
 from .model import Model
 from .spectra import BAND
 
@@ -115,9 +115,9 @@ def first_model(
             )
     arm = Geometry(drive.positions).arm
     # an axis without a turn starts at the usual inertia of such a vehicle
-    usual = USUAL.gyration[0] * mass * arm**2
+    usual = GYRATION[0] * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
-    flat = USUAL.flat[0] * inertia.sum()
+    flat = FLAT[0] * inertia.sum()
     speed = max(np.concatenate([p.rotors for p in pieces]).mean(), 1e-6)
     along = {
         "tilt": 0.01,
@@ -135,7 +135,7 @@ def first_model(
         "Jy": inertia[1],
         "Jz": flat,
         **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 0.1 * inertia[0]),
-        "reach": float(np.clip(abs(gains[2]) * flat, 1e-3 * arm, 10.0 * arm)),
+        "reach": np.clip(abs(gains[2]) * flat, 1e-3 * arm, 10.0 * arm),
         **dict.fromkeys(("cx", "cy"), 0.01 * arm),
         "Jr": 0.01 * inertia[0] / speed * np.sqrt(GRAVITY / arm),
         **dict.fromkeys(("rx", "ry", "rz"), 0.01),

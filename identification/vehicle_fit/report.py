@@ -52,11 +52,12 @@ def identified_data(identified: Identified) -> Data:
         "notes": identified.notes,
         "advice": identified.advice,
         "status": identified.vehicle.status,
+        "use": use_of(identified),
     }
     keys = ("unit", "model", "if_nothing_changes", "thrust_and_drag")
-    for where, errors in identified.predicted.items():
+    for where, (errors, simplest) in identified.predicted.items():
         data[where] = {"starts": errors.starts, "horizon_s": errors.horizon}
-        ends = errors.model, errors.still, identified.simplest[where].model
+        ends = errors.model, errors.still, simplest.model
         for name, *of in zip(QUANTITIES, QUANTITIES.values(), *ends, strict=True):
             data[where][name.replace(" ", "_")] = dict(zip(keys, of, strict=True))
     told: Data = plain(data)
@@ -92,19 +93,14 @@ def use_of(identified: Identified) -> str:
             f"Use: {kept}, and the flight loop's reaction for the body rate (predict does both). "
             "Plant and tasks fly assumed inertia and reaction torque."
         )
-    if len(parts) == 2:
-        return (
-            "Use: assume an unchanged velocity and body rate; the vehicle predicts no better. Fly "
-            "as advised and identify again."
-        )
-    if parts == ["torque"]:
-        return (
-            "Use: the vehicle for force, with an unchanged body rate (predict does both). Inertia "
-            "and reaction torque are assumed."
-        )
-    if parts:
-        return "Use: the vehicle for torque, with an unchanged velocity (predict does both)."
-    return "Use: this vehicle."
+    return {
+        "": "Use: this vehicle.",
+        "force": "Use: the vehicle for torque, with an unchanged velocity (predict does both).",
+        "torque": "Use: the vehicle for force, with an unchanged body rate (predict does both). "
+        "Inertia and reaction torque are assumed.",
+        "force torque": "Use: assume an unchanged velocity and body rate; the vehicle predicts no "
+        "better. Fly as advised and identify again.",
+    }[" ".join(parts)]
 
 
 def table_of(errors: PredictionErrors, simplest: PredictionErrors) -> list[Names]:
@@ -139,11 +135,12 @@ def write_identified(identified: Identified, path: Path) -> list[Path]:
     written = [path, data, picture]
     if identified.predicted:
         written.append(path.with_name(f"{path.stem}.prediction.png"))
-        write_png(_prediction_picture(*list(identified.predicted.items())[-1]), written[-1])
+        where, (errors, _) = list(identified.predicted.items())[-1]
+        write_png(_prediction_picture(where, errors), written[-1])
     return written
 
 
-def fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
+def _fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
 
     Both are (n, 6), behind the picture's low-pass and within the band of the fit.
@@ -166,8 +163,8 @@ def explained(identified: Identified) -> Array:
     band. Each frequency counts by its ratio to the noise; NaN without a measurement.
     """
     fit = identified.fit
-    left, total = powers(fit, fit.balance.segments, fit.spectra)
-    return np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0)
+    left, total = powers(fit, fit.spectra).sum(axis=0)
+    return np.asarray(np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0))
 
 
 @styled()
@@ -177,7 +174,7 @@ def _picture(identified: Identified) -> "Figure":
     longest = max(identified.pieces, key=lambda p: len(p.t))
     t = longest.t
     shown = np.abs(t - t[len(t) // 2]) <= 0.5 * _SHOWN_SECONDS
-    curves = ((x[shown] * scale).T for x in fitted(identified, longest))
+    curves = ((x[shown] * scale).T for x in _fitted(identified, longest))
     figure = new_figure(4.8)
     axes = figure.subplots(2, 3, sharex=True)
     titles = [

@@ -1,7 +1,7 @@
 """The result of an identification."""
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Names
@@ -25,8 +25,7 @@ def told(known: Interval) -> bool:
     return low > 0.0 and 0.5 * math.log(high / low) <= WIDEST
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """One quantity: value with a 95 % interval, and its source."""
 
     name: str  # as in vehicle files and reports
@@ -41,8 +40,7 @@ class Estimate:
 Estimated = dict[str, Estimate]  # by name
 
 
-@dataclass(frozen=True, eq=False)
-class Identified:
+class Identified(NamedTuple):
     """A vehicle from its logs."""
 
     vehicle: Vehicle
@@ -53,7 +51,6 @@ class Identified:
     notes: Names
     advice: Names
     # errors on data outside the fit: held_out_blocks, flights_left_out (each in turn, of several),
-    # and prediction, of further flights
+    # and prediction, of further flights. Those of the vehicle, and of thrust and drag with an
+    # unchanged body rate
     predicted: ErrorsByPart
-    # the same of thrust and drag with an unchanged body rate
-    simplest: ErrorsByPart

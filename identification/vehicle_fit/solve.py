@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import t as student
 
-from ...runtime.arrays import Array, Mask
+from ...runtime.arrays import Array, Index, Mask
 from ...runtime.errors import InputError
 from ..logs.table import Data, NamedNumbers, Values
 from .channels import Pieces
@@ -88,8 +88,7 @@ class VehicleFit:
         here = of(values(theta))
         steps = 1e-5 * np.eye(len(theta))
         slope = np.array([of(values(theta + e)) - of(values(theta - e)) for e in steps]) / 2e-5
-        variance = float(slope @ self.covariance @ slope)
-        size = self.width * math.sqrt(max(variance, 0.0))
+        size = self.width * math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
         if logarithm and here > 0.0:
             factor = math.exp(min(size / here, 50.0))
             return here, here / factor, here * factor
@@ -108,8 +107,8 @@ def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFi
     powers = [(np.abs(s.columns[:, :, :6]) ** 2).mean(axis=0) for s in made.segments]
     spectra = residual_spectra(made.segments, powers)
     for number in range(_ROUNDS):
-        total = np.sum(_grams(made, spectra), axis=0)
-        theta, information, moved = _moved(made, total, model, theta, _STEPS)
+        grams = np.sum(_grams(made, spectra), axis=0)
+        theta, information, moved = _moved(made, grams, model, theta, _STEPS)
         made = linear()
         if number >= 2 and moved < _CLOSE:
             break
@@ -127,20 +126,22 @@ def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFi
     return VehicleFit(model, theta, information, scores, loss, made, spectra)
 
 
-def refitted(fit: VehicleFit, kept: Sequence[Mask]) -> list[VehicleFit]:
-    """Return a fit's coefficients by its ``kept`` segments (s,) alone, at the same spectrum of the
-    noise.
+def refitted(fit: VehicleFit, fold: Index) -> list[tuple[Mask, VehicleFit]]:
+    """Return, without each number of ``fold`` (s,) in turn, the segments (s,) kept, and the
+    coefficients by these alone, at the same spectrum of the noise.
 
     Raises:
         InputError: no segment is kept.
     """
     grams, out = np.array(_grams(fit.balance, fit.spectra)), []
-    for keep in kept:
+    for held in np.unique(fold):
+        keep = fold != held
         if not keep.any():
             raise InputError("the flight is too short; expected more than 5 s without a break")
         total = grams[keep].sum(axis=0)
         theta, information, _ = _moved(fit.balance, total, fit.model, fit.theta, _ROUNDS)
-        out.append(replace(fit, theta=theta, information=information, scores=fit.scores[keep]))
+        part = replace(fit, theta=theta, information=information, scores=fit.scores[keep])
+        out.append((keep, part))
     return out
 
 
@@ -178,8 +179,8 @@ def score_tests(
     """
     model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
     made = made or fit.balance
-    total = np.sum(_grams(made, fit.spectra), axis=0)
-    step, information, *_ = _newton(made, total, model, start)
+    grams = np.sum(_grams(made, fit.spectra), axis=0)
+    step, information, *_ = _newton(made, grams, model, start)
     gradient, without, tests = information @ step, list(range(len(fit.theta))), {}
 
     def reached(rows: list[int]) -> tuple[float, Array, Array]:

@@ -39,8 +39,7 @@ class Segment(NamedTuple):
 
 def edges_of(n: int, period: float) -> Index:
     """Return the ends (count + 1,) of the segments, of about equal length, of a piece."""
-    count = max(1, round(n * period / _SEGMENT))
-    return np.linspace(0, n, count + 1).astype(np.int64)
+    return np.linspace(0, n, 1 + max(1, round(n * period / _SEGMENT))).astype(np.int64)
 
 
 def segments_of(columns: Array, period: float, log: int, band: float) -> list[Segment]:
@@ -55,8 +54,8 @@ def segments_of(columns: Array, period: float, log: int, band: float) -> list[Se
         frequency = frequency[inside]
         weight = np.where(frequency == 0.0, 1.0, 2.0) / TAPERS
         places = np.arange(1, size + 1) * (np.pi / (size + 1))
-        waves = np.sin(np.arange(1, TAPERS + 1)[:, None] * places)
-        tapers = np.sqrt(2.0 * period / (size + 1)) * waves[:, :, None]
+        waves = np.sin(np.arange(1, TAPERS + 1)[:, None, None] * places[:, None])
+        tapers = np.sqrt(2.0 * period / (size + 1)) * waves
         transforms = np.fft.rfft(tapers * columns[a:b], axis=1)[:, inside]
         out.append(Segment(log, frequency, weight, transforms))
     return out

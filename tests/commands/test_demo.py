@@ -61,7 +61,7 @@ def test_the_example_is_diagnosed_beside_what_is_known(call):
     code, out, _ = call("diagnose", "--example", "--no-open", "--out", "example")
     assert code == 0
     assert "Known before the diagnosis:" in out
-    assert "rotor_drag or body_drag: known, and found" in out
+    assert "Known: rotor_drag or body_drag, found as" in out
     assert "page: file://" in out
     assert json.loads(Path("example/report.json").read_bytes())["effects"]
 
@@ -123,4 +123,4 @@ def test_no_command_is_proposed_that_refuses_the_log(call, log, tmp_path):
     told = "identify refuses this log: theirs: rotor speeds of motors 1 and 2 are equal"
     assert told in " ".join(out.split())
     page = Path("all/log.html").read_text(encoding="utf-8")
-    assert page.index("Doubt: rotor speeds of motors 1 and 2") < page.index("What the log holds")
+    assert page.index("Doubt: rotor speeds of motors 1 and 2") < page.index("The log")

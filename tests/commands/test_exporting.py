@@ -89,7 +89,7 @@ def test_identify_writes_a_vehicle_that_loads(call, log, tmp_path):
     assert data["flight_s"] == pytest.approx(10.5, abs=0.5)
     assert (tmp_path / "mine.identify.png").read_bytes()[:4] == b"\x89PNG"
     assert "<motorConstant>" in text
-    assert "95 % interval" in text
+    assert "± (95 %)" in text
 
 
 def test_the_vehicle_predicts_flights_that_it_was_not_fitted_to(call, log, tmp_path):

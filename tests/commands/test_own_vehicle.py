@@ -2,7 +2,6 @@
 vehicle; ``train`` and ``export-c`` take one in ``test_examples``.
 """
 
-import json
 import shutil
 
 import gymnasium as gym
@@ -28,12 +27,11 @@ def written(tmp_path_factory):
 
 @pytest.fixture
 def mine(written, call, tmp_path):
-    """Return the path of the vehicle file in the test's folder, identified once."""
+    """Return the path of the vehicle file in the test's folder, identified once from a flight."""
     kept = written / "mine.yaml"
     if not kept.exists():
-        logs = [written / f"{name}.csv.gz" for name in FLIGHTS]
         words = ("--mass", 0.034, "--geometry", 0.0325, "--reader", "nanobench")
-        code, text, err = call("identify", *logs, *words, "--out", kept)
+        code, text, err = call("identify", written / f"{FLIGHTS[1]}.csv.gz", *words, "--out", kept)
         assert code == 0, err
         assert "thrust and drag" in text
         assert "Use: " in text
@@ -49,13 +47,11 @@ def test_it_says_what_stands(mine):
     assert (vehicle.k / disc < 0.1).all()
 
 
-def test_its_flights_are_estimated_and_diagnosed(mine, written, call):
+def test_another_flight_is_estimated_by_it(mine, written, call):
     log = written / f"{FLIGHTS[0]}.csv.gz"
-    words = ("--reader", "nanobench", "--vehicle", mine)
-    assert call("estimate", log, *words, "--out", "estimate")[0] == 0
-    code, text, err = call("diagnose", log, *words, "--out", "found", "--json")
+    words = ("--reader", "nanobench", "--vehicle", mine, "--no-tune")
+    code, _, err = call("estimate", log, *words)
     assert code == 0, err
-    assert json.loads(text)["result"]["verdict"]
 
 
 def test_it_flies_every_task(mine, call):

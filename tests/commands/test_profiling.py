@@ -27,16 +27,17 @@ def calm(tmp_path_factory):
 
 
 def test_a_profile_becomes_a_law_that_is_flown(call, swept, tmp_path):
-    code, out, _ = call("profile", swept, "--write", "law.yaml", "--out", "found", "--json")
+    code, out, _ = call("profile", swept, "--write", "law.yaml", "--out", "found")
     assert code == 0
-    result = json.loads(out)["result"]
+    assert out.startswith("A gain of ")
+    assert "k tau_max" in out
+    result = json.loads((tmp_path / "found" / "profile.json").read_bytes())
     assert result["why_no_law"] is None
     gain = result["law"]["gain"]
     low, high = result["law"]["fastest_fan_ci95_m_s"]
     assert low <= result["law"]["fastest_fan_m_s"] * 1.02
     assert high >= result["law"]["fastest_fan_m_s"] * 0.98
-    assert json.loads((tmp_path / "found" / "profile.json").read_bytes()) == result
-    assert (tmp_path / "found" / "profile.png").stat().st_size > 10_000
+    assert (tmp_path / "found" / "profile.png").stat().st_size > 1_000
     with open(tmp_path / "found" / "profile.csv") as file:
         rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
     assert all(row["t_up_low"] < row["t_up"] < row["t_up_high"] for row in rows)
@@ -51,15 +52,8 @@ def test_a_profile_becomes_a_law_that_is_flown(call, swept, tmp_path):
     assert flown["rmse_m"] < 0.6  # from 0.8 m
 
 
-def test_the_sentence_begins_with_the_law(call, swept):
-    code, out, _ = call("profile", swept, "--fan-speed", "0.2", "--axis", "90")
-    assert code == 0
-    assert out.startswith("A gain of ")
-    assert "k tau_max" in out
-
-
 def test_without_a_jet_there_is_no_law(call, calm, tmp_path):
-    code, out, _ = call("profile", calm)
+    code, out, _ = call("profile", calm, "--fan-speed", "0.2", "--axis", "90")
     assert code == 0
     assert out.splitlines()[-1].startswith("No law: the torque about z is not distinguishable")
     code, _, said = call("profile", calm, "--write", "law.yaml")

@@ -8,7 +8,6 @@ from numpy.linalg import cholesky, lstsq
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.support.synthetic_wrench import TICKS, observations
 from windwrench.controllers import InformedTracker, Limit, Tracker, TrackerLQG
 from windwrench.controllers.briefing import Briefing, Motions
 from windwrench.controllers.jet_map import COUNT, FIRST, STEP, jet_map
@@ -126,21 +125,22 @@ def test_the_expected_path_is_the_mean_of_all_paths():
 
 def test_a_fan_that_leaves_the_family_is_found_again():
     """It stands for 5 s and then goes, which no motion of the family does."""
-    path = np.concatenate([np.zeros(60), np.cumsum(np.full(30, 0.2 * 0.08))])
     briefing = replace(BRIEFING, motions=Motions(("still",), offset=(0.0, 0.1)))
-    fan = np.repeat(np.repeat(path, TICKS)[None], 5, axis=0)
-    shown = observations(fan, briefing, default_rng(4), turns=False)
-    off = {}
-    for leave in (0.0, 0.1):
-        tracker = InformedTracker(leave=leave)
-        tracker.brief(briefing)
-        errors = []
-        for seen in shown:
+    near = replace(SCENARIOS["static"], offset=(0.0, 0.1))
+    env = FanTrackingEnv(near, fan_path=lambda t: 0.2 * np.maximum(t - 4.8, 0.0))
+    off = {0.0: [], 0.1: []}
+    for seed in range(5):
+        env.reset(seed=seed)
+        steps = [env.step(np.zeros(1, dtype=np.float32)) for _ in range(90)]
+        info = steps[-1][-1]
+        for leave, errors in off.items():
+            tracker = InformedTracker(leave=leave)
+            tracker.brief(briefing)
             tracker.reset()
-            for one in seen:
-                tracker(one)
-            errors.append(abs(tracker.mean[0] - path[-1]))
-        off[leave] = np.median(errors)
+            for seen, *_ in steps:
+                tracker(seen)
+            errors.append(abs(tracker.mean[0] - (info["fan_y"] - info["y"])))
+    off = {leave: np.median(errors) for leave, errors in off.items()}
     assert off[0.0] > 0.3
     assert off[0.1] < 0.15
 

@@ -2,8 +2,6 @@
 
 import copy
 import pickle
-import subprocess
-import sys
 from dataclasses import fields, replace
 
 import gymnasium as gym
@@ -170,17 +168,3 @@ def test_a_copy_in_flight_goes_on_like_the_original_bit_for_bit(name, how, given
     # the episodes that follow, without a seed of their own, are the same too
     assert_array_equal(env.reset()[0], other.reset()[0])
     assert_array_equal(fly_alone(env), fly_alone(other))
-
-
-def test_a_copy_goes_on_in_another_process(tmp_path):
-    env = make_single("WindHover", effects=LAG)
-    env.reset(seed=5)
-    (tmp_path / "env").write_bytes(pickle.dumps(env))
-    code = (
-        "import pickle, sys; from tests.support.vector_flights import fly_alone; "
-        "env = pickle.load(open(sys.argv[1], 'rb')); "
-        "sys.stdout.buffer.write(fly_alone(env).tobytes())"
-    )
-    command = [sys.executable, "-c", code, str(tmp_path / "env")]
-    there = subprocess.run(command, capture_output=True, check=True).stdout
-    assert there == fly_alone(env).tobytes()

@@ -153,13 +153,14 @@ def test_an_episode_is_written_as_a_gif_that_keeps_the_colours_of_the_arrows(tmp
 
 
 RECORDED = """
-import gymnasium as gym, itertools, windwrench
+import gymnasium as gym, windwrench
 from gymnasium.wrappers import RecordVideo
+from itertools import cycle
 from windwrench.envs import ACTIONS, OBSERVATIONS
-for task, action, observation in itertools.product(TASKS, ACTIONS, OBSERVATIONS):
+for task, action, observation in zip(cycle(TASKS), ACTIONS, cycle(OBSERVATIONS)):
     seen = {"action": action, "observation": observation, "width": 64, "height": 48}
     env = gym.make(f"windwrench/{task}-v2", render_mode="rgb_array", **seen)
-    env = RecordVideo(env, f"{task}-{action}-{observation}")
+    env = RecordVideo(env, action)
     env.reset(seed=0)
     for _ in range(3):
         env.step(env.action_space.sample())
@@ -171,10 +172,11 @@ for task, action, observation in itertools.product(TASKS, ACTIONS, OBSERVATIONS)
     find_spec("moviepy") is None, reason="moviepy is not installed: pip install 'windwrench[video]'"
 )
 def test_gymnasium_s_recorder_films_every_task_action_and_observation(tmp_path):
+    """Each in one film at least, not all combined: pictures are of the world alone."""
     import imageio_ffmpeg
 
     run(tmp_path, RECORDED.replace("TASKS", repr(TASKS)), MUJOCO_GL=BACKEND)
     films = list(tmp_path.glob("*/*.mp4"))
-    assert len(films) == 5 * 4 * len(TASKS)
-    for film in films[::7]:
+    assert len(films) == 5
+    for film in films:
         assert imageio_ffmpeg.count_frames_and_secs(str(film))[0] == 4

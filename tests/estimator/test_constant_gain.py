@@ -48,7 +48,7 @@ def both(vehicle, flight, settled, missing=(), kind=ConstantGainFilter):
 @pytest.fixture(scope="module")
 def turning():
     """A flight that starts yawed by 120 degrees, turns at 1.5 to 4.5 rad/s and translates."""
-    return yawing_flight(VEHICLE, 2400, seed=6, torque=(0.01, -0.015, 0.02))
+    return yawing_flight(VEHICLE, 2400, seed=6, torque=(0.01, -0.015, 0.02), substeps=3)
 
 
 GAP = range(1200, 1300)  # half a second without poses
@@ -113,7 +113,7 @@ def test_after_a_gap_it_is_honest_at_any_heading(turning, through_a_gap):
 
 def test_it_knows_the_declared_effects():
     vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}))
-    flight = yawing_flight(VEHICLE, 2000, seed=2)
+    flight = yawing_flight(VEHICLE, 2000, seed=2, substeps=3)
     full, constant = both(vehicle, flight, 1500)
     _, plain = both(VEHICLE, flight, 1500)
     difference = largest_differences(full, constant)

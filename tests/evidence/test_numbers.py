@@ -11,12 +11,12 @@ from windwrench.evidence import pages as rendering
 from windwrench.evidence import quotes as quoting
 from windwrench.evidence.kept_results import kept
 from windwrench.evidence.pages import missing_sources
-from windwrench.evidence.probabilities.__main__ import plan, plan_of_other_logs
+from windwrench.evidence.probabilities.__main__ import plan
 from windwrench.evidence.probabilities.calibration import RESULTS, flights_of
 from windwrench.evidence.probabilities.fitting import fit
-from windwrench.evidence.probabilities.flights import KINDS, WAYS_TO_LOG
+from windwrench.evidence.probabilities.flights import WAYS_TO_LOG
 from windwrench.identification.diagnosis.settings import DIAGNOSIS
-from windwrench.identification.diagnosis.unknown import UNKNOWN
+from windwrench.identification.diagnosis.unknown import ABSORBED, PUSH
 
 QUOTES, NOT_RESULTS = quoting.read_quotes()
 
@@ -95,31 +95,25 @@ def test_the_rule_of_a_sure_name_is_that_of_the_code():
     assert f"its printed probability is {DIAGNOSIS.least_sure_probability:.0%} or more" in rule
     assert f"has a probability of {DIAGNOSIS.most_unknown:.0%} at most" in rule
     assert f"the flight has {DIAGNOSIS.least_seconds:g} s" in rule
-    assert f"in the mean {UNKNOWN.absorbed / (UNKNOWN.absorbed + 1.0):.0%}" in rule
+    assert f"in the mean {ABSORBED / (ABSORBED + 1.0):.0%}" in rule
 
 
 def test_a_sure_name_is_printed_with_what_the_page_says_and_without_a_ceiling():
-    named = [e for flight in flights_of(kept(RESULTS["latest"])) for e in flight["named"]]
+    flights = flights_of(kept(RESULTS)["flights"])
+    named = [e for flight in flights for e in flight["named"]]
     sure = [e["probability"] for e in named if not e["tentative"]]
     assert min(sure) >= DIAGNOSIS.least_sure_probability
     assert max(sure) > 0.999
 
 
 def test_the_weight_of_a_push_is_that_of_the_kept_flights():
-    found = fit(flights_of(kept(RESULTS["first"])))
-    assert found.push == pytest.approx(UNKNOWN.push, abs=0.02)
+    _, push = fit(flights_of(kept("results/unknown_weights.json.gz")))
+    assert push == pytest.approx(PUSH, abs=0.02)
 
 
-def test_a_run_has_flights_of_both_and_none_twice():
-    tasks = plan(20, 20, 0, 3, "other.py")
-    assert len(set(tasks)) == len(tasks)
+def test_a_run_has_flights_of_both_simulators_and_all_logs_and_none_twice():
+    tasks = plan(20, "other.py")
+    assert len(set(tasks)) == len(tasks) == 65
     assert {t[1] for t in tasks if t[0] == "own"} >= {"single", "pair", "nothing", "left out"}
     assert {t[1] for t in tasks if t[0] == "other.py"} == {"catalogue", "left out"}
-
-
-def test_other_logs_are_of_all_ways_and_none_is_flown_twice():
-    tasks = plan_of_other_logs(20, 0, 1000, "other.py")
-    assert len(set(tasks)) == len(tasks) == 60
-    assert {t[3] for t in tasks} == set(WAYS_TO_LOG[1:])
-    assert {t[3] for t in tasks if t[0] == "other.py"} == {"filtered"}
-    assert {t[1] for t in tasks if t[0] == "own"} == set(KINDS)
+    assert {t[3] for t in tasks if len(t) == 4} == set(WAYS_TO_LOG[1:])

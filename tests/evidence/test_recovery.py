@@ -13,9 +13,7 @@ from windwrench.evidence.recovery import (
     FLOWN,
     GATES,
     NOISES,
-    SEQUENCES,
     TAILS,
-    WRONG,
     Verdict,
     befall,
     estimated,
@@ -106,27 +104,6 @@ def test_poses_as_noisy_as_declared_are_within_the_limits(kind, event):
     assert fly_combination(words, seed=1) != verdict
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", FILTERS)
-def test_all_combinations_are_within_the_limits(kind):
-    verdicts = {words: fly_combination(words) for words in named(AXES, kind)}
-    assert len(verdicts) == 192
-    assert [(words, v) for words, v in verdicts.items() if v.failures] == []
-
-
-@pytest.mark.slow
-def test_wrong_attitudes_are_got_over_without_a_gate():
-    later = {words: claim.z for words, _, claim in map(fly_wrong_attitudes, range(SEQUENCES))}
-    assert [(words, z) for words, z in later.items() if not z <= WRONG] == []
-
-
-def test_a_filter_that_knows_the_noise_is_told_it():
-    words = ("ukf", "crazyflie@100", "x3", "nothing", "no-gate")
-    told = fly_combination(words, told=True).error
-    learned = fly_combination(words).error
-    assert 0.8 * learned < told < learned  # what is learned of the noise is nearly as good
-
-
 def test_wrong_attitudes_are_as_wrong_as_said():
     attitude = exact_flight("crazyflie@100", 1.0).attitude
     seen = set()
@@ -147,7 +124,5 @@ def test_a_rate_lies_within_its_interval():
     assert (low, high) == (pytest.approx(2.398, rel=1e-3), pytest.approx(9.195, rel=1e-3))
 
 
-def test_quiet_flights_are_counted(capsys):
-    quiet_flights("ukf crazyflie@50 x1", 1)
-    said = capsys.readouterr().out
-    assert "all                   0 restarts in 0.050 h: 0.0 an hour (0.0 to 73.8)" in said
+def test_quiet_flights_are_counted():
+    assert quiet_flights("ukf crazyflie@50 x1", 1) == {"x1": (0, pytest.approx(0.05))}

@@ -16,7 +16,7 @@ from windwrench.evaluation.episodes import fly_episode
 from windwrench.evaluation.tasks import make_pilot
 from windwrench.evidence.sim_to_sim.__main__ import ranking
 from windwrench.evidence.sim_to_sim.flight import WindHoverElsewhere
-from windwrench.evidence.sim_to_sim.peers import OURS, PEERS, Flown, _simulator
+from windwrench.evidence.sim_to_sim.peers import OURS, PEERS, Flown, simulator
 
 
 class Ours:
@@ -49,7 +49,7 @@ def test_the_kits_plant_as_a_peer_flies_the_kits_episode():
 
 def test_a_missing_simulator_is_told_with_its_installation():
     with refused(r"nowhere cannot be imported .*; expected pip install"):
-        _simulator("nowhere.sim", "pip install nowhere")
+        simulator("nowhere.sim", "pip install nowhere")
 
 
 @pytest.mark.parametrize("name", PEERS)

@@ -134,7 +134,9 @@ def test_predictions_start_where_a_whole_horizon_follows(clean):
 LATE = {"clock_offset": {"dt": -0.03}}
 
 
-@pytest.mark.parametrize("kind", ["pose", "gap", "jitter", "imu", "late", "wrong inertia"])
+@pytest.mark.parametrize(
+    "kind", ["pose", "gap", "jitter", "imu", "late", "commands", "wrong inertia"]
+)
 def test_nothing_after_a_start_changes_its_prediction(kind):
     log = imu_flight(VEHICLE, seconds=8.0) if kind == "imu" else fly(seconds=8.0)
     vehicle = VEHICLE
@@ -142,6 +144,8 @@ def test_nothing_after_a_start_changes_its_prediction(kind):
         log = without_pose(log, slice(700, 760))
     elif kind == "jitter":
         log = replace(log, t=log.t + default_rng(0).uniform(-1e-3, 1e-3, len(log.t)))
+    elif kind == "commands":
+        log = replace(log, commanded=True)
     elif kind == "late":
         vehicle = VEHICLE.with_effects(*settings(LATE))
     elif kind == "wrong inertia":
@@ -243,6 +247,9 @@ def test_errors_of_predictions_are_those_of_the_motion():
     assert attitude[-1] < 0.025  # of this, 0.02 is the start's angular velocity
     assert found.still[0, -1] < 0.2 * position[-1]
     assert found.still[1, -1] < 0.2 * velocity[-1]
+    # commands of another day: the flight so far tells their thrust
+    (found,) = errors_of_models([replace(log, commanded=True)], [VEHICLE])
+    assert found.model[1, -1] < 0.3 * velocity[-1]
 
 
 def test_a_turn_at_one_rate_is_no_change():

@@ -23,7 +23,6 @@ from windwrench.live.messages import SECOND
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 
-RATES = (0.5, 0.7, 0.9, 1.0, 1.1, 1.5)
 START = 100.0  # s, on our clock
 LATENCY = 0.005  # s: delays of 5 to 20 ms
 JITTER = 0.015
@@ -128,10 +127,12 @@ SENDERS = [
 ]
 IDS = ["JSON", "JSON, rotors unstamped", "JSON, poses unstamped", "MAVLink", "ESC telemetry"]
 senders = pytest.mark.parametrize(("kind", "stamped"), SENDERS, ids=IDS)
+# one that stamps all it sends, and one whose rotor speeds are placed by its poses
+two_senders = pytest.mark.parametrize(("kind", "stamped"), SENDERS[::4], ids=IDS[::4])
 
 
 @pytest.mark.parametrize(
-    ("rate", "jitter"), [*((rate, JITTER) for rate in RATES), (0.5, 0.0), (1.0, 0.0)]
+    ("rate", "jitter"), [(0.5, JITTER), (1.5, JITTER), (1.0, JITTER), (1.0, 0.0)]
 )
 @senders
 def test_a_simulator_of_any_rate_has_no_pose_too_late(kind, stamped, rate, jitter):
@@ -162,7 +163,7 @@ PAUSED = {
 
 
 @pytest.mark.parametrize("pace", PAUSED)
-@senders
+@two_senders
 def test_a_clock_that_changes_its_rate_costs_no_pose(kind, stamped, pace):
     flown = flight()
     live = played(kind(flown), times_of(flown, PAUSED[pace]), stamped)
@@ -173,7 +174,7 @@ def test_a_clock_that_changes_its_rate_costs_no_pose(kind, stamped, pace):
 
 
 @pytest.mark.parametrize("in_order", [False, True])
-@senders
+@two_senders
 def test_bursts_of_a_link_cost_no_pose(kind, stamped, in_order):
     """Nothing comes for up to 0.5 s, then all at once, of a simulator at 0.9 of real time."""
     flown = flight()
@@ -185,7 +186,7 @@ def test_bursts_of_a_link_cost_no_pose(kind, stamped, in_order):
     assert error_of(live) < 0.1
 
 
-@pytest.mark.parametrize("rate", [0.5, 1.0, 1.5])
+@pytest.mark.parametrize("rate", [0.5, 1.5])
 @senders
 def test_a_sender_that_restarts_is_followed_after_20_messages(kind, stamped, rate):
     """Stamps begin at zero again, of two kinds of messages that come in turns."""
@@ -216,7 +217,7 @@ def test_another_sender_in_place_of_a_silent_one_is_another_clock_at_once(stampe
     assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(10.5, abs=0.06)
 
 
-@pytest.mark.parametrize("rate", [0.5, 1.0, 1.5])
+@pytest.mark.parametrize("rate", [0.5, 1.5])
 def test_where_poses_stop_the_estimate_goes_on_in_the_senders_time(rate):
     """Rotor speeds without a stamp carry it for 2 s, as those with one do."""
     flown = flight()
@@ -240,7 +241,7 @@ def test_a_stream_without_any_stamp_is_in_our_time_and_says_so():
     assert any("no message has a stamp" in line for line in live.tallies.news())
 
 
-@pytest.mark.parametrize(("simulator", "camera"), [(0.9, 1.0), (0.5, 1.0), (1.0, 0.9), (1.0, 1.0)])
+@pytest.mark.parametrize(("simulator", "camera"), [(0.5, 1.0), (1.0, 0.9)])
 def test_two_clocks_of_different_rates_are_one_time(simulator, camera):
     """Rotor speeds in the simulator's time, poses stamped from 1970 on another clock."""
     live = played(

@@ -30,7 +30,6 @@ from tests.support.exported_c.hostile import PERIOD, hostile
 from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
 from tests.support.paths import ROOT
-from tests.support.synthetic_wrench import TICKS, observations
 from tests.support.vehicles import VEHICLE
 from windwrench.controllers import Tracker
 from windwrench.controllers.lqg import LQG
@@ -38,6 +37,7 @@ from windwrench.controllers.observation import FORCE_X, TORQUE_Z, VELOCITY_Y
 from windwrench.controllers.trained_policy import TaskPolicy, load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names, parse_setting
+from windwrench.envs import FanTrackingEnv
 from windwrench.envs.closed_loop import Stage
 from windwrench.envs.vector import SETTLE_TICKS
 from windwrench.envs.wind_tasks import WindTrajectoryEnv
@@ -171,7 +171,8 @@ def test_every_effect_works_as_in_python_to_the_bit(estimator, half, tmp_path):
     model = declaring(replace(vehicle_of(TURNING), ceiling_z=3.0), *names()[half::2])
     exported = export_c(model, estimator, precision="double")
     c = CompiledFilter(exported, tmp_path)
-    flown = flight(TURNING, 400)  # with faults
+    flown = {name: values[:400] for name, values in hostile(VEHICLE, 1).items()}
+    del flown["gyro"], flown["accelerometer"]
     flown["voltage"] = 12.4 - 0.003 * np.arange(400.0)  # a battery that runs down
     flown["voltage"][150:180] = np.nan
     worst = compare(c, exported.filter, flown, 5)
@@ -198,7 +199,8 @@ def commands(c, seen):
 
 
 def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
-    c = CompiledFilter(export_c(VEHICLE, policy=exportable_policy("sac-0")), tmp_path)
+    policy = exportable_policy("sac-0")
+    c = CompiledFilter(export_c(VEHICLE, "constant-gain", policy=policy), tmp_path)
     python = load_policy(POLICY)
     rng = default_rng(0)
     force = rng.normal(0.3, 0.3, (50, 3))
@@ -211,7 +213,8 @@ def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
 
 
 def test_the_law_with_lead(tmp_path):
-    c = CompiledFilter(export_c(VEHICLE, policy=exportable_policy("lead")), tmp_path)
+    policy = exportable_policy("lead")
+    c = CompiledFilter(export_c(VEHICLE, "constant-gain", policy=policy), tmp_path)
     seen = np.zeros((5, 8))
     seen[:, TORQUE_Z] = torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
     seen[:, FORCE_X] = force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
@@ -290,7 +293,7 @@ def test_the_example_finds_the_force_that_it_is_given(tmp_path):
 def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
     """Code, memory and instructions of every filter on the board that qemu imitates."""
     needs(*firmware.TOOLS)
-    flown = flight(TURNING, 150, faults=False)
+    flown = flight(TURNING, 150)
     for estimator, ram, instructions in (
         ("constant-gain", 3_200, 8_400),
         ("ukf", 6_144, 96_000),
@@ -383,17 +386,13 @@ def c(tmp_path_factory):
     return CompiledFilter(exported, tmp_path_factory.mktemp("tracker"))
 
 
-def fans(count, decisions, rng):
-    t = 0.005 * np.arange(decisions * TICKS)
-    start = rng.uniform(-0.3, 0.3, (count, 1))
-    return start + 0.8 * np.sin(rng.uniform(0.05, 0.35, (count, 1)) / 0.8 * t)
-
-
 def test_given_the_same_random_numbers_it_commands_the_same(c):
-    rng = default_rng(1)
-    seen = observations(fans(6, 60, rng), BRIEFING, rng)
+    envs = FanTrackingEnv.vector(6, scenario="base")
+    envs.reset(seed=1)
+    still = np.zeros((6, 1), dtype=np.float32)
+    seen = np.array([envs.step(still)[0] for _ in range(60)])
     apart = []
-    for one in seen.astype(np.float32):
+    for one in seen.swapaxes(0, 1):
         law = OwnTracker(particles=PARTICLES)
         law.brief(BRIEFING)
         law.reset()
@@ -401,7 +400,7 @@ def test_given_the_same_random_numbers_it_commands_the_same(c):
         assert np.ptp(python) > 0.2
         apart.append(abs(commands(c, one) - python))
     apart = np.array(apart)
-    assert np.max(apart[:, :6]) < 1e-4
+    assert np.sum(np.max(apart[:, :6], axis=1) < 1e-5) >= 5
     # where rounding once draws another particle than Python does, commands go on a little apart
     assert np.sum(np.max(apart, axis=1) < 1e-3) >= 4
     assert np.max(apart) < 0.1

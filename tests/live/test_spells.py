@@ -41,7 +41,7 @@ def calm(name, imu, kind, noise):
     """
     estimator = export_c(vehicle_of(name), kind, gate=GATE).filter
     rate = 200 // FLIGHTS[name][4]
-    flown = flight(name, 15 * rate, SEED, faults=False, imu=imu, noise=noise)
+    flown = flight(name, 15 * rate, SEED, imu=imu, noise=noise)
     begin(estimator, flown)
     said = [None]
     copies = {}

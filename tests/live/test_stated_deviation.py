@@ -11,9 +11,9 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c.compiled import begin, take
-from tests.support.model_flights import drawn
 from tests.support.vehicles import VEHICLE
 from windwrench.envs.recording import record_flight
+from windwrench.envs.scenarios import draw_vehicle
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.live.export_c import ESTIMATORS, export_c
@@ -33,7 +33,7 @@ STATED = ("std_torque", "std_force")
 def flights():
     """Circles of drawn vehicles, measured with the declared noise."""
     return [
-        record_flight(drawn(VEHICLE, default_rng(seed)), (), "circle", 5.0, seed)
+        record_flight(draw_vehicle(VEHICLE, default_rng(seed)), (), "circle", 5.0, seed)
         | {"dt": np.full(STEPS + 1, 0.005)}
         for seed in range(COUNT)
     ]
@@ -70,7 +70,9 @@ def log_of(flown, **fields):
 
 @pytest.mark.parametrize("way", [*ESTIMATORS, "smoothed"])
 def test_errors_of_drawn_vehicles_are_as_large_as_it_says(way, flights):
-    """Turbulence is no random walk: of 80 vehicles the mean squares are 0.55 and 0.63, not 1."""
+    """Turbulence is no random walk: of 80 vehicles torque's mean square is 0.49, not 1. It scatters
+    by 0.11 over 20 of them.
+    """
     if way == "smoothed":
         found = [told(estimate_log(log_of(flown), VEHICLE, smooth=True)) for flown in flights]
     else:
@@ -82,7 +84,7 @@ def test_errors_of_drawn_vehicles_are_as_large_as_it_says(way, flights):
     torque = np.mean(z[..., :3] ** 2)
     force = np.mean(z[..., 3:] ** 2)
     print(f"{way}: mean square of z: torque {torque:.2f}, force {force:.2f}; {abs(z).max():.1f}")
-    assert 0.4 < torque < 1.2
+    assert 0.27 < torque < 1.2
     assert 0.4 < force < 1.2
     assert np.abs(z).max() < 6.0
 
@@ -92,5 +94,5 @@ def test_a_stream_says_what_a_log_says(flights, commanded):
     """Rotor speeds of commands are known less well."""
     log = log_of(flights[0], commanded=commanded)
     stream = by_stream(flights[0], commanded)
-    assert_allclose(stream[1:], told(estimate_log(log, VEHICLE))[1:], rtol=1e-9)
+    assert_allclose(stream[1:], told(estimate_log(log, VEHICLE))[1:], rtol=1e-9, atol=1e-12)
     assert (stream[-1, 11] > 0.1 * VEHICLE.weight) == commanded

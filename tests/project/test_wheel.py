@@ -71,16 +71,13 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
     package = installed / "windwrench"
     for name in (
         "py.typed",
-        "cli.py",
         "_core/__init__.pyi",
         "core/ukf.hpp",
         "_core/baseline" + sysconfig.get_config_var("EXT_SUFFIX"),
         "envs/quadrotor.xml",
         "dynamics/vehicles/ardrone2.yaml",
-        "dynamics/effects/rotor_drag.py",
         "dynamics/effects/page.md.j2",
         "live/export_c/source/windwrench.cpp",
-        "identification/logs/readers/px4_ulog.py",
         "identification/logs/maps/nanobench.yaml",
         "training/policies/tasks/WindHover-gru-0.npz",
     ):
@@ -94,13 +91,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
     sources = {str(p.relative_to(ROOT)) for room in rooms for p in (ROOT / room).rglob("*.py")}
     wrapped = {str(p.relative_to(package)) for p in package.rglob("*.py")}
     assert sources <= wrapped
-    assert not [
-        name
-        for name in wrapped
-        if name.startswith(CHECKOUT_ONLY) or "fuzz" in name or "trials" in name
-    ]
-    entry = next(installed.glob("windwrench-*.dist-info")) / "entry_points.txt"
-    assert "windwrench = windwrench.__main__:main" in entry.read_text()
+    assert not [name for name in wrapped if name.startswith(CHECKOUT_ONLY)]
 
 
 def test_the_wheel_is_small(wheel):

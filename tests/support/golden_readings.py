@@ -68,12 +68,14 @@ def cases():
     return found + [f"hostile {name}" for name in (*map(str, range(len(FLIGHTS))), *MEASURED)]
 
 
-def recorded(case):
-    """Return what is said of a case."""
+def recorded(case, every=1):
+    """Return what is said of a case, of hostile conventions of each so many."""
     way, _, name = case.partition(" ")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return {"file": _file, "table": _table, "random": _random, "hostile": _hostile}[way](name)
+        if way == "hostile":
+            return _hostile(name, every)
+        return {"file": _file, "table": _table, "random": _random}[way](name)
 
 
 def _plain(text, folder):
@@ -150,7 +152,7 @@ def _random(name):
     return {verdict: " ".join(fields) for verdict, fields in said.items() if fields}
 
 
-def _hostile(name):
+def _hostile(name, every):
     if name in MEASURED:
         vehicle = vehicle_of(MEASURED[name])
         log = read_log(MEASURED[name], vehicle=vehicle)
@@ -160,7 +162,7 @@ def _hostile(name):
     log = replace(log, source="flight.csv")
     said = {"diagnosis": {}, "estimate": {}}
     for use, least, kinds in (
-        ("diagnosis", LEAST_SECONDS, ("as it is", *HOSTILE)),
+        ("diagnosis", LEAST_SECONDS, ("as it is", *HOSTILE)[::every]),
         ("estimate", None, ESTIMATED),
     ):
         for kind in kinds:

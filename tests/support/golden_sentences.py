@@ -7,6 +7,7 @@ import json
 import sys
 import tempfile
 from pathlib import Path
+from unittest.mock import patch
 
 from tests.support.data_paths import DATA, data_file
 from tests.support.flown import recorded
@@ -80,7 +81,8 @@ def first_sentence(case):
     command, _, name = case.partition(" ")
     folder = name.split("/")[0]
     reading = LogOptions(vehicle=VEHICLES.get(folder))
-    with tempfile.TemporaryDirectory() as place, silently():
+    undrawn = patch("windwrench.identification.report.log_channels.write_png")
+    with tempfile.TemporaryDirectory() as place, silently(), undrawn:
         out = Path(place)
         log = _windy(out / "wind.csv") if folder == "made" else data_file(name)
         try:

@@ -1,6 +1,4 @@
-"""Vehicles drawn from their stated uncertainty; flights drawn from the filter's own model: each of
-its assumptions holds to the letter.
-"""
+"""Flights drawn from the filter's own model: each of its assumptions holds to the letter."""
 
 from dataclasses import dataclass, replace
 
@@ -34,21 +32,6 @@ WITH_EFFECTS = load_vehicle("ardrone2").with_effects(
     EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
     EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
 )
-
-
-def drawn(vehicle, rng):
-    """Return a vehicle as it may be where ``vehicle`` is declared."""
-    known = vehicle.uncertainty
-    normal = rng.standard_normal
-    command = 1.0 + known.command * normal() if vehicle.omega_source == "commanded" else 1.0
-    return replace(
-        vehicle,
-        mass=vehicle.mass * (1.0 + known.mass * normal()),
-        k=vehicle.k * (1.0 + known.thrust * normal()) * (1.0 + known.rotor * normal(4)) * command,
-        p=vehicle.p * max(1.0 + known.torque * normal(), 0.1) * command,
-        inertia=vehicle.inertia * max(1.0 + known.inertia * normal(), 0.2),
-        arm_l=vehicle.arm_l * (1.0 + known.arm_l * normal()),
-    )
 
 
 @dataclass(frozen=True, eq=False)

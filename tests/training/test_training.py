@@ -14,6 +14,7 @@ import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.support.parameters import mostly_slow
 from tests.training.tiny import TINY
 from windwrench.controllers.features import Features, History
 from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
@@ -58,7 +59,7 @@ def make_env(config, seed=0):
     )
 
 
-@pytest.mark.parametrize("algorithm", LEARNERS)
+@pytest.mark.parametrize("algorithm", mostly_slow(LEARNERS, {"sac", "recurrent-ppo"}.__contains__))
 def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
     config = tiny(algorithm)
     train(config, "base", 3, tmp_path / "whole")

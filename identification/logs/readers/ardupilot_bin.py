@@ -51,11 +51,8 @@ from ..what_flew import (
     slots_of_motors,
 )
 
-Bytes = NDArray[np.uint8]
-
 _EARTH = 6_378_137.0  # m
 _PLACE = ("Lat", "Lng", "Alt")  # of POS
-_NUMBERS = ("C", "I", "Inst")  # of a core, a sensor or a battery
 _PLUS = 0  # of FRAME_TYPE, and of FRAME before Copter 3.5
 _MOTOR1 = 33  # of SERVOn_FUNCTION
 _CHANNELS = 14  # of RCOU
@@ -68,11 +65,8 @@ ByType = dict[str, Messages]
 _AS_TEXT = b"FMT, 128, 89, FMT,"  # stands in a log as text
 BEGINS = b"\xa3\x95|(?s:.*)" + _AS_TEXT
 WHAT = "an ArduPilot log (DataFlash .BIN)"
-_TEXTS = ("Name", "Message")  # columns, of PARM and MSG
 _HEAD = 3  # bytes of a message before its columns
-_FMT = 128
 _FORMAT = np.dtype("u1, u1, S4, S16, S64")  # number, length, name, letters and columns of a type
-_MOST_FORMATS = 100_000  # at most
 # types of columns by their letters, as of ``struct`` and further ones; and units of columns other
 # than 1
 _TYPES = {letter: f"<{letter}" for letter in "bBhHiIqQfd"}
@@ -114,13 +108,12 @@ def read(path: Path, vehicle: SomeVehicle = None, piece: Piece = None) -> Flight
     if np.median(volts) > MOST_VOLTS:
         messages["CURR"]["Volt"] = 0.01 * volts
         notes.append("CURR: hundredths of a volt, as Copter before 3.4 logged them")
-    telemetry, telemetry_notes = _telemetry(messages.pop("ESC", {}), parameters)
-    notes += telemetry_notes
+    telemetry = _telemetry(messages.pop("ESC", {}), parameters, notes)
     columns = {*log_map.wanted, *_PLACE, *(f"C{i + 1}" for i in range(_CHANNELS))}
     if skipped:
         notes.append(f"{skipped} bytes of the file belong to no message; it was cut or is damaged")
-    recorded = [_samples(name, rows, columns) for name, rows in messages.items()]
-    groups = [samples for samples in (*recorded, *telemetry) if len(samples.t) > 1]
+    recorded = [*(_samples(name, rows, columns) for name, rows in messages.items()), *telemetry]
+    groups = [samples for samples in recorded if len(samples.t) > 1]
     sections = sections_of(path, groups, log_map, "ardupilot_bin", notes, piece, flown)
     return flight_log(path, "ardupilot_bin", sections, vehicle, flown)
 
@@ -136,7 +129,7 @@ def _samples(name: str, messages: Messages, columns: set[str]) -> ChannelGroup:
     """Return some columns of a type's messages, of the first core, sensor or battery. Places become
     north, east, down in m from the first.
     """
-    for number in _NUMBERS:
+    for number in ("C", "I", "Inst"):
         if number in messages:
             first = messages[number] == messages[number].min()
             messages = {name: column[first] for name, column in messages.items()}
@@ -189,8 +182,10 @@ def _order(path: Path, parameters: Values, vehicle: SomeVehicle) -> tuple[Order,
         return order, f"quad x assumed, which the log does not state: {order_words(order)}"
     kind = int(parameters.get(name, 1))
     if kind == _PLUS and (motors := order_by_places(PLUS, vehicle)):
-        listed = ", ".join(map(str, motors))
-        return motors, f"{name} 0, a plus: rotors 1, 2, 3, 4 of the vehicle are motors {listed}"
+        return motors, (
+            f"{name} 0, a plus: rotors 1, 2, 3, 4 of the vehicle are motors "
+            f"{', '.join(map(str, motors))}"
+        )
     known = stated("airframes")["ardupilot_order"]
     if kind not in known:
         what, end = f"{kind}", ""
@@ -228,7 +223,7 @@ def _with_parameters(
     least, most = given("MOT_SPIN_MIN", 0.15), given("MOT_SPIN_MAX", 0.95)
     if not 0.0 <= least < most:
         least, most = 0.0, 1.0
-    slots = slots_of_motors(_functions(parameters), _MOTOR1) or list(range(4))
+    slots = slots_of_motors(_functions(parameters), _MOTOR1) or range(4)
     outputs = [str(slot + 1) for slot in slots]
     assert log_map.commands is not None
     commands = replace(
@@ -244,25 +239,31 @@ def _with_parameters(
     return replace(log_map, commands=commands).with_order(order), [*log_map.notes, note]
 
 
-def _telemetry(messages: Messages, parameters: Values) -> Noted[Groups]:
-    """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC, and notes."""
+def _telemetry(messages: Messages, parameters: Values, notes: Lines) -> Groups:
+    """Return the ESCs' reports of motors 1 to 4, at the times of the first ESC; ``notes`` get a
+    further one.
+    """
     if not {"Instance", "RPM", "TimeUS"} <= set(messages):
-        return [], []
+        return []
     slots, which = slots_of_motors(_functions(parameters), _MOTOR1), messages["Instance"]
     if not slots or not np.isin(slots, which).all():
-        slots = list(range(4))
+        slots = [0, 1, 2, 3]
     each, known = [], np.isfinite(messages["RPM"])
     for slot in slots:
         times, rpm = (x[known & (which == slot)] for x in (_times(messages), messages["RPM"]))
         if len(rpm) < 2 or not (rpm > 0.0).any():
-            return [], ["ESC telemetry: not of all four motors, or without rpm; left out"]
+            notes.append("ESC telemetry: not of all four motors, or without rpm; left out")
+            return []
         rows, _ = in_order(times)
         each.append((times[rows], rpm[rows]))
     t = each[0][0]
     columns = {f"RPM {motor}": np.interp(t, *one) for motor, one in enumerate(each, 1)}
     poles = parameters.get("SERVO_BLH_POLES", 14.0)
-    told = f"measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took them"
-    return [ChannelGroup(t, columns, "ESC")], [f"rotor speeds: {told}"]
+    notes.append(
+        f"rotor speeds: measured by the ESCs (ESC), with {poles:g} magnet poles as ArduPilot took "
+        "them"
+    )
+    return [ChannelGroup(t, columns, "ESC")]
 
 
 def read_dataflash(path: Path, wanted: Wanted) -> tuple[ByType, int]:
@@ -281,7 +282,7 @@ def read_dataflash(path: Path, wanted: Wanted) -> tuple[ByType, int]:
     count, used = _core.walk_dataflash(data, places, kinds)
     places, kinds = places[:count], kinds[:count]  # take memory as they were filled
     by_type = {}
-    formats = places[kinds == _FMT][:_MOST_FORMATS]
+    formats = places[kinds == 128][:100_000]  # FMT
     if not len(formats):
         raise InputError(f"{path}: cannot be read as {WHAT}: no FMT message; expected some")
     for number, (name, layout, units) in _layouts(_rows(data, formats, _FORMAT), wanted).items():
@@ -320,10 +321,11 @@ def _of_text(path: Path, content: bytes, wanted: Wanted) -> ByType:
         check_count(f"{path}: {name}", len(messages), LIMITS.table_rows, "messages")
         columns = dict(zip(names[name], zip(*messages, strict=True), strict=True))
         by_type[name] = {
-            column: np.char.strip(np.array(texts)) if column in _TEXTS else _numbers(texts)
-            for column, texts in columns.items()
+            # PARM's and MSG's
+            column: np.char.strip(np.array(x)) if column in ("Name", "Message") else _numbers(x)
+            for column, x in columns.items()
         }
-    said = by_type.get("MSG", {}).get("Message", np.empty(0, "S1"))
+    said = by_type.get("MSG", {}).get("Message", ())
     by_type["MSG"] = {"Message": np.array([*before.splitlines(), *said, b""])}
     return by_type
 
@@ -337,7 +339,7 @@ def _numbers(texts: Sequence[bytes]) -> NDArray[np.float64]:
     return numbers
 
 
-def _rows(data: Bytes, places: NDArray[np.int32], layout: Layout) -> Rows:
+def _rows(data: NDArray[np.uint8], places: NDArray[np.int32], layout: Layout) -> Rows:
     """Return the messages (N,) at places (N,), by their layout."""
     return sliding_window_view(data[_HEAD:], layout.itemsize)[places].view(layout)[:, 0]
 
@@ -354,7 +356,7 @@ def _layouts(formats: Rows, wanted: Wanted) -> dict[int, tuple[str, Layout, Name
         if not (name in wanted and is_known and len(letters) == len(columns) == len({*columns})):
             continue
         layout = np.dtype([*zip(columns, map(_TYPES.__getitem__, letters), strict=True)])
-        units = [_UNITS.get(letter, 1.0) for letter in letters]
+        units = {column: _UNITS.get(x, 1.0) for column, x in zip(columns, letters, strict=True)}
         if layout.itemsize + _HEAD == length:
-            layouts[number] = name, layout, dict(zip(columns, units, strict=True))
+            layouts[number] = name, layout, units
     return layouts

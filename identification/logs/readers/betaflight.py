@@ -38,9 +38,7 @@ from ..channels import ChannelGroup, check_piece
 from ..flight_log import FlightLog, SomeVehicle
 from ..log_map import shipped_map
 from ..mapped_log import MOST_VOLTS, flight_log, motors_left_out, sections_of
-from ..table import Array, Lines, NamedArrays, Piece, Table
-
-Ints = NDArray[np.int64]
+from ..table import Array, Lines, NamedArrays, Piece, Table, lengths
 
 BEGINS = b"H Product:Blackbox"
 Headers = defaultdict[str, str]
@@ -49,17 +47,12 @@ SIGNATURE = ("time (us)", "motor[0]", "motor[3]")
 # stated units in the map's: g, degrees per second, volts
 _UNITS = {"g": 1.0, "m/s2": 1.0 / 9.80665, "deg/s": 1.0, "rad/s": np.degrees(1.0)}
 _UNITS |= {"V": 1.0, "mV": 1e-3}
-_POLES = 14  # on most motors of 5 inch quadrotors
 _STANDING = 0.5  # s after arming without motion
-_RADIANS = 1e-5  # a gyro's scale below is in rad/us
-_ONE_G = 8, 14  # powers of two, counts
-_DSHOT, _PWM = (48.0, 2047.0), (1000.0, 2000.0)
 _MORE_MOTORS = tuple(f"motor[{i}]" for i in range(4, 8))  # of other vehicles than quadrotors
 _HUNDREDS = "(/100)"  # behind the name eRPM of some versions, which are all in hundreds
 WHAT = "a blackbox of Betaflight or INAV"
 _HEADERS = re.compile(rb"(H [^\n]{0,20000}\n){0,2000}")
-# how fields are coded, the numbers to which they are added, and the letters of frames with fields
-_ENCODINGS = (0, 1, 3, 6, 7, 8, 9, 10)
+# the numbers to which fields are added, and the letters of frames with fields
 _PREDICTORS = (*range(12), 256)
 _FRAMES = "IPSGH"
 
@@ -88,8 +81,8 @@ def read(
     begin = next(_HEADERS.finditer(data, start, end)).end()
     if data[begin : begin + 2] == b"H ":
         raise InputError(f"{path}: its headers do not end; expected frames behind them")
-    lines = data[start:begin].decode("ascii", "replace").split("\n")
-    pairs = (line.removeprefix("H ").partition(":") for line in lines)
+    text = data[start:begin].decode("ascii", "replace")
+    pairs = (line.removeprefix("H ").partition(":") for line in text.split("\n"))
     headers = defaultdict(str, {key.strip(): value.strip() for key, _, value in pairs})
     version = headers.get("Data version", "2")
     if version != "2":
@@ -209,7 +202,7 @@ def _gyro_scale(headers: Headers) -> float:
         return fine
     if not 1e-12 < scale < 1e3:
         return fine
-    return fine * scale * (1e6 * _UNITS["rad/s"] if scale < _RADIANS else 1.0)
+    return fine * scale * (1e6 * _UNITS["rad/s"] if scale < 1e-5 else 1.0)
 
 
 def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, float, str]:
@@ -228,14 +221,12 @@ def _range(path: Path, motors: list[Array], headers: Headers) -> tuple[float, fl
                 f"{path}: header motorOutput: {stated[:60]!r}; expected two rising numbers"
             )
         return low, high, "motorOutput of the header"
-    names = ("minthrottle", "maxthrottle")
-    least, most = (_whole_number(headers[name], 1, 10**9) for name in names)
+    least, most = (_whole_number(headers[f"{end}throttle"], 1, 10**9) for end in ("min", "max"))
     if 0 < least < most:
         return least, most, "minthrottle and maxthrottle of the header"
-    low, high = _PWM
-    if any(((x > high) | ((x < low) & (x > 0.0))).any() for x in motors):
-        return *_DSHOT, "assumed: DShot, no header says it"
-    return low, high, "assumed: pulses in us, no header says it"
+    if any(((x > 2000.0) | ((x < 1000.0) & (x > 0.0))).any() for x in motors):
+        return 48.0, 2047.0, "assumed: DShot, no header says it"
+    return 1000.0, 2000.0, "assumed: pulses in us, no header says it"
 
 
 def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
@@ -254,16 +245,16 @@ def _magnet_poles(path: Path, option: str, stated: str) -> tuple[int, str]:
         )
     if poles := _whole_number(stated, 2, 100):
         return poles, "motor_poles of the header"
-    return _POLES, "assumed; betaflight:NUMBER says another"
+    return 14, "assumed; betaflight:NUMBER says another"
 
 
 def _one_g(t: Array, force: list[Array], headers: Headers) -> tuple[float, str]:
     """Return the accelerometer's counts of 1 g, and words on whence they are known."""
     if stated := _whole_number(headers["acc_1G"], 1, 10**6):
         return stated, f"accelerometer: acc_1G of the header: {stated} counts are 1 g"
-    length = np.linalg.norm(np.column_stack(force)[t <= t[0] + _STANDING], axis=1)
+    length = lengths(np.column_stack(force)[t <= t[0] + _STANDING])
     middle = np.nanmedian(length) if np.isfinite(length).any() else 0.0
-    counts = 2.0 ** float(np.clip(np.rint(np.log2(max(middle, 1.0))), *_ONE_G))
+    counts = 2.0 ** float(np.clip(np.rint(np.log2(max(middle, 1.0))), 8, 14))
     return counts, (
         f"accelerometer: {counts:g} counts taken as 1 g, from its {middle:.4g} in the first "
         f"{_STANDING:g} s; no header says it"
@@ -276,7 +267,7 @@ def _whole_number(text: str, least: int, most: int, default: int = 0) -> int:
     return int(text) if is_whole and least <= int(text) <= most else default
 
 
-def _layout(path: Path, headers: Headers, names: Lines) -> list[Ints]:
+def _layout(path: Path, headers: Headers, names: Lines) -> list[NDArray[np.int64]]:
     """Return the frames' layout from the headers, as the core takes it: the encodings (6, F) of I,
     P, S, G and H frames and none; their predictors (6, F); the number of fields (5,) of each; the
     intervals (3,) of I frames, and numerator and denominator of P frames, in loops; the constants
@@ -289,7 +280,7 @@ def _layout(path: Path, headers: Headers, names: Lines) -> list[Ints]:
     check_count(path, len(names), LIMITS.log_fields, "fields")
     predictors, encodings = (
         [_numbers(path, headers, f"Field {letter} {what}", known) for letter in _FRAMES]
-        for what, known in (("predictor", _PREDICTORS), ("encoding", _ENCODINGS))
+        for what, known in (("predictor", _PREDICTORS), ("encoding", (0, 1, 3, 6, 7, 8, 9, 10)))
     )
     for letter, one, other in zip(_FRAMES, predictors, encodings, strict=True):
         sizes = {len(one), len(other)}
@@ -299,8 +290,9 @@ def _layout(path: Path, headers: Headers, names: Lines) -> list[Ints]:
                 f"{' and '.join(map(str, sorted(sizes)))} numbers; expected as many as the "
                 f"{len(names)} names of Field I"
             )
-    sought = ("loopIteration", "time", "motor[0]")
-    places = [names.index(name) if name in names else -1 for name in sought]
+    places = [
+        names.index(name) if name in names else -1 for name in ("loopIteration", "time", "motor[0]")
+    ]
     if places[0] < 0 and any(6 in one for one in predictors):
         raise InputError(f"{path}: no field loopIteration, which its predictors count on")
 
@@ -309,7 +301,7 @@ def _layout(path: Path, headers: Headers, names: Lines) -> list[Ints]:
 
     top, _, bottom = headers.get("P interval", "1/1").rpartition("/")
     every = headers.get("I interval", "32")
-    intervals = [max(1, number(text, 1)) for text in (every, top or "1", bottom)]
+    intervals = [max(1, number(text, 1)) for text in (every, top, bottom)]
     constants = np.zeros(max(_PREDICTORS) + 1, np.int64)
     constants[4] = number(headers["minthrottle"], 1150)
     constants[8], constants[9] = 1500, number(headers["vbatref"], 4095)
@@ -318,7 +310,7 @@ def _layout(path: Path, headers: Headers, names: Lines) -> list[Ints]:
         np.array(list(zip_longest(*lists, [0], fillvalue=0)), np.int64).T.copy()
         for lists in (encodings, predictors)
     )
-    counts = [len(one) for one in encodings]
+    counts = [*map(len, encodings)]
     return [*rows, *(np.array(x, np.int64) for x in (counts, intervals, constants, places))]
 
 
@@ -329,9 +321,9 @@ def _numbers(path: Path, headers: Headers, key: str, known: Collection[int]) -> 
         InputError: one is unknown.
     """
     texts = headers[key].split(",") if headers[key] else []
-    expected = [str(x) for x in known]
+    expected = [*map(str, known)]
     if bad := [text for text in texts if text.strip() not in expected]:
         raise InputError(
             f"{path}: header {key}: {bad[0][:20]}; expected one of {', '.join(expected)}"
         )
-    return [int(text) for text in texts]
+    return [*map(int, texts)]

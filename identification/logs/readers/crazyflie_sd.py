@@ -45,9 +45,6 @@ WHAT = "a Crazyflie's SD-card log"
 _START = re.compile(rb"\xbc([\x01\x02])\0(..)", re.DOTALL)
 _EVENT = re.compile(rb"(..)([^\0]{0,200})\0(..)", re.DOTALL)
 _VARIABLE = re.compile(rb"([^\0,]{1,200})\(([bBhHiIqQefd])\)[\0,]")
-_CHECKED = 0xFFFFFFFF  # CRC-32 of a block and its own, inverted
-_EXPECTED = "a variable's name and the letter of its type, one of b B h H i I q Q e f d"
-_RUN = 4096  # events looked at together
 _TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
 
 
@@ -139,8 +136,9 @@ def _layout(
         InputError: the header is cut, says something else, or names a variable twice.
     """
     fields = [*zip(("event", "time"), types, strict=True)]
+    expected = "a variable's name and the letter of its type, one of b B h H i I q Q e f d"
     for _ in range(many):
-        variable = _part(path, data, place, _VARIABLE, _EXPECTED)
+        variable = _part(path, data, place, _VARIABLE, expected)
         name = variable[1].decode("ascii", "replace").strip()
         if name in dict(fields):
             raise InputError(f"{path}: {name!r} stands in its header twice; expected each once")
@@ -159,7 +157,8 @@ def _rows(path: Path, data: bytes) -> tuple[Rows, int]:
     blocks, count, end = [], 0, place + 4
     while end < len(data):
         behind = end + 1 + data[end] * layout.itemsize + 4
-        if not data[end] or zlib.crc32(data[end:behind]) != _CHECKED:
+        # the CRC-32 of a block and its own, inverted
+        if not data[end] or zlib.crc32(data[end:behind]) != 0xFFFFFFFF:
             break
         blocks.append(data[end + 1 : behind - 4])
         count += data[end]
@@ -178,8 +177,7 @@ def _events(path: Path, data: bytes, kinds: Layouts, begin: int) -> tuple[list[R
         if number not in kinds:
             break
         layout = kinds[number]
-        whole = min((len(data) - place) // layout.itemsize, _RUN)
-        rows = np.frombuffer(data, layout, whole, place)
+        rows = np.frombuffer(data, layout, min((len(data) - place) // layout.itemsize, 4096), place)
         other = np.flatnonzero(rows["event"] != number)
         rows = rows[: other[0]] if other.size else rows
         if not len(rows):

@@ -60,19 +60,12 @@ _SENSORS = (  # field of an inertial sensor, and field of its gain over a time
     ("gyro_rad", "delta_angle"),
     ("accelerometer_m_s2", "delta_velocity"),
 )
-_MICROSECOND = 1e-6  # s
-_HEADER, _MESSAGE = 16, 3  # bytes, of a file and of a message
 _DEEPEST = 20  # topics within topics
 _MOTOR1 = 101  # PX4's number of the output function "motor 1"
 _BANKS = {"MAIN": "PWM_MAIN_FUNC", "AUX": "PWM_AUX_FUNC", "UAVCAN": "UAVCAN_EC_FUNC"}
 _OUTPUTS = 16  # of a bank
-_ESCS = 8
 _LARGEST_SHARE = 1.5  # an output beyond is no share, but of the protocol's range
-_DSHOT = 1999.0  # full command
-_UAVCAN = 8191.0
-_DSHOT_TIMERS = range(-5, -1)  # of PWM_MAIN_TIMn: DShot150 to DShot1200
 _LEAST_PULSE = 700.0  # us: no speed controller is sent a shorter one, disarmed or not
-_ABOVE_PULSES = 1.1  # times the longest pulse: no pulse is longer
 
 
 _Topics = dict[str, list[ArrayMap]]  # columns of each instance
@@ -117,7 +110,7 @@ def channels(
         InputError: pyulog is missing, the file is no ULog or no quadrotor's, or lacks four motors.
     """
     topics, stated, is_damaged = _read_ulog(path)
-    flown = what_flew(stated, topics.pop(_STATUS, []))
+    flown = _what_flew(stated, topics.pop(_STATUS, []))
     flown.check(path)
     parameters = {
         n: x for n, x in stated.items() if has_ranges or not re.search(r"_(MIN|MAX)\d*$", n)
@@ -145,16 +138,24 @@ def channels(
     batteries = [fields.get("connected", 1) for fields in topics.get("battery_status", [])]
     if batteries and not any(map(np.any, batteries)):
         notes.append("battery_status: no battery is connected (connected = 0), so no voltage")
-    instances = [(topic, fields) for topic, each in topics.items() for fields in each]
-    recorded = [s for topic, fields in instances for s in _samples(topic, fields, outputs)]
+    recorded = [
+        samples
+        for topic, instances in topics.items()
+        for fields in instances
+        for samples in _samples(topic, fields, outputs)
+    ]
     empty = {s.topic for s in recorded if not s.columns} - {s.topic for s in recorded if s.columns}
     notes += [f"{topic}: not of four motors that turn; left out" for topic in sorted(empty)]
     sections = sections_of(path, recorded, log_map, "px4_ulog", notes, piece, flown)
     log_map, _, _, said = sections
     if log_map.position is not None and log_map.position.topic == _FILTER:
         fields = topics[_FILTER][0]
-        counters = ("xy_reset_counter", "z_reset_counter")
-        if resets := [name for name in counters if np.ptp(fields.get(name, 0.0)) > 0.0]:
+        resets = [
+            name
+            for name in ("xy_reset_counter", "z_reset_counter")
+            if np.ptp(fields.get(name, 0.0)) > 0.0
+        ]
+        if resets:
             said.append(
                 f"the onboard position was reset in the log ({', '.join(resets)}): it jumps there"
             )
@@ -176,12 +177,12 @@ def _read_ulog(path: Path) -> tuple[_Topics, NamedNumbers, bool]:
     with one_line(f"{path}: cannot be read as a ULog", "a PX4 log (.ulg)"):
         # pyulog prints its doubts; the notes say them
         with open_regular(path, WHAT) as file, redirect_stdout(io.StringIO()):
-            parsed = counting(Parser)(file, sorted(wanted))
+            parsed = _counting(Parser)(file, sorted(wanted))
         with open_regular(path, WHAT) as file:  # each message states its length
-            size, place = file.seek(0, os.SEEK_END), _HEADER
-            while place + _MESSAGE <= size:
+            size, place = file.seek(0, os.SEEK_END), 16  # behind the file's header
+            while place + 3 <= size:
                 file.seek(place)
-                place += _MESSAGE + int.from_bytes(file.read(2), "little")
+                place += 3 + int.from_bytes(file.read(2), "little")
         is_damaged = bool(parsed.file_corruption) or place != size
     topics: _Topics = {}
     for data in (one for one in parsed.data_list if "timestamp" in one.data):
@@ -204,8 +205,8 @@ def _samples(topic: str, fields: ArrayMap, outputs: Outputs) -> Iterator[Channel
     """
     published = fields["timestamp"]
     sampled = fields.get("timestamp_sample", published)
-    plausible = ((sampled > 0.0) & (np.abs(published - sampled) < 1e6)).all()
-    t = _MICROSECOND * (sampled if plausible else published)
+    plausible = ((sampled > 0.0) & (abs(published - sampled) < 1e6)).all()
+    t = 1e-6 * (sampled if plausible else published)
     if topic in ("sensor_combined", "vehicle_imu"):
         yield from (_sensor(topic, t, fields, *names) for names in _SENSORS)
         return
@@ -220,7 +221,7 @@ def unified(topic: str, fields: ArrayMap) -> NamedArrays:
     columns = dict(fields)
     if topic == "esc_status":
         # the ESCs of motors 1 to 4: found by their functions, if all are stated
-        functions = [columns.get(f"esc[{i}].actuator_function", [-1])[-1] for i in range(_ESCS)]
+        functions = [columns.get(f"esc[{i}].actuator_function", [-1])[-1] for i in range(8)]
         reported = [f"esc[{i}].esc_rpm" for i in slots_of_motors(functions, _MOTOR1) or range(4)]
         if not set(reported) <= set(columns):
             return {}
@@ -252,12 +253,12 @@ def _sensor(topic: str, t: Array, fields: ArrayMap, field: str, gained: str) -> 
     stored = [f"{source}[{i}]" for i in range(3)]
     axes = {f"{field}{name[-3:]}": fields[name] for name in stored if name in fields}
     if f"{source}_dt" in fields:  # of gains
-        span = _MICROSECOND * fields[f"{source}_dt"]
+        span = 1e-6 * fields[f"{source}_dt"]
         axes = {n: column / np.where(span > 0.0, span, np.nan) for n, column in axes.items()}
         t = t - 0.5 * span
     late = fields.get("accelerometer_timestamp_relative", np.zeros(len(t)))
-    if field == "accelerometer_m_s2" and (np.abs(late) < 1e6).all():
-        t = t + _MICROSECOND * late
+    if field == "accelerometer_m_s2" and (abs(late) < 1e6).all():
+        t = t + 1e-6 * late
     return ChannelGroup(t, axes, topic)
 
 
@@ -265,7 +266,7 @@ class _TooMuchError(Exception):
     """Ends the parser: after all usual errors the parser goes on."""
 
 
-def counting(parser: Any) -> Any:
+def _counting(parser: Any) -> Any:
     """Return pyulog's class ``ULog``, with a _TooMuchError beyond ``FileLimits``."""
     counts: Counter[str] = Counter()
 
@@ -276,16 +277,17 @@ def counting(parser: Any) -> Any:
 
     class AddLogged(parser._MessageAddLogged):  # type: ignore[misc]
         def _parse_format(self, message_formats: Data) -> None:
-            # an empty one takes its place, too
-            more = 1 + _fields(self.message_name, message_formats, {}, 0)
-            count("fields of its topics", LIMITS.ulog_fields, more)
+            count(
+                "fields of its topics",
+                LIMITS.ulog_fields,
+                1 + _fields(self.message_name, message_formats, {}, 0),  # an empty one counts, too
+            )
             super()._parse_format(message_formats)
 
     def counted(kind: Any) -> Any:
         class Counted(kind):  # type: ignore[misc]
             def __init__(self, *arguments: Any, **options: Any) -> None:
-                what = "parameters, pieces of information, texts and dropouts"
-                count(what, LIMITS.ulog_texts)
+                count("parameters, pieces of information, texts and dropouts", LIMITS.ulog_texts)
                 super().__init__(*arguments, **options)
 
         return Counted
@@ -317,7 +319,7 @@ def _fields(name: str, formats: Data, known: dict[str, int], depth: int) -> int:
     return known[name]
 
 
-def what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
+def _what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
     """Return a log's statements on its vehicle.
 
     Args:
@@ -325,13 +327,15 @@ def what_flew(parameters: Values, statuses: Sequence[ArrayMap]) -> WhatFlew:
         statuses: instances of vehicle_status.
     """
     known = stated("airframes")
-    names = ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
-    count, frame, kind, start = (int(parameters.get(name, 0)) for name in names)
+    count, frame, kind, start = (
+        int(parameters.get(name, 0))
+        for name in ("CA_ROTOR_COUNT", "CA_AIRFRAME", "MAV_TYPE", "SYS_AUTOSTART")
+    )
     if frame in known["px4_airframe"]:
         return WhatFlew(known["px4_airframe"][frame], f"parameter CA_AIRFRAME = {frame}")
     if any(np.any(fields.get("is_vtol", 0)) for fields in statuses):
         return WhatFlew("a VTOL plane", "vehicle_status.is_vtol")
-    types = [int(x) for fields in statuses for x in fields.get("system_type", ())[-1:]]
+    types = (int(x) for fields in statuses for x in fields.get("system_type", ())[-1:])
     claims = (
         ("mav_type", kind, f"parameter MAV_TYPE = {kind}"),
         *(("mav_type", x, f"vehicle_status.system_type = {x}") for x in types),
@@ -368,8 +372,9 @@ def _motor_order(path: Path, parameters: Values, vehicle: SomeVehicle) -> tuple[
             f"{path}: parameters {said} put the rotors at {places} (x forward, y left); expected "
             "one in each quadrant, as on a quad x, or a vehicle file with these rotor_positions"
         )
-    motors = ", ".join(map(str, order))
-    return order, f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {motors}"
+    return order, (
+        f"motors renumbered {whence}: rotors 1, 2, 3, 4 are motors {', '.join(map(str, order))}"
+    )
 
 
 def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Outputs:
@@ -390,7 +395,7 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
         functions = [int(parameters.get(f"{prefix}{i + 1}", 0.0)) for i in range(_OUTPUTS)]
         if of_bank := slots_of_motors(functions, _MOTOR1):
             bank, slots = name, of_bank
-    each = (_of_motors(fields, slots) for fields in sent)
+    each = [_of_motors(fields, slots) for fields in sent]
     motors = next((motors for motors in each if motors is not None), np.zeros((0, 4)))
     most = motors.max(initial=0.0)
     turning = motors[motors > 0.5 * most]  # not the stop command
@@ -399,30 +404,35 @@ def _outputs_of(path: Path, sent: Sequence[ArrayMap], parameters: Values) -> Out
     def pulses(end: str, default: float) -> Array:
         """Return one end (4,) of the outputs' ranges of pulses, us."""
         names = ((f"PWM_{bank}_{end}{s + 1}", f"PWM_{bank}_{end}", f"PWM_{end}") for s in slots)
-        given = (filter(None, map(positive.get, one)) for one in names)
-        return np.array([next(one, default) for one in given])
+        return np.array([next((given[n] for n in one if n in given), default) for one in names])
 
-    positive = {name: x for name, x in parameters.items() if x > 0.0}
+    given = {name: x for name, x in parameters.items() if x > 0.0}
     lows, highs = pulses("MIN", 1000.0), pulses("MAX", 2000.0)
     # with a bus for sensors alone the motors have pulses, long ones at rest, too
     has_bus = parameters.get("UAVCAN_ENABLE", 0.0) >= 3.0 and (motors < _LEAST_PULSE).any()
+    # DShot150 to DShot1200 are -5 to -2
     timers = [parameters.get(f"PWM_{bank}_TIM{i}", 0.0) for i in range(_OUTPUTS)]
-    is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in _DSHOT_TIMERS for x in timers)
+    is_dshot = parameters.get("DSHOT_CONFIG", 0.0) > 0.0 or any(x in range(-5, -1) for x in timers)
     if 0.0 < most <= _LARGEST_SHARE:
         return Outputs(slots, np.zeros(4), np.ones(4), "shares of 1")
     is_uavcan = bank == "UAVCAN" or has_bus
-    if is_uavcan or most > _ABOVE_PULSES * highs.max():
-        protocol, high, stated = "UAVCAN", _UAVCAN, is_uavcan
+    if is_uavcan or most > 1.1 * highs.max():  # no pulse is longer
+        protocol, high, stated = "UAVCAN", 8191.0, is_uavcan
     elif is_dshot or usual < _LEAST_PULSE:
-        protocol, high, stated = "DShot", _DSHOT, is_dshot
+        protocol, high, stated = "DShot", 1999.0, is_dshot
     else:
         if not (highs > lows).all():
             raise InputError(
                 f"{path}: the PWM_{bank}_MIN and MAX parameters of the motors' outputs are "
                 f"{lows.tolist()} and {highs.tolist()}; expected MIN below MAX"
             )
-        words = f"pulses, of which one is above {_LARGEST_SHARE:g}: {lows.min():g} to "
-        return Outputs(slots, lows, highs, f"{words}{highs.max():g} us")
+        return Outputs(
+            slots,
+            lows,
+            highs,
+            f"pulses, of which one is above {_LARGEST_SHARE:g}: {lows.min():g} to "
+            f"{highs.max():g} us",
+        )
     if most > high:
         raise InputError(
             f"{path}: actuator_outputs reaches {most:g}; expected shares up to 1, pulses in us, "
@@ -451,6 +461,5 @@ def _of_motors(columns: ArrayMap, slots: Sequence[int]) -> SomeArray:
     """Return the values of the motors' outputs (N, 4). None: one is missing or never changes, as of
     a servo, or of an unused bank.
     """
-    each = [columns.get(f"output[{slot}]", np.zeros(1)) for slot in slots]
-    is_sent = all(np.ptp(np.nan_to_num(one)) > 0.0 for one in each)
-    return np.nan_to_num(np.column_stack(each)) if is_sent else None
+    each = [np.nan_to_num(columns.get(f"output[{slot}]", np.zeros(1))) for slot in slots]
+    return np.column_stack(each) if all(np.ptp(one) > 0.0 for one in each) else None

@@ -26,10 +26,7 @@ SECTIONS = ("position", "attitude", "rotors", "commands", "battery", "accelerome
 # sections in the messages of another, without a topic of their own
 BESIDE = {"attitude": "position", "gyro": "accelerometer"}
 MOTORS = ("rotors", "commands")
-_SECOND = 10**9  # ns
-_MICROSECOND = 1000  # ns
 _LATEST = 2**63  # ns
-_SHOWN = 30  # fields in an error
 _PX4 = "px4_msgs/msg/"
 
 
@@ -68,7 +65,7 @@ def map_of(types: Types, given: Stated, source: str, where: str) -> Noted[LogMap
             if section in given:
                 raise InputError(f"{source}: {refused[section]}") from error
             continue
-        own = {key: given[key] for key in ("body",) if key in usual and key in given}
+        own = {key: given[key] for key in {"body"} & usual.keys() & given.keys()}
         sections[section] = {**usual, **own, **said, "topic": topic}
         if topic != beside:
             notes.append(f"{section}: topic {topic} ({types[topic]}){why}")
@@ -200,9 +197,9 @@ def stamp(message: Any) -> int:
     """Return the time of a message's sample, in ns of its sender's clock; 0: unknown."""
     header = getattr(message, "header", None)
     if header is not None:
-        return min(int(header.stamp.sec) * _SECOND + int(header.stamp.nanosec), _LATEST - 1)
+        return min(int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec), _LATEST - 1)
     sampled = int(getattr(message, "timestamp_sample", 0) or getattr(message, "timestamp", 0))
-    return _MICROSECOND * sampled if sampled < _LATEST // _MICROSECOND else 0
+    return 1000 * sampled if sampled < _LATEST // 1000 else 0
 
 
 _Getter = Callable[[Any], Any]  # of a number from a message
@@ -235,9 +232,8 @@ class MessageFields:
             before = self._rows()
             paths = list(islice(_paths(message), LIMITS.log_fields + 1))
             check_count(self.where, len(paths), LIMITS.log_fields, "fields of a message")
-            arrays = set(map(array_of, self._wanted))
-            is_used = self._is_px4
-            if new := [x for x in paths if x not in known and (is_used or array_of(x) in arrays)]:
+            arrays = set(map(array_of, paths if self._is_px4 else self._wanted))
+            if new := [x for x in paths if x not in known and array_of(x) in arrays]:
                 known |= {path: _getter(path) for path in new}
                 rows = np.pad(before, ((0, 0), (0, len(new))), constant_values=np.nan)
                 self._numbers = array("d", rows.tobytes())
@@ -261,10 +257,10 @@ class MessageFields:
 
     def lack(self, columns: Wanted) -> InputError:
         """Return the error for columns without some of the wanted ones."""
-        missing = [name for name in self._wanted if name not in columns]
+        missing = ", ".join(name for name in self._wanted if name not in columns)
         return InputError(
-            f"{self.where}: no field {', '.join(missing)} in its {self._kind}; found "
-            f"{', '.join(islice(columns, _SHOWN)) or 'no number'}"
+            f"{self.where}: no field {missing} in its {self._kind}; found "
+            f"{', '.join(islice(columns, 30)) or 'no number'}"
         )
 
 

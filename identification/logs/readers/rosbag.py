@@ -64,10 +64,7 @@ _Messages = Callable[[str], _Received]  # by topic
 
 # times (N,) in ns, columns by name, and a topic, or a doubt on its time stamps
 _Decoded = tuple[NDArray[np.int64], NamedArrays, str]
-_SAME_CLOCK = 1_000_000_000  # ns between a header's time and the recording's
-_NANOSECOND = 1e-9  # s
 LARGEST = LIMITS.bag_chunk
-_METADATA = 1_000_000  # bytes
 _TABLES = 100  # a bag has four or five
 _COMPUTED = re.compile(r"\bAS\s*\(|\bVIRTUAL\b", re.IGNORECASE)
 _LISTED = re.compile(r"^\s*-\s*['\"]?(.+\.(?:db3|mcap))['\"]?\s*$", re.MULTILINE)
@@ -118,8 +115,7 @@ def read(
         raise InputError(f"{path}: {notes[-1]}")
     origin = min(times[0] for times, _, _ in decoded)
     recorded = [
-        ChannelGroup(_NANOSECOND * (times - origin), columns, name)
-        for times, columns, name in decoded
+        ChannelGroup(1e-9 * (times - origin), columns, name) for times, columns, name in decoded
     ]
     sections = sections_of(path, recorded, log_map, "rosbag", notes, piece)
     return flight_log(path, "rosbag", sections, vehicle)
@@ -133,8 +129,7 @@ def _bag_in(path: Path) -> Path:
     """
     if not os.path.isdir(path) or os.path.lexists(path / "metadata.yaml"):
         return path
-    entries = sorted(path.iterdir())
-    files = [x for x in entries if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
+    files = [x for x in path.iterdir() if x.suffix.lower() in (".db3", ".mcap") and not x.is_dir()]
     if len(files) != 1:
         raise InputError(
             f"{path}: no metadata.yaml, and {len(files)} .db3 or .mcap files; expected "
@@ -253,7 +248,7 @@ def _decoded_topic(fields: MessageFields, messages: _Received) -> _Decoded:
     received_at, sampled_at, doubt = np.array(recorded), np.array(stamped), ""
     if not sampled_at.any():
         doubt = "no time stamps"
-    elif np.abs(sampled_at - received_at).max() > _SAME_CLOCK:
+    elif abs(sampled_at - received_at).max() > 1_000_000_000:  # ns
         doubt = "its time stamps are of another clock than the bag's"
     return received_at if doubt else sampled_at, fields.columns(), doubt
 
@@ -325,7 +320,7 @@ def _check_bag_files(path: Path) -> None:
     metadata = (path if is_folder else path.parent) / "metadata.yaml"
     files, text = [path], ""
     if metadata.exists():
-        check_regular(metadata, "the metadata of a ROS 2 bag", _METADATA)
+        check_regular(metadata, "the metadata of a ROS 2 bag", 1_000_000)
         text = metadata.read_bytes().decode("utf-8", "replace")
     if is_folder:
         listed = (path / name for name in _LISTED.findall(text))
@@ -341,8 +336,9 @@ def _check_bag_files(path: Path) -> None:
             uri = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:
                 database.text_factory = partial(str, errors="replace")
-                query = "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
-                tables = database.execute(query).fetchmany(_TABLES)
+                tables = database.execute(
+                    "SELECT name, type, sql FROM sqlite_master WHERE type IN ('table', 'view')"
+                ).fetchmany(_TABLES)
         for name, kind, sql in tables:
             if kind == "view" or _COMPUTED.search(sql or "") or len(tables) == _TABLES:
                 raise InputError(

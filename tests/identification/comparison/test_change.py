@@ -140,7 +140,7 @@ def test_simulated_changes_are_named_without_a_true_model(effects, place, tmp_pa
     said = json.loads(data.read_bytes())
     assert said["headline"] == change_headline(change)
     assert place in said["headline"]
-    assert picture.stat().st_size > 5000
+    assert picture.stat().st_size > 500
     assert compare(before, before).place == NOWHERE
 
 

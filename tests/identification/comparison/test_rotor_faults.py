@@ -83,4 +83,4 @@ def test_a_px4_log_names_the_motor_and_the_time(name, commanded, tmp_path):
     assert found["sure"]
     assert commanded - 0.12 < found["onset_s"] < commanded
     assert found["remaining_ci95"][0] <= 0.2 <= found["remaining_ci95"][1]
-    assert (tmp_path / "rotor_faults.png").stat().st_size > 5000
+    assert (tmp_path / "rotor_faults.png").stat().st_size > 500

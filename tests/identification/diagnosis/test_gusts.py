@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import data_file
+from tests.support.imu_flights import pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.causal_filter import Poses, Track
@@ -33,6 +34,15 @@ def test_gusts_around_a_perfect_model_are_gusts(name, rms):
     assert 0.05 * rms < gust["tau_x"] < 0.2 * rms  # Nm
 
 
+@pytest.mark.parametrize("every", [pytest.param(0), pytest.param(20, marks=pytest.mark.slow)])
+def test_gusts_around_a_perfect_model_are_gusts_without_its_pose(every):
+    vehicle = load_vehicle("ardrone2")
+    log = read_log(data_file("hard_logs/perfect_model_gusts_10mN_imu.csv.gz"), vehicle=vehicle)
+    found = diagnose([pose_removed(log, every)], vehicle)
+    assert found.verdict == "nothing to explain"
+    assert found.probabilities.unknown < 0.25
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["perfect_model_smooth_rounded", "rubber_tether"])
 def test_what_no_effect_of_the_library_does_has_no_sure_name(name):
@@ -57,13 +67,14 @@ def test_rotors_that_answer_a_product_of_rates_have_no_innovation_by_it():
     mix = 1e-5 * np.array([[1, 1, 1, 1], roll, [-1, 1, 1, -1], [1, -1, 1, -1]]).T
     between = 0.5 * (speeds + np.vstack([speeds[1:], speeds[-1:]]))
     heading = np.tile([1.0, 0.0], (n, 1))
-    t = 0.005 * np.arange(n)
-    poses = Poses(t, 0.005, zeros[:, :3], heading, speeds, zeros[:, 0], np.zeros(3), np.zeros(3))
+    k = np.arange(n)
+    t = 0.005 * k
+    poses = Poses(t, zeros[:, :3], heading, speeds, zeros[:, 0], zeros[:1], k, k, k)
     track = Track(
         t, zeros[:, :3], level, zeros[:, :3], rate, zeros, between**2 @ mix, zeros, zeros, heading,
         zeros, zeros,
     )  # fmt: skip
-    (found,) = rotor_innovations([(poses, track)])
+    found = rotor_innovations(poses, track)
     roll_innovation, answer = found[LAGS:, 1], answered[LAGS:, 1]
     assert abs(np.corrcoef(roll_innovation, answer)[0, 1]) < 0.01
 

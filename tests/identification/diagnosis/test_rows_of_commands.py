@@ -73,6 +73,9 @@ def test_thrust_at_a_command_is_a_nuisance_by_its_differences_between_flights():
     assert not one["thrust 0"].any()
     assert abs(two["thrust 0"]).max() > 0.4 * THRUST_STD * STATED.gravity
     assert_allclose(two["thrust 0"], -two["thrust 1"], atol=1e-12)
+    # only a curve states the thrust
+    assert not RegressedFlights(logs, STATED).thrust_std
+    assert RegressedFlights(logs, VEHICLE).thrust_std > 0.0
 
 
 def test_a_hover_shows_a_load_by_the_mean_thrust_alone():

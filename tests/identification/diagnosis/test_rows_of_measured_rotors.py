@@ -15,7 +15,7 @@ from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.evidence.trials.logged_poses import FILTERS
 from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.priors import NUISANCE
+from windwrench.identification.diagnosis.column import Column, Part
 from windwrench.identification.diagnosis.ranking import rank_by_rows
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
@@ -79,21 +79,21 @@ def test_rows_hold_forces_and_torques(offset):
     without = rows.residual({})
     found = rows.residual({"com_offset": dict(OFFSET.coefficients)})
     assert np.square(found[:, 4]).mean() < 0.2 * np.square(without[:, 4]).mean()
-    column = rows.columns({}, [("com_offset", "cx")])["com_offset", "cx"]
+    (column,) = rows.columns({}, [Column("com_offset", "cx")]).values()
     assert_allclose(without - found, 0.01 * column, atol=0.03 * abs(without).max())
 
 
 def test_a_centre_of_mass_is_found_behind_a_filter(offset):
-    found = rank_by_rows(offset, LIBRARY, {}, {})
+    found = rank_by_rows(offset, LIBRARY, {}, {}, print)
     best = found.ranking.sets[0]
     assert best.effects == ("com_offset",)
     assert found.ranking.probability["com_offset"] > 0.95
     assert best.coefficients["com_offset"]["cx"] == pytest.approx(0.01, abs=0.001)
-    assert worth(offset, {}, (), found.setting)["com_offset"] > 1.0
+    assert worth(offset, {}, (), found.needed)["com_offset"] > 1.0
 
 
 def test_a_weak_rotor_is_found_by_an_imu_alone(weak):
-    found = rank_by_rows(weak, LIBRARY, {}, {})
+    found = rank_by_rows(weak, LIBRARY, {}, {}, print)
     best = found.ranking.sets[0]
     assert best.effects == ("rotor_efficiency",)
     assert best.coefficients["rotor_efficiency"]["e2"] == pytest.approx(
@@ -106,33 +106,33 @@ def test_a_bias_hides_steady_forces_along_the_body():
     """In a calm hover they show by little else, and torques do not look like a bias."""
     log = pose_removed(imu_flight(VEHICLE, seconds=15.0, trajectory="gentle"))
     flights = RegressedFlights([log], VEHICLE)
-    found = rank_by_rows(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {})
+    found = rank_by_rows(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {}, print)
     assert found.ranking.sets[0].effects == ()
-    biases = [("", f"{NUISANCE}{name}") for _, name in flights.biases]
+    biases = [c._replace(part=Part.NUISANCE) for c in flights.biases]
     shown = found.posterior.shown()
     known = found.posterior.shown(biases)
-    assert all(x > 13.0 for x in shown.values())
-    assert {e for e, x in shown.items() if x < 250.0 <= known[e]} == {
+    assert {e for e, x in shown.items() if x < 13.0} <= {"thrust_scale"}  # as a vertical gust does
+    assert {e for e, x in shown.items() if x < 200.0 <= known[e]} == {
         "thrust_scale",
         "thrust_axis_tilt",
     }
 
 
 def test_a_share_of_what_follows_disturbances_counts_as_one(weak):
-    """All of the rotors' answers where disturbances are as large, and next to none where the flight
-    is far from one.
+    """All of the rotors' answers where disturbances are as large, and a tenth where disturbances
+    are a tenth.
     """
     rows = Rows(weak, {})
     ones = np.tile((-1.0) ** np.arange(len(rows.t))[:, None], rows.channels)  # deviation of one
     for name, (signal, channels) in followers(rows).items():
         spread = signal[rows.fit].std()
         calm, rough = (
-            answered(rows, {name: (signal, channels)}, x * spread * ones)[f"answer by {name}"]
+            answered(rows, {name: (signal, channels)}, x * spread * ones)[f"answer by {name} 0"]
             for x in (0.1, 1.0)
         )
         moved = signal - signal[rows.fit].mean()
         assert_allclose(rough[:, channels[0]], moved, rtol=0.05)
-        assert_allclose(calm, 0.01 * rough, rtol=0.1)
+        assert_allclose(calm, 0.1 * rough, rtol=0.1)
 
 
 def test_a_disturbance_that_thrust_answers_by_its_change_counts_as_one(weak):

@@ -12,11 +12,12 @@ from tests.support.flown import VEHICLE, recorded, resting, settings
 from tests.support.own_effects import HOSE, joined
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.evidence.trials.practice_flights import fly_practice
-from windwrench.identification.diagnosis.advice import composites
+from windwrench.identification.diagnosis.advice import cancelling, composites
+from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY, delays_at_bound
 from windwrench.identification.diagnosis.priors import prior_size
-from windwrench.identification.diagnosis.ranking import rank, starts_of
+from windwrench.identification.diagnosis.ranking import _starts_of, rank
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.starting_points import starting_points
 from windwrench.identification.diagnosis.traces import ORDER, carrying_channels
@@ -59,10 +60,17 @@ STIFFER = {"inertia": {"jx": 0.1, "jy": 0.1, "jz": 0.1}}
     ],
 )
 def test_two_that_change_alike_may_be_a_third(setting, third):
-    std = {effect: dict.fromkeys(values, 0.002) for effect, values in setting.items()}
-    found = list(composites(VEHICLE, setting, std))
+    sized = {effect: (values, dict.fromkeys(values, 0.002)) for effect, values in setting.items()}
+    found = list(composites(VEHICLE, sized))
     assert len(found) == bool(third)
     assert all(third in sentence.split(": ")[1] for sentence in found)
+
+
+def test_effects_that_cancel_are_told_by_their_sum():
+    lift, load, drag = np.outer([0.25, -0.22, 0.2], np.eye(6)[2])[:, None]
+    (told,) = cancelling({"lift": lift, "load": load}, 0.1 * np.eye(6))
+    assert told.endswith("their sum, 0.03 N")
+    assert not [*cancelling({"lift": lift, "drag": drag}, 0.1 * np.eye(6))]
 
 
 STARTS = "starting_points=lambda flights: [{'a': 0.15, 'w': 1.25 + 0.125 * i} for i in range(60)]"
@@ -89,7 +97,7 @@ def test_an_effect_may_start_in_the_place_of_another():
     """A force that is known already leaves nothing of the wind that would explain it."""
     force = {"constant_force": {"fx": 0.3, "fy": 0.0, "fz": 0.0}}
     flights = RegressedFlights([recorded(seconds=12.0, **force)], VEHICLE)
-    found = starts_of(flights, ["wind"], force, {}).values()
+    found = _starts_of(flights, ["wind"], force, {}).values()
     assert any(start["wx"] > 3.0 * abs(start["wy"]) for start in found)
 
 
@@ -163,10 +171,10 @@ def test_a_lag_that_is_uneven_leaves_no_mass():
     """The mass is that of a fit to the rotor speeds themselves, which are smoothed here."""
     library = ["motor_lag", "mass"]
     known = rank(
-        RegressedFlights([unevenly_lagging(commanded=False)], VEHICLE), library
+        RegressedFlights([unevenly_lagging(commanded=False)], VEHICLE), library, print
     ).ranking.sets[0]
-    found = rank(RegressedFlights([unevenly_lagging(commanded=True)], VEHICLE), library)
-    assert found.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.006)
+    found = rank(RegressedFlights([unevenly_lagging(commanded=True)], VEHICLE), library, print)
+    assert found.needed["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.006)
     apart, _ = found.posterior.nuisances()[LAG_ASYMMETRY]
     assert 0.5 * APART < apart < 1.5 * APART
     off = [x.coefficients.get("mass", {"dm": 0.0})["dm"] for x in (found.ranking.sets[0], known)]
@@ -176,7 +184,7 @@ def test_a_lag_that_is_uneven_leaves_no_mass():
 def test_a_hanging_load_of_half_the_vehicles_mass_is_expected():
     """A prior of a tenth of that mass told measured loads of a half too small by a third."""
     flights = SimpleNamespace(vehicle=load_vehicle("crazyflie"), thrust_std=0.0)
-    assert 0.5 * flights.vehicle.mass < 2.0 * prior_size(("slung_payload", "m"), flights)
+    assert 0.5 * flights.vehicle.mass < 2.0 * prior_size(Column("slung_payload", "m"), flights)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from tests.support.flown import resting
 from tests.support.outcomes import noted, refused
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
-from windwrench.identification.diagnosis.commanded_rotors import thrust_is_assumed
 from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
@@ -49,7 +48,6 @@ def test_a_motor_curve_turns_commands_into_rotor_speeds(tmp_path):
     assert not read_log(path).has_rotor_speeds
     log = read_log(path, vehicle=vehicle)
     assert log.commanded
-    assert not thrust_is_assumed([log], vehicle)
     assert noted(log, "motor curve")
     u = np.array([0.5, 0.6, 0.7, 0.8])
     thrust = (0.02 * u + 0.10 * u**2) * (3.8 / 4.0) ** 2

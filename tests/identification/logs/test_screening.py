@@ -236,7 +236,7 @@ def test_a_frozen_pose_counts_as_none():
     quaternion[frozen] = quaternion[first]
     log = replace(log, position=position, quaternion=quaternion)
     checked, notes = screen_log(log, VEHICLE, None)
-    assert any("pose is frozen for 0.995 s from t = 5.005 s (1 such" in note for note in notes)
+    assert any("pose is frozen for 0.995 s from t = 5.005 s (1 in" in note for note in notes)
     assert_array_equal(checked.valid, ~(frozen & (np.arange(len(log.t)) != first)) & log.valid)
     still = replace(log, position=0 * log.position + 1, quaternion=0 * log.quaternion + 0.5)
     with refused(r"flight.csv: the pose never changes"):

@@ -65,12 +65,12 @@ def test_a_file_keeps_the_loop():
 
 def test_a_known_loop_comes_back(log):
     starts = logged_starts(log, CRAZYFLIE, [(log.t[0], log.t[-1])], 0.5)
-    made = replace(starts, seen=starts.flown(with_loop(LOOP)))
-    groups = np.arange(len(made.rows)) // 8
-    fit = fit_loop([made], [groups], with_loop(None))
+    segment = np.arange(len(starts.rows)) // 8
+    made = starts._replace(segment=segment, seen=starts.flown(with_loop(LOOP)))
+    fit = fit_loop([made], with_loop(None))
     found = dict(zip(UNITS, astuple(fit.loop), strict=True))
     for name, value in zip(UNITS, astuple(LOOP), strict=True):
         assert found[name] == pytest.approx(value, rel=0.1, abs=0.05), name
-    without = fit.by(np.unique(groups)[2:])
-    assert astuple(without) == pytest.approx(astuple(fit.loop), rel=0.1, abs=0.1)
+    without = fit_loop([made.those(segment > 1)], with_loop(None), fit.loop)
+    assert astuple(without.loop) == pytest.approx(astuple(fit.loop), rel=0.1, abs=0.1)
     assert (fit.deviations > 0.0).all()

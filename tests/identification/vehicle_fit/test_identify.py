@@ -65,6 +65,11 @@ def commanded():
 
 
 @pytest.fixture(scope="module")
+def identified(commanded):
+    return of_crazyflie(commanded)
+
+
+@pytest.fixture(scope="module")
 def inertial():
     return inertial_flights(range(8))
 
@@ -82,8 +87,8 @@ def test_results_are_those_kept():
     assert_alike(json.loads(json.dumps(made())), json.loads(GOLDEN.read_bytes()))
 
 
-def test_commanded_speeds_show_the_vehicle_and_its_lag(commanded):
-    found = of_crazyflie(commanded)
+def test_commanded_speeds_show_the_vehicle_and_its_lag(identified):
+    found = identified
     check(found, "k", CRAZYFLIE.k[0], 0.05)
     check(found, "p", CRAZYFLIE.p[0], 0.05)
     for name, moment in zip(("Jxx", "Jyy", "Jzz"), np.diag(CRAZYFLIE.inertia), strict=True):
@@ -96,7 +101,7 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(commanded):
     assert (share[2:] > 0.9).all()
     assert (share[:2] < 0.1).all()
     assert list(found.predicted) == ["held_out_blocks", "flights_left_out"]
-    for errors in found.predicted.values():
+    for errors, _ in found.predicted.values():
         assert (errors.model[:, -1] < 0.3 * errors.still[:, -1]).all()
 
 
@@ -296,8 +301,8 @@ def test_commands_are_read_by_the_curve_of_the_vehicle_that_predicts(inertial):
     assert with_commanded_speeds(measured, vehicle) is measured
 
 
-def test_an_inertia_that_no_body_has_moves_to_the_nearest(commanded):
-    fit = of_crazyflie(commanded[:2]).fit
+def test_an_inertia_that_no_body_has_moves_to_the_nearest(identified):
+    fit = identified.fit
     flat = fit.theta.copy()
     flat[fit.model.free.index("Jz")] += 0.4
     body, size = nearest_body(replace(fit, theta=flat))

@@ -1,4 +1,4 @@
-"""Five flights for C and Python, with faults of a pose: numbers as single precision holds them."""
+"""Five flights for C and Python: numbers as single precision holds them."""
 
 import math
 from dataclasses import replace
@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import default_rng
 
-from tests.support.exported_c.hostile import befall
 from tests.support.flown import noisy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import parse_setting
@@ -26,9 +25,6 @@ FLIGHTS = {
     ),
     "crazyflie, 50 poses a second": ("crazyflie", "circle", (), (0.0, 0.0, 0.0), 4),
 }
-_FAULT = 0.01  # chance a step that a fault begins
-_SIZES = {"gap": 0.0, "position only": 0.0, "attitude only": 0.0, "burst": 1.5, "tilted": 0.5}
-_LENGTHS = (0.015, 0.08, 0.3, 0.8, 1.5)  # s
 
 
 def vehicle_of(name):
@@ -39,13 +35,11 @@ def vehicle_of(name):
     return replace(model, mocap=rate).with_effects(*(parse_setting(e, model) for e in effects))
 
 
-def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
+def flight(name, steps, seed=0, imu=False, noise=1.0):
     """Return ``dt`` (n,), ``rotor_speeds`` (n, 4), ``position`` (n, 3), ``quaternion`` (n, 4), and
     with an IMU ``gyro`` and ``accelerometer`` (n, 3); what was not measured is NaN.
 
-    Steps are uneven by 2 %. Faults are gaps, positions or attitudes alone, jumps by 1.5 m, and
-    tilts by half a radian, of 15 ms to 1.5 s. ``noise`` is that of poses in declared deviations, at
-    least one.
+    Steps are uneven by 2 %. ``noise`` is that of poses in declared deviations, at least one.
     """
     vehicle, trajectory, _, com, every = FLIGHTS[name]
     model = replace(load_vehicle(vehicle), com=np.array(com))
@@ -73,15 +67,6 @@ def flight(name, steps, seed=0, faults=True, imu=False, noise=1.0):
             out[key] = log[key][rows] + bias * rng.uniform(-1.0, 1.0, 3)
             out[key] += noise * rng.standard_normal((n, 3))
         _saturate(rng, out["accelerometer"])
-    k = round(0.5 / period) if faults else n
-    while k < n:
-        if rng.random() < _FAULT * period / 0.005:
-            kind = str(rng.choice(list(_SIZES)))
-            length = float(rng.choice(_LENGTHS))
-            rows = slice(k, min(k + max(1, round(length / period)), n))
-            befall(kind, rows, position, quaternion, out["rotor_speeds"], rng, _SIZES[kind])
-            k = rows.stop
-        k += 1
     return {key: np.asarray(value, dtype=np.float32).astype(float) for key, value in out.items()}
 
 
