@@ -215,10 +215,15 @@ def test_a_wind_is_no_drag_and_no_tilt(swing):
     wind = named["wind"]
     assert wind.coefficients["wx"] == pytest.approx(-6.0, abs=2.0 * wind.std["wx"])
     assert wind.std["wx"] < 0.8
-    drags = {"body_drag", "rotor_drag", "constant_force"}
-    assert not {"world_tilt", "thrust_axis_tilt", *drags} & named.keys()
+    assert not named.keys() & {
+        "world_tilt",
+        "thrust_axis_tilt",
+        "body_drag",
+        "rotor_drag",
+        "constant_force",
+    }
     assert found.probabilities.names["wind"] > 0.8
-    assert found.after.force_rms < 0.35 * found.before.force_rms
+    assert found.after.force_rms < (0.2 + swing / 12.0) * found.before.force_rms
 
 
 def test_in_still_air_nothing_is_sure():
