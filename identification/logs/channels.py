@@ -34,6 +34,7 @@ from .table import (
     Rows,
     SomeArray,
     Table,
+    among,
     finite_rows,
     lengths,
 )
@@ -124,7 +125,7 @@ class Stream:
         out = resampled(t, times, self.values)
         step = np.diff(times)
         after = np.searchsorted(times, t).clip(1, len(step))
-        there = (step[after - 1] <= LONGEST_STEPS * np.median(step)) | np.isin(t, times)
+        there = (step[after - 1] <= LONGEST_STEPS * np.median(step)) | among(t, times)
         out[~there | (t < times[0]) | (t > times[-1])] = nan
         return out
 
@@ -144,7 +145,7 @@ def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
     good = lengths(attitude.values) > 0.5  # False where NaN
     times, values = attitude.t[good], attitude.values[good]
     after = np.searchsorted(times, t)
-    exact = np.isin(t, times)
+    exact = among(t, times)
     if exact.all():
         return values[after]
     if len(times) < 2:

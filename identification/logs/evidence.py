@@ -194,11 +194,11 @@ class Evidence:
         """Return columns (m, k), low-passed as a trajectory's motion is."""
         return low_pass(x, CUTOFFS.convention_hz, self._period)
 
-    def _band(self, x: Array) -> Array:
-        """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
+    def _band(self, x: Array, rows: Rows | slice = slice(None)) -> Array:
+        """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k), some rows."""
         # Below 1 Hz, steady moments of the air are larger than the torques of turning; above 4 Hz
         # (of yaw, where rotors do least, 3 Hz), the pose's noise is
-        low, high, yaw = (low_pass(x, hz, self._period) for hz in (1.0, 4.0, 3.0))
+        low, high, yaw = (low_pass(x, hz, self._period)[rows] for hz in (1.0, 4.0, 3.0))
         return np.stack([high - low, yaw - low], axis=1)
 
     @cached_property
@@ -248,8 +248,9 @@ class Evidence:
             matrices, w = turning(smooth, self._period)
         axes = self._slow(self._driving[:, 9:] * matrices.reshape(-1, 9))
         products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
-        turns = self._band(np.column_stack([w, derivative(w, self._period), products]))
-        return axes[self._compared].reshape(-1, 3, 3), turns[self._compared]
+        turns = np.column_stack([w, derivative(w, self._period), products])
+        rows = self._compared
+        return axes[rows].reshape(-1, 3, 3), self._band(turns, rows)
 
     def _needed(self, along: Array, reading: Convention) -> Array:
         """Return the force ``along`` the thrust axis (n,) above the torques in Nm of the motion, in

@@ -21,7 +21,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.inertial_signals import imu_rows, inertial_pieces, reads_imu
 from ..motion.signals import SHORTEST_PIECE, pose_pieces
-from ..motion.smoothing import CUTOFFS, low_pass, runs_of, turn_between
+from ..motion.smoothing import CUTOFFS, low_pass, runs_of
 from .evidence import remedies
 from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, serves
 from .flight_phases import carrying, flying, usual_thrust
@@ -289,7 +289,7 @@ def _steps(log: FlightLog) -> _Findings:
     t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
     step = np.diff(t)
     way = lengths(np.diff(position, axis=0))
-    angle = lengths(turn_between(q[:-1], q[1:]))
+    angle = 2.0 * np.arccos(np.minimum(abs(np.einsum("ni,ni->n", q[:-1], q[1:])), 1.0))
     # m and rad, and m/s and rad/s over the step
     far, turned = way > 0.3 + 20.0 * step, angle > 0.8 + 60.0 * step
     leaps = far | turned
@@ -370,11 +370,10 @@ def _still(name: str, t: Array, rows: Mask, x: Array, own: list[int], names: str
     """
     still = rows & ~np.diff(x[:, own], axis=0, prepend=np.nan).any(axis=1)
     sisters = np.delete(x, own, axis=1)
-    changes = (np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0).cumsum(axis=0)
     for first, end in runs_of(still):
         lasts = t[end - 1] - t[first] >= _STILL
         # of equally often changing channels, one without a change in 20 has a chance of exp(-20)
-        if lasts and (changes[end - 1] - changes[first]).min() < 20:
+        if lasts and np.count_nonzero(np.diff(sisters[first:end], axis=0), axis=0).min() < 20:
             still[first:end] = False
     if stretches := _stretches(still, t, _STILL):
         yield _Note(
