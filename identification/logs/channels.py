@@ -369,7 +369,12 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> C
     if len(raw) < 2:
         raise InputError(f"{where}: {len(raw)} time(s); expected at least two")
     # a channel with a value in every row has one time for each value
-    full = any(np.isfinite(x).all() for n, x in samples.columns.items() if n not in clock.named)
+    held = np.diff(raw) == 0.0
+    full = any(
+        np.isfinite(x).all() and np.diff(x)[held].any()  # else a row was written twice
+        for n, x in samples.columns.items()
+        if n not in clock.named
+    )
     if full and (even := _even_times(raw)) is not None:
         rounded, raw = np.diff(np.unique(raw)).min(), even
         notes.append(

@@ -140,7 +140,7 @@ class _Motion:
             # above a quarter of the poses' rate is noise alone
             noises.append(robust_std(high_pass(angles, 0.25)))
             self.turns.append((log.t[piece], running_integral(angles, log.t[piece])))
-        self.count = round(_SEGMENT / period)
+        self.count = max(1, round(_SEGMENT / period))
         self.window = np.hanning(self.count)[:, None]
         frequency = np.fft.rfftfreq(self.count, period).astype(float)
         self.band = (frequency >= 0.8) & (frequency <= min(10.0, 0.4 / step))
@@ -168,7 +168,7 @@ class _Motion:
                 part = both[:, begin : begin + self.count]
                 part = self.window * (part - part.mean(axis=1, keepdims=True))
                 transforms.append(np.fft.rfft(part, axis=1)[:, self.band])
-        return np.array(transforms).reshape(-1, 2, len(self.omega), 2).swapaxes(0, 1)
+        return np.reshape(transforms, (len(transforms), 2, len(self.omega), 2)).swapaxes(0, 1)
 
     def response(self, moment: Spectra, turning: Spectra) -> _Response:
         """Return the frequency response of some of the segments."""

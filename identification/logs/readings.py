@@ -136,10 +136,10 @@ class Convention:
                 f"{seconds} {sooner}"
             )
         if self.length != "m":
-            name = {"mm": "milli", "cm": "centi"}[self.length]
+            name = {"mm": "millimetres", "cm": "centimetres", "ft": "feet"}[self.length]
             words.append(
-                f"px, py, pz look like {name}metres; expected metres: divide them by "
-                f"{1.0 / UNITS['position'][self.length]:.0f}"
+                f"px, py, pz look like {name}; expected metres: divide them by "
+                f"{1.0 / UNITS['position'][self.length]:.4g}"
             )
         words += self._pose_words()
         if self.rotors != ROTORS:
@@ -258,7 +258,7 @@ def log_readings(has_pose: bool) -> list[Convention]:
         attitudes = _quaternions(("wxyz", "xyzw", "zwxy"))
         others = _each(attitude=attitudes, frames=_USUAL_FRAMES)[1:]
         others.append(Convention(attitudes[1], _frames(_STATED["mirrored"])))
-        others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
+        others += _each(frames=_POSITIONS) + _each(length=("cm", "mm", "ft"))
     others = [replace(reading, unlikely=OTHER) for reading in others]
     return [DECLARED, *_weighed(others), *ROTOR_READINGS]
 
