@@ -67,7 +67,10 @@ class ChannelGroup:
 
     def there(self, part: Columns) -> Mask:
         """Return the rows (N,) with all values of a section."""
-        return finite_rows(self.values(part))
+        there = np.isfinite(self.t)
+        for name in part.named:
+            there &= np.isfinite(self.columns[name])
+        return there
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""
@@ -160,7 +163,7 @@ def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
 
 def scaled(part: Columns, values: Array) -> Array:
     """Return columns (N, k), with the section's signs and scale."""
-    return values * (part.signs or 1) * part.scale
+    return values * (np.array(part.signs or 1) * part.scale)
 
 
 def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) -> Array:
@@ -179,8 +182,8 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
     if isinstance(part, Battery):
         return values * unit * part.cells
     if isinstance(part, Sensor):
-        return values * unit @ BODY_TURNS[part.body or log_map.body].T
-    return values if section == "wrench" else values * unit @ WORLD_TURNS[log_map.world].T
+        return values @ (unit * BODY_TURNS[part.body or log_map.body].T)
+    return values if section == "wrench" else values @ (unit * WORLD_TURNS[log_map.world].T)
 
 
 def quaternions(part: Attitude, values: Array) -> Array:
