@@ -600,7 +600,7 @@ def _cleaned(path: Path, streams: Streams, notes: Lines) -> Streams:
             values = np.where(finite_rows(values)[:, None], values, nan)
         if section == "position" or (np.isfinite(values).any() and count > 1):
             made[section] = Stream(name, stream.t, values)
-        elif section == "battery" and not (values > 0.0).any():
+        elif section == "battery" and not (stream.values > 0.0).any():
             notes.append(f"{name}: no positive voltage; left out")
     return made
 
