@@ -106,7 +106,7 @@ class _PreviewLaw:
         ]
         return np.clip(wanted, -self.largest, self.largest).astype(np.float32)
 
-    def _states(
+    def along(
         self, info: Mapping[str, Any], place: Wide, speed: Wide, pushed: Wide
     ) -> list[Wide]:
         """Return the state (..., n) of each axis; ``place``, ``speed`` and ``pushed`` (..., 3) are
@@ -168,7 +168,7 @@ class WindOracle(_PreviewLaw):
         """Return the state (..., n) of each axis for observations (..., 27) and true values."""
         place = info["position"] - info["reference"]
         speed = info["velocity"] - o[..., REFERENCE_VELOCITY]
-        return self._states(info, place, speed, o[..., REFERENCE_ACCELERATION])
+        return self.along(info, place, speed, o[..., REFERENCE_ACCELERATION])
 
     def _look(self, o: Wide, info: Mapping[str, Any]) -> tuple[list[Wide], list[Wide]]:
         return self.states(o, info), pushing(
@@ -214,7 +214,7 @@ class Oracle(_PreviewLaw):
         place = info["place"]
         fan = np.insert(info["fan_ahead"], 0, place[0], axis=1)  # it keeps its distance
         moves, off = np.diff(fan, axis=0), info["setpoint"] - fan[0]
-        states = self._states(info, place - fan[0], info["velocity"], np.zeros(3))
+        states = self.along(info, place - fan[0], info["velocity"], np.zeros(3))
         wrench = np.concatenate([info["force"], info["torque"]])
         comes = pushing(lasting(wrench, self.foresight, DECISION_PERIOD))
         return (

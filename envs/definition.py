@@ -56,7 +56,7 @@ class TaskDefinition:
     accelerometer: ClassVar[tuple[float, float] | None] = ACCELEROMETER
     label: ClassVar[str] = "trajectory"  # entry of ``info`` with the name of the episode's draw
     draws: ClassVar[int] = 20  # at most, until an episode begins with the vehicle not lost
-    mixes: ClassVar[bool] = False  # whether episodes differ in what lanes share
+    mixes: bool = False  # whether episodes differ in what lanes share
     _made: ClosedLoop | None = None  # last of all loops, whose MuJoCo model the next one may take
     limits: Any = None  # (k,) largest sizes of the observation's numbers
     scales: Any = None  # (k,) their divisors, with ``normalize``

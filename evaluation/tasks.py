@@ -143,10 +143,12 @@ class BenchmarkTask:
         if self.scenarios:
             given["scenario"] = self.scenario(scenario)
         if self.kin or self.spec is None:
-            given["normalize"] = True
-        spec = self.spec or gym.spec(f"windwrench/{self.name}-v1")
-        mode = "sync" if spec.vector_entry_point is None else "vector_entry_point"
-        return gym.make_vec(spec, count, vectorization_mode=mode, **given)
+            given.setdefault("normalize", True)
+        if self.spec is None:
+            many: gym.vector.VectorEnv = self.environment.vector(count, **given)
+            return many
+        mode = "sync" if self.spec.vector_entry_point is None else "vector_entry_point"
+        return gym.make_vec(self.spec, count, vectorization_mode=mode, **given)
 
     def units(self, envs: gym.vector.VectorEnv, judge: Any) -> dict[str, Any]:
         """Return the entries of a policy's card for the units of ``make``: ``scale`` of the

@@ -60,7 +60,7 @@ class FanHindsight:
     def __init__(self, features: Features | None = FEATURES) -> None:
         """Take a policy's inputs; None: the scaled observation."""
         self._features = features
-        oracle = Oracle()
+        self._oracle = oracle = Oracle()
         model = Oracle.steps(oracle.vehicle)[_ALONG_Y]
         self._gain, self._ahead = preview(*model, oracle.effort, AHEAD)
 
@@ -97,13 +97,10 @@ class FanHindsight:
     def _own(self, infos: dict[str, Any]) -> Array:
         """Return the states (n, 7) of the vehicles along y."""
         truth = self._envs.truth()
-        up = truth["up"]
-        y = _ALONG_Y
-        turning = tilting(truth["rate"])[y]
-        turned = tilting(truth["angular_acceleration"])[y]
-        middle = up[:, y] / up[:, 2], turning, turned, truth["integral"][:, y]
-        moved = infos["y"], truth["velocity"][:, y], *middle, self._set_point
-        return np.column_stack(moved)
+        still = np.zeros_like(truth["velocity"])
+        place = still + infos["y"][:, None]
+        state = self._oracle.along(truth, place, truth["velocity"], still)[_ALONG_Y]
+        return np.column_stack([state, self._set_point])
 
     def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the best command, the fan's offset (m) and its velocity (m/s), (decisions, n, 3),

@@ -16,7 +16,6 @@ from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
 from ..envs.definition import TaskDefinition
 from ..evaluation.episodes import fly_episode
-from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
@@ -25,7 +24,7 @@ from ..runtime.provenance import package_versions
 from ..runtime.regular_files import read_json
 from .configuration import Config, features_of
 from .seeds import FIRST_VALIDATION_SEED, validation_seeds
-from .training_envs import check_training_env, make_training_env
+from .training_envs import training_task
 
 _SQUASHED = ("sac", "td3")  # algorithms with a tanh behind the policy's output
 
@@ -176,11 +175,12 @@ class Run:
         seed: int,
         folder: Path,
         report: Callable[[Progress], None],
-        task: str = STANDARD_TASK,
-        reward: str | None = None,
-        observation: str | None = None,
+        task: str,
+        reward: str | None,
+        observation: str | None,
     ) -> None:
-        check_training_env(scenario, task)
+        known = training_task(task)
+        self.judge = known.make(scenario, reward, observation=observation)
         self.config = config
         self.scenario = scenario
         self.seed = seed
@@ -188,12 +188,11 @@ class Run:
         chosen = {"reward": reward, "observation": observation}
         self.own = {name: value for name, value in chosen.items() if value is not None}
         if task != STANDARD_TASK or observation:
-            self.own["task"] = task_of(task).name
+            self.own["task"] = known.name
         self._claim()
         self.progress = Progress()
         self._report = report
         self._began = time.perf_counter()
-        self.judge = make_training_env(scenario, task, reward, observation)
         self.best = folder / "best.npz"
 
     def _claim(self) -> None:
@@ -235,12 +234,9 @@ class Run:
                 card["flight"] = flight_of(world)
         return card
 
-    def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
+    def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> None:
         """Validate a policy, and save the policy as the last, and as the best if no earlier policy
         is better.
-
-        Returns:
-            Its RMSE and losses, as of ``validate``.
         """
         episodes = self.config["validation"]["episodes"]
         rmse, lost, by_error = validate(policy, self.judge, episodes)
@@ -257,7 +253,6 @@ class Run:
             save_policy(card, policy.weights, self.best)
         self.write_progress()
         self._report(now)
-        return rmse, lost
 
     def write_progress(self) -> None:
         """Write the run's progress to ``progress.json``."""

@@ -78,7 +78,15 @@ def train(
         run.resume(progress_from(load_checkpoint(learner, env, checkpoint), checkpoint))
     every = config["validation"]["every"]
     between = config["checkpoint"]
-    follow = _follower(advance)
+
+    def follow(collecting: dict[str, Any], _: dict[str, Any]) -> bool:
+        """Tell the decisions so far, and the RMSE of finished training episodes."""
+        advance(learner.num_timesteps)
+        for info in collecting["infos"]:
+            if "rmse" in info:
+                learner.logger.record_mean("rollout/rmse_m", info["rmse"])
+        return True
+
     while (done := learner.num_timesteps) < whole:
         target = min((done // every + 1) * every, (done // between + 1) * between, whole)
         learner.learn(target - done, callback=follow, reset_num_timesteps=False, log_interval=4)
@@ -86,9 +94,9 @@ def train(
         if run.is_due(done, done >= whole):
             kind = TrainedPolicy if standard else TaskPolicy
             policy = kind(run.card(done) | seen, weights_of(learner, algorithm))
-            rmse, lost = run.take_stock(policy)
-            learner.logger.record("validation/rmse_m", rmse)
-            learner.logger.record("validation/lost", lost)
+            run.take_stock(policy)
+            learner.logger.record("validation/rmse_m", run.progress.rmse_m[-1])
+            learner.logger.record("validation/lost", run.progress.lost[-1])
             learner.logger.dump(done)
         else:
             run.write_progress()
@@ -108,19 +116,3 @@ def _logger(folder: Path) -> Any:
     except ImportError:
         return configure(str(folder), ["csv"])
     return configure(str(folder / "tensorboard"), ["tensorboard"])
-
-
-def _follower(advance: Callable[[int], None]) -> Any:
-    from stable_baselines3.common.callbacks import BaseCallback
-
-    class Follow(BaseCallback):  # type: ignore[misc]
-        """Tell the decisions so far, and the RMSE of finished training episodes."""
-
-        def _on_step(self) -> bool:
-            advance(self.num_timesteps)
-            for info in self.locals["infos"]:
-                if "rmse" in info:
-                    self.logger.record_mean("rollout/rmse_m", info["rmse"])
-            return True
-
-    return Follow()
