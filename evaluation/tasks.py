@@ -318,11 +318,8 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
     }
     shown = {}
     for name, folders in parts.items():
-        others = [other for key, other in parts.items() if key != name]
-        length = 1
-        while length < len(folders) and any(
-            other[-length:] == folders[-length:] for other in others
-        ):
-            length += 1
-        shown[name] = "/".join(folders[-length:])
+        ends = ["/".join(folders[i:]) for i in reversed(range(len(folders)))]
+        others = ["/".join(("", *other)) for key, other in parts.items() if key != name]
+        alone = (end for end in ends if not any(o.endswith(f"/{end}") for o in others))
+        shown[name] = next(alone, ends[-1])
     return shown
