@@ -113,7 +113,7 @@ def leaderboard(
 Flown = Mapping[str, Sequence[Sequence[Episode]]]
 
 
-def flights_of(row: Standing, results: Results) -> list[Sequence[Episode]]:
+def flights_of(row: Standing, results: Results) -> list[list[Episode]]:
     """Return the episodes of each policy in a row."""
     return [
         flown
