@@ -31,20 +31,7 @@ _COUNTS = 10  # decisions flown until a command counts
 _LEAD = 2.0  # 1/s, gain of the law with sight of the fan that flies the first round
 _VELOCITY = 3  # decisions, over which the fan's velocity is taught
 _ALONG_Y = 1
-# episodes in each scenario, out of nineteen
-MIX = {"base": 4, "fast": 3, "varied": 4, "far": 4} | dict.fromkeys(
-    ("static", "noisy", "gusty", "slow-filter"), 1
-)
 FEATURES = Features(("torque_z", "force_x", "force_y", "velocity_y", "command", "path_y"), 3)
-
-
-def fan_lanes(episodes: int) -> list[TaskLanes]:
-    """Return environments for about so many episodes in the mix of scenarios."""
-    total = sum(MIX.values())
-    return [
-        TaskLanes(max(1, episodes * n // total), task=FanTrackingEnv, scenario=name)
-        for name, n in MIX.items()
-    ]
 
 
 class FanHindsight:

@@ -46,12 +46,8 @@ class Flights:
 
     def sequences(self) -> Sequences:
         """Return all flown sequences."""
-        return Sequences(
-            *(
-                np.concatenate([getattr(one, name) for one in self._flown], axis=1)
-                for name in ("seen", "truth", "counts")
-            )
-        )
+        parts = zip(*self._flown, strict=True)
+        return Sequences(*(np.concatenate(part, axis=1) for part in parts))
 
     def fly(self, network: TaughtNetwork | LinearLaw | None, shares: Frames) -> None:
         """Fly a round at ``shares`` (axes, taught) of the network's means, or with the teacher

@@ -41,23 +41,28 @@ _LATE = replace(
         dropout=(0.0, 0.1),
     ),
 )
-MIX = "wide-late"
-# episodes in each scenario, out of sixteen
-_PARTS = {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2} | dict.fromkeys(
-    ("varied", "gusts", "wash", "fan-wall"), 1
-)
+MIX, FAN_MIX = "wide-late", "wide"  # of the tasks in the wind, and of FanTracking
+# parts of the episodes in each scenario
+MIXES = {
+    MIX: {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2}
+    | dict.fromkeys(("varied", "gusts", "wash", "fan-wall"), 1),
+    FAN_MIX: {"base": 4, "fast": 3, "varied": 4, "far": 4}
+    | dict.fromkeys(("static", "noisy", "gusty", "slow-filter"), 1),
+}
 
 
 def mix_of(name: str, episodes: int) -> dict[str, int]:
-    """Return how many of ``episodes`` fly in each scenario of ``MIX``, or in the one scenario."""
-    parts = _PARTS if name == MIX else {name: 1}
-    return {each: episodes * part // sum(parts.values()) for each, part in parts.items()}
+    """Return how many of ``episodes`` fly in each scenario of a mix, at least one, or in the one
+    scenario.
+    """
+    parts = MIXES.get(name, {name: 1})
+    return {each: max(1, episodes * n // sum(parts.values())) for each, n in parts.items()}
 
 
 def lanes_of(
     task: str, scenario: str, episodes: int, observation: str | None = None
 ) -> list[TaskLanes]:
-    """Return environments of a task for so many episodes in a scenario, or in ``MIX``;
+    """Return environments of a task for so many episodes in a scenario, or in one of ``MIXES``;
     ``observation``: one of ``OBSERVATIONS`` in place of the task's own.
     """
     kind = TASKS[task].environment

@@ -1,7 +1,6 @@
 """A recurrent network with taught quantities as its output, and its fit to episodes."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -20,8 +19,7 @@ _SMALLEST = 1.4e-3  # smallest relevant size of a scaled quantity
 _STEEPEST = 1.0  # norm to which a gradient is cut
 
 
-@dataclass(frozen=True)
-class Sequences:
+class Sequences(NamedTuple):
     """Whole episodes to learn from, time first."""
 
     seen: Array  # (decisions, episodes, quantities), frames
@@ -104,9 +102,8 @@ def fit(
     rates: tuple[float, float],
     generator: torch.Generator,
     mirrored: Array | None = None,
-) -> float:
-    """Fit means and deviations to the taught quantities, over whole episodes; return the last
-    epoch's mean loss.
+) -> None:
+    """Fit means and deviations to the taught quantities, over whole episodes.
 
     The loss is the likelihood of normal errors, each times the deviation of the output. Samples
     with a fan hard to locate count less. They count more than by the likelihood alone, which would
@@ -132,9 +129,7 @@ def fit(
     updates = epochs * -(-count // batch_size)
     optimiser = torch.optim.Adam(network.parameters(), lr=rates[0], fused=True)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, updates, eta_min=rates[1])
-    losses: list[float] = []
     for _ in range(epochs):
-        losses.clear()
         for batch in torch.randperm(count, generator=generator).split(batch_size):  # type: ignore[no-untyped-call]
             frames = seen[:, batch]
             taught = truth[:, batch]
@@ -152,5 +147,3 @@ def fit(
             torch.nn.utils.clip_grad_norm_(network.parameters(), _STEEPEST)
             optimiser.step()
             schedule.step()
-            losses.append(loss.item())
-    return float(np.mean(losses))

@@ -9,7 +9,7 @@ import yaml
 
 from ..controllers.registry import STANDARD_TASK
 from ..evaluation.episodes import fly_episode
-from ..evaluation.tasks import TASKS
+from ..evaluation.tasks import TASKS, BenchmarkTask
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.page_files import write_text
 from ..runtime.yaml_file import read_yaml
@@ -24,8 +24,8 @@ STARTS: dict[str, dict[str, float]] = _GAINS["starts"]  # for each law
 _PRUNE_AFTER = 10  # episodes
 
 
-def check_request(task: str, law: str, scenario: str, trials: int, episodes: int) -> None:
-    """Check a request to ``tune``.
+def check_request(task: str, law: str, scenario: str, trials: int, episodes: int) -> BenchmarkTask:
+    """Check a request to ``tune``; return its task.
 
     Raises:
         InputError: an unknown task, law or scenario, no trials, or too many episodes.
@@ -39,6 +39,7 @@ def check_request(task: str, law: str, scenario: str, trials: int, episodes: int
     if trials < 1:
         raise InputError(f"tune: trials must be at least 1, got {trials}")
     validation_seeds(episodes)
+    return known
 
 
 def first_gains(task: str, law: str) -> dict[str, float]:
@@ -80,8 +81,7 @@ def tune(
     """
     import optuna
 
-    check_request(task, law, scenario, trials, episodes)
-    tuned_task = training_task(task)
+    tuned_task = check_request(task, law, scenario, trials, episodes)
     ranges = RANGES[task][law]
     seeds = validation_seeds(episodes)
     env = tuned_task.make(scenario)

@@ -20,6 +20,9 @@ from .seeds import training_seed
 Array = NDArray[np.float32]
 
 
+_seed_of_run_0 = partial(training_seed, 0)
+
+
 class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     """An SB3 ``VecEnv`` over a Gymnasium vector environment.
 
@@ -42,12 +45,12 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         self,
         envs: Any,
         features: Features | None = None,
-        seed_of: Callable[[int, int], int] | None = None,
+        seed_of: Callable[[int, int], int] = _seed_of_run_0,
         reward: Reward | None = None,
     ) -> None:
         self.envs = envs
         self.features = features
-        self._seed_of = seed_of or partial(training_seed, 0)
+        self._seed_of = seed_of
         self._reward = reward
         space = envs.single_observation_space
         if features is not None:
