@@ -8,14 +8,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from ..controllers.briefing import standard_vehicle
 from ..dynamics.mean_jet import HULL_RADIUS, HULL_STATIONS
 from ..dynamics.vehicle import Vehicle
-
-Array = NDArray[np.float64]
+from ..runtime.arrays import Array
 
 STATIONS = 4 + HULL_STATIONS  # points of drag: four rotors and a ring on the hull
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..controllers.briefing import Air, Briefing, FilterNoise, Jet, Motions
 from ..controllers.observation import MAX_COMMAND
-from ..dynamics.motion import Array
+from ..runtime.arrays import Array
 from .fan import Fan
 from .plant import TICK, PlantSettings
 from .scenarios import SCENARIOS

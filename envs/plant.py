@@ -21,8 +21,8 @@ from ..dynamics.model import (
     load_model,
     reset_model,
 )
-from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array
 from ..runtime.errors import InputError
 from .fan import STATIONS
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..controllers.registry import STANDARD_TASK
+from ..runtime.arrays import Array
 from .benchmark import Results
 from .episodes import Episode
 from .statistics import (
@@ -123,12 +123,12 @@ def flights_of(row: Standing, results: Results) -> list[list[Episode]]:
     ]
 
 
-def figures(flown: Sequence[Sequence[Episode]], name: str) -> NDArray[np.float64]:
+def figures(flown: Sequence[Sequence[Episode]], name: str) -> Array:
     """Return a property of all episodes (policies, episodes)."""
     return np.array([[getattr(e, name) for e in one] for one in flown], dtype=np.float64)
 
 
-def ranking_figures(flown: Flown) -> tuple[str, dict[str, NDArray[np.float64]]]:
+def ranking_figures(flown: Flown) -> tuple[str, dict[str, Array]]:
     """Return the name of the ranking figure, and its values by controller (policies, episodes);
     less is better.
     """
@@ -163,7 +163,7 @@ def _row(task: str, scenario: str, seed: int, name: str, flown: Flown) -> Standi
         return float(relative_change(x, ranked[law])), interval_of(draws), p
 
     def in_metres(
-        statistic: Callable[..., Any], values: NDArray[np.float64]
+        statistic: Callable[..., Any], values: Array
     ) -> tuple[float, tuple[float, float]]:
         if by == RETURN:
             return math.nan, _NONE

@@ -22,7 +22,8 @@ from ..identification.logs.log_map import (
 )
 from ..identification.logs.magnitudes import LARGEST
 from ..identification.logs.mapped_log import with_range
-from .messages import SECOND, Array, Malformed, Measurement
+from ..runtime.arrays import Array
+from .messages import SECOND, Malformed, Measurement
 
 _OUTSIDE = 0.01  # tolerance, share of a command's range
 _FIELDS = {

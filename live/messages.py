@@ -8,10 +8,8 @@ the sender's time of measurement, and the time of arrival. The filter and the re
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from ..runtime.arrays import Array
 
-Array = NDArray[np.float64]
 SECOND = 1_000_000_000  # ns
 
 

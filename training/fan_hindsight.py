@@ -10,7 +10,6 @@ offset and velocity, for its memory alone.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..controllers.axis_models import PLACE, SET_POINT, tilting
 from ..controllers.features import Features, History
@@ -20,9 +19,7 @@ from ..controllers.preview import Oracle, lasting, preview
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.lanes.vector import TaskLanes
 from ..envs.observations import as_numbers
-
-Array = NDArray[np.float64]
-Frames = NDArray[np.float32]
+from ..runtime.arrays import Array, Mask, Single
 
 AHEAD = 24  # decisions with known places of the fan, for a command
 # largest taught command, m/s: a fan far away on an unknown side needs a mean far beyond 1
@@ -58,10 +55,10 @@ class FanHindsight:
         self._set_point: Any = None  # (n,) m
         self._flown: list[tuple[Array, ...]] = []
 
-    def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
+    def look(self, observations: Single, infos: dict[str, Any]) -> tuple[Single, Array]:
         """Return frames (n, quantities), and the commands (n, 1) of the law with sight."""
         if self._features is None:
-            seen: Frames = observations / as_numbers(self._envs.task.bounds()[1] or 1.0)
+            seen: Single = observations / as_numbers(self._envs.task.bounds()[1] or 1.0)
         else:
             remember = self._history.push if self._flown else self._history.restart
             remember(self._features.frames(observations))
@@ -89,7 +86,7 @@ class FanHindsight:
         state = self._oracle.along(truth, place, truth["velocity"], still)[_ALONG_Y]
         return np.column_stack([state, self._set_point])
 
-    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+    def taught(self, in_flight: Mask) -> tuple[Array, Mask]:
         """Return the best command, the fan's offset (m) and its velocity (m/s), (decisions, n, 3),
         and weights (decisions, n).
         """

@@ -15,7 +15,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..controllers import make_controller
 from ..controllers.axis_models import MOTOR_LAG, axis_models
@@ -25,9 +24,7 @@ from ..envs.lanes.vector import TaskLanes
 from ..envs.observations import as_numbers
 from ..envs.wind_scenarios import WIND_SCENARIOS, WindVariation
 from ..evaluation.tasks import TASKS
-
-Array = NDArray[np.float64]
-Frames = NDArray[np.float32]
+from ..runtime.arrays import Array, Mask, Single
 
 AHEAD = 14  # decisions, of which a command knows the disturbances
 LATE = "late"
@@ -119,7 +116,7 @@ class WindLesson:
         self._states: list[list[Array]] = []  # for each axis (n, its states)
         self._laws = [make_controller("lqg", self._task) for _ in range(envs.num_envs * leads)]
 
-    def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Any]:
+    def look(self, observations: Single, infos: dict[str, Any]) -> tuple[Single, Any]:
         """Return scaled observations (n, k), and the commands (n, 3) of ``lqg`` in flight."""
         raw = as_numbers(self._envs.task.observe(self._envs.state))
         seen = raw.astype(np.float64)
@@ -128,7 +125,7 @@ class WindLesson:
         wanted = [law(each) for law, each in zip(self._laws, raw, strict=False)]
         return observations / self._scale, np.array(wanted)
 
-    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+    def taught(self, in_flight: Mask) -> tuple[Array, Mask]:
         """Return the best commands (decisions, n, 3), and weights (decisions, n): the vehicle flew
         on for at least ``AHEAD`` further decisions.
         """

@@ -19,20 +19,18 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from ..controllers.features import Features
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, Weights, save_policy
 from ..envs.observations import OBSERVATIONS, as_numbers
 from ..evaluation.tasks import TASKS
+from ..runtime.arrays import Mask, Single
 from .fan_hindsight import FEATURES, FanHindsight
 from .flown_sequences import Flights
 from .hindsight import FAN_MIX, MIX, WindLesson, lanes_of
 from .linear_policy import MEMORY, LinearLaw
 from .run import origin, validate
 from .taught_network import TaughtNetwork, fit
-
-Array = NDArray[np.float32]
 
 FAN = "FanTracking"
 FAN_PLANE = "FanTracking2D"
@@ -92,18 +90,18 @@ class _FanPlaneLesson:
         self._truth: list[Any] = []
         self._scale = as_numbers(envs.task.bounds()[1] or 1.0)
 
-    def look(self, observations: Array, infos: dict[str, Any]) -> tuple[Array, Any]:
+    def look(self, observations: Single, infos: dict[str, Any]) -> tuple[Single, Any]:
         """Return scaled observations (n, quantities) and the law's commands (n, 2)."""
         truth = np.hstack([infos["fan"] - infos["position"], infos["fan_velocity"]])
         self._truth.append(truth)
         return observations / self._scale, truth @ _shares(FAN_PLANE).T
 
-    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
+    def taught(self, in_flight: Mask) -> tuple[Any, Mask]:
         """Return the taught quantities (decisions, n, 4), and weights (decisions, n)."""
         return np.array(self._truth[:-1]), in_flight[:-1]
 
 
-def _shares(task: str, gain: float = _GAINS[1]) -> Array:
+def _shares(task: str, gain: float = _GAINS[1]) -> Single:
     """Return the shares (axes, taught) of each taught quantity in the command."""
     if task == FAN:
         return np.eye(3, dtype=np.float32)[:1]
@@ -155,7 +153,7 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
 
 
 def _chosen(
-    card: dict[str, Any], weights: Callable[[Array], Weights]
+    card: dict[str, Any], weights: Callable[[Single], Weights]
 ) -> TaskPolicy | TrainedPolicy:
     """Return the policy of ``weights`` of shares; in FanTracking2D with the gain that is best on
     validation episodes in the scenario of its training.

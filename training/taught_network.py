@@ -4,12 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from ..controllers.trained_policy import Weights, layers_of
+from ..runtime.arrays import Single
 from .learners import cell_weights, dense_layers, dense_weights
-
-Array = NDArray[np.float32]
 
 CELLS: dict[str, Any] = {"lstm": torch.nn.LSTM, "gru": torch.nn.GRU}
 _SURE = -4.0  # bounds of an output's logarithmic standard deviation
@@ -22,9 +20,9 @@ _STEEPEST = 1.0  # norm to which a gradient is cut
 class Sequences(NamedTuple):
     """Whole episodes to learn from, time first."""
 
-    seen: Array  # (decisions, episodes, quantities), frames
-    truth: Array  # (decisions, episodes, quantities that are taught)
-    counts: Array  # (decisions, episodes), 0 where the vehicle is lost or the truth unknown
+    seen: Single  # (decisions, episodes, quantities), frames
+    truth: Single  # (decisions, episodes, quantities that are taught)
+    counts: Single  # (decisions, episodes), 0 where the vehicle is lost or the truth unknown
 
 
 class TaughtNetwork(torch.nn.Module):
@@ -67,7 +65,7 @@ class TaughtNetwork(torch.nn.Module):
         deviations = output[..., self.taught :].clamp(_SURE, _UNSURE)
         return output[..., : self.taught], deviations, state
 
-    def whiten(self, seen: Array) -> None:
+    def whiten(self, seen: Single) -> None:
         """Whiten the cell's input by the frames ``seen`` (decisions, episodes, quantities): a small
         difference of two quantities then counts as much as their sum. The policy has the whitening
         in the weights of its cell.
@@ -80,7 +78,7 @@ class TaughtNetwork(torch.nn.Module):
             torch.from_numpy(np.float32(flat.mean(axis=0))),
         )
 
-    def policy_weights(self, shares: Array) -> Weights:
+    def policy_weights(self, shares: Single) -> Weights:
         """Return the weights of the policy that commands ``shares`` (axes, taught) of the means."""
         weights = dense_weights(self.dense)
         last = layers_of(weights) - 1
@@ -101,7 +99,7 @@ def fit(
     batch_size: int,
     rates: tuple[float, float],
     generator: torch.Generator,
-    mirrored: Array | None = None,
+    mirrored: Single | None = None,
 ) -> None:
     """Fit means and deviations to the taught quantities, over whole episodes.
 

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from ...runtime.extras import need
 from ...runtime.regular_files import check_archive, read_bytes
 from ...runtime.whole_files import replaced
-from .field import Array, CompiledWind, Wind
+from .field import CompiledWind, Wind
 
 AXES = ("t", "x", "y", "z")
 _LARGEST = 400_000_000  # bytes of a grid in memory

@@ -14,10 +14,11 @@ hypothesis): a point sees ``u(x - U t)``.
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError, unknown_name
-from .field import Array, CompiledWind, number, vector
+from .field import CompiledWind, number, vector
 
 _FOOT = 0.3048  # m
 # factor on the length; powers of 1 + x along and across, the latter with a factor on x; factor and
@@ -156,7 +157,7 @@ class Turbulence(CompiledWind):
         super().__init__("waves", parameters, {"waves": table})
 
 
-def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:
+def _three(value: ArrayLike, name: str, at_least_zero: bool) -> Array:
     array = np.asarray(value, dtype=np.float64)
     whole = np.full(3, float(array)) if array.ndim == 0 else array
     good = whole.shape == (3,) and np.all(np.isfinite(whole))

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.vehicle import Vehicle
 from ...identification.logs.flight_log import NORM_TOLERANCE
 from ...identification.logs.what_flew import ORDERS
-from ..messages import Array, Malformed, Measurement
+from ...runtime.arrays import Array
+from ..messages import Malformed, Measurement
 from .base import unwrapped
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # turns a vector
