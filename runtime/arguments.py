@@ -62,6 +62,6 @@ def described(value: object) -> str:
     return kind
 
 
-def in_brackets(values: Array, digits: int = 3) -> str:
-    """Return a vector (n,) with so many significant digits, for a short ``repr``."""
-    return f"({', '.join(f'{x:.{digits}g}' for x in values)})"
+def in_brackets(values: Array) -> str:
+    """Return a vector (n,) with three significant digits, for a short ``repr``."""
+    return f"({', '.join(f'{x:.3g}' for x in values)})"
