@@ -79,11 +79,9 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
         f[name] = getattr(fan, name)
     f["keep"] = math.exp(-period / fan.gust_time)
     angle = np.arange(8) * math.pi / 4
-    ring = fan.hull_radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)
-    if fan.hull_elevation != 0.0:
-        above = fan.hull_elevation * (-1.0) ** np.arange(8)
-        ring[:, :2] *= np.cos(above)[:, None]
-        ring[:, 2] = fan.hull_radius * np.sin(above)
+    above = fan.hull_elevation * (-1.0) ** np.arange(8)
+    ring = fan.hull_radius * np.stack([np.cos(angle), np.sin(angle), np.sin(above)], axis=1)
+    ring[:, :2] *= np.cos(above)[:, None]
     stations = np.concatenate([rotor_positions, ring])
     f["stations"] = stations
     distance = np.linalg.norm(stations[:, None] - stations[None], axis=2)

@@ -2,7 +2,6 @@
 
 import platform
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -159,7 +158,6 @@ class Run:
         scenario: scenario or tier to train in.
         seed: the run's.
         folder: for its files.
-        report: called after each validation.
         task: a name, as of ``evaluation.tasks.task_of``.
         reward: one's own, as of ``evaluation.rewards.find_reward``; None: the task's.
         observation: one of ``OBSERVATIONS``; None: the task's own, or features.
@@ -174,7 +172,6 @@ class Run:
         scenario: str,
         seed: int,
         folder: Path,
-        report: Callable[[Progress], None],
         task: str,
         reward: str | None,
         observation: str | None,
@@ -191,7 +188,6 @@ class Run:
             self.own["task"] = known.name
         self._claim()
         self.progress = Progress()
-        self._report = report
         self._began = time.perf_counter()
         self.best = folder / "best.npz"
 
@@ -252,7 +248,6 @@ class Run:
             now.best = len(now.rmse_m) - 1
             save_policy(card, policy.weights, self.best)
         self.write_progress()
-        self._report(now)
 
     def write_progress(self) -> None:
         """Write the run's progress to ``progress.json``."""

@@ -55,7 +55,7 @@ def train(
     """
     import_files(imports)
     standard = task == STANDARD_TASK and observation is None
-    run = Run(config, scenario, seed, folder, report, task, reward, observation)
+    run = Run(config, scenario, seed, folder, task, reward, observation)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv
@@ -95,6 +95,7 @@ def train(
             kind = TrainedPolicy if standard else TaskPolicy
             policy = kind(run.card(done) | seen, weights_of(learner, algorithm))
             run.take_stock(policy)
+            report(run.progress)
             learner.logger.record("validation/rmse_m", run.progress.rmse_m[-1])
             learner.logger.record("validation/lost", run.progress.lost[-1])
             learner.logger.dump(done)

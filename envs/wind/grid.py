@@ -7,6 +7,7 @@ dimensions. A file without a time is steady.
 """
 
 import io
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,7 @@ class GridWind(CompiledWind):
 
     def __init__(
         self,
-        axes: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],
+        axes: Sequence[ArrayLike],
         wind: ArrayLike,
         where: str = "GridWind",
     ) -> None:
@@ -134,7 +135,7 @@ def read_wind(path: str | Path) -> GridWind:
         raise
     except Exception as error:  # a parser's own, on bytes of another form
         raise InputError(f"{file}: cannot be read as {what}: {error}") from error
-    return GridWind((axes[0], axes[1], axes[2], axes[3]), wind, str(file))
+    return GridWind(axes, wind, str(file))
 
 
 def _read_npz(file: Path) -> tuple[list[Array], Array]:
