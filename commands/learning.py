@@ -61,8 +61,8 @@ def train(
         "task": task or STANDARD_TASK,
         "observation": observation,
         "reward": reward,
+        "imports": tuple(imports or ()),
     }
-    what |= {"reward": reward, "imports": tuple(imports or ())}
     folder = results_folder(
         out,
         algorithm=given["algorithm"],

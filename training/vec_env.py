@@ -2,7 +2,7 @@
 features for observations.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -54,7 +54,6 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
             space = gym.spaces.Box(-10.0, 10.0, (features.size,), np.float32)
         super().__init__(envs.num_envs, space, envs.single_action_space)
         self._history = None if features is None else History(features, self.num_envs)
-        self._seen: Single = np.zeros((self.num_envs, *(space.shape or ())), dtype=np.float32)
         self.episode = np.full(self.num_envs, -1)  # none has begun
         self._length = np.zeros(self.num_envs, dtype=np.int64)  # decisions since the start
         self._returns, self._squares = np.zeros(self.num_envs), np.zeros(self.num_envs)
@@ -63,9 +62,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     def _look(self, observations: Single, begun: Mask | None = None) -> Single:
         """Return the learner's observations (n, size); episodes have ``begun`` in some."""
         if self._history is None or self.features is None:
-            new = slice(None) if begun is None else begun
-            self._seen[new] = observations[new]
-            return self._seen.copy()
+            return np.array(observations, dtype=np.float32)
         frames = self.features.frames(observations)
         if begun is None:
             self._history.push(frames)
@@ -140,7 +137,3 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Tell SB3 to read ``infos[i]["episode"]``: episodes are counted here."""
         return [wrapper_class.__name__ == "Monitor" for _ in self._get_indices(indices)]
-
-    def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Do nothing: every episode's seed follows from the run's seed and the episode's number."""
-        return [None] * self.num_envs

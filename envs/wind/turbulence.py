@@ -12,7 +12,6 @@ hypothesis): a point sees ``u(x - U t)``.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,7 +40,7 @@ TURBULENCE = np.dtype(
 )
 
 
-def _spectrum_of(form: str) -> Any:
+def _spectrum_of(form: str) -> tuple[float, float, tuple[float, float], tuple[float, float]]:
     if form not in _SPECTRA:
         raise unknown_name("form", form, _SPECTRA, "wind: turbulence")
     return _SPECTRA[form]
