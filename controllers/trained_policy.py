@@ -18,7 +18,7 @@ from ..runtime.arrays import Floats, Single
 from ..runtime.errors import InputError
 from ..runtime.file_limits import LIMITS
 from ..runtime.page_files import write_text
-from ..runtime.regular_files import check_archive, read_bytes, read_json
+from ..runtime.regular_files import check_archive, read_bytes, read_json, reading
 from ..runtime.whole_files import replaced
 from .features import Features, History
 from .observation import MAX_COMMAND
@@ -279,11 +279,8 @@ def load_policy(path: str | Path) -> Any:
             f"{file}: not the weights that its card {card_file.name} describes (sha256 differs)"
         )
     check_archive(file, io.BytesIO(data), LIMITS.policy_weights, "weights")
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            weights = {name: np.asarray(arrays[name], dtype=np.float32) for name in arrays.files}
-    except Exception as error:  # any error of a parser on bytes of another kind
-        raise InputError(f"{file}: cannot be read as weights: {error}") from error
+    with reading(file, "weights"), np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        weights = {name: np.asarray(arrays[name], dtype=np.float32) for name in arrays.files}
     bad = [
         name
         for name, array in weights.items()

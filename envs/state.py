@@ -76,7 +76,6 @@ _BESIDE = {
     "change": 1,
 }
 _FIRST = sum(_TRUE.values())  # column of the estimate
-_STD = _FIRST + 20
 _REST = _FIRST + sum(_ESTIMATED.values())
 _SIZE = _REST + sum(_BESIDE.values())
 assert _SIZE == _core.WORLD_SIZE, "the core was built for another layout"

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from ...runtime.extras import need
-from ...runtime.regular_files import check_archive, read_bytes
+from ...runtime.regular_files import check_archive, read_bytes, reading
 from ...runtime.whole_files import replaced
 from .field import CompiledWind, Wind
 
@@ -129,12 +129,8 @@ def read_wind(path: str | Path) -> GridWind:
     if file.suffix not in (".npz", ".nc", ".nc4", ".cdf"):
         raise InputError(f"{file}: expected .npz or .nc")
     read, what = (_read_npz, "arrays") if file.suffix == ".npz" else (_read_netcdf, "netCDF")
-    try:
+    with reading(file, what):
         axes, wind = read(file)
-    except InputError:
-        raise
-    except Exception as error:  # a parser's own, on bytes of another form
-        raise InputError(f"{file}: cannot be read as {what}: {error}") from error
     return GridWind(axes, wind, str(file))
 
 
