@@ -188,7 +188,7 @@ class Run:
             self.own["task"] = known.name
         self._claim()
         self.progress = Progress()
-        self._began = time.perf_counter()
+        self._begun = time.perf_counter()
         self.best = folder / "best.npz"
 
     def _claim(self) -> None:
@@ -208,17 +208,6 @@ class Run:
                     "give another --out, or delete it"
                 )
         write_json({**run, "versions": _versions()}, path)
-
-    def resume(self, progress: Progress) -> None:
-        """Continue from the progress of an earlier part of the run."""
-        self.progress = progress
-        self._began -= progress.seconds
-
-    def is_due(self, steps: int, last: bool) -> bool:
-        """Whether a validation is due after ``steps`` decisions."""
-        every = self.config["validation"]["every"]
-        before = self.progress.steps[-1] if self.progress.steps else 0
-        return last or steps // every > before // every
 
     def card(self, steps: int) -> dict[str, Any]:
         """Return the card of the policy after ``steps`` decisions."""
@@ -251,5 +240,7 @@ class Run:
 
     def write_progress(self) -> None:
         """Write the run's progress to ``progress.json``."""
-        self.progress.seconds = time.perf_counter() - self._began
+        now = time.perf_counter()
+        self.progress.seconds += now - self._begun
+        self._begun = now
         write_json(asdict(self.progress), self.folder / "progress.json")

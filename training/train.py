@@ -75,7 +75,7 @@ def train(
     learner.set_logger(_logger(folder))
     checkpoint = folder / "checkpoint.pt"
     if checkpoint.exists():
-        run.resume(progress_from(load_checkpoint(learner, env, checkpoint), checkpoint))
+        run.progress = progress_from(load_checkpoint(learner, env, checkpoint), checkpoint)
     every = config["validation"]["every"]
     between = config["checkpoint"]
 
@@ -88,10 +88,11 @@ def train(
         return True
 
     while (done := learner.num_timesteps) < whole:
-        target = min((done // every + 1) * every, (done // between + 1) * between, whole)
+        validated = done // every
+        target = min((validated + 1) * every, (done // between + 1) * between, whole)
         learner.learn(target - done, callback=follow, reset_num_timesteps=False, log_interval=4)
         done = learner.num_timesteps
-        if run.is_due(done, done >= whole):
+        if done // every > validated or done >= whole:
             kind = TrainedPolicy if standard else TaskPolicy
             policy = kind(run.card(done) | seen, weights_of(learner, algorithm))
             run.take_stock(policy)
