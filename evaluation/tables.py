@@ -3,26 +3,14 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from ..runtime.page_files import write_text
+from ..runtime.plain_values import plain
 from .leaderboard import SETTLED, Standing, shown
 from .tasks import short_names, task_of
 
 _CLEAR = 0.05  # p-value, corrected
-
-
-def rows_of(rows: Sequence[Standing]) -> list[dict[str, Any]]:
-    """Return the rows as plain values; a number without a meaning is None."""
-    return [{key: _plain(value) for key, value in asdict(row).items()} for row in rows]
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_plain(each) for each in value]
-    return None if value != value else value
 
 
 def write_leaderboard(rows: Sequence[Standing], folder: Path) -> Path:
@@ -31,7 +19,7 @@ def write_leaderboard(rows: Sequence[Standing], folder: Path) -> Path:
     A number without a meaning is null.
     """
     path = folder / "leaderboard.json"
-    write_text(json.dumps(rows_of(rows), indent=1, allow_nan=False) + "\n", path)
+    write_text(json.dumps(plain(rows), indent=1, allow_nan=False) + "\n", path)
     return path
 
 

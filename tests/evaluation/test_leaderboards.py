@@ -16,8 +16,9 @@ from windwrench.evaluation.episodes import Episode, fly_episode
 from windwrench.evaluation.leaderboard import leaderboard, shown
 from windwrench.evaluation.pictures import draw_leaderboard
 from windwrench.evaluation.submission import results_hash, write_submission
-from windwrench.evaluation.tables import markdown, rows_of, summary, write_leaderboard
+from windwrench.evaluation.tables import markdown, summary, write_leaderboard
 from windwrench.evaluation.tasks import TASKS, short_names
+from windwrench.runtime.plain_values import plain
 
 GOLDEN = json.loads((ROOT / "tests" / "golden" / "leaderboards.json").read_bytes())
 EPISODES = 2
@@ -76,7 +77,7 @@ def test_episodes_and_rows_are_those_that_were_kept(task, flown):
     for name, kept in GOLDEN[task]["episodes"].items():
         assert_alike(episodes[name], kept, name, *tolerance(name.partition(" ")[0]))
     # null stands for a number that means nothing
-    for row, kept in zip(rows_of(rows), GOLDEN[task]["rows"], strict=True):
+    for row, kept in zip(plain(rows), GOLDEN[task]["rows"], strict=True):
         name = kept["controller"]
         rel, least = tolerance(name)
         # a change over another controller is a difference of two numbers

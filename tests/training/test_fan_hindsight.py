@@ -14,7 +14,7 @@ pytest.importorskip("torch", reason="pip install 'windwrench[rl]'")
 pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
 import torch
 
-from windwrench.training.fan_hindsight import FEATURES, MIX, FanHindsight, fan_lanes
+from windwrench.training.fan_hindsight import FEATURES, FanHindsight
 from windwrench.training.flown_sequences import Flights
 from windwrench.training.seeds import training_seed
 from windwrench.training.taught_network import Sequences, TaughtNetwork, fit
@@ -60,11 +60,6 @@ def test_nothing_is_taught_where_the_vehicle_is_lost():
     assert len(np.flatnonzero(flights.counts[:200].min(axis=0) == 0.0)) > 0
     assert (np.diff(flights.counts, axis=0) <= 0.0).all()  # and never again
     assert abs(flights.truth[..., 1][flights.counts > 0]).max() <= 2.6
-
-
-def test_a_round_has_all_scenarios_of_the_mix():
-    total = sum(MIX.values())
-    assert [envs.num_envs for envs in fan_lanes(2 * total)] == [2 * n for n in MIX.values()]
 
 
 def test_the_mean_of_what_is_hidden_is_learned():
