@@ -15,3 +15,4 @@ def frozen():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("windwrench.live.session.gc", kept)
         yield
+    gc.unfreeze()

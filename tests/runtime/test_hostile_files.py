@@ -182,7 +182,8 @@ EMPTY_FRAMES = b"".join(
         b"H Field P predictor:6,0\nH Field P encoding:9,9\n",
     ]
 )
-TEXTS_ULOG = ulog(*[("P", b"\x09float " + b"%3x" % i + b"\0\0\0\0") for i in range(4096)] * 60)
+TEXTS_ULOG = ulog(*[("P", b"\x09float " + b"%3x" % i + b"\0\0\0\0") for i in range(4096)])
+TEXTS_ULOG += 59 * TEXTS_ULOG[len(ulog()) :]
 
 
 @pytest.mark.skipif(
