@@ -292,7 +292,7 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
     pyarrow = pytest.importorskip("pyarrow", reason="pip install 'windwrench[parquet]'")
     from pyarrow import parquet
 
-    rows = 12_000
+    rows = 1_200
     columns = {name: np.full(rows, float(name == "qw")) for name in REQUIRED}
     columns["t"] = 0.005 * np.arange(rows)
     path = tmp_path / "flight.parquet"
@@ -302,8 +302,8 @@ def test_a_column_that_would_unpack_to_too_much_is_refused_by_the_footer(tmp_pat
                 pyarrow.table(columns), path, compression=packing, use_dictionary=dictionary
             )
             assert_array_equal(read_log(path).t, columns["t"])
-    monkeypatch.setattr(tables, "LIMITS", replace(LIMITS, table_numbers=10_000))
-    with refused("more than 10000 numbers in column"):
+    monkeypatch.setattr(tables, "LIMITS", replace(LIMITS, table_numbers=1_000))
+    with refused("more than 1000 numbers in column"):
         read_log(path)
 
 
