@@ -135,6 +135,8 @@ import gymnasium as gym
 from gymnasium.wrappers import RecordVideo
 from windwrench.cli import main
 from windwrench.envs import ACTIONS, OBSERVATIONS
+from windwrench.runtime import page_files
+page_files._DPI = 20
 for task, action, observation in zip(TASKS, ACTIONS, OBSERVATIONS):
     seen = {"action": action, "observation": observation, "width": 64, "height": 48}
     env = gym.make(f"windwrench/{task}-v2", render_mode="rgb_array", **seen)
