@@ -128,7 +128,7 @@ def _write_matlab(path: Path, data: BinaryIO, made: BinaryIO) -> None:
         )
     program = str(Path(__file__).with_name("matlab_arrays.py"))
     ran = subprocess.run(
-        [sys.executable, "-P", program, str(LIMITS.arrays), str(7 * 2**27)],  # bytes
+        [sys.executable, "-P", program, str(LIMITS.arrays), str(7 * LIMITS.arrays // 4)],
         stdin=data,
         stdout=made,
         stderr=PIPE,

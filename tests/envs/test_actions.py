@@ -165,11 +165,11 @@ def numbers(envs, decisions, seed=3):
     return np.array(rows)
 
 
-# each action with each observation, and either on each task
+# each action with two observations on two tasks
 COMBINED = [
-    (TASKS[(i + j) % len(TASKS)], action, observation)
+    (TASKS[(2 * i + j) % len(TASKS)], action, OBSERVATIONS[(i + j) % len(OBSERVATIONS)])
     for i, action in enumerate(ACTIONS)
-    for j, observation in enumerate(OBSERVATIONS)
+    for j in range(2)
 ]
 
 
