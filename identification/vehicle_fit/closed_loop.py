@@ -28,8 +28,11 @@ UNITS = {  # in the order of the coefficients
     "yaw_damping": "1/s",
 }
 _EITHER_SIGN = np.array([name in ("flapping", "never_answered") for name in UNITS])
+_DAMPING = np.array(["damping" in name for name in UNITS])
 # a loop that damps within .2 s; the unmeasured moments' start is the model's own turning
 _BEGIN = LoopReaction(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
+# of a body whose rate decays, whatever its rotors do
+_DAMPED = LoopReaction(0.0, 0.0, 0.0, 1e6, 4.0, 0.0, 0.0, 0.0, 4.0)
 _SIZES = np.array([0.5, 0.5, 0.5, 30.0, 10.0, 20.0, 10.0, 3.0, 5.0])  # of the coefficients
 # share of the loss: the prior's at three sizes from the start. Coefficients without excitation stay
 _PRIOR = 0.003
@@ -44,20 +47,17 @@ _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 class LoopFit(NamedTuple):
     """The likeliest loop, and the standard deviations (9,) of its coefficients, by the scatter of
-    groups of starts (a sandwich).
+    groups of starts (a sandwich); 0 of those that are not fitted.
     """
 
     loop: LoopReaction
     deviations: Array
 
 
-def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
-    """Return the coefficients after a damped step, the best one with those of one sign not beyond
-    0.
-    """
+def _moved(theta: Array, gram: Array, gradient: Array, damping: float, least: Array) -> Array:
+    """Return the coefficients after a damped step, the best one with none below the ``least``."""
     root = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
     aim = root.T @ theta - np.linalg.solve(root, gradient)
-    least = np.where(_EITHER_SIGN, -np.inf, 0.0)
     return np.asarray(lsq_linear(root.T, aim, (least, np.inf)).x)
 
 
@@ -65,6 +65,7 @@ def fit_loop(
     starts: Sequence[LoggedStarts],
     vehicle: Vehicle,
     near: LoopReaction | None = None,
+    damped: bool = False,
 ) -> LoopFit:
     """Return the loop of flights with starts, one at least.
 
@@ -72,6 +73,7 @@ def fit_loop(
         starts: of each flight; those of a segment are a group.
         vehicle: with the force, inertia and rotors that stay.
         near: the loop by more starts: two rounds from there; None: from a usual one.
+        damped: the body rate decays, and nothing else turns the body.
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
@@ -86,23 +88,29 @@ def fit_loop(
 
     speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
     turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
-    begin = np.array(astuple(replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))))
+    usual = replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))
+    begin = np.array(astuple(_DAMPED if damped else usual))
+    free = np.flatnonzero(_DAMPING | (not damped))
+    moves, sized = _STEP * _SIZES[free], 3.0 * _SIZES[free]
+    bound = np.where(_EITHER_SIGN[free], -np.inf, 0.0)
     theta = begin if near is None else np.array(astuple(near))
     e, damping = off(theta), 1e-3
     for _ in range(_ROUNDS if near is None else _AGAIN):
         norms = np.linalg.norm(e, axis=-1)
         least = np.maximum(0.5 * np.median(norms, axis=(0, 1)), _LEAST)
         root = 1.0 / np.sqrt(np.maximum(norms, least))[..., None]
-        moves = _STEP * _SIZES
-        changes = [(root * (off(theta + x) - e)).reshape(len(e), -1) for x in np.diag(moves)]
+        steps = _STEP * np.diag(_SIZES)[free]
+        changes = [(root * (off(theta + x) - e)).reshape(len(e), -1) for x in steps]
         slopes = np.stack(changes, axis=1) / moves[:, None]  # (n, 9, ..)
         residual = (root * e).reshape(len(e), -1, 1)
-        strength = _PRIOR * np.square(residual).sum() / np.square(3.0 * _SIZES)
+        strength = _PRIOR * np.square(residual).sum() / np.square(sized)
         grams = np.concatenate([slopes @ np.swapaxes(slopes, 1, 2), np.diag(strength)[None]])
-        gradients = np.vstack([(slopes @ residual)[..., 0], strength * (theta - begin)])
-        before = _loss(e, theta - begin)
+        gradients = np.vstack([(slopes @ residual)[..., 0], strength * (theta - begin)[free]])
+        before, tried = _loss(e, theta - begin), theta.copy()
         for _ in range(6):
-            tried = _moved(theta, grams.sum(axis=0), gradients.sum(axis=0), damping)
+            tried[free] = _moved(
+                theta[free], grams.sum(axis=0), gradients.sum(axis=0), damping, bound
+            )
             there = off(tried)
             loss = _loss(there, tried - begin)
             if loss < before:
@@ -111,8 +119,8 @@ def fit_loop(
             damping *= 8.0
         if before - loss < _SETTLED * before:
             break
-    scores = (group == np.unique(group)[:, None]) @ gradients
-    deviations = np.linalg.norm(scores @ np.linalg.inv(grams.sum(axis=0)), axis=0)
+    scores, deviations = (group == np.unique(group)[:, None]) @ gradients, np.zeros(len(UNITS))
+    deviations[free] = np.linalg.norm(scores @ np.linalg.inv(grams.sum(axis=0)), axis=0)
     return LoopFit(LoopReaction(*theta.tolist()), deviations)
 
 
