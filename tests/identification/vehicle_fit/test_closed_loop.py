@@ -74,3 +74,13 @@ def test_a_known_loop_comes_back(log):
     without = fit_loop([made.those(segment > 1)], with_loop(None), fit.loop)
     assert astuple(without.loop) == pytest.approx(astuple(fit.loop), rel=0.1, abs=0.1)
     assert (fit.deviations > 0.0).all()
+
+
+def test_one_flight_tells_how_its_body_rate_decays(log):
+    starts = logged_starts(log, CRAZYFLIE, [(log.t[0], log.t[-1])], 0.5)
+    segment = np.arange(len(starts.rows)) // 8
+    made = starts._replace(segment=segment, seen=starts.flown(with_loop(DAMPED)))
+    loop, deviations = fit_loop([made], with_loop(None), damped=True)
+    assert astuple(loop) == pytest.approx((0, 0, 0, 1e6, 5.0, 0, 0, 0, 3.0), rel=0.02)
+    fitted = {name for name, size in zip(UNITS, deviations, strict=True) if size > 0.0}
+    assert fitted == {"damping", "yaw_damping"}

@@ -275,6 +275,21 @@ def test_a_model_stands_on_each_flight():
         assert standing({OTHER_FLIGHTS: errors}) == stands
 
 
+@pytest.mark.parametrize("off", [0.5, 2.0])
+def test_torques_that_fail_on_their_own_flight_turn_no_prediction(commanded, monkeypatch, off):
+    """12 times the error of no change, on flights of 9 s of which nothing can be held out."""
+
+    def errors(_, vehicles):
+        return [of(*4 * [off if v.closed_loop is None else 1.0]) for v in vehicles]
+
+    monkeypatch.setattr("windwrench.identification.vehicle_fit.held_out.errors_at", errors)
+    geometry = parse_geometry(str(CRAZYFLIE.arm_l))
+    found = identify(commanded[:1], CRAZYFLIE.mass, geometry, [(2.0, 9.0)])
+    assert found.vehicle.status.torque == "assumed"
+    assert (found.vehicle.closed_loop is not None) == (off > 1.0)
+    assert found.estimates["k" if off < 1.0 else "closed_loop damping"].status == "assumed"
+
+
 def test_a_vehicle_that_is_refuted_keeps_its_motion(commanded):
     log = commanded[0]
     status = ModelStatus("refuted", "refuted")
