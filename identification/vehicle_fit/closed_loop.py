@@ -78,15 +78,19 @@ def fit_loop(
     turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
     usual = replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))
     begin = np.array(astuple(_DAMPED if damped else usual))
-    free = _DAMPING | (not damped)
+    free, shares = _DAMPING | (not damped), np.arange(1, _TIMES + 1) / _TIMES
     unit = np.diag(_SIZES)[free]  # of the fitted numbers x (p,)
 
     def loop(x: Array) -> LoopReaction:
         return LoopReaction(*np.maximum(begin + x @ unit, _LOWEST).tolist())
 
     def off(x: Array) -> Array:
-        model = replace(vehicle, closed_loop=loop(x))
-        return np.concatenate([_compared(part, part.flown(model)) for part in thin]) / sizes
+        """Return the differences (n, _TIMES, 4, 3) of predictions from the flight."""
+        model, each = replace(vehicle, closed_loop=loop(x)), []
+        for part in thin:
+            at = np.rint(shares * len(part.ahead)).astype(int) - 1
+            each.append(offsets(part.flown(model)[:, at], part.seen[:, at]))
+        return np.concatenate(each) / sizes
 
     start = begin if near is None else np.array(astuple(near))
     bound, x = (((at - begin) / _SIZES)[free] for at in (_LOWEST, start))
@@ -122,9 +126,3 @@ def fit_loop(
 def _loss(e: Array, away: Array) -> float:
     """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (p,)."""
     return float((1.0 + _PRIOR * away @ away) * np.linalg.norm(e, axis=-1).mean())
-
-
-def _compared(part: LoggedStarts, path: Array) -> Array:
-    """Return the differences (n, _TIMES, 4, 3) of paths (n, m, STATE) from the flight."""
-    at = np.rint(np.arange(1, _TIMES + 1) / _TIMES * path.shape[1]).astype(int) - 1
-    return offsets(path[:, at], part.seen[:, at])

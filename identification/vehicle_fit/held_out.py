@@ -7,8 +7,9 @@ its torque, both; and where torque is refuted, the flight loop's reaction in its
 stands if no quantity is worse than the better one of no change and of thrust and drag. The one with
 the least mean of these ratios is the vehicle.
 
-One flight tells no reaction: on a slower flight of a racer the body rate was off by 3 times the
-error of no change.
+One flight tells how the body rate decays, and nothing else of a reaction. All nine coefficients
+hold the trajectory, too: on a slower flight of a racer the body rate was off by 2.1 times the error
+of no change, and by 1.06 times with two dampings.
 """
 
 from collections.abc import Callable
@@ -153,7 +154,9 @@ def held_out(
 
 
 def _by_own_flight(starts: list[LoggedStarts], vehicle: Vehicle) -> HeldOut:
-    """Return the damped body in place of torques that fail on the flight of their fit."""
+    """Return the damped body in place of torques that fail on the flight of their fit: on others,
+    these were off by up to 37 times the error of no change (10 Crazyflie flights of 9 s).
+    """
     if not any(len(of.rows) for of in starts):
         return HeldOut({}, "")
     loop = fit_loop(starts, vehicle, damped=True)
@@ -192,7 +195,7 @@ def standing(errors: Errors) -> str:
 
     Blocks count by their mean, flights by the worst of them.
     """
-    worst, means = {}, {}
+    scores = {}
     for name in next(iter(errors.values())):
         bounds, ratios = [], []
         for where, each in errors.items():
@@ -200,9 +203,8 @@ def standing(errors: Errors) -> str:
             ratio = np.array([of.model[:, -1] for of in each[name]]) / least
             bounds.append(np.max(ratio if where == OTHER_FLIGHTS else ratio.mean(axis=0)))
             ratios.append(np.log(ratio).mean())
-        worst[name], means[name] = max(bounds), np.mean(ratios)
-    fine = [name for name, bound in worst.items() if bound <= _ALIKE]
-    return min(fine, key=means.__getitem__) if fine else min(worst, key=worst.__getitem__)
+        scores[name] = max(_ALIKE, *bounds), np.mean(ratios)
+    return min(scores, key=scores.__getitem__)
 
 
 def _reason(errors: Errors) -> str:
@@ -210,15 +212,16 @@ def _reason(errors: Errors) -> str:
     said = []
     for where, each in errors.items():
         whole, simple = (PredictionErrors.pooled(each[name]) for name in (WHOLE, SIMPLEST))
-        least = np.minimum(whole.still, simple.model)
-        ends = whole.model[:, -1], least[:, -1]
-        for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True):
-            figures = (
+        ends = whole.model[:, -1], np.minimum(whole.still, simple.model)[:, -1]
+        said += [
+            (
+                end / best,
                 f"{what} of {where.replace('_', ' ')} worse than the simplest guess "
-                f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
+                f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)",
             )
-            said.append((end / best, figures))
-    return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"
+            for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True)
+        ]
+    return f"not identifiable: torques predict the {max(said)[1]}"
 
 
 def _by_balance(fit: VehicleFit) -> HeldOut:
