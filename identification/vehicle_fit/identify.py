@@ -170,12 +170,14 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
     models = models_of(vehicle)
     if tested.loop is not None:
         models |= loops_of(vehicle, tested.loop.loop)
-        stands = IDENTIFIED if "closed loop" in tested.stands else REFUTED
+        models[""] = replace(vehicle, closed_loop=tested.loop.loop)
+        stands = REFUTED if tested.stands in models_of(vehicle) else IDENTIFIED
         for size, (c, unit), value in zip(
             tested.loop.deviations, UNITS.items(), astuple(tested.loop.loop), strict=True
         ):
             name, wide = f"closed_loop {c}", 1.96 * size
-            named[name] = Estimate(name, value, value - wide, value + wide, unit, stands, LOOP)
+            if size > 0.0:
+                named[name] = Estimate(name, value, value - wide, value + wide, unit, stands, LOOP)
     if not tested.stands:
         for name, e in named.items():
             if e.status == IDENTIFIED:

@@ -54,8 +54,8 @@ GAZEBO = parse_geometry("0.1262")
 HOVER = np.sqrt(MASS * 9.81 / (4 * K)) / FULL  # command
 
 
-def of_crazyflie(logs):
-    return identify(logs, CRAZYFLIE.mass, parse_geometry(str(CRAZYFLIE.arm_l)))
+def of_crazyflie(logs, windows=None):
+    return identify(logs, CRAZYFLIE.mass, parse_geometry(str(CRAZYFLIE.arm_l)), windows)
 
 
 @pytest.fixture(scope="module")
@@ -273,6 +273,19 @@ def test_a_model_stands_on_each_flight():
         loop = [of(1, 1, 1, rate) for rate in rates]
         errors = {"no change": still, "thrust and drag": still, "loop": loop}
         assert standing({OTHER_FLIGHTS: errors}) == stands
+
+
+@pytest.mark.parametrize("off", [0.5, 2.0])
+def test_torques_that_fail_on_their_own_flight_turn_no_prediction(commanded, monkeypatch, off):
+    """12 times the error of no change, on flights of 9 s of which nothing can be held out."""
+
+    def errors(_, vehicles):
+        return [of(*4 * [off if v.closed_loop is None else 1.0]) for v in vehicles]
+
+    monkeypatch.setattr("windwrench.identification.vehicle_fit.held_out.errors_at", errors)
+    found = of_crazyflie(commanded[:1], [(2.0, 9.0)])
+    assert found.vehicle.status.torque == "assumed"
+    assert ("closed_loop damping" in found.estimates) == (off > 1.0)
 
 
 def test_a_vehicle_that_is_refuted_keeps_its_motion(commanded):
