@@ -29,6 +29,7 @@ from windwrench.dynamics.vehicle import Vehicle
 from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.evidence.kept_results import DOCS
 from windwrench.evidence.runner import start
+from windwrench.evidence.scoring import share
 from windwrench.identification.logs.magnitudes import motor_doubts
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.text_table import open_table
@@ -151,8 +152,8 @@ def brushless(data: Path) -> dict[str, Any]:
 
 
 def stands(data: Path, vehicle: Vehicle) -> dict[str, list[float]]:
-    """Return the mean thrust coefficients (N/(rad/s)^2) of two stands near a vehicle's rotor speed in
-    hover, and the numbers of their rows.
+    """Return the mean thrust coefficients (N/(rad/s)^2) of two stands near a vehicle's rotor speed
+    in hover, and the numbers of their rows.
     """
     guarded = np.loadtxt(
         data / "system-id/data/cf21bl_guards/feb25_2026_0.csv", delimiter=",", skiprows=1
@@ -201,11 +202,50 @@ def pull(folder: Path, vehicle: Vehicle) -> dict[str, dict[str, Any]]:
     return found
 
 
-def felt(pulls: Mapping[str, Mapping[str, Any]]) -> tuple[float, float, float]:
-    """Return the mean load felt (kg) and its 95 % interval, of the flights' scatter."""
-    loads = np.array([flight["felt"] for flight in pulls.values()])
-    wide = float(student.ppf(0.975, len(loads) - 1) * sem(loads))
-    return float(loads.mean()), float(loads.mean() - wide), float(loads.mean() + wide)
+def load_felt(result: Mapping[str, Any]) -> str:
+    """Return the mean load felt, its 95 % interval by the flights' scatter, and on how many flights
+    it is within 10 % of the weighed one.
+    """
+    loads = _loads(result)
+    wide = student.ppf(0.975, len(loads) - 1) * sem(loads)
+    low, high = loads.mean() - wide, loads.mean() + wide
+    near = int(np.sum(np.abs(loads / LOAD - 1.0) <= 0.1))
+    return (
+        f"{1e3 * loads.mean():.2f} g ({1e3 * low:.2f}–{1e3 * high:.2f}); "
+        f"within 10 % on {share(near, len(loads))} flights"
+    )
+
+
+def brushless_rows(result: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Return what was measured of the brushless Crazyflie, the result, and what stands beside."""
+    k, on_stands = result["k"], result["stands"]
+    said = {
+        name: f"{1e8 * value:.2f} ({1e8 * low:.2f}–{1e8 * high:.2f})"
+        for name, (value, low, high) in k.items()
+    }
+    stand = on_stands["no guards"][0]
+    # the thrust carries vehicle and load: a factor on it is one on both
+    scaled = stand / k["free"][0] * (CARRIER + _loads(result).mean()) - CARRIER
+    beside = "; ".join(
+        f"thrust stand, {name}: {1e8 * value:.2f} ({count} rows)"
+        for name, (value, count) in on_stands.items()
+    )
+    measured = (
+        f"Crazyflie 2.1 Brushless: `k` (1e-8 N/(rad/s)²) of flights by {1e3 * FREE_MASS:g} g; "
+        f"with a load, by {1e3 * (CARRIER + LOAD):.3g} g"
+    )
+    return [
+        (
+            f"Load of {1e3 * LOAD:g} g on a cable under it: felt",
+            load_felt(result),
+            f"{1e3 * LOAD:g} g weighed; by the stand's `k` {1e3 * scaled:.1f} g",
+        ),
+        (measured, f"{said['free']}; {said['carrying']}", beside),
+    ]
+
+
+def _loads(result: Mapping[str, Any]) -> Array:
+    return np.array([flight["felt"] for flight in result["pull"].values()])
 
 
 def section(result: dict[str, Any]) -> str:
@@ -224,7 +264,7 @@ def section(result: dict[str, Any]) -> str:
             said = f"{OF_SYSID_TOOLS[name]:.4g}"
             lines.append(f"| {name} | {value:.3g} | {low:.3g}–{high:.3g} | {said} |")
     if cables := result.get("brushless"):
-        lines += ["", f"k: {cables['k']}, on stands {cables['stands']}"]
+        lines += ["", *(": ".join(row) for row in brushless_rows(cables))]
         lines += ["", "| flight | mean pull, N (x, y, z) | off, RMS, N | g |", "| --- " * 4 + "|"]
         for name, row in cables["pull"].items():
             numbers = (" ".join(f"{x:.4f}" for x in row[key]) for key in ("estimated", "rms_off"))
