@@ -84,10 +84,12 @@ def identify(
             models = identified.vehicle, models_of(identified.vehicle)[SIMPLEST]
             further = errors_of_models(unseen, models, windows=parts_of)
         identified = identified._replace(predicted={**identified.predicted, "prediction": further})
+    load = "a load is tracked: --mass is that of the vehicle with its load"
     doubts = [
         f"warning: {flight.name}: {text}"
-        for flight in (*flights, *unseen)
-        if (text := convention_doubt(flight, None))
+        for flight in flights
+        for text in (convention_doubt(flight, None), "payload_position" in flight.extra and load)
+        if text
     ]
     identified = identified._replace(notes=(*doubts, *identified.notes))
     run.record = out.with_name(f"{out.stem}.run.json")
@@ -111,8 +113,7 @@ def identify(
     reasons: dict[str, list[str]] = {}
     for e in identified.estimates.values():
         if e.status in ("assumed", "not identifiable"):
-            why = e.how.removeprefix(f"{e.status}: ")
-            reasons.setdefault(f"{e.status}: {why}", []).append(e.name)
+            reasons.setdefault(e.how.removeprefix("not identifiable: "), []).append(e.name)
     for why, names in reasons.items():
         console.print(f"{', '.join(names)}: {why}")
     for line in identified.advice:

@@ -152,8 +152,7 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
             "motor_curve; expected one, to turn commands into thrust"
         )
     # ``identify`` gives a preset's flights a vehicle of their own
-    known = vehicle.status.coefficients
-    if log.vehicle and log.vehicle != vehicle.name and not known:
+    if log.vehicle not in ("", vehicle.name) and not vehicle.status.coefficients:
         yield _Note(
             f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
         )

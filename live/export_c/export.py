@@ -17,6 +17,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ... import __version__
+from ...controllers.wind_observation import WIND_PERIOD
 from ...dynamics.effects import get
 from ...dynamics.effects.base import MEMORY, PARAMETERS, ROW_SIZE, Effect
 from ...dynamics.mean_jet import jet_table
@@ -25,7 +26,7 @@ from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchUKF
 from ...estimator.filter_record import FILTER, fields_between
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError, unknown_name
-from .flights import CONTROLLERS, flight_of, whole_rate
+from .flights import CONTROLLERS, flight_of
 from .numbers import PRECISIONS, filters
 from .policies import policy_numbers
 
@@ -91,7 +92,8 @@ def export_c(
     learned = (policy or {}).get("policy")
     if rate is None:
         rate = vehicle.mocap.rate_hz
-        rate = whole_rate(rate, learned) if controller or learned else rate
+        if controller or learned:  # a measured rate, such as 101.3 Hz, holds no whole steps
+            rate = max(1, round(WIND_PERIOD * rate)) / WIND_PERIOD
     for name, value in (("rate", rate), ("rise_time", rise_time)):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"{name}: expected a positive number, got {value!r}")

@@ -14,15 +14,6 @@ CONTROLLERS = ("lqg",)
 _ACTIONS = ("attitude", "rates", "rotors")
 
 
-def whole_rate(rate: float, policy: TaskPolicy | None) -> float:
-    """Return the multiple of a policy's decisions a second, or of a controller's, nearest to a rate
-    (Hz): a measured rate, such as 101.3 poses a second, holds no whole number of steps.
-    """
-    usual = 1.0 / WIND_PERIOD
-    each: float = policy.card.get("flight", {}).get("decision_hz", usual) if policy else usual
-    return each * max(1, round(rate / each))
-
-
 def flight_of(
     vehicle: Vehicle, period: float, controller: str | None, policy: TaskPolicy | None
 ) -> dict[str, Any]:
