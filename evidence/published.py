@@ -4,8 +4,8 @@
   the published network and of estimators (NeuroMHE; TR-NeuroMHE).
 * Pull of a tracked load of 4.7 g on a cable under a Crazyflie 2.1 Brushless
   (IMRCLab/crazyflie-data-collection), beside the load's weight and acceleration; and the thrust
-  coefficient, beside two thrust stands of the same source. One stand had propeller guards. The
-  source does not state whether the stands' vehicle is the one that flew, or whether guards flew.
+  coefficient, beside two thrust stands of the same source, named as its folders. The source does
+  not state whether a stand held the vehicle that flew, or whether guards flew.
 * Coefficients of a Crazyflie (Eschmann, Albani, Loianno, arXiv 2404.07837: sysid.tools), by the
   same parts of the same logs.
 
@@ -165,8 +165,8 @@ def stands(data: Path, vehicle: Vehicle) -> dict[str, list[float]]:
     turned = np.array([logged[logged[:, 1] == pwm, 6].mean() for pwm in weighed[:, 0]])
     found = {}
     for name, grams, squares in (
-        ("guards", guarded[:, 6], np.square(_RPM * guarded[:, 2:6]).sum(axis=1)),
-        ("no guards", weighed[:, 1], 4.0 * np.square(_RPM * turned)),
+        ("cf21bl_guards", guarded[:, 6], np.square(_RPM * guarded[:, 2:6]).sum(axis=1)),
+        ("brushless_calibration", weighed[:, 1], 4.0 * np.square(_RPM * turned)),
     ):
         near = np.abs(np.sqrt(squares / 4.0) / vehicle.hover_rate - 1.0) < _NEAR
         k = 1e-3 * vehicle.gravity * grams[near] / squares[near]
@@ -223,11 +223,11 @@ def brushless_rows(result: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         name: f"{1e8 * value:.2f} ({1e8 * low:.2f}–{1e8 * high:.2f})"
         for name, (value, low, high) in k.items()
     }
-    stand = on_stands["no guards"][0]
+    stand = on_stands["brushless_calibration"][0]
     # the thrust carries vehicle and load: a factor on it is one on both
     scaled = stand / k["free"][0] * (CARRIER + _loads(result).mean()) - CARRIER
     beside = "; ".join(
-        f"thrust stand, {name}: {1e8 * value:.2f} ({count} rows)"
+        f"thrust stand {name} {1e8 * value:.2f} ({count} rows)"
         for name, (value, count) in on_stands.items()
     )
     measured = (
@@ -236,7 +236,7 @@ def brushless_rows(result: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     )
     return [
         (
-            f"Load of {1e3 * LOAD:g} g on a cable under it: felt",
+            f"Load of {1e3 * LOAD:g} g on a cable under a Crazyflie: felt",
             load_felt(result),
             f"{1e3 * LOAD:g} g weighed; by the stand's `k` {1e3 * scaled:.1f} g",
         ),
