@@ -152,7 +152,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
             f"has motor commands and no rotor speeds, and the vehicle {vehicle.name} states no "
             "motor_curve; expected one, to turn commands into thrust"
         )
-    if log.vehicle and log.vehicle != vehicle.name:
+    # ``identify`` gives a preset's flights a vehicle of their own
+    if log.vehicle not in ("", vehicle.name) and not vehicle.status.coefficients:
         yield _Note(
             f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
         )

@@ -235,6 +235,14 @@ def test_the_law_with_lead(tmp_path):
     assert_allclose(commands(c, seen), wanted, rtol=0, atol=1e-5)
 
 
+def test_a_controller_decides_in_whole_steps_at_a_measured_pose_rate():
+    """101.276 poses a second, as ``identify`` writes them: 25 decisions need 100 steps."""
+    vehicle = load_vehicle("crazyflie")
+    measured = replace(vehicle, mocap=replace(vehicle.mocap, rate_hz=101.276))
+    assert export_c(measured).filter.period == 1.0 / 101.276
+    assert export_c(measured, controller="lqg").filter.period == 0.01
+
+
 class Rates(WindTrajectoryEnv):
     action, observation, normalize = "rates", "all", True
 

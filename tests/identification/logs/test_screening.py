@@ -21,6 +21,7 @@ from tests.support.parameters import mostly_slow
 from tests.support.sizes import rms
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
+from windwrench.dynamics.vehicle import ModelStatus
 from windwrench.evidence.trials.practice_flights import practise
 from windwrench.identification.logs.evidence import Evidence, log_ranking
 from windwrench.identification.logs.flight_log import with_rows, write_log
@@ -289,6 +290,8 @@ def test_rotors_that_stop_or_race_are_named():
 def test_another_vehicle_than_the_log_names_is_doubted():
     _, (note,) = screen_log(replace(flight(), vehicle="crazyflie"), VEHICLE)
     assert note == "warning: the log names the vehicle crazyflie; it is read as ardrone2"
+    own = replace(VEHICLE, status=ModelStatus(coefficients={"k": "identified"}))
+    assert screen_log(replace(flight(), vehicle="crazyflie"), own)[1] == ()
 
 
 def test_a_log_names_its_vehicle(tmp_path):
