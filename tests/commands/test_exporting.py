@@ -69,7 +69,7 @@ def test_declared_effects_are_in_it_unless_none_are_wanted(call, tmp_path):
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
     path = tmp_path_factory.mktemp("flights") / "flight.csv.gz"
-    ((flight, speeds),) = inertial_flights([3], seconds=12.0)
+    ((flight, speeds),) = inertial_flights(range(3, 4), 12.0)
     write_log(replace(flight, command=None, rotor_speeds=speeds), path)
     return path
 

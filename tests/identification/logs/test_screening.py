@@ -32,7 +32,7 @@ from windwrench.identification.wrench_series import estimate_log
 
 CLEAN = ("excite", "gentle", "circle", "yaw")
 # one effect of each kind
-SHOWN = ("motor_lag", "rotor_drag", "slung_payload", "marker_offset", "clock_offset")
+SHOWN = ("motor_lag", "rotor_drag", "slung_payload")
 EXCITED = [CLEAN[0], pytest.param("yaw", marks=pytest.mark.slow)]
 
 
@@ -50,7 +50,7 @@ def flight(trajectory="excite", effect=None, size=2.0, seconds=14.0):
 
 @pytest.mark.parametrize(
     ("trajectory", "step"),
-    [(CLEAN[0], 5), *(pytest.param(name, 1, marks=pytest.mark.slow) for name in CLEAN)],
+    [(CLEAN[0], 9), *(pytest.param(name, 1, marks=pytest.mark.slow) for name in CLEAN)],
 )
 def test_every_order_of_rotors_is_told_apart(trajectory, step):
     log = flight(trajectory)
@@ -75,10 +75,8 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
 @pytest.mark.parametrize(
     ("columns", "signs", "expected"),
     [
-        ((2, 1, 0), (1, 1, 1), "px and pz are swapped"),
         ((1, 2, 0), (1, 1, 1), r"take \(pz, px, py\) as the position"),
         ((1, 0, 2), (-1, -1, 1), r"take \(-py, -px, pz\) as the position"),
-        ((0, 1, 2), (1, 1, -1), r"position's z points down; expected .* take \(px, py, -pz\)"),
     ],
 )
 @pytest.mark.parametrize("trajectory", EXCITED)
