@@ -33,7 +33,7 @@ JET = 0.03 * PLACE / 0.46 * np.exp(0.5 - 0.5 * (PLACE / 0.46) ** 2)
 
 @pytest.fixture(scope="module")
 def swept():
-    return profile_log(recorded(FAN, DISTANCE, "sweep", 6801, seconds=120.0), VEHICLE)
+    return profile_log(recorded(FAN, DISTANCE, "sweep", 6801, seconds=70.0), VEHICLE)
 
 
 def test_the_intervals_of_a_sweep_hold_the_jet(swept):

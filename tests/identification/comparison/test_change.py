@@ -64,8 +64,8 @@ def test_more_sessions_make_an_answer_surer_and_more_flights_of_one_do_not():
         stated(difference(after, drawn(rng, count, sessions=sessions)))
         for count, sessions in ((1, 1), (6, 1), (1, 6))
     )
-    assert (apart < 0.95 * one).all()
-    assert (more > 0.5 * (one + apart)).all()
+    assert (apart < 0.8 * one).all()
+    assert (more > 0.8 * one).all()
 
 
 def test_a_session_ends_where_the_battery_was_changed():

@@ -50,7 +50,7 @@ def flight(trajectory="excite", effect=None, size=2.0, seconds=14.0):
 
 @pytest.mark.parametrize(
     ("trajectory", "step"),
-    [(CLEAN[0], 9), *(pytest.param(name, 1, marks=pytest.mark.slow) for name in CLEAN)],
+    [(CLEAN[0], 5), *(pytest.param(name, 1, marks=pytest.mark.slow) for name in CLEAN)],
 )
 def test_every_order_of_rotors_is_told_apart(trajectory, step):
     log = flight(trajectory)

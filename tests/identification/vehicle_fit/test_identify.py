@@ -61,7 +61,7 @@ def of_crazyflie(logs):
 @pytest.fixture(scope="module")
 def commanded():
     lag = {"motor_lag": {"tau": 0.06}}
-    return [recorded(t, 12.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "shake", "yaw")]
+    return [recorded(t, 15.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "shake", "yaw")]
 
 
 @pytest.fixture(scope="module")
