@@ -56,6 +56,7 @@ def test_stable_baselines3_trains_on_the_plain_environment(example):
     assert found["learned"] != found["hover"]
 
 
+@pytest.mark.slow  # its steps: test_own_vehicle, tests/training and tests/live/test_export_c
 @pytest.mark.measured
 def test_a_log_becomes_a_vehicle_and_two_controllers_in_c(example, monkeypatch):
     pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
@@ -79,10 +80,20 @@ def test_fans_on_paths_of_ones_own_are_followed_and_drawn(example, tmp_path):
     assert (tmp_path / "followed" / "fan_path.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_an_effect_of_ones_own_is_found_with_its_coefficient(example, tmp_path, capsys):
+def asks_for(monkeypatch, script, *effects):
+    """Let a script's diagnoses ask for its own and a few of the kit's effects."""
+    others = {*library.names()} - {*effects}
+    monkeypatch.setattr(script, "diagnose", partial(script.diagnose, without=tuple(others)))
+
+
+def test_an_effect_of_ones_own_is_found_with_its_coefficient(
+    example, tmp_path, capsys, monkeypatch
+):
     with joined(tmp_path):  # and leaves the library again
         assert "tether" not in library.names()
-        found = example("custom_effect").main(seconds=14.0, stiffness=0.12, seed=1)
+        script = example("custom_effect")
+        asks_for(monkeypatch, script, "tether", "constant_force", "rotor_drag")
+        found = script.main(seconds=14.0, stiffness=0.12, seed=1)
     assert found.verdict == "explained"
     assert [effect.name for effect in found.effects] == ["tether"]
     assert found.effects[0].coefficients["k"] == pytest.approx(0.12, rel=0.08)
@@ -91,10 +102,8 @@ def test_an_effect_of_ones_own_is_found_with_its_coefficient(example, tmp_path, 
 
 
 def test_a_coefficient_is_regressed_on_the_time_of_flights(example, tmp_path, capsys, monkeypatch):
-    """Each flight is asked for two drags alone."""
     script = example("drift_over_flights")
-    others = {*library.names()} - {"rotor_drag", "body_drag"}
-    monkeypatch.setattr(script, "diagnose", partial(script.diagnose, without=tuple(others)))
+    asks_for(monkeypatch, script, "rotor_drag")
     regress = script.main
     flights = tmp_path / "flights"
     flights.mkdir()

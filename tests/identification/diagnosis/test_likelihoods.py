@@ -205,7 +205,7 @@ def flown(wind=(0.0, 0.0, 0.0), seconds=25.0, pose_noise=3e-4, imu=False, seed=1
     return replace(log, accelerometer=noisy, gyro=np.zeros_like(felt))
 
 
-@pytest.mark.parametrize("swing", [0.0, 1.8])
+@pytest.mark.parametrize("swing", [pytest.param(0.0, marks=pytest.mark.slow), 1.8])
 def test_a_wind_is_no_drag_and_no_tilt(swing):
     """The swing is in step with the flight."""
     t = np.arange(0.0, 25.0, 0.01)
@@ -226,6 +226,7 @@ def test_a_wind_is_no_drag_and_no_tilt(swing):
     assert found.after.force_rms < (0.2 + swing / 12.0) * found.before.force_rms
 
 
+@pytest.mark.slow
 def test_in_still_air_nothing_is_sure():
     found = diagnose([flown()], VEHICLE)
     assert not [e.name for e in found.effects if not e.tentative]
@@ -267,7 +268,7 @@ def test_the_noise_of_an_autoregression_is_found():
     rng = default_rng(4)
     lag = np.array([[0.7, 0.2], [0.0, 0.4]])
     root = np.array([[1.0, 0.0], [0.8, 0.5]])
-    x = np.zeros((20000, 2))
+    x = np.zeros((12000, 2))
     for k in range(1, len(x)):
         x[k] = lag @ x[k - 1] + root @ rng.standard_normal(2)
     begins = np.arange(len(x)) == 0

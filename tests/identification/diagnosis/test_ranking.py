@@ -18,7 +18,7 @@ from windwrench.identification.logs.flight_log import FlightLog
 
 
 def flown(**effects):
-    log = fly_practice(VEHICLE, settings(effects), "excite", 20.0, seed=5)
+    log = fly_practice(VEHICLE, settings(effects), "excite", 12.0, seed=5)
     return RegressedFlights([log], VEHICLE)
 
 
@@ -34,7 +34,7 @@ def blow(loop):
 
 
 def test_the_swing_of_a_wind_is_no_drag():
-    log = FlightLog(**record_flight(VEHICLE, seconds=20.0, seed=1, push=blow))
+    log = FlightLog(**record_flight(VEHICLE, seconds=12.0, seed=1, push=blow))
     found = rank(
         RegressedFlights([log], VEHICLE), ("wind", "body_drag", "constant_force"), print
     ).ranking

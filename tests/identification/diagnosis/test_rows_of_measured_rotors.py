@@ -40,11 +40,12 @@ def weak():
     return RegressedFlights([pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=20.0))], VEHICLE)
 
 
-@pytest.mark.parametrize("trajectory", ["hover", "excite"])
-@pytest.mark.parametrize("missing", [(), (EffectSetting("mass", {"dm": 0.03}),)])
+@pytest.mark.parametrize(
+    ("trajectory", "missing"), [("excite", ()), ("hover", (EffectSetting("mass", {"dm": 0.03}),))]
+)
 def test_a_simulator_may_have_no_noise(trajectory, missing):
     """An exact pose looks like a filtered one; what is left of it counts for none."""
-    log = fly_practice(VEHICLE, missing, trajectory, 20.0, 1, turbulence=0.0, sensor=0.0)
+    log = fly_practice(VEHICLE, missing, trajectory, 12.0, 1, turbulence=0.0, sensor=0.0)
     found = diagnose([log], VEHICLE)
     assert (found.verdict == "nothing to explain") == (not missing)
     # of thrust and mass a flight shows the ratio
@@ -56,12 +57,12 @@ def test_a_simulator_may_have_no_noise(trajectory, missing):
 def test_a_still_flight_without_noise_is_diagnosed(turns):
     """Columns that do not vary carry nothing; what is known to the last digit is no more."""
     rng = default_rng(0)
-    count = 3001
+    count = 2101
     place = [0.0, 0.0, 1.0] + 1e-9 * rng.standard_normal((count, 3))
     attitude = [1.0, 0.0, 0.0, 0.0] + turns * rng.standard_normal((count, 4))
     log = resting(0.005 * np.arange(count), position=place, quaternion=attitude)
     found = diagnose([log], VEHICLE)
-    assert not any(not e.tentative for e in found.effects)
+    assert all(e.tentative for e in found.effects)
 
 
 def test_an_imu_that_was_read_along_some_axes_counts_as_not_read():

@@ -160,7 +160,7 @@ APART = 0.008
 
 def unevenly_lagging(commanded):
     """A flight, and its log with the commands that such a lag turns into its rotor speeds."""
-    log = recorded(seed=3)
+    log = recorded(seconds=12.0, seed=3)
     speeds = low_pass(log.rotor_speeds, 30.0, log.period)  # slower, a lag would make up for it
     rate = np.gradient(speeds, log.period, axis=0)
     tau = np.where(rate > 0.0, TAU - APART, TAU + APART)

@@ -25,7 +25,7 @@ from windwrench.identification.logs.text_table import open_table
 @pytest.fixture(scope="module")
 def flown():
     """A lively flight."""
-    return flight("ardrone2", "excite", 1, 15.0)
+    return flight("ardrone2", "excite", 1, 10.0)
 
 
 def guessed(path, name=""):

@@ -33,7 +33,7 @@ from windwrench.identification.wrench_series import estimate_log
 
 CLEAN = ("excite", "gentle", "circle", "yaw")
 # one effect of each kind
-SHOWN = ("motor_lag", "rotor_drag", "slung_payload", "marker_offset", "clock_offset")
+SHOWN = ("motor_lag", "rotor_drag", "slung_payload")
 EXCITED = [CLEAN[0], pytest.param("yaw", marks=pytest.mark.slow)]
 
 
@@ -76,10 +76,8 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
 @pytest.mark.parametrize(
     ("columns", "signs", "expected"),
     [
-        ((2, 1, 0), (1, 1, 1), "px and pz are swapped"),
         ((1, 2, 0), (1, 1, 1), r"take \(pz, px, py\) as the position"),
         ((1, 0, 2), (-1, -1, 1), r"take \(-py, -px, pz\) as the position"),
-        ((0, 1, 2), (1, 1, -1), r"position's z points down; expected .* take \(px, py, -pz\)"),
     ],
 )
 @pytest.mark.parametrize("trajectory", EXCITED)
