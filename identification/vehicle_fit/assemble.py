@@ -17,7 +17,6 @@ from .geometry import (
     QUADRANT,
     ROTOR_RADIUS,
     THRUST_SPREAD,
-    Geometry,
 )
 from .model import inertia_of
 from .motors import MotorResponse
@@ -30,7 +29,6 @@ def vehicle_of(
     name: str,
     fit: VehicleFit,
     estimates: Estimated,
-    geometry: Geometry,
     logs: Logs,
     step: float,
     motors: MotorResponse | None,
@@ -41,9 +39,9 @@ def vehicle_of(
     arm = estimates["arm_l"].value
     effects = _effects(estimates)
     curve = None
-    if fit.drive.commands:
-        thrust = np.zeros(max(fit.drive.exponents) + 1)
-        for j, exponent in enumerate(fit.drive.exponents):
+    if fit.model.commands:
+        thrust = np.zeros(max(fit.model.exponents) + 1)
+        for j, exponent in enumerate(fit.model.exponents):
             thrust[exponent] = fit.values[f"a{j}"]
         voltage = estimates["voltage_exponent"]
         known = voltage.value if voltage.status == IDENTIFIED else 0.0
@@ -59,7 +57,7 @@ def vehicle_of(
         effects.append(EffectSetting(of_lag, {coefficient: estimates[of_lag].value}))
     inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
     inertia |= {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
-    even = np.allclose(geometry.positions, geometry.arm * QUADRANT)
+    even = np.allclose(fit.model.geometry.positions, fit.model.geometry.arm * QUADRANT)
     vehicle = Vehicle(
         name=name,
         mass=fit.model.mass,
@@ -70,9 +68,9 @@ def vehicle_of(
         rotor_radius=ROTOR_RADIUS * arm,
         omega_lsb=step,
         omega_source="commanded" if late else "measured",
-        voltage_ref=fit.drive.voltage_ref,
-        spin=fit.drive.spin.copy(),
-        rotor_positions=None if even else geometry.positions,
+        voltage_ref=fit.model.voltage_ref,
+        spin=fit.model.spin.copy(),
+        rotor_positions=None if even else fit.model.geometry.positions,
         com=np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"]),
         effects=tuple(effects),
         motor_curve=curve,

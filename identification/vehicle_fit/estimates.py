@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 from ...dynamics.effects import Role, get
 from ...runtime.errors import InputError
 from ..logs.table import Pair, Values
-from .channels import Pieces, Sources
+from .channels import Pieces
 from .effect_settings import effect_of, estimate_name
-from .geometry import FLAT, GYRATION, VOLTAGE_EXPONENTS, YAW_REACH, Geometry, Interval
+from .geometry import FLAT, GYRATION, VOLTAGE_EXPONENTS, YAW_REACH, Interval
 from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Estimated, told
 from .solve import Function, VehicleFit
@@ -38,8 +38,6 @@ class Estimates:
     """The estimates of one vehicle, and the lengths of their scale."""
 
     fit: VehicleFit
-    sources: Sources
-    geometry: Geometry
     kept: Mapping[str, str]  # visible further effects, each with the reason to doubt it, or empty
     hidden: Interval | None  # an invisible moment of velocity: value, deviation, least visible
     doubt: str  # reason to believe no estimate of torque; empty without one
@@ -53,9 +51,9 @@ class Estimates:
         Raises:
             InputError: neither turning nor an arm says how large the vehicle is.
         """
-        of = self.sources
+        of = self.fit.model.sources
         vertical = f"{of.force} along body z against {of.rotors}, with the mass given"
-        if self.fit.drive.commands:
+        if self.fit.model.commands:
             self._say_curve(pieces, vertical)
         else:
             self._say_positive("k", "a0", "N/(rad/s)^2", vertical)
@@ -93,7 +91,7 @@ class Estimates:
         return value, min(corners), max(corners)
 
     def _say_curve(self, pieces: Pieces, how: str) -> None:
-        fit, exponents = self.fit, self.fit.drive.exponents
+        fit, exponents = self.fit, self.fit.model.exponents
         for j, e in enumerate(exponents):
             self._say(f"thrust u^{e}", fit.interval(f"a{j}", False), "N", how)
         flown = np.concatenate([p.rotors for p in pieces])
@@ -130,12 +128,12 @@ class Estimates:
         self._say("voltage_exponent", known, "1", how, doubt=why if wide else "")
         flown = np.concatenate([p.voltage for p in pieces if p.voltage is not None])
         for volts in () if wide else np.quantile(flown, [0.05, 0.95]).tolist():
-            at_voltage = partial(hover, share=volts / fit.drive.voltage_ref)
+            at_voltage = partial(hover, share=volts / fit.model.voltage_ref)
             self._say_positive(f"hover command at {volts:.2f} V", at_voltage, "1", how)
 
     def _say_arm_and_inertia(self) -> None:
         fit, values = self.fit, self.fit.values
-        known_arm, mass = self.geometry.known, self.fit.model.mass
+        known_arm, mass = self.fit.model.geometry.known, self.fit.model.mass
         flat = values["Jz"] / (values["Jx"] + values["Jy"])
         motions = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}
         why = {
@@ -150,7 +148,7 @@ class Estimates:
                 "--geometry, or a log with quick roll and pitch"
             )
         if known_arm:
-            self._say("arm_l", 3 * (self.geometry.arm,), "m", "--geometry", GIVEN)
+            self._say("arm_l", 3 * (self.fit.model.geometry.arm,), "m", "--geometry", GIVEN)
         else:
             # with rotors at unit distance the fit's inertia is inertia over arm: gyration * mass *
             # arm at a usual radius of gyration
@@ -163,7 +161,7 @@ class Estimates:
             self._say("arm_l", (value, low, high), "m", how, ASSUMED)
             self.arm, self.arm_range = value, (low / value, high / value)
         status, given = (IDENTIFIED, "given") if known_arm else (ASSUMED, "assumed")
-        rate, rotors = self.sources.rate, f"against {self.sources.rotors}"
+        rate, rotors = self.fit.model.sources.rate, f"against {self.fit.model.sources.rotors}"
         for axis, motion in motions.items():
             name = axis + axis[1]
             if axis not in why:
@@ -176,12 +174,12 @@ class Estimates:
                 known = flat * (x.value + y.value), low * (x.low + y.low), high * (x.high + y.high)
                 how = f"{flat:g} of Jxx + Jyy, {low:g} to 1"
             else:
-                known = _times(mass * self.geometry.arm**2, GYRATION)
+                known = _times(mass * self.fit.model.geometry.arm**2, GYRATION)
                 how = f"{GYRATION[0]:g} mass arm^2"
             self._say(name, known, "kg m2", f"{why[axis]}; {how}", ASSUMED)
         for axis, across in (("Jx", 1), ("Jy", 0)):
             if axis not in why:
-                length = np.abs(fit.drive.positions[:, across]).mean()
+                length = np.abs(fit.model.geometry.positions[:, across]).mean()
                 value, low, high = (length / x for x in fit.interval(axis))
                 how = f"{rate} {rotors}: needs no arm"
                 self._say(f"l/{axis}{axis[1]}", (value, high, low), "1/(kg m)", how)
@@ -191,13 +189,13 @@ class Estimates:
             self._say(name, known, "kg m2", f"{rate} across axes", status, doubt)
 
     def _say_yaw(self) -> None:
-        how = f"{self.sources.rate} in yaw against {self.sources.rotors}"
+        how = f"{self.fit.model.sources.rate} in yaw against {self.fit.model.sources.rotors}"
         gain = self.fit.interval(lambda v: v["reach"] / v["Jz"])
         inertia, status = self.said["Jzz"], ASSUMED
         doubt = self.doubt or ("" if told(gain) else "the flight hardly accelerates in yaw")
         self._say("(p/k)/Jzz", gain, "1/(kg m)", how, doubt=doubt)
         if doubt:
-            length = self.geometry.arm * self.arm
+            length = self.fit.model.geometry.arm * self.arm
             ratio, how = _times(length, YAW_REACH), f"{doubt}; {YAW_REACH[0]:g} of the arm"
         elif inertia.status == ASSUMED:
             # the flight tells the ratio alone: p/k carries the assumption of Jzz
@@ -206,7 +204,7 @@ class Estimates:
         else:
             ratio, status = self._scaled(self.fit.interval("reach")), IDENTIFIED
         self._say("p/k", ratio, "m", how, status)
-        if not self.fit.drive.commands:
+        if not self.fit.model.commands:
             known = _times(self.said["k"].value, ratio)
             if status == IDENTIFIED:
                 known = self.fit.interval(lambda v: v["reach"] * v["a0"])
@@ -218,9 +216,9 @@ class Estimates:
             "force follows the logged rotor speeds at once: they are measured, and no command is "
             "logged beside them"
         )
-        how = f"force and turning against {self.sources.rotors}"
+        how = f"force and turning against {self.fit.model.sources.rotors}"
         if "lag" in self.fit.model.free:
-            if not self.fit.drive.commands:
+            if not self.fit.model.commands:
                 how += ", which therefore are commanded, not measured"
             known = self.fit.interval("lag")
             late = "a time offset of the motion does nearly the same here"
@@ -236,23 +234,23 @@ class Estimates:
         )
         steady = "thrust hardly changes: a constant torque does the same"
         swing = "the pose's point swings about it: or the markers' middle is off"
-        widest = 0.5 * self.arm * self.geometry.arm
+        widest = 0.5 * self.arm * self.fit.model.geometry.arm
         for axis in "xy":
             known = _times(self.arm, self.fit.interval(f"c{axis}", False))
             doubt = self.doubt or steady * (known[2] - known[1] > widest)
-            status = IDENTIFIED if self.geometry.known else ASSUMED
+            status = IDENTIFIED if self.fit.model.geometry.known else ASSUMED
             self._say(f"com {axis}", known, "m", how, status, doubt)
-        if self.sources.force == "pose":
+        if self.fit.model.sources.force == "pose":
             known = self.fit.interval(lambda v: -v["rz"], False)
             self._say("com z", known, "m", swing, doubt=swing * (known[2] - known[1] > widest))
 
     def _say_air(self) -> None:
-        if not self.sources.velocity:
+        if not self.fit.model.sources.velocity:
             why = "no velocity is known: the logs have no position"
             self._say("drag", UNKNOWN, "N/(m/s)", "", doubt=why)
             return
-        along = f"{self.sources.force} along body x and y against velocity"
-        damped = f"{self.sources.rate}, its own derivative against it and against velocity"
+        along = f"{self.fit.model.sources.force} along body x and y against velocity"
+        damped = f"{self.fit.model.sources.rate}, its own derivative against it and against velocity"
         for kind, effect in FURTHER.items():
             if effect.role is None or kind not in self.kept:
                 continue
