@@ -20,7 +20,7 @@ from .geometry import (
 )
 from .model import inertia_of
 from .motors import MotorResponse
-from .parameters import FURTHER
+from .parameters import FURTHER, QUANTITIES
 from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate, Estimated
 from .solve import VehicleFit
 
@@ -134,33 +134,18 @@ def _effects(estimates: Estimated) -> list[EffectSetting]:
 def advice_of(estimates: Estimated) -> list[str]:
     """Return the flights or arguments to add for quantities missing from the logs."""
     lag = effect_of(Role.LAG)
-    climb = "Climb hard and let the vehicle sink: the thrust curve is known where it flew."
-    brisk = "Climb and sink briskly: thrust that changes shows the centre of mass."
-    advice = {
-        "arm_l": "Give --geometry, the rotors' distance from the body axes: inertia follows.",
-        "Jxx": "Fly quick roll movements for 20 s: they show Jxx.",
-        "Jyy": "Fly quick pitch movements for 20 s: they show Jyy.",
-        "Jzz": "Yaw at 1 to 2 rad/s while moving to and fro in roll and pitch for 20 s: the "
-        "gyroscopic torque shows Jzz, and with it p.",
-        "(p/k)/Jzz": "Turn quickly to the left and to the right: it shows p/k over Jzz.",
-        lag: "Climb, roll and pitch in quick steps: they tell a motor's lag from a time offset.",
-        "thrust(0.75)": climb,
-        "thrust(0.25)": climb,
-        "voltage_exponent": "Log the voltage, and climb and sink with a full and with an empty "
-        "battery: it tells the voltage from the thrust curve.",
-        "com x": brisk,
-        "com y": brisk,
-        "drag": "Fly to and fro at 2 m/s and more along both body axes: it shows drag.",
+    missing = {
+        "lag" if name == lag else name: e
+        for name, e in estimates.items()
+        if e.status in (ASSUMED, NOTHING)
     }
-    unmeasured = {
-        lag: "Log the motor commands beside the rotor speeds: together they show the lag.",
-        "drag": "Log the position: drag needs a velocity.",
-    }
-    for name in unmeasured.keys() & estimates.keys():
-        if math.isnan(estimates[name].value):
-            advice[name] = unmeasured[name]
     if estimates["arm_l"].status == ASSUMED:  # and inertia with it
-        for name in ("Jxx", "Jyy", "Jzz"):
-            del advice[name]
-    open_ones = {e.name for e in estimates.values() if e.status in (ASSUMED, NOTHING)}
-    return list(dict.fromkeys(text for name, text in advice.items() if name in open_ones))
+        missing = {name: e for name, e in missing.items() if name not in ("Jxx", "Jyy", "Jzz")}
+    nowhere = {name for name, e in missing.items() if math.isnan(e.value)}
+    advice, unmeasured = QUANTITIES["advice"], QUANTITIES["unmeasured"]
+    texts = (
+        (unmeasured if name in nowhere & unmeasured.keys() else advice)[name]
+        for name in advice
+        if name in missing
+    )
+    return list(dict.fromkeys(texts))

@@ -30,7 +30,7 @@ from .geometry import Geometry, Interval
 from .held_out import HeldOut, held_out, loops_of, models_of
 from .model import Model
 from .motors import motor_response
-from .parameters import BIASES, FORCE_BIAS, FURTHER, POSED_BIAS, first_model
+from .parameters import FORCE_BIAS, FURTHER, POSED_BIAS, QUANTITIES, first_model
 from .plausible import check_thrust
 from .result import ASSUMED, IDENTIFIED, NOTHING, REFUTED, Estimate, Estimated, Identified, told
 from .solve import VehicleFit, nearest_body, score_tests, solve
@@ -98,8 +98,8 @@ def identify(
             "only what is slower was used"
         )
     if sources.force == "accelerometer" and sources.velocity:
-        model = replace(fit.model, prior={**fit.model.prior, **dict.fromkeys(BIASES, POSED_BIAS)})
-        fit = solve(pieces, model, fit.theta)
+        biases = dict.fromkeys(QUANTITIES["biases"], POSED_BIAS)
+        fit = solve(pieces, replace(fit.model, prior={**fit.model.prior, **biases}), fit.theta)
     report(0.5, "asking what else shows")
     fit, kept, hidden = _with_optional(pieces, fit)
     if "answered torque" in kept:
@@ -124,7 +124,7 @@ def identify(
 
     def described(part: VehicleFit, why: str) -> tuple[Estimated, Vehicle]:
         part, _ = nearest_body(part)
-        named = Estimates(part, kept, hidden, doubt or why).say_all(pieces)
+        named = Estimates(part, kept, hidden, doubt or why).say_all()
         return named, vehicle_of(name, part, named, logs, step, motors)
 
     report(0.9, "predicting what is held out")
@@ -294,7 +294,7 @@ def _with_optional(
     offered = {
         name: further.parameters
         for name, further in FURTHER.items()
-        if (moving or further.role in (None, Role.RATE_DAMPING))
+        if (moving or further.role in ("", Role.RATE_DAMPING))
         and not (fit.model.commands and further.of_speeds)
         # the noise of a pose goes round the loop: quick torques then follow noise alone
         and (name != "answered torque" or rate == "gyro")

@@ -3,15 +3,16 @@ by axis, with every coefficient linear.
 """
 
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from ...dynamics.effects import Role
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-from ..logs.table import ArrayPair, NamedArrays, Names, Pair
+from ...runtime.yaml_file import read_yaml
+from ..logs.table import ArrayPair, Data, NamedArrays, Names, Pair
 from .channels import Pieces
 from .columns import ANSWERED_HZ, rotor_columns
 from .geometry import FLAT, GRAVITY, GYRATION
@@ -34,55 +35,22 @@ _FIRST_DELAYS = np.linspace(0.0, 0.08, 9)
 _OPPOSED = 0.15
 _SWING_HZ = (0.5, 8.0)
 
-BASE = (
-    "Jx",
-    "Jy",
-    "Jz",
-    "reach",
-    "cx",
-    "cy",
-    "Jr",
-    "tilt x",
-    "tilt y",
-    "rx",
-    "ry",
-    "rz",
-    "turn bias x",
-    "turn bias y",
-    "turn bias z",
-)
-BIASES = ("force bias x", "force bias y", "force bias z")
+QUANTITIES: Data = read_yaml(Path(__file__).with_name("quantities.yaml"), "quantities")
 
 
 class Further(NamedTuple):
-    """An effect for logs that get much likelier by it."""
+    """An effect for logs that get much likelier by it; ``quantities.yaml`` says what each is."""
 
     parameters: Names
-    role: Role | None = None  # the library effect's role; None: not in the library
-    first: int = 0  # index of the effect's first coefficient here
-    shows: str = ""  # in force along body x and y; or along "z", or in "turning"
-    of_speeds: bool = False  # takes measured rotor speeds
-    positive: bool = True  # a negative value is no physics, but another fault of the model
+    role: str = ""
+    first: int = 0
+    factor: float = 1.0
+    shows: str = ""
+    of_speeds: bool = False
+    positive: bool = True
 
 
-FURTHER: dict[str, Further] = {
-    "rotor drag": Further(("rotor drag x", "rotor drag y"), Role.ROTOR_DRAG, of_speeds=True),
-    "linear drag": Further(("linear drag x", "linear drag y"), Role.BODY_DRAG),
-    "quadratic drag": Further(
-        ("quadratic drag x", "quadratic drag y"), Role.BODY_DRAG, 3, positive=False
-    ),
-    "vertical drag": Further(("linear drag z",), Role.BODY_DRAG, 2),
-    "inflow": Further(("rotor drag z",), Role.INFLOW_THRUST, 0, "z", of_speeds=True),
-    "lift": Further(("lift",), Role.TRANSLATIONAL_LIFT, 0, "z", positive=False),
-    # shares of slow torques without a turn: the flight loop's answers
-    "answered torque": Further(("answered x", "answered y", "answered z")),
-    **{
-        f"damping {a}": Further((f"damping {a}",), Role.RATE_DAMPING, i, "turning")
-        for i, a in enumerate("xyz")
-    },
-    "flapping": Further(("flapping",), Role.FLAPPING_MOMENT, 0, "turning", of_speeds=True),
-    "products of inertia": Further(("Jxy", "Jxz", "Jyz"), positive=False),
-}
+FURTHER: dict[str, Further] = {n: Further(**row) for n, row in QUANTITIES["effects"].items()}
 
 
 def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, Array]:
@@ -136,10 +104,11 @@ def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, A
         "flapping": 0.05 * mass / speed * 0.03 * arm,
         **{f"{name} {a}": x for name, x in along.items() for a in "xyz"},
     }
-    free, prior = (*each, *BASE), {"delay": DELAY}
+    free, prior = (*each, *QUANTITIES["basic"]), {"delay": DELAY}
     if model.sources.force == "accelerometer":
-        free = (*free, *BIASES)
-        prior |= {**dict.fromkeys(BIASES, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
+        biases = QUANTITIES["biases"]
+        free = (*free, *biases)
+        prior |= {**dict.fromkeys(biases, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
     model = replace(model, opposite=gains[2] < 0.0, free=free, scale=scale, prior=prior)
     start = {**dict.fromkeys(each, 1.0 / count), "reach": 1.0}
     theta = np.array([start.get(name, 0.0) for name in free])

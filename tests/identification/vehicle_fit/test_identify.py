@@ -17,6 +17,7 @@ from tests.identification.vehicle_fit.flown import (
     INERTIA,
     MASS,
     REACH,
+    SPIN,
     K,
     X,
     Y,
