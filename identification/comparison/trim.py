@@ -56,12 +56,12 @@ class Trim:
 
 
 def features_of(thrust: Array) -> Array:
-    """Return the four numbers of thrusts (4,): differences in parts of the total, and log(total).
+    """Return the four numbers (..., 4) of thrusts (..., 4): differences in parts of the total, and log(total).
 
     The differences are left less right, front less rear, and rotors 1 and 3 less 2 and 4.
     """
-    total = thrust.sum()
-    return np.append(_MIX @ thrust / total, math.log(total))
+    total = thrust.sum(axis=-1, keepdims=True)
+    return np.concatenate([thrust @ _MIX.T / total, np.log(total)], axis=-1)
 
 
 def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | None = None) -> Trim:

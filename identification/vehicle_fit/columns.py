@@ -61,7 +61,7 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> Balance:
     for piece in pieces:
         air, rotors = air_columns(piece, model), rotor_columns(piece, model, centre)
         base = np.column_stack([*rotors.values()])
-        parts = [piece.measured(), *air.values(), base]
+        parts = [np.nan_to_num(piece.measured()), *air.values(), base]
         for name in [name for name in centre if name in _STEP]:
             there = centre | {name: centre[name] + _STEP[name]}
             moved = np.column_stack([*rotor_columns(piece, model, there).values()])

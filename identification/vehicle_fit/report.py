@@ -151,11 +151,8 @@ def _fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     columns |= air_columns(piece, fit.model)
     gains = coefficients(fit.model, fit.values, tuple(columns))
     model = np.column_stack(list(columns.values())) @ gains.T
-    measured = piece.measured()
-    if piece.specific_force is None:
-        measured[:, :3] = np.nan
     shown_hz = min(_SHOWN_HZ, fit.model.band)
-    return low_pass(measured, shown_hz, piece.period), low_pass(model, shown_hz, piece.period)
+    return tuple(low_pass(x, shown_hz, piece.period) for x in (piece.measured(), model))
 
 
 def explained(identified: Identified) -> Array:
