@@ -28,6 +28,7 @@ from .fault_channels import STEP, Samples
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
 _SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
+BEFORE, AFTER = 25, 4  # least intervals of usual flight before a fault, and after one
 PARTS = (0.0, 0.25, 0.5, 0.75)  # starts of a fault within an interval
 _AROUND = 5  # intervals around a strong acceleration: the model may be as wrong there
 ORDER = 10
@@ -91,6 +92,7 @@ class FaultBalance:
 
     Attributes:
         channels: with the noise of the last fit.
+        rows: possible starts of a fault.
         ramps: elapsed shares (J,) of a loss in each interval; 1 afterwards. A loss begins within an
             interval, at once (a propeller that breaks) or as the rotors' speed falls (a motor).
     """
@@ -101,6 +103,7 @@ class FaultBalance:
         w = samples.angular_velocity
         turning = samples.angular_acceleration
         self.follows = samples.follows
+        self.rows = np.arange(BEFORE, len(w) - AFTER)
         self.thrust = thrust = samples.thrust(lag, bend, dead)  # (N, 4)
         self.ramps = [_ramp(part, late) for late in (0.0, lag) for part in PARTS]
         gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, 1, axis=1)

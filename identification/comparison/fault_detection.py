@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
 
-from ...runtime.arrays import Array, Index
+from ...runtime.arrays import Array
 from ..logs.table import ArrayPair
 from .fault_balance import PARTS, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
@@ -37,9 +37,6 @@ _NOTHING = 0.5
 _EVENTS = (*[0.075] * 4, 0.05, 0.15)
 # the model's error of a loss, as a share: curve, lag and inflow of rotors at a new working point
 _ERROR = 0.25
-_BEFORE = 25  # least intervals of usual flight before a fault
-_AFTER = 4  # least intervals after a fault
-_PLACES = 2000  # most rows for the start of a fault
 # standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
 # usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
@@ -81,10 +78,13 @@ def find_fault(channels: Channels) -> RotorFault:
         InputError: too little flight.
     """
     samples = sample(channels)
-    rows = _rows(len(samples.t))
-    tried = _search(samples, rows, channels.thrust_known)
+    tried = _search(samples, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
-    evidence, starts, likely = _onsets(samples.t, rows, best)
+    # of a jump at each row, by each ramp
+    balance = best.balance
+    jumps = balance.steps(balance.rows, balance.ramps)
+    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), samples.t[balance.rows])
+    evidence = logsumexp(jumps) - math.log(len(balance.ramps) * len(samples.t))
     each, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
@@ -96,7 +96,7 @@ def find_fault(channels: Channels) -> RotorFault:
         samples,
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
         1 + rotor,
-        _quantiles(starts, likely, STEP),
+        _quantiles(starts.ravel(), softmax(jumps).ravel(), STEP),
         (1.0 - weights[rotor] @ _LOSSES, max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
@@ -113,14 +113,14 @@ class _Tried(NamedTuple):
     ramp: int
 
 
-def _search(samples: Samples, rows: Index, thrust_known: bool) -> list[_Tried]:
+def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
     """Return all trials: lags, and then curves, each from the best so far."""
     tried = dict[Interval, _Tried]()
 
     def best_of(keys: Iterable[Interval]) -> Interval:
         for key in keys:
             if key not in tried:
-                tried[key] = _fitted(FaultBalance(samples, *key), rows)
+                tried[key] = _fitted(FaultBalance(samples, *key))
         return max(tried, key=lambda key: tried[key].log)
 
     curves = _CURVES[:1] if thrust_known else _CURVES
@@ -130,31 +130,21 @@ def _search(samples: Samples, rows: Index, thrust_known: bool) -> list[_Tried]:
     return list(tried.values())
 
 
-def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
+def _fitted(balance: FaultBalance) -> _Tried:
     """Return a lag and curve with noise fitted beside the likeliest jump."""
     nothing = balance.nothing()
     for _ in range(_ROUNDS):
-        balance.fit(balance.share(*_jump(balance, rows)[1:]))
-    return _Tried(balance, max(nothing, balance.nothing()), *_jump(balance, rows))
+        balance.fit(balance.share(*_jump(balance)[1:]))
+    return _Tried(balance, max(nothing, balance.nothing()), *_jump(balance))
 
 
-def _jump(balance: FaultBalance, rows: Index) -> tuple[float, int, int]:
-    """Return log-likelihood, row and ramp of the likeliest jump, also at rows between ``rows``."""
-    k = int(np.argmax(balance.steps(rows, balance.ramps[:1])))
-    around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
+def _jump(balance: FaultBalance) -> tuple[float, int, int]:
+    """Return log-likelihood, row and ramp of the likeliest jump."""
+    k = int(np.argmax(balance.steps(balance.rows, balance.ramps[:1])))
+    around = balance.rows[max(k - 2, 0) : k + 3]
     logs = balance.steps(around, balance.ramps)
     ramp, k = divmod(int(np.argmax(logs)), len(around))
     return logs[ramp, k], around[k], ramp
-
-
-def _onsets(t: Array, every: Index, best: _Tried) -> tuple[float, Array, Array]:
-    """Return the log-evidence of a jump, times (T,) in s of its start and their probabilities."""
-    rows = np.arange(max(best.row - 5, _BEFORE), min(best.row + 6, every[-1] + 1))
-    ramps = best.balance.ramps
-    logs, fine = (best.balance.steps(some, ramps) for some in (every, rows))
-    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), t[rows])
-    evidence = max(logsumexp(logs), logsumexp(fine))
-    return evidence - math.log(len(ramps) * len(t)), starts.ravel(), softmax(fine).ravel()
 
 
 def _patterns(best: _Tried) -> ArrayPair:
@@ -186,15 +176,6 @@ def _patterns(best: _Tried) -> ArrayPair:
     ]
     evidence = [logsumexp(log) - math.log(len(log)) for log in logs]
     return np.array(evidence), softmax(logs[:4], axis=1)
-
-
-def _rows(count: int) -> Index:
-    """Return the rows for the start of a fault: all, or in a long flight an even spread and all
-    rows near the end, with few samples after them.
-    """
-    early, late = np.split(np.arange(_BEFORE, count - _AFTER), [-_PLACES // 4])
-    step = max(1, math.ceil(len(early) / (0.75 * _PLACES)))
-    return np.concatenate([early[::step], late])
 
 
 def _quantiles(values: Array, weight: Array, margin: float) -> Interval:
