@@ -88,10 +88,12 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
 
 
 class FaultBalance:
-    """The four channels with one lag and one curve of the rotors (N samples).
+    """The four channels with one lag and one curve of the rotors (N samples), the noise fitted
+    beside the likeliest jump.
 
     Attributes:
-        channels: with the noise of the last fit.
+        nothing, log: log-likelihoods of no jump, and of the likeliest.
+        share: elapsed share (N,) of that jump.
         rows: possible starts of a fault.
         ramps: elapsed shares (J,) of a loss in each interval; 1 afterwards. A loss begins within an
             interval, at once (a propeller that breaks) or as the rotors' speed falls (a motor).
@@ -102,7 +104,6 @@ class FaultBalance:
 
         w = samples.angular_velocity
         turning = samples.angular_acceleration
-        self.follows = samples.follows
         self.rows = np.arange(BEFORE, len(w) - AFTER)
         self.thrust = thrust = samples.thrust(lag, bend, dead)  # (N, 4)
         self.ramps = [_ramp(part, late) for late in (0.0, lag) for part in PARTS]
@@ -112,7 +113,7 @@ class FaultBalance:
         free[2].extend(turning.T[:2])
         free.append([])
         # each channel's measurement, moment and free columns
-        self.columns = [
+        columns = [
             np.column_stack([y, thrust @ signs, *own])
             for y, signs, own in zip(
                 [*turning.T, samples.specific_force], _SIGNS, free, strict=True
@@ -124,31 +125,33 @@ class FaultBalance:
         strong = maximum_filter1d(np.linalg.norm(turning[:, :2], axis=1), _AROUND)
         away += strong / max(strong.max(), 1e-300)
         # a rotor late by an interval is wrong there too
-        self.activity = np.maximum(away, np.append(away[:1], away[:-1]))
-        self.fit()
+        activity = np.maximum(away, np.append(away[:1], away[:-1]))
+        step: list[Array] = []  # none, and then the likeliest jump beside the noise
+        nothing = []
+        for _ in range(3):
+            self.channels = [_BalanceChannel(x, activity, samples.follows, *step) for x in columns]
+            nothing.append(sum(channel.nothing for channel in self.channels))
+            self.log, self.share = self._jump()
+            step = [self.share]
+        self.nothing = max(nothing[0], nothing[-1])
 
-    def fit(self, *step: Array) -> None:
-        """Fit the channels' noise to the residual of no change, or beside a ``step`` (N,)."""
-        self.channels = [
-            _BalanceChannel(columns, self.activity, self.follows, *step) for columns in self.columns
-        ]
-
-    def nothing(self) -> float:
-        """Return the log-likelihood where nothing happens."""
-        return sum(channel.nothing for channel in self.channels)
+    def _jump(self) -> tuple[float, Array]:
+        """Return log-likelihood and elapsed share (N,) of the likeliest jump."""
+        k = int(np.argmax(self.steps(self.rows, self.ramps[:1])))
+        around = self.rows[max(k - 2, 0) : k + 3]
+        logs = self.steps(around, self.ramps)
+        ramp, k = np.unravel_index(logs.argmax(), logs.shape)
+        count = len(self.thrust)
+        share = np.concatenate([np.zeros(around[k]), self.ramps[ramp], np.ones(count)])[:count]
+        return logs[ramp, k], share
 
     def steps(self, rows: Index, ramps: list[Array]) -> Array:
         """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
         return np.array([sum(c.steps(rows, ramp) for c in self.channels) for ramp in ramps])
 
-    def share(self, row: int, ramp: int) -> Array:
-        """Return the elapsed share (N,) of a change beginning at a row, by one of the ramps."""
-        count = len(self.thrust)
-        return np.concatenate([np.zeros(row), self.ramps[ramp], np.ones(count)])[:count]
-
-    def lost(self, rotor: int, share: Array) -> Array:
-        """Return each channel's loss (N, 4) if a ``share`` (N,) of rotor 0 to 3 goes."""
-        return (self.thrust[:, rotor] * share)[:, None] * _SIGNS[:, rotor]
+    def lost(self, rotor: int) -> Array:
+        """Return each channel's loss (N, 4) if rotor 0 to 3 goes as the likeliest jump does."""
+        return (self.thrust[:, rotor] * self.share)[:, None] * _SIGNS[:, rotor]
 
 
 def _ramp(part: float, lag: float) -> Array:

@@ -40,7 +40,6 @@ _ERROR = 0.25
 # standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
 # usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
-_ROUNDS = 2  # each fits the noise and searches again
 _SURE = 0.95  # least probability of a fault named without a doubt
 
 
@@ -81,10 +80,9 @@ def find_fault(channels: Channels) -> RotorFault:
     tried = _search(samples, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
     # of a jump at each row, by each ramp
-    balance = best.balance
-    jumps = balance.steps(balance.rows, balance.ramps)
-    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), samples.t[balance.rows])
-    evidence = logsumexp(jumps) - math.log(len(balance.ramps) * len(samples.t))
+    jumps = best.steps(best.rows, best.ramps)
+    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), samples.t[best.rows])
+    evidence = logsumexp(jumps) - math.log(len(best.ramps) * len(samples.t))
     each, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
@@ -101,26 +99,13 @@ def find_fault(channels: Channels) -> RotorFault:
     )
 
 
-class _Tried(NamedTuple):
-    """One lag and curve with noise fitted beside the likeliest jump: its row, and the ramp by its
-    number; the log-likelihoods of no jump, and of this one.
-    """
-
-    balance: FaultBalance
-    nothing: float
-    log: float
-    row: int
-    ramp: int
-
-
-def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
+def _search(samples: Samples, thrust_known: bool) -> list[FaultBalance]:
     """Return all trials: lags, and then curves, each from the best so far."""
-    tried = dict[Interval, _Tried]()
+    tried = dict[Interval, FaultBalance]()
 
     def best_of(keys: Iterable[Interval]) -> Interval:
         for key in keys:
-            if key not in tried:
-                tried[key] = _fitted(FaultBalance(samples, *key))
+            tried[key] = tried.get(key) or FaultBalance(samples, *key)
         return max(tried, key=lambda key: tried[key].log)
 
     curves = _CURVES[:1] if thrust_known else _CURVES
@@ -130,24 +115,7 @@ def _search(samples: Samples, thrust_known: bool) -> list[_Tried]:
     return list(tried.values())
 
 
-def _fitted(balance: FaultBalance) -> _Tried:
-    """Return a lag and curve with noise fitted beside the likeliest jump."""
-    nothing = balance.nothing()
-    for _ in range(_ROUNDS):
-        balance.fit(balance.share(*_jump(balance)[1:]))
-    return _Tried(balance, max(nothing, balance.nothing()), *_jump(balance))
-
-
-def _jump(balance: FaultBalance) -> tuple[float, int, int]:
-    """Return log-likelihood, row and ramp of the likeliest jump."""
-    k = int(np.argmax(balance.steps(balance.rows, balance.ramps[:1])))
-    around = balance.rows[max(k - 2, 0) : k + 3]
-    logs = balance.steps(around, balance.ramps)
-    ramp, k = divmod(int(np.argmax(logs)), len(around))
-    return logs[ramp, k], around[k], ramp
-
-
-def _patterns(best: _Tried) -> ArrayPair:
+def _patterns(best: FaultBalance) -> ArrayPair:
     """Return the log-evidence (6,) of rotors 1 to 4, all rotors, and another force and torque; and
     the probabilities of ``_LOSSES`` for each rotor (4, E).
     """
@@ -155,17 +123,16 @@ def _patterns(best: _Tried) -> ArrayPair:
 
     each = _LOSSES[:, None]
     lost = each[_LOSSES <= _ALL_LOSE]
-    share = best.balance.share(best.row, best.ramp)
 
     def seen(columns: Array) -> Array:
         """Return the visible part (4,) of a column in each channel, and its deviation (4,)."""
-        pairs = zip(best.balance.channels, columns.T, strict=True)
+        pairs = zip(best.channels, columns.T, strict=True)
         return np.array([channel.part(column) for channel, column in pairs]).T
 
     # each channel's visible part, its standard deviation, and the hypothesis' means and spread
-    tried = [(*seen(best.balance.lost(rotor, share)), each, _ERROR * each) for rotor in range(4)]
+    tried = [(*seen(best.lost(rotor)), each, _ERROR * each) for rotor in range(4)]
     # a jump of each channel, in parts of one rotor's usual torque or force there
-    jumps = seen(np.tile(share[:, None], 4))
+    jumps = seen(np.tile(best.share[:, None], 4))
     tried.append((*jumps, lost * [0.0, 0.0, 0.0, 4.0], _ERROR * lost * [2.0, 2.0, 2.0, 4.0]))
     tried.append((*jumps, np.zeros((1, 1)), np.array(_OTHER)))
     # channels finite under every hypothesis, so all hypotheses explain the same numbers
