@@ -25,7 +25,7 @@ from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .closed_loop import UNITS
 from .columns import ANSWERED_HZ, balance
 from .effect_settings import effect_of
-from .estimates import Estimates, thrust_of
+from .estimates import estimates_of, thrust_of
 from .geometry import Geometry, Interval
 from .held_out import HeldOut, held_out, loops_of, models_of
 from .model import Model
@@ -124,7 +124,7 @@ def identify(
 
     def described(part: VehicleFit, why: str) -> tuple[Estimated, Vehicle]:
         part, _ = nearest_body(part)
-        named = Estimates(part, kept, hidden, doubt or why).say_all()
+        named = estimates_of(part, kept, hidden, doubt or why)
         return named, vehicle_of(name, part, named, logs, step, motors)
 
     report(0.9, "predicting what is held out")
