@@ -127,7 +127,8 @@ class FaultBalance:
         # a rotor late by an interval is wrong there too
         activity = np.maximum(away, np.append(away[:1], away[:-1]))
         step: list[Array] = []  # none, and then the likeliest jump beside the noise
-        nothing = []
+        nothing: list[float] = []
+        self.channels: list[_BalanceChannel] = []
         for _ in range(3):
             self.channels = [_BalanceChannel(x, activity, samples.follows, *step) for x in columns]
             nothing.append(sum(channel.nothing for channel in self.channels))
@@ -140,7 +141,7 @@ class FaultBalance:
         k = int(np.argmax(self.steps(self.rows, self.ramps[:1])))
         around = self.rows[max(k - 2, 0) : k + 3]
         logs = self.steps(around, self.ramps)
-        ramp, k = np.unravel_index(logs.argmax(), logs.shape)
+        ramp, k = divmod(int(np.argmax(logs)), len(around))
         count = len(self.thrust)
         share = np.concatenate([np.zeros(around[k]), self.ramps[ramp], np.ones(count)])[:count]
         return logs[ramp, k], share

@@ -56,9 +56,9 @@ class Trim:
 
 
 def features_of(thrust: Array) -> Array:
-    """Return the four numbers (..., 4) of thrusts (..., 4): differences in parts of the total, and log(total).
+    """Return the four numbers (..., 4) of thrusts (..., 4).
 
-    The differences are left less right, front less rear, and rotors 1 and 3 less 2 and 4.
+    These are three differences in parts of the total, and log(total). The differences are left less right, front less rear, and rotors 1 and 3 less 2 and 4.
     """
     total = thrust.sum(axis=-1, keepdims=True)
     return np.concatenate([thrust @ _MIX.T / total, np.log(total)], axis=-1)
@@ -94,10 +94,9 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
         )
     known = np.empty(0) if voltage is None else voltage[steady]
     known = known[(known > 0.0) & (known < np.inf)]
-    ends = np.flatnonzero(np.diff(np.floor(np.cumsum(step) / BATCH))) + 1
-    batches = zip(np.split(thrust, ends), np.split(step, ends), strict=True)
+    batches = np.cumsum(step) // BATCH == np.arange(seconds // BATCH + 1.0)[:, None]
     # the last batch may be a short one
-    means = [batch.mean(axis=0) for batch, steps in batches if steps.sum() > 0.5 * BATCH]
+    means = [thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() > 0.5 * BATCH]
     numbers = [features_of(some) for some in means if some.min() > 0.0]
     noise = np.var(numbers, axis=0, ddof=1) / len(numbers) if len(numbers) > 1 else np.zeros(4)
     return Trim(name, mean, seconds, noise, known.mean() if known.size else math.nan)

@@ -92,15 +92,12 @@ def _sources_of(logs: Logs) -> Sources:
             rotor speeds and others commands.
     """
 
-
     def quick(log: FlightLog, channel: str) -> bool:
         """Return whether a channel of the rotors is quick enough to tell their torque."""
         return serves(log.rates.get(channel, np.inf), TORQUE_HZ)
 
     unmeasured = [
-        log
-        for log in logs
-        if not log.has_rotor_speeds or log.commanded or not quick(log, "rotors")
+        log for log in logs if not log.has_rotor_speeds or log.commanded or not quick(log, "rotors")
     ]
     commands = all(log.command is not None and quick(log, "commands") for log in logs)
     if unmeasured and not commands:
@@ -213,8 +210,8 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
-        known = log.accelerometer is not None
-        force = _sensor(log, log.accelerometer, t) if known else np.full_like(rate, np.nan)
+        none, read = np.full_like(rate, np.nan), log.accelerometer
+        force = none if read is None else _sensor(log, read, t)
         piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
         moving = []
         if sources.velocity:

@@ -3,7 +3,7 @@ of quantities missing from the flight.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -21,7 +21,6 @@ from .solve import Function, VehicleFit
 UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 UNIT: Interval = (1.0, 1.0, 1.0)
 Estimates = Iterator[Estimate]
-Doubts = Mapping[str, str]  # visible further effects, each with the reason to doubt it, or empty
 
 
 def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
@@ -36,26 +35,17 @@ def _times(known: Interval, by: Interval | float) -> Interval:
     return known[0] * value, min(corners), max(corners)
 
 
-def estimates_of(
-    fit: VehicleFit, kept: Doubts, hidden: Interval | None, doubt: str
-) -> Estimated:
+def estimates_of(fit: VehicleFit) -> Estimated:
     """Return the estimate of every quantity of a vehicle.
-
-    Args:
-        fit: its parameters.
-        kept: the further effects.
-        hidden: an invisible moment of velocity: value, deviation, least visible value.
-        doubt: reason to believe no estimate of torque; empty without one.
 
     Raises:
         InputError: neither turning nor an arm says how large the vehicle is.
     """
-    said = {e.name: e for e in (*_thrust(fit), *_size(fit, kept, doubt))}
+    said = {e.name: e for e in (*_thrust(fit), *_size(fit))}
     # m for each unit of the rotors' positions
     arm = UNIT if fit.model.geometry.known else said["arm_l"][1:4]
-    further = _yaw(fit, said, arm, doubt), _lag(fit), _centre(fit, arm, doubt)
-    every = (*further, _air(fit, arm, kept, hidden, doubt))
-    return said | {e.name: e for part in every for e in part}
+    further = (*_yaw(fit, said, arm), *_lag(fit), *_centre(fit, arm), *_air(fit, arm))
+    return said | {e.name: e for e in further}
 
 
 def _estimate(
@@ -122,7 +112,7 @@ def _thrust(fit: VehicleFit) -> Estimates:
             yield _positive(fit, f"hover command at {volts:.2f} V", at_voltage, "1", how)
 
 
-def _size(fit: VehicleFit, kept: Doubts, doubt: str) -> Estimates:
+def _size(fit: VehicleFit) -> Estimates:
     """Yield arm and inertia.
 
     Raises:
@@ -134,9 +124,9 @@ def _size(fit: VehicleFit, kept: Doubts, doubt: str) -> Estimates:
     known = {axis: fit.interval(axis) for axis in motions}
     flat = known["Jz"][0] / (known["Jx"][0] + known["Jy"][0])
     why = {
-        axis: doubt or f"the flight hardly shows {motion}"
+        axis: fit.doubt or f"the flight hardly shows {motion}"
         for axis, motion in motions.items()
-        if doubt or not told(known[axis]) or (axis == "Jz" and not 0.3 < flat < 1.3)
+        if fit.doubt or not told(known[axis]) or (axis == "Jz" and not 0.3 < flat < 1.3)
     }
     arm, status, given = UNIT, IDENTIFIED, "given"
     if geometry.known:
@@ -173,18 +163,19 @@ def _size(fit: VehicleFit, kept: Doubts, doubt: str) -> Estimates:
             value, high, low = (length / x for x in known[axis])
             how = f"{rate} {rotors}: needs no arm"
             yield _estimate(f"l/{axis}{axis[1]}", (value, low, high), "1/(kg m)", how)
-    for name in ("Jxy", "Jxz", "Jyz") if "products of inertia" in kept else ():
-        product, unsure = _times(fit.interval(name, False), arm), kept["products of inertia"]
-        yield _estimate(name, product, "kg m2", f"{rate} across axes", doubt or unsure, status)
+    for name in ("Jxy", "Jxz", "Jyz") if "products of inertia" in fit.kept else ():
+        product = _times(fit.interval(name, False), arm)
+        unsure = fit.doubt or fit.kept["products of inertia"]
+        yield _estimate(name, product, "kg m2", f"{rate} across axes", unsure, status)
 
 
-def _yaw(fit: VehicleFit, said: Estimated, arm: Interval, doubt: str) -> Estimates:
+def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
     """Yield reaction torque over thrust."""
     of = fit.model.sources
     how = f"{of.rate} in yaw against {of.rotors}"
     gain = fit.interval(lambda v: v["reach"] / v["Jz"])
     inertia, status, k = said["Jzz"], ASSUMED, said.get("k")
-    doubt = doubt or ("" if told(gain) else "the flight hardly accelerates in yaw")
+    doubt = fit.doubt or ("" if told(gain) else "the flight hardly accelerates in yaw")
     yield _estimate("(p/k)/Jzz", gain, "1/(kg m)", how, doubt)
     ratio, product = _times(gain, inertia[1:4]), None
     if doubt:
@@ -204,9 +195,12 @@ def _yaw(fit: VehicleFit, said: Estimated, arm: Interval, doubt: str) -> Estimat
 def _lag(fit: VehicleFit) -> Estimates:
     """Yield the rotors' lag, and the time offset of the motion."""
     how = f"force and turning against {fit.model.sources.rotors}"
-    known, doubt = UNKNOWN, (
-        "force follows the logged rotor speeds at once: they are measured, and no command is "
-        "logged beside them"
+    known, doubt = (
+        UNKNOWN,
+        (
+            "force follows the logged rotor speeds at once: they are measured, and no command is "
+            "logged beside them"
+        ),
     )
     if "lag" in fit.model.free:
         if not fit.model.commands:
@@ -219,7 +213,7 @@ def _lag(fit: VehicleFit) -> Estimates:
     yield _estimate("time_offset", offset, "s", "of the motion behind the rotors")
 
 
-def _centre(fit: VehicleFit, arm: Interval, doubt: str) -> Estimates:
+def _centre(fit: VehicleFit, arm: Interval) -> Estimates:
     """Yield the centre of mass."""
     model = fit.model
     how = (
@@ -233,15 +227,13 @@ def _centre(fit: VehicleFit, arm: Interval, doubt: str) -> Estimates:
     for axis in "xy":
         known = _times(fit.interval(f"c{axis}", False), arm[0])
         unsure = steady * (known[2] - known[1] > widest)
-        yield _estimate(f"com {axis}", known, "m", how, doubt or unsure, status)
+        yield _estimate(f"com {axis}", known, "m", how, fit.doubt or unsure, status)
     if model.sources.force == "pose":
         known = fit.interval(lambda v: -v["rz"], False)
         yield _estimate("com z", known, "m", swing, swing * (known[2] - known[1] > widest))
 
 
-def _air(
-    fit: VehicleFit, arm: Interval, kept: Doubts, hidden: Interval | None, doubt: str
-) -> Estimates:
+def _air(fit: VehicleFit, arm: Interval) -> Estimates:
     """Yield the effects of moving through the air."""
     of = fit.model.sources
     if not of.velocity:
@@ -254,24 +246,24 @@ def _air(
         "turning": f"{of.rate}, its own derivative against it and against velocity",
     }
     for kind, effect in FURTHER.items():
-        if not effect.role or kind not in kept:
+        if not effect.role or kind not in fit.kept:
             continue
         turns = effect.shows == "turning"
         size = effect.factor * (arm[0] if turns else 1.0)
-        why = (doubt if turns else "") or kept[kind]
+        why = (fit.doubt if turns else "") or fit.kept[kind]
         for index, parameter in enumerate(effect.parameters, effect.first):
             known = _times(fit.interval(parameter, turns), size)
             yield _of_effect(effect.role, index, known, hows[effect.shows], why)
-    if hidden:
-        value, deviation, least = (arm[0] * x for x in hidden)
+    if fit.hidden:
+        value, deviation, least = (arm[0] * x for x in fit.hidden)
         wide = fit.width * deviation
-        why = doubt or (
+        why = fit.doubt or (
             f"moments that nothing measures hide it: it would show from {least:.2g} on. Fly "
             "faster to and fro, and longer"
         )
         known = value, value - wide, value + wide
         yield _of_effect(Role.FLAPPING_MOMENT, 0, known, "", why)
-    if not {"rotor drag", "linear drag", "quadratic drag"} & set(kept):
+    if not {"rotor drag", "linear drag", "quadratic drag"} & set(fit.kept):
         why = "none stands out of the disturbances"
         yield _estimate("drag", (0.0, math.nan, math.nan), "N/(m/s)", "", why)
 

@@ -26,7 +26,7 @@ from .closed_loop import UNITS
 from .columns import ANSWERED_HZ, balance
 from .effect_settings import effect_of
 from .estimates import estimates_of, thrust_of
-from .geometry import Geometry, Interval
+from .geometry import Geometry
 from .held_out import HeldOut, held_out, loops_of, models_of
 from .model import Model
 from .motors import motor_response
@@ -89,7 +89,7 @@ def identify(
     report(0.05, "fitting forces and torques")
     fit = _first_fit(pieces, basic)
     report(0.4, "asking whether slow and quick motion agree")
-    fit, doubt = _agreeing(pieces, fit), ""
+    fit, doubt = _agreeing(fit), ""
     if fit.model.band < BAND:
         doubt = "quick motion contradicts slow motion in these logs"
         notes.append(
@@ -99,10 +99,10 @@ def identify(
         )
     if sources.force == "accelerometer" and sources.velocity:
         biases = dict.fromkeys(QUANTITIES["biases"], POSED_BIAS)
-        fit = solve(pieces, replace(fit.model, prior={**fit.model.prior, **biases}), fit.theta)
+        fit = fit.again(prior={**fit.model.prior, **biases})
     report(0.5, "asking what else shows")
-    fit, kept, hidden = _with_optional(pieces, fit)
-    if "answered torque" in kept:
+    fit = _with_optional(fit)
+    if "answered torque" in fit.kept:
         shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
         notes.append(
             f"below {ANSWERED_HZ:g} Hz {shares} of the rotors' torque about x, y and z turn "
@@ -123,8 +123,8 @@ def identify(
     motors = None if basic.commands or "lag" in fit.model.free else motor_response(pieces)
 
     def described(part: VehicleFit, why: str) -> tuple[Estimated, Vehicle]:
-        part, _ = nearest_body(part)
-        named = estimates_of(part, kept, hidden, doubt or why)
+        part, _ = nearest_body(replace(part, doubt=doubt or why))
+        named = estimates_of(part)
         return named, vehicle_of(name, part, named, logs, step, motors)
 
     report(0.9, "predicting what is held out")
@@ -140,7 +140,7 @@ def identify(
         )
     vehicle = _with_status(vehicle, named, tested)
     if "lag" in fit.model.free:
-        named["lag without offset"] = _lag_alone(pieces, fit)
+        named["lag without offset"] = _lag_alone(fit)
     if motors is not None:
         lag = effect_of(Role.LAG)
         how = (
@@ -183,11 +183,10 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
     return replace(flown, status=replace(flown.status, coefficients=known))
 
 
-def _lag_alone(pieces: Pieces, fit: VehicleFit) -> Estimate:
+def _lag_alone(fit: VehicleFit) -> Estimate:
     """Return the lag of a model without a time offset: the offset is then part of the lag."""
-    model = replace(fit.model, prior={**fit.model.prior, "delay": _NO_OFFSET})
-    start = np.where([name == "delay" for name in model.free], 0.0, fit.theta)
-    alone = solve(pieces, model, start)
+    start = np.where([name == "delay" for name in fit.model.free], 0.0, fit.theta)
+    alone = fit.again(start, prior={**fit.model.prior, "delay": _NO_OFFSET})
     known = alone.interval("lag")
     how = "of a model without a time offset: what other tools call the lag"
     return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
@@ -231,7 +230,7 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
         sure = lag > _LEAST_LAG * (lag - low) / other.width
         return other if sure and plain.loss - other.loss > _cost(plain, 1) else plain
     nonlinear = ("delay", *(("gamma",) if basic.voltage_ref > 0.0 else ()), "lag")
-    best, lags = None, _LAGS
+    best, lags = None, [*_LAGS]
     # from the richest curve down: a poor first fit takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         model, start = first_model(pieces, replace(basic, exponents=exponents), *nonlinear)
@@ -241,7 +240,7 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
         thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
         if rises and (best is None or cost < best[0]):
-            best, lags = (cost, fit), (fit.values["lag"],)
+            best, lags = (cost, fit), [fit.values["lag"]]
     if best is None:
         raise InputError(
             "thrust does not grow with the motor commands; expected cmd1..cmd4, 0 to 1"
@@ -249,12 +248,12 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
     return best[1]
 
 
-def _agreeing(pieces: Pieces, fit: VehicleFit) -> VehicleFit:
+def _agreeing(fit: VehicleFit) -> VehicleFit:
     """Return the fit up to the highest frequency without a contradiction: thrust agrees with slower
     motion alone (Hausman's test), and each sensor's bias is credible.
     """
     for band in _BANDS:
-        slow = solve(pieces, replace(fit.model, band=band), fit.theta)
+        slow = fit.again(band=band)
         wide, narrow = _hover_thrust(fit), _hover_thrust(slow)
         apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
         credible = abs(fit.values.get("force bias z", 0.0)) < _APART * FORCE_BIAS
@@ -281,14 +280,10 @@ def _cost(fit: VehicleFit, parameters: int) -> float:
     return _PENALTY * parameters * math.log(6 * frequencies)
 
 
-def _with_optional(
-    pieces: Pieces, fit: VehicleFit
-) -> tuple[VehicleFit, dict[str, str], Interval | None]:
-    """Return a fit with further effects, their names, and a moment of velocity that stays hidden.
+def _with_optional(fit: VehicleFit) -> VehicleFit:
+    """Return a fit with further effects, and the moment of velocity that stays hidden.
 
     Effects join if the logs get much likelier, the likeliest first, lest another stands for it.
-    Each has the reason to doubt it, or an empty text. The hidden moment has its value, its standard
-    deviation and the least visible value.
     """
     moving, rate = fit.model.sources.velocity, fit.model.sources.rate
     offered = {
@@ -310,7 +305,7 @@ def _with_optional(
                 _, (value,), (size,) = tests["flapping"]
                 hidden = value, size, math.sqrt(_cost(fit, 1)) * size
             break
-        richer = solve(pieces, *fit.model.with_more(fit.theta, *offered.pop(name)))
+        richer = solve(fit.balance.pieces, *fit.model.with_more(fit.theta, *offered.pop(name)))
         asked = [FURTHER[n] for n in (*kept, name)]
         if all(richer.values[p] > 0.0 for f in asked if f.positive for p in f.parameters):
             fit = richer
@@ -323,4 +318,4 @@ def _with_optional(
         size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
         if size < math.sqrt(_cost(fit, len(at))) + fit.width:
             kept[name] = "it shows, but by so little that what shows is too large on average"
-    return fit, kept, hidden
+    return replace(fit, kept=kept, hidden=hidden)

@@ -10,15 +10,17 @@ offset and voltage exponent change the columns themselves, and stand in SI units
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
 from ...runtime.arrays import Array
-from ..logs.table import ArrayPair, NamedArrays, NamedNumbers, Names, Values
+from ..logs.table import NamedArrays, NamedNumbers, Names, Values
 from .channels import Sources
 from .geometry import GRAVITY, SPIN, Geometry
 from .spectra import BAND
 
+T = TypeVar("T", float, Array)
 NONLINEAR = ("lag", "gamma", "delay")  # s, 1, s; in the order of their columns
 # inertia in logarithms: positive, and with intervals of ratios
 LOGARITHMIC = ("Jx", "Jy", "Jz")
@@ -100,9 +102,9 @@ def coefficients(model: Model, p: Values, names: Names) -> Array:
     inertia, lever = inertia_of(p), np.array([p["rx"], p["ry"], p["rz"]])
     out = np.zeros((6, len(names)))
     for column, name in enumerate(names):
-        row, _, parameter = name.partition(" ")
-        if row in ROWS:
-            out[ROWS.index(row), column] = p.get(parameter, 0.0)
+        place, _, parameter = name.partition(" ")
+        if place in ROWS:
+            out[ROWS.index(place), column] = p.get(parameter, 0.0)
     for j in range(len(model.exponents)):
         thrust = np.array([p["tilt x"], p["tilt y"], 1.0, -p["cy"], p["cx"], 0.0])
         out[:, names.index(f"T{j}")] = p[f"a{j}"] * thrust
@@ -123,7 +125,7 @@ def coefficients(model: Model, p: Values, names: Names) -> Array:
     return out
 
 
-def slopes(of: Callable[[Array], Array], theta: Array) -> ArrayPair:
+def slopes(of: Callable[[Array], T], theta: Array) -> tuple[T, Array]:
     """Return a function's value (...) and derivatives (p, ...) by the free parameters (p,)."""
     here = of(theta)
     return here, np.array([(of(theta + e) - here) / 1e-6 for e in 1e-6 * np.eye(len(theta))])

@@ -147,12 +147,16 @@ def _fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     """
     fit = identified.fit
     then = piece.t - fit.values["delay"]
-    columns = {n: np.interp(then, piece.t, x) for n, x in rotor_columns(piece, fit.model, fit.values).items()}
+    columns = {
+        n: np.interp(then, piece.t, x)
+        for n, x in rotor_columns(piece, fit.model, fit.values).items()
+    }
     columns |= air_columns(piece, fit.model)
     gains = coefficients(fit.model, fit.values, tuple(columns))
     model = np.column_stack(list(columns.values())) @ gains.T
     shown_hz = min(_SHOWN_HZ, fit.model.band)
-    return tuple(low_pass(x, shown_hz, piece.period) for x in (piece.measured(), model))
+    measured = piece.measured()
+    return low_pass(measured, shown_hz, piece.period), low_pass(model, shown_hz, piece.period)
 
 
 def explained(identified: Identified) -> Array:

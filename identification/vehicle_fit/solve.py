@@ -7,8 +7,9 @@ shrink the coefficients, so the addition is taken off before the normal equation
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
@@ -46,6 +47,11 @@ class VehicleFit:
     loss: float  # twice the negative log-likelihood, up to a constant
     balance: Balance
     spectra: Spectra  # (m, 6) a segment
+    # visible further effects, each with the reason to doubt it, or empty
+    kept: Mapping[str, str] = field(default_factory=dict)
+    # an invisible moment of velocity: value, deviation, least visible value
+    hidden: Interval | None = None
+    doubt: str = ""  # reason to believe no estimate of torque
 
     @cached_property
     def covariance(self) -> Array:
@@ -74,12 +80,21 @@ class VehicleFit:
         """Standard deviations to either end of a 95 % interval: Student's, for the segments."""
         return float(student.ppf(0.975, max(len(self.balance.segments) - 1, 3)))
 
+    def again(self, theta: Array | None = None, **changes: Any) -> "VehicleFit":
+        """Return the fit of a changed model, from these parameters or others."""
+        theta = self.theta if theta is None else theta
+        return solve(self.balance.pieces, replace(self.model, **changes), theta)
+
     def interval(self, what: str | Function, logarithm: bool = True) -> Interval:
         """Return value, low and high of a parameter, or of a function of the parameters, in SI
         units; of a positive quantity as a ratio.
         """
-        of = (lambda v: v[what]) if isinstance(what, str) else what
-        here, slope = slopes(lambda theta: of(self.model.values(theta)), self.theta)
+
+        def at(theta: Array) -> float:
+            values = self.model.values(theta)
+            return values[what] if isinstance(what, str) else what(values)
+
+        here, slope = slopes(at, self.theta)
         size = self.width * math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
         if logarithm and here > 0.0:
             factor = math.exp(min(size / here, 50.0))
