@@ -58,7 +58,8 @@ class Trim:
 def features_of(thrust: Array) -> Array:
     """Return the four numbers (..., 4) of thrusts (..., 4).
 
-    These are three differences in parts of the total, and log(total). The differences are left less right, front less rear, and rotors 1 and 3 less 2 and 4.
+    These are differences in parts of the total, and log(total). The differences are left less
+    right, front less rear, and rotors 1 and 3 less 2 and 4.
     """
     total = thrust.sum(axis=-1, keepdims=True)
     return np.concatenate([thrust @ _MIX.T / total, np.log(total)], axis=-1)

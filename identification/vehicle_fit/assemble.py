@@ -98,7 +98,7 @@ def _coefficients(role: str, shown: Values) -> NamedNumbers:
     """
     effect = effect_of(role)
     values = {c: shown.get(f"{effect} {c.name}", 0.0) for c in get(effect).coefficients}
-    return {c.name: x for c, x in values.items() if x > 0.0 or c.minimum < 0.0 != x}
+    return {c.name: x for c, x in values.items() if x > 0.0 or (x < 0.0 and c.minimum < 0.0)}
 
 
 def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertainty:
