@@ -287,7 +287,7 @@ def _with_optional(fit: VehicleFit) -> VehicleFit:
     """
     moving, rate = fit.model.sources.velocity, fit.model.sources.rate
     offered = {
-        name: further.parameters
+        name: tuple(further.parameters)
         for name, further in FURTHER.items()
         if (moving or further.role in ("", Role.RATE_DAMPING))
         and not (fit.model.commands and further.of_speeds)

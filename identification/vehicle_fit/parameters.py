@@ -2,6 +2,8 @@
 by axis, with every coefficient linear.
 """
 
+import math
+from collections import ChainMap
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from ...runtime.yaml_file import read_yaml
-from ..logs.table import ArrayPair, Data, NamedArrays, Names, Pair
+from ..logs.table import ArrayPair, Data, NamedArrays, Pair
 from .channels import Pieces
 from .columns import ANSWERED_HZ, rotor_columns
 from .geometry import FLAT, GRAVITY, GYRATION
@@ -41,7 +43,7 @@ QUANTITIES: Data = read_yaml(Path(__file__).with_name("quantities.yaml"), "quant
 class Further(NamedTuple):
     """An effect for logs that get much likelier by it; ``quantities.yaml`` says what each is."""
 
-    parameters: Names
+    parameters: Data
     role: str = ""
     first: int = 0
     factor: float = 1.0
@@ -79,34 +81,21 @@ def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, A
     usual = GYRATION[0] * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
     flat = FLAT[0] * inertia.sum()
-    speed = max(np.concatenate([p.rotors for p in pieces]).mean(), 1e-6)
-    along = {
-        "tilt": 0.01,
-        "turn bias": 0.1,
-        "force bias": 0.1,
-        "rotor drag": 0.05 * mass / speed,
-        "linear drag": 0.1 * mass,
-        "quadratic drag": 0.03 * mass,
-        "damping": inertia[0],
-        "answered": 0.3,
-    }
-    scale = {
-        **each,
+    known = {
+        "mass": mass,
+        "arm": arm,
         "Jx": inertia[0],
         "Jy": inertia[1],
         "Jz": flat,
-        **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 0.1 * inertia[0]),
         "reach": np.clip(abs(gains[2]) * flat, 1e-3 * arm, 10.0 * arm),
-        **dict.fromkeys(("cx", "cy"), 0.01 * arm),
-        "Jr": 0.01 * inertia[0] / speed * np.sqrt(GRAVITY / arm),
-        **dict.fromkeys(("rx", "ry", "rz"), 0.01),
-        "lift": 0.03 * mass,
-        "flapping": 0.05 * mass / speed * 0.03 * arm,
-        **{f"{name} {a}": x for name, x in along.items() for a in "xyz"},
+        "per_speed": 1.0 / max(np.concatenate([p.rotors for p in pieces]).mean(), 1e-6),
+        "turn": np.sqrt(GRAVITY / arm),
     }
-    free, prior = (*each, *QUANTITIES["basic"]), {"delay": DELAY}
+    basic, biases = QUANTITIES["basic"], QUANTITIES["biases"]
+    units = ChainMap(basic, biases, *(further.parameters for further in FURTHER.values()))
+    scale = each | {p: math.prod(known.get(x, x) for x in unit) for p, unit in units.items()}
+    free, prior = (*each, *basic), {"delay": DELAY}
     if model.sources.force == "accelerometer":
-        biases = QUANTITIES["biases"]
         free = (*free, *biases)
         prior |= {**dict.fromkeys(biases, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
     model = replace(model, opposite=gains[2] < 0.0, free=free, scale=scale, prior=prior)
