@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_erosion, uniform_filter1d
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.arrays import Array, Mask
@@ -23,7 +23,6 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, flight_phases, flying, usual_thrust
 from ..logs.table import median_step
-from ..motion.smoothing import runs_of
 
 LEAST_SECONDS = 3.0  # steady flight: a mean over less follows single manoeuvres
 CALM = 1.5  # m/s: faster, the airflow decides how the rotors share the work
@@ -145,16 +144,13 @@ def carrying(t: Array, total: Array) -> Mask:
         t: (N,) s.
         total: (N,) thrust of all rotors, in any unit.
     """
-    steady = np.zeros(len(t), dtype=bool)
-    smooth = _smooth(total, t)
-    for first, end in runs_of(flying(smooth)):  # a single low sample is no landing
-        # a log may begin and end in flight
-        start = t[first] + (EDGE if first > 0 else 0.0)
-        stop = t[end - 1] - (EDGE if end < len(t) else 0.0)
-        steady |= (t >= start) & (t <= stop)
+    smooth = _smooth(total, t)  # a single low sample is no landing
+    around = np.ones(1 + 2 * round(EDGE / median_step(t)))
+    # a log may begin and end in flight
+    steady = binary_erosion(flying(smooth), around, border_value=True)
     if steady.any():
         steady &= np.abs(smooth / np.median(total[steady]) - 1.0) < NEAR
-    return steady
+    return np.asarray(steady)
 
 
 def _smooth(values: Array, t: Array) -> Array:
