@@ -210,8 +210,8 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
-        none, read = np.full_like(rate, np.nan), log.accelerometer
-        force = none if read is None else _sensor(log, read, t)
+        none, felt = np.full_like(rate, np.nan), log.accelerometer
+        force = none if felt is None else _sensor(log, felt, t)
         piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
         moving = []
         if sources.velocity:
