@@ -93,7 +93,7 @@ class FaultBalance:
 
     Attributes:
         nothing, log: log-likelihoods of no jump, and of the likeliest.
-        share: elapsed share (N,) of that jump.
+        share: elapsed share (N,) of the likeliest jump.
         rows: possible starts of a fault.
         ramps: elapsed shares (J,) of a loss in each interval; 1 afterwards. A loss begins within an
             interval, at once (a propeller that breaks) or as the rotors' speed falls (a motor).
@@ -215,7 +215,7 @@ class _BalanceChannel:
         growth = np.diff(ramp, prepend=0.0, append=1.0)
         sums = lfilter(growth, [1.0, -1.0], impulse, axis=0)[::-1][rows]
         sy, sm = sums[:, :2].T
-        # its square: first outputs of the filter during the ramp, and those of a share of 1 later
+        # its square: first outputs of the filter during the ramp, and later ones of a share of 1
         pad = 0, len(noise.filter) - 1 + len(ramp)
         at = rows[:, None] + np.arange(pad[1])
         begun = 1.0 / np.pad(noise.scale, pad, constant_values=np.inf)[at]

@@ -24,7 +24,7 @@ from .parameters import FURTHER, QUANTITIES
 from .result import ASSUMED, IDENTIFIED, NOTHING, Estimated
 from .solve import VehicleFit
 
-# of the library's effects that a fit may find
+# of the library's effects within a fit's reach
 ROLES = dict.fromkeys(further.role for further in FURTHER.values() if further.role)
 
 
@@ -93,9 +93,7 @@ def vehicle_of(
 
 
 def _coefficients(role: str, shown: Values) -> NamedNumbers:
-    """Return the coefficients of a role's effect; without those of a sign that the effect has
-    not.
-    """
+    """Return the coefficients of a role's effect, without impossible signs."""
     effect = effect_of(role)
     values = {c: shown.get(f"{effect} {c.name}", 0.0) for c in get(effect).coefficients}
     return {c.name: x for c, x in values.items() if x > 0.0 or (x < 0.0 and c.minimum < 0.0)}

@@ -7,8 +7,8 @@ time offset. Drag, inflow and lift act at each rotor, at its own velocity, and s
 too. Forward velocity goes with pitch rate. The moment of lift while yawing therefore looks like the
 gyroscopic one behind ``Jz``.
 
-A column that one parameter multiplies is named by where it acts and by the parameter: ``Fx rotor
-drag x``, ``My lift``.
+A column of one parameter has the name of its axis and of the parameter: ``Fx rotor drag x``, ``My
+lift``.
 """
 
 from typing import NamedTuple
@@ -29,13 +29,13 @@ _STEP = {"lag": 1e-3, "gamma": 0.05}  # finite differences
 ANSWERED_HZ = 3.0
 
 
-class Balance(NamedTuple):
+class BalanceSpectra(NamedTuple):
     """All pieces' transforms: the measured six first, then the columns, then the derivatives of the
     rotors' columns by the nonlinear parameters.
     """
 
     pieces: Pieces
-    centre: NamedNumbers  # nonlinear parameters, about which the columns are linear
+    centre: NamedNumbers  # nonlinear parameters: the columns are linear about them
     names: Names  # columns; the rotors' are the last
     rotors: int  # the number of these
     segments: tuple[Segment, ...]
@@ -43,7 +43,7 @@ class Balance(NamedTuple):
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
     def combined(self, model: Model, theta: Array) -> Array:
-        """Return what the balance leaves, as a combination (6, 1 + ...) of a measured axis and all
+        """Return the residual as a combination (6, 1 + ...) of a measured axis and all
         columns.
         """
         values = model.values(theta)
@@ -53,7 +53,7 @@ class Balance(NamedTuple):
         return np.column_stack([np.ones(6), -gains, *(-x for x in moved)])
 
 
-def balance(pieces: Pieces, model: Model, theta: Array) -> Balance:
+def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about the nonlinear parameters of ``theta``."""
     values = model.values(theta)
     centre = {name: values[name] for name in model.nonlinear}
@@ -82,7 +82,7 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> Balance:
         size = model.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
         for letter, share in model.shares.items():
             noise[:, names.index(f"{letter}0")] = size * share
-    return Balance(pieces, centre, names, len(rotors), tuple(segments), seconds.sum(), noise)
+    return BalanceSpectra(pieces, centre, names, len(rotors), tuple(segments), seconds.sum(), noise)
 
 
 def rotor_columns(piece: MotionPiece, model: Model, values: Values) -> NamedArrays:

@@ -47,7 +47,7 @@ _APART = 3.0  # standard deviations of thrust between two bands, or of a bias' p
 _CLOSE = 0.01  # share of thrust: two bands may differ by it at any interval
 _LEAST_VOLTAGE_RANGE = 0.03  # share: no exponent is fitted to a smaller range of voltage
 _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
-_NO_OFFSET = 1e-6  # s, deviation of a time offset that is none
+_NO_OFFSET = 1e-6  # s, deviation of an absent time offset
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 LOOP = "predictions of half a second from states of the flight: no part of the vehicle"
@@ -281,7 +281,7 @@ def _cost(fit: VehicleFit, parameters: int) -> float:
 
 
 def _with_optional(fit: VehicleFit) -> VehicleFit:
-    """Return a fit with further effects, and the moment of velocity that stays hidden.
+    """Return a fit with further effects, and a hidden moment of velocity.
 
     Effects join if the logs get much likelier, the likeliest first, lest another stands for it.
     """

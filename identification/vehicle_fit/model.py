@@ -29,7 +29,7 @@ PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]  # of axes
 # e_ijk of a cross product
 _CROSS = np.zeros((3, 3, 3))
 _CROSS[[0, 1, 2], [1, 2, 0], [2, 0, 1]], _CROSS[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0, -1.0
-# the symmetric matrix (6, 3, 3) that picks each pair from the products of angular velocities
+# symmetric matrices (6, 3, 3): each picks a pair from the products of angular velocities
 _PICK = np.zeros((6, 3, 3))
 for _at, (_i, _j) in enumerate(PAIRS):
     _PICK[_at, _i, _j] = _PICK[_at, _j, _i] = 1.0

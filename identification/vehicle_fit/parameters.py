@@ -41,7 +41,7 @@ QUANTITIES: Data = read_yaml(Path(__file__).with_name("quantities.yaml"), "quant
 
 
 class Further(NamedTuple):
-    """An effect for logs that get much likelier by it; ``quantities.yaml`` says what each is."""
+    """An effect for logs that get much likelier; ``quantities.yaml`` explains each field."""
 
     parameters: Data
     role: str = ""

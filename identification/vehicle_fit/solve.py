@@ -18,7 +18,7 @@ from ...runtime.arrays import Array, Index, Mask
 from ...runtime.errors import InputError
 from ..logs.table import NamedNumbers, Values
 from .channels import Pieces
-from .columns import Balance, balance
+from .columns import BalanceSpectra, balance
 from .geometry import Interval
 from .model import Model, slopes
 from .spectra import LOSS, TAPERS, Spectra, residual_spectra
@@ -45,7 +45,7 @@ class VehicleFit:
     information: Array  # (p, p), with priors
     scores: Array  # (s, p): each segment's gradient
     loss: float  # twice the negative log-likelihood, up to a constant
-    balance: Balance
+    balance: BalanceSpectra
     spectra: Spectra  # (m, 6) a segment
     # visible further effects, each with the reason to doubt it, or empty
     kept: Mapping[str, str] = field(default_factory=dict)
@@ -170,7 +170,7 @@ def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
 
 
 def score_tests(
-    fit: VehicleFit, groups: Mapping[str, Sequence[str]], made: Balance | None = None
+    fit: VehicleFit, groups: Mapping[str, Sequence[str]], made: BalanceSpectra | None = None
 ) -> dict[str, tuple[float, Array, Array]]:
     """Return, for each group of further parameters alone, the fall of twice the negative
     log-likelihood, the parameters after one step from 0, and their standard deviations.
@@ -181,7 +181,7 @@ def score_tests(
     made = made or fit.balance
     grams = np.sum(_grams(made, fit.spectra, model.band), axis=0)
     step, information, *_ = _newton(made, grams, model, start)
-    # of the further parameters, with the fit's own following: information, and behind it the slope
+    # information of the further parameters while the fit's own follow, and behind it the slope
     both, n, tests = np.column_stack([information, information @ step]), len(fit.theta), {}
     both = both[n:, n:] - information[n:, :n] @ np.linalg.solve(information[:n, :n], both[:n, n:])
     for name, group in groups.items():
@@ -194,7 +194,7 @@ def score_tests(
 
 
 def _moved(
-    made: Balance, grams: Array, model: Model, theta: Array, steps: int
+    made: BalanceSpectra, grams: Array, model: Model, theta: Array, steps: int
 ) -> tuple[Array, Array, float]:
     """Return the parameters (p,) after some steps, the information (p, p) before the last, and the
     longest step in standard deviations. Nonlinear parameters stay in their range and near the
@@ -213,7 +213,7 @@ def _moved(
     return theta, information, moved
 
 
-def _grams(made: Balance, spectra: Spectra, band: float) -> Spectra:
+def _grams(made: BalanceSpectra, spectra: Spectra, band: float) -> Spectra:
     """Return each segment's weighted Gram matrices (6, 1 + ..., ...), axis by axis: the axis'
     measurement with all columns, less the rotors' noise.
     """
@@ -233,10 +233,10 @@ def _grams(made: Balance, spectra: Spectra, band: float) -> Spectra:
 
 
 def _newton(
-    made: Balance, grams: Array, model: Model, theta: Array
+    made: BalanceSpectra, grams: Array, model: Model, theta: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Return a Gauss-Newton step (p,), the information (p, p), and the combination of measurement
-    and columns that is left: its slopes (p, 6, 1 + ...) and itself (6, 1 + ...).
+    """Return a Gauss-Newton step (p,), the information (p, p), and slopes (p, 6, 1 + ...) of the
+    residual's combination of measurement and columns, and the combination (6, 1 + ...).
     """
     left, rows = slopes(lambda x: made.combined(model, x), theta)
     weighted = np.einsum("iac,acd->iad", rows, grams)
@@ -249,7 +249,7 @@ def _newton(
 
 
 def _powers(
-    made: Balance, spectra: Spectra, model: Model, theta: Array, information: Array
+    made: BalanceSpectra, spectra: Spectra, model: Model, theta: Array, information: Array
 ) -> Spectra:
     """Return the residual's power (m, 6) in each segment, before the parameters took their share:
     parameters told by few frequencies follow the noise most.
