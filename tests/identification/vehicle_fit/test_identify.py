@@ -37,11 +37,11 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
-from windwrench.identification.vehicle_fit.columns import Drive
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, standing
 from windwrench.identification.vehicle_fit.identify import identify
+from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
 from windwrench.identification.vehicle_fit.report import explained, use_of
 from windwrench.identification.vehicle_fit.result import IDENTIFIED, Estimate
@@ -152,7 +152,7 @@ def test_a_hover_does_not_show_what_it_does_not_excite():
 
 def test_an_imu_and_commands_are_enough():
     found = vehicles()["imu and commands"]
-    assert found.sources.force == "accelerometer"
+    assert found.fit.model.sources.force == "accelerometer"
     check(found, "hover command", HOVER, 0.05)
     check(found, "thrust(0.5)", K * (0.5 * FULL) ** 2, 0.05)
     check(found, "Jxx", INERTIA[0, 0], 0.05)
@@ -377,11 +377,10 @@ def test_turning_is_compared_with_torque_at_its_own_delay():
     t = period * np.arange(n)
     rate = period * np.cumsum(turn, axis=0)
     piece = MotionPiece(0, t, period, force, turn, rate, still, np.sqrt(square), None, None)
-    drive = Drive(GIVEN.positions, SPIN)
     sources = Sources("accelerometer", "gyro", "rotor speeds", True)
-    model, start, usual = first_model([piece], sources, drive, MASS, ("delay",))
+    model, start = first_model([piece], Model(MASS, GIVEN, sources), "delay")
     values = model.values(start)
-    assert usual.spin is SPIN
+    assert not model.opposite
     assert values["Jx"] == pytest.approx(INERTIA[0, 0], rel=0.2)
     assert values["Jy"] == pytest.approx(INERTIA[1, 1], rel=0.2)
 
@@ -413,7 +412,7 @@ LAG = Estimate("motor_lag", 0.05, 0.04, 0.06, "s", IDENTIFIED, "")
 def found(*effects, curve=None, lag=LAG, commands=False):
     """Return as much of a result as exports read."""
     vehicle = replace(CRAZYFLIE.with_effects(*effects), motor_curve=curve)
-    fit = SimpleNamespace(drive=SimpleNamespace(commands=commands))
+    fit = SimpleNamespace(model=SimpleNamespace(commands=commands))
     return SimpleNamespace(vehicle=vehicle, estimates={lag.name: lag}, fit=fit)
 
 
