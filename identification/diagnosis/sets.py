@@ -171,10 +171,10 @@ class Posterior:
             for variant in best.variants:
                 effect = variant[0].effect
                 rest = tuple(x for x in best.variants if x != variant)
-                kept = {v[0].effect for v in rest}
-                gained, std = gains[effect] = left_out.gain(m.index(chain.from_iterable(rest)))
-                smaller = _Candidate(base, rest, m.evidence(chain.from_iterable(rest)))
-                least = left_out.least * std - self.odds * len(every - kept)
+                less = [*chain.from_iterable(rest)]
+                gained, std = gains[effect] = left_out.gain(less)
+                smaller = _Candidate(base, rest, m.evidence(less))
+                least = left_out.least * std - self.odds * len(every - {c.effect for c in less})
                 if gained < least and self._possible(smaller):
                     weak[probability[effect], gained / (std + 1e-9)] = smaller
             if not weak:
@@ -321,7 +321,7 @@ class Posterior:
         base = best.base
         m = base.marginal(best.columns, base.plain, self.power)
         whole = m.deviance - self.power * base.penalty
-        return whole - m.explained(range(len(m.right)), best.evidence.mode)
+        return whole - m.explained(m.place, best.evidence.mode)
 
     def alone(self) -> NamedNumbers:
         """Return the deviance of each effect of the library alone, beside the given effects, over
@@ -362,8 +362,8 @@ class Posterior:
                 continue
             sign = np.sign([coefficient(c).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
-            i = m.index(columns)
-            out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
+            _, normal, _ = m.at(columns)
+            out[effect] = max(float(z @ normal @ z), out.get(effect, 0.0))
         return out
 
     def _dictionary_beside_best(self, base: Base) -> Marginal:
