@@ -27,7 +27,7 @@ from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .commands import Given, what_commands_show
 from .priors import Setting
-from .ranking import FittedPosterior, Report, rank, rank_by_rows
+from .ranking import FittedPosterior, Report, rank
 from .regression import (
     CENTRAL,
     RegressedFlights,
@@ -85,11 +85,7 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
     library = [e for e in library if e not in flights.not_identifiable]
     given = what_commands_show(flights, library)
     report("asking how probable each effect is")
-    likeliest = (
-        rank(flights, library, report)
-        if flights.has_raw_poses
-        else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
-    )
+    likeliest = rank(flights, given.library, report, given.first, given.fixed)
     sensors = {name: value for name, (value, _) in likeliest.sensors.items()}
     known_apart = {**given.fixed, "": sensors}
     # no set with a larger error on held-out flight is printed

@@ -13,12 +13,16 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Coefficients, Unexplained
-from ..logs.table import Array
+from ..logs.table import Array, Values
 from ..motion.smoothing import mean_square
-from .regression import RegressedFlights, Setting, typical_sizes
+from .column import Column, Part
+from .priors import Starts
+from .regression import RegressedFlights, Setting, moves_time, typical_size, typical_sizes
 
 MOST_TRIED = 12  # starts; no more are tried all
 KEPT_OF_MORE = 4  # starts of more, the most like the residual
+# typical sizes of the trials of a lag or a delay as a whole: their columns change with them
+TIME_STARTS = (0.3, 0.6, 1.2)
 SAMPLE_STEP = 20  # one of so many samples is enough to compare
 
 
@@ -91,3 +95,27 @@ def starting_points(
         if size > 0.0:
             likeness.append((np.sum(shape * target * scale) / math.sqrt(size), i))
     return [starts[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]
+
+
+def starts_of(
+    flights: RegressedFlights, library: Sequence[str], setting: Setting, *others: Setting
+) -> Starts:
+    """Return columns of whole effects outside a setting, with the coefficients of each: lags and
+    delays, and effects whose coefficients do nothing one by one. The latter start from the residual
+    of the setting, and of ``others``: an effect may act in the place of another.
+    """
+    out: dict[Column, Values] = {}
+    beside = [*setting, *(e.name for e in flights.vehicle.effects)]
+    for effect in (e for e in library if e not in setting):
+        own = []
+        if moves_time(effect) and get(effect).kind == "rotor input":
+            name = get(effect).coefficients[0].name
+            typical = typical_size(Column(effect, name), flights.vehicle)
+            own = [{name: share * typical} for share in TIME_STARTS]
+        elif flights.is_nonlinear(effect):
+            stated = flights.stated(effect)
+            for x in (setting, *others):
+                starts = starting_points(effect, flights, flights.residual(x), stated, beside)
+                own += [{**start, **stated} for start in starts]
+        out |= {Column(effect, "", Part.START, i): start for i, start in enumerate(own)}
+    return out

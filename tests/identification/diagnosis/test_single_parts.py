@@ -17,9 +17,9 @@ from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY, delays_at_bound
 from windwrench.identification.diagnosis.priors import prior_size
-from windwrench.identification.diagnosis.ranking import _starts_of, rank
+from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import RegressedFlights
-from windwrench.identification.diagnosis.starting_points import starting_points
+from windwrench.identification.diagnosis.starting_points import starting_points, starts_of
 from windwrench.identification.diagnosis.traces import ORDER, carrying_channels
 from windwrench.identification.diagnosis.turning_delay import turning_delay
 from windwrench.identification.motion.signals import log_signals
@@ -97,7 +97,7 @@ def test_an_effect_may_start_in_the_place_of_another():
     """A force that is known already leaves nothing of the wind that would explain it."""
     force = {"constant_force": {"fx": 0.3, "fy": 0.0, "fz": 0.0}}
     flights = RegressedFlights([recorded(seconds=12.0, **force)], VEHICLE)
-    found = _starts_of(flights, ["wind"], force, {}).values()
+    found = starts_of(flights, ["wind"], force, {}).values()
     assert any(start["wx"] > 3.0 * abs(start["wy"]) for start in found)
 
 
