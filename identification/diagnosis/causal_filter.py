@@ -9,41 +9,16 @@ Rotor speeds move linearly between samples.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from ... import _core
 from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array, Mask, Rows
+from ..logs.table import Array
 from ..motion.residual import loaded_model
+from .raw_poses import Poses
 from .steady_filter import SteadyFilter
-
-
-@dataclass(frozen=True, eq=False)
-class Poses:
-    """Unbroken pieces of flights as measured, one after the other, evenly spaced (n samples)."""
-
-    t: Array  # (n,) s
-    position: Array  # (n, 3) m
-    quaternion: Array  # (n, 4), of continuous sign
-    rotor_speeds: Array  # (n, 4) rad/s, at the samples
-    voltage: Array  # (n,) V; 0 where unknown
-    start: Array  # (p, 6) m/s, and rad/s, body: the velocities at the start of each piece
-    sample: Rows  # (n,) number of the sample in its piece
-    log: Rows  # (n,) index of its log among the flights
-    counted: Mask  # (n,) whether it is in the fit
-
-    @property
-    def begins(self) -> Rows:
-        """Where each piece begins (p,)."""
-        return np.flatnonzero(self.sample == 0)
-
-    @property
-    def pieces(self) -> list[slice]:
-        """The samples of each piece."""
-        return [slice(*ends) for ends in pairwise([*self.begins, len(self.t)])]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +58,11 @@ def level(heading: Array, x: Array) -> Array:
     return np.column_stack([c * ahead - s * left, s * ahead + c * left, up])
 
 
-def run(poses: Poses, period: float, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
+def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
     """Return the pieces as the filter with a vehicle's model sees them.
 
     Args:
         poses: the pieces.
-        period: s.
         vehicle: the model.
         steady: the filter's gains.
         known: (n, 6, 3) corrections of pose, rate and disturbance of each axis before the pose of
@@ -100,7 +74,7 @@ def run(poses: Poses, period: float, vehicle: Vehicle, steady: SteadyFilter, kno
         models = loaded_model(vehicle)[0].copy()
         _core.run_causal_filter(
             models.ctypes.data,
-            period,
+            poses.period,
             poses.rotor_speeds[at],
             poses.voltage[at],
             poses.position[at],
