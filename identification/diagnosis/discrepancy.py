@@ -6,19 +6,17 @@ The columns are of the filter's predicted state: none holds the noise of the pos
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
-from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array, ArrayMap, NamedArrays, Rows, median_step
 from ..motion.signals import in_body
 from ..motion.smoothing import filtered
 from .causal_filter import FlightState
-from .column import Column, Part
+from .coefficients import weight_and_torque
+from .column import Column, Columns, Part, Product, along_axis
 from .regression import RegressedFlights
 
-TORQUE_ARM = 0.25  # of the arm: times the weight, the unit of a torque
 HEIGHTS = (0.2, 0.6)  # m above the lowest place: where a bump falls off
 # Hz: a load on a cable of 0.1 to 1.5 m, and a part on a soft mount
 LOAD_HZ = (0.4, 0.55, 0.75, 1.0, 1.4)
@@ -27,50 +25,6 @@ DAMPING_RATIO = 0.08  # of both
 # times ``sets.UNKNOWN_SIZES``: change of an effect's coefficients, as a share of its own wrench,
 # with one standard deviation of a variable
 SHARE_OF_EFFECT = 30.0
-
-
-class Product(NamedTuple):
-    """A column (n, 6), multiplied out a part at a time: ten minutes of 150 columns would take 0.9
-    GB.
-    """
-
-    scale: float
-    x: Array  # (n,)
-    y: Array  # (n, k)
-    first: int = 0  # channel of y's first column; the other channels are zero
-
-    @staticmethod
-    def ones(*shape: int) -> Array:
-        """Return ones without memory of their own."""
-        return np.broadcast_to(1.0, shape)
-
-    def part(self, rows: slice) -> "Product":
-        """Return some rows."""
-        return Product(self.scale, self.x[rows], self.y[rows], self.first)
-
-    @property
-    def whole(self) -> Array:
-        """All of it (n, 6)."""
-        out = np.zeros((len(self.x), 6))
-        out[:, self.first : self.first + self.y.shape[1]] = self.scale * self.x[:, None] * self.y
-        return out
-
-
-Columns = dict[Column, Product]
-
-
-def along_axis(axis: int, rotation: Array) -> tuple[Array, int]:
-    """Return the last two fields of a product along an axis of the body, three of force and three
-    of torque.
-    """
-    return (rotation[:, :, axis], 0) if axis < 3 else (Product.ones(len(rotation), 1), axis)
-
-
-def weight_and_torque(vehicle: Vehicle, arm: float = TORQUE_ARM) -> Array:
-    """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
-    share of the arm.
-    """
-    return vehicle.weight * np.repeat([1.0, arm * vehicle.arm_l], 3)
 
 
 def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Rows]:

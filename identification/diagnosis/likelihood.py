@@ -22,24 +22,13 @@ from ..motion.sensing_effects import sensing_of
 from ..motion.sensor_noise import sensor_noise
 from ..motion.smoothing import filtered
 from .causal_filter import level, run
-from .column import Column, Part
-from .discrepancy import (
-    Product,
-)
+from .column import Column, Part, Product
+from .flight_rows import BLOCK
 from .noise_search import FIRST_TIME, NoiseSearch
-from .pose_columns import PoseColumns, whole
-from .priors import (
-    GAINS,
-    Base,
-    Setting,
-    Starts,
-    in_prior_units,
-)
+from .pose_columns import PoseColumns
+from .priors import GAINS, Base, Setting, Starts, in_prior_units
 from .raw_poses import read_poses
-from .regression import (
-    BLOCK,
-    RegressedFlights,
-)
+from .regression import RegressedFlights
 from .rotor_innovations import DRIVEN, rotor_innovations, unrounded
 from .steady_filter import OWN, PAIRS, PoseNoise, SteadyFilter, steady_filter
 
@@ -176,7 +165,7 @@ class Likelihood:
             self.gains = gains
             self._run()
             if explained is not None:
-                pose, force = map(whole, explained)
+                pose, force = map(Product.of, explained)
                 each = self._changes([force], [pose], every=True)
                 left = np.diff(np.concatenate([x for _, x in each])).reshape(-1, 6)
                 left = left @ np.linalg.inv(steady.whitening).T

@@ -23,19 +23,13 @@ from ..findings import (
 from ..logs.table import Array, NamedNumbers, Names, Values
 from ..motion.smoothing import mean_square
 from .advice import FILTERED, composites
+from .coefficients import CENTRAL, coefficient, typical_size, unit_of_change, without
 from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .commands import Given, what_commands_show
 from .priors import Setting
 from .ranking import FittedPosterior, Report, rank
-from .regression import (
-    CENTRAL,
-    RegressedFlights,
-    coefficient,
-    typical_size,
-    unit_of_change,
-    without,
-)
+from .regression import RegressedFlights
 from .residuals import Balance, balance, transient_disturbances
 from .row_nuisances import between_flights
 from .settings import DiagnosisSettings

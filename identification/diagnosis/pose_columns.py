@@ -16,20 +16,14 @@ from ..motion.sensing_effects import undo_log_sensing
 from ..motion.signals import Signals, in_body
 from ..motion.smoothing import turn_between
 from .causal_filter import Track
-from .column import Column, Part
-from .discrepancy import (
-    Columns,
-    Product,
-    along_axis,
-    changing_columns,
-    discrepancy_columns,
-    variables,
-)
+from .coefficients import CENTRAL, STEP, is_delay, typical_size, without
+from .column import Column, Columns, Part, Product, along_axis
+from .discrepancy import changing_columns, discrepancy_columns, variables
 from .gusty_wind import gusts
 from .log_offsets import ATTITUDE_TIME_OFFSET, LAG_ASYMMETRY, ROTOR_TIME_OFFSET
 from .priors import MODEL_ERROR, Setting, Starts, variants_of
 from .raw_poses import Poses
-from .regression import CENTRAL, STEP, RegressedFlights, is_delay, typical_size, without
+from .regression import RegressedFlights
 from .rotor_innovations import DRIVEN
 
 
@@ -90,7 +84,7 @@ class PoseColumns:
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in self.acting:
-                self.acting[c] = whole(self._change({**self.setting, c.effect: dict(start)}))
+                self.acting[c] = Product.of(self._change({**self.setting, c.effect: dict(start)}))
         for effect in library:
             for columns in variants_of(self.flights, effect, self.setting, starts):
                 for c in columns:
@@ -116,7 +110,7 @@ class PoseColumns:
             for u in [np.diff(s.rotor_speeds, 2, axis=0)]
         ]
         change = self._accelerations(self.setting, bent) - self._base
-        self.acting[Column("", "", Part.BETWEEN_SAMPLES)] = whole(change)
+        self.acting[Column("", "", Part.BETWEEN_SAMPLES)] = Product.of(change)
         self._add_model_errors(answers, rounding)
         self._add_answers(disturbed)
         # the rate before the sample is read: the rate after holds the sample's noise
@@ -125,7 +119,7 @@ class PoseColumns:
         )
         rate = np.roll(after, 1, axis=0)
         rate[self.poses.begins] = self.track.angular_velocity[self.poses.begins]
-        self.posed[ATTITUDE_TIME_OFFSET] = whole(np.hstack([np.zeros_like(rate), -rate]))
+        self.posed[ATTITUDE_TIME_OFFSET] = Product.of(np.hstack([np.zeros_like(rate), -rate]))
 
     def add_gusts(self) -> None:
         """Add the columns of a wind's changes."""
@@ -166,13 +160,13 @@ class PoseColumns:
             self.acting[column] = self.acting[ROTOR_TIME_OFFSET]
             return
         if effect and get(effect).kind == "sensing":
-            self.posed[column] = whole(self._moved(column))
+            self.posed[column] = Product.of(self._moved(column))
             return
         with suppress(InputError, np.linalg.LinAlgError):
             change = self._slope(column)
             if effect and get(effect).role == Role.CENTRE_OF_MASS:
                 self._swing(column, change)
-            self.acting[column] = whole(change)
+            self.acting[column] = Product.of(change)
 
     def _slope(self, column: Column) -> Array:
         """Return the change of the acceleration (n, 6) by a unit of a coefficient."""
@@ -214,7 +208,7 @@ class PoseColumns:
         axis = [c.name for c in get(column.effect).coefficients].index(column.coefficient)
         (marker,) = playing(Role.MARKER)
         moved = -self._moved(Column(marker, get(marker).coefficients[axis].name))
-        self.posed[column] = whole(moved)
+        self.posed[column] = Product.of(moved)
 
     def _add_changing_coefficients(self) -> None:
         """Add the dictionary's columns: effects of the setting with changing coefficients."""
@@ -271,10 +265,3 @@ class PoseColumns:
             for i, x in enumerate((rotors - rotors.mean(), change, *own)):
                 column = Product(answer / max(x.std(), 1e-9), x, *along)
                 self.acting[Column("", f"answer {i} of axis {axis}", Part.NUISANCE)] = column
-
-
-def whole(column: Array) -> Product:
-    """Return a column (n, 6), without channels of zeros before and after the others."""
-    used = np.flatnonzero(column.any(axis=0)).tolist() or [0]
-    some = column[:, used[0] : used[-1] + 1].copy()
-    return Product(1.0, Product.ones(len(column)), some, used[0])

@@ -13,10 +13,11 @@ import numpy as np
 
 from ...dynamics.effects import get
 from .climbing import Height, linearised, mode
+from .coefficients import Effects
 from .column import Column
 from .likelihood import Likelihood
 from .priors import Base, Setting, Starts, prior_size
-from .regression import Effects, RegressedFlights
+from .regression import RegressedFlights
 from .sets import Posterior
 from .starting_points import starts_of
 

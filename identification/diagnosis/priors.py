@@ -12,17 +12,10 @@ import numpy as np
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
 from ..logs.table import Array, NamedNumbers, Pair, Values
+from .coefficients import CENTRAL, Effects, coefficient, moves_time, typical_size, unit_of_change
 from .column import Column, Part
 from .evidence import Index, Marginal, SetEvidence, marginal
-from .regression import (
-    CENTRAL,
-    Effects,
-    RegressedFlights,
-    coefficient,
-    moves_time,
-    typical_size,
-    unit_of_change,
-)
+from .regression import RegressedFlights
 
 Setting = dict[str, NamedNumbers]
 # columns of whole effects, with the coefficients of each

@@ -12,9 +12,10 @@ from ..logs.table import Array, Mask, Rows
 from ..motion.sensing_effects import sensing_of, undo_log_sensing
 from ..motion.signals import log_signals
 from ..motion.smoothing import continuous
+from .coefficients import is_delay
 from .log_offsets import ROTOR_TIME_OFFSET, with_time_offsets
 from .noise_search import SETTLING_TIME
-from .regression import RegressedFlights, is_delay
+from .regression import RegressedFlights
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Disturbance, TransientDisturbance
 from ..logs.table import Array, Pair
 from ..motion.smoothing import CUTOFFS
-from .discrepancy import weight_and_torque
-from .regression import RegressedFlights, Setting
+from .coefficients import Setting, weight_and_torque
+from .regression import RegressedFlights
 
 # times the noise floor; a smaller residual is the sensors' noise
 MOST_FLOOR_RATIO = 1.2

@@ -11,8 +11,10 @@ from ..logs.table import Array, ArrayMap, Pair
 from ..motion.smoothing import mean_square
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
+from .coefficients import Effects, without
 from .column import Column, Part
 from .discrepancy import changing_columns, discrepancy_columns, joined, variables
+from .flight_rows import delivered
 from .gusty_wind import gusts
 from .log_offsets import LAG_ASYMMETRY
 from .priors import (
@@ -23,7 +25,7 @@ from .priors import (
     in_prior_units,
     prior_size,
 )
-from .regression import Effects, RegressedFlights, delivered, without
+from .regression import RegressedFlights
 from .row_noise import ROUNDS, RowNoise, fitted_noise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows

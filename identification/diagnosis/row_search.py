@@ -10,8 +10,9 @@ from collections.abc import Callable, Sequence
 
 from ..findings import LEAST_RIVAL
 from ..logs.table import Names
+from .coefficients import without
 from .priors import Base, Setting
-from .regression import RegressedFlights, without
+from .regression import RegressedFlights
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible
 from .starting_points import starts_of

@@ -13,6 +13,7 @@ from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import LEAST_RIVAL, RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
+from .coefficients import CENTRAL, Effects, coefficient, moves_time, typical_sizes
 from .column import Column, Part
 from .discrepancy import SHARE_OF_EFFECT
 from .evidence import Index, Marginal, SetEvidence, evidence_of_one_more, tempering
@@ -27,14 +28,7 @@ from .priors import (
     changed,
     variants_of,
 )
-from .regression import (
-    CENTRAL,
-    Effects,
-    RegressedFlights,
-    coefficient,
-    moves_time,
-    typical_sizes,
-)
+from .regression import RegressedFlights
 
 MOST_EFFECTS = 5  # in a set, beside the given ones
 KEPT_SETS = 8  # of each size, extended by a further effect

@@ -15,9 +15,10 @@ from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Coefficients, Unexplained
 from ..logs.table import Array, Values
 from ..motion.smoothing import mean_square
+from .coefficients import Setting, moves_time, typical_size, typical_sizes
 from .column import Column, Part
 from .priors import Starts
-from .regression import RegressedFlights, Setting, moves_time, typical_size, typical_sizes
+from .regression import RegressedFlights
 
 MOST_TRIED = 12  # starts; no more are tried all
 KEPT_OF_MORE = 4  # starts of more, the most like the residual

@@ -26,7 +26,7 @@ from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array
 from ..motion.signals import Signals
-from .regression import moves_time
+from .coefficients import moves_time
 
 # Hz, of the commanded moments in the angular acceleration
 BAND_HZ = (1.0, 8.0)

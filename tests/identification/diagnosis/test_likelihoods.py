@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.discrepancy import Product
+from windwrench.identification.diagnosis.column import Product
 from windwrench.identification.diagnosis.evidence import (
     Marginal,
     evidence_of_one_more,
