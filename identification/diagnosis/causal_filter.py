@@ -48,6 +48,39 @@ class Track(FlightState):
     innovations: Array  # (n, 6) m, world; rad, as ``level`` returns them
     disturbance: Array  # (n, 6) m/s2, world; rad/s2
 
+    @classmethod
+    def of(cls, poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> "Track":
+        """Return the pieces as the filter with a vehicle's model sees them.
+
+        Args:
+            poses: the pieces.
+            vehicle: the model.
+            steady: the filter's gains.
+            known: (n, 6, 3) corrections of pose, rate and disturbance of each axis before the pose
+                of sample k is read, in the directions of ``innovations``.
+        """
+        shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
+        written = [np.empty((len(poses.t), *shape)) for shape in shapes]
+        for at, start in zip(poses.pieces, poses.start, strict=True):
+            models = loaded_model(vehicle)[0].copy()
+            _core.run_causal_filter(
+                models.ctypes.data,
+                poses.period,
+                poses.rotor_speeds[at],
+                poses.voltage[at],
+                poses.position[at],
+                poses.quaternion[at],
+                start,
+                steady.gain,
+                steady.keep,
+                known[at],
+                *(x[at] for x in written),
+            )
+            raise_errors()
+        out = cls(poses.t, *written)
+        out.rotors[:] /= [vehicle.mass, *np.diagonal(vehicle.inertia)]
+        return out
+
 
 def level(heading: Array, x: Array) -> Array:
     """Return vectors (n, 3) in body axes about three others: the world's x and y, turned with the
@@ -56,36 +89,3 @@ def level(heading: Array, x: Array) -> Array:
     c, s = heading.T
     ahead, left, up = x.T
     return np.column_stack([c * ahead - s * left, s * ahead + c * left, up])
-
-
-def run(poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
-    """Return the pieces as the filter with a vehicle's model sees them.
-
-    Args:
-        poses: the pieces.
-        vehicle: the model.
-        steady: the filter's gains.
-        known: (n, 6, 3) corrections of pose, rate and disturbance of each axis before the pose of
-            sample k is read, in the directions of ``Track.innovations``.
-    """
-    shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
-    written = [np.empty((len(poses.t), *shape)) for shape in shapes]
-    for at, start in zip(poses.pieces, poses.start, strict=True):
-        models = loaded_model(vehicle)[0].copy()
-        _core.run_causal_filter(
-            models.ctypes.data,
-            poses.period,
-            poses.rotor_speeds[at],
-            poses.voltage[at],
-            poses.position[at],
-            poses.quaternion[at],
-            start,
-            steady.gain,
-            steady.keep,
-            known[at],
-            *(x[at] for x in written),
-        )
-        raise_errors()
-    out = Track(poses.t, *written)
-    out.rotors[:] /= [vehicle.mass, *np.diagonal(vehicle.inertia)]
-    return out

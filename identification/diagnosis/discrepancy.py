@@ -4,8 +4,7 @@ The columns are of the filter's predicted state: none holds the noise of the pos
 """
 
 import itertools
-from collections.abc import Iterable, Sequence
-from dataclasses import fields
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -25,12 +24,6 @@ DAMPING_RATIO = 0.08  # of both
 # times ``sets.UNKNOWN_SIZES``: change of an effect's coefficients, as a share of its own wrench,
 # with one standard deviation of a variable
 SHARE_OF_EFFECT = 30.0
-
-
-def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Rows]:
-    """Return all pieces, one after the other, and their ends without the last."""
-    columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(FlightState))
-    return FlightState(*columns), np.cumsum([len(track.position) for track in tracks])[:-1]
 
 
 def _scaled(x: Array) -> Array:

@@ -47,6 +47,37 @@ class Marginal:
     deviance: float  # with the coefficients at zero, and the others at their mode
     log_volume: float  # minus the logarithm of the integrated volume
 
+    @classmethod
+    def of(
+        cls,
+        columns: Sequence[Column],
+        bounds: ArrayPair,
+        products: Array,
+        asked: Index,
+        others: Index,
+        size: Array | float = 1.0,
+    ) -> "Marginal":
+        """Return the log-likelihood with ``others`` integrated out over their normal prior.
+
+        Args:
+            columns: (a,) to keep.
+            bounds: (a,) least and largest coefficients.
+            products: (c + 1, c + 1) of all columns, in prior standard deviations, and of the
+                residual: the last is -2 log-likelihood with all coefficients at zero.
+            asked: (a,) indices of the kept columns.
+            others: columns to integrate out; they may be among the kept ones as well.
+            size: (len(others),) standard deviations of this prior, with mean zero.
+        """
+        size = np.full(len(others), size)
+        kept = np.append(asked, len(products) - 1)
+        inner = products[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
+        factor = np.linalg.cholesky(inner)
+        known = solve_triangular(factor, products[np.ix_(others, kept)] * size[:, None], lower=True)
+        left = products[np.ix_(kept, kept)] - known.T @ known
+        volume = float(np.log(np.diagonal(factor)).sum())
+        place = {c: i for i, c in enumerate(columns)}
+        return cls(place, *bounds, left[:-1, :-1], left[:-1, -1], float(left[-1, -1]), volume)
+
     @property
     def constant(self) -> float:
         """The log-likelihood with all coefficients at zero."""
@@ -84,36 +115,6 @@ class Marginal:
         if math.isnan(value):
             raise np.linalg.LinAlgError("no prior tells columns of the set apart")
         return SetEvidence(self.constant + value, mode, std)
-
-
-def marginal(
-    columns: Sequence[Column],
-    bounds: ArrayPair,
-    products: Array,
-    asked: Index,
-    others: Index,
-    size: Array | float = 1.0,
-) -> Marginal:
-    """Return the log-likelihood with ``others`` integrated out over their standard normal prior.
-
-    Args:
-        columns: (a,) to keep.
-        bounds: (a,) least and largest coefficients.
-        products: (c + 1, c + 1) of all columns, in prior standard deviations, and of the residual:
-            the last is -2 log-likelihood with all coefficients at zero.
-        asked: (a,) indices of the kept columns.
-        others: columns to integrate out; they may be among the kept ones as well.
-        size: (len(others),) standard deviations of their prior.
-    """
-    size = np.full(len(others), size)
-    kept = np.append(asked, len(products) - 1)
-    inner = products[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
-    factor = np.linalg.cholesky(inner)
-    known = solve_triangular(factor, products[np.ix_(others, kept)] * size[:, None], lower=True)
-    left = products[np.ix_(kept, kept)] - known.T @ known
-    volume = float(np.log(np.diagonal(factor)).sum())
-    place = {c: i for i, c in enumerate(columns)}
-    return Marginal(place, *bounds, left[:-1, :-1], left[:-1, -1], float(left[-1, -1]), volume)
 
 
 def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:

@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 
 from ..logs.table import Array, Pair
 from .column import Column
-from .evidence import Marginal, marginal
+from .evidence import Marginal
 from .priors import Base
 
 CONFIDENCE = 0.95  # that a gain is above its bound
@@ -45,7 +45,7 @@ class LeftOut:
         asked, others = (np.searchsorted(base.single, x) for x in (at, base.plain))
 
         def likelihood(products: Array) -> Marginal:
-            return marginal(columns, bounds, power * products, asked, others)
+            return Marginal.of(columns, bounds, power * products, asked, others)
 
         count = len(base.blocks)
         self.least = float(stdtrit(count, CONFIDENCE)) if count > 1 else -math.inf

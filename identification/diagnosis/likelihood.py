@@ -21,13 +21,13 @@ from ..logs.table import Array
 from ..motion.sensing_effects import sensing_of
 from ..motion.sensor_noise import sensor_noise
 from ..motion.smoothing import filtered
-from .causal_filter import level, run
+from .causal_filter import Track, level
 from .column import Column, Part, Product
 from .flight_rows import BLOCK
 from .noise_search import FIRST_TIME, NoiseSearch
 from .pose_columns import PoseColumns
 from .priors import GAINS, Base, Setting, Starts, in_prior_units
-from .raw_poses import read_poses
+from .raw_poses import Poses
 from .regression import RegressedFlights
 from .rotor_innovations import DRIVEN, rotor_innovations, unrounded
 from .steady_filter import OWN, PAIRS, PoseNoise, SteadyFilter, steady_filter
@@ -76,7 +76,7 @@ class Likelihood:
         self.setting = setting
         self.vehicle = flights.amended(setting)
         if not near or sensing_of(near.vehicle) != sensing_of(self.vehicle):
-            self.poses = read_poses(flights, self.vehicle, self.finer)
+            self.poses = Poses.read(flights, self.vehicle, self.finer)
         # the states (3,) after a period of one m/s2 or rad/s2
         period = self.poses.period
         self._units = np.array([period**2, period, 1.0])
@@ -124,7 +124,7 @@ class Likelihood:
         each = (OWN @ self.gains).reshape(6, -1, len(STATES)) * self._units
         # the jumps of the states (n, 6, 3) by the rotors' innovations
         self.known = (self.jumps.swapaxes(0, 1) @ each).swapaxes(0, 1)
-        self.track = run(self.poses, self.vehicle, self.steady, self.known)
+        self.track = Track.of(self.poses, self.vehicle, self.steady, self.known)
 
     # Noise
 

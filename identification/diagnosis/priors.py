@@ -14,7 +14,7 @@ from ...dynamics.effects.declaration import Role
 from ..logs.table import Array, NamedNumbers, Pair, Values
 from .coefficients import CENTRAL, Effects, coefficient, moves_time, typical_size, unit_of_change
 from .column import Column, Part
-from .evidence import Index, Marginal, SetEvidence, marginal
+from .evidence import Index, Marginal, SetEvidence
 from .regression import RegressedFlights
 
 Setting = dict[str, NamedNumbers]
@@ -93,7 +93,7 @@ class Base:
         products = power * self.total
         products[-1, -1] += power * self.penalty
         at = self.at(asked)
-        return marginal(asked, (self.low[at], self.high[at]), products, at, others, size)
+        return Marginal.of(asked, (self.low[at], self.high[at]), products, at, others, size)
 
     def mode(self, chosen: Index, power: float = 1.0, draw: bool = False) -> dict[Column, Pair]:
         """Return the coefficients of some columns at the mode without all others, or a draw about

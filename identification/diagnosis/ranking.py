@@ -13,7 +13,7 @@ from ..logs.table import Names, Pair
 from .pose_search import search_by_poses
 from .priors import Setting
 from .regression import RegressedFlights
-from .row_search import hidden_rivals, search_by_rows
+from .row_search import search_by_rows
 from .sets import Posterior
 
 Report = Callable[[str], None]  # takes a line of progress
@@ -65,5 +65,5 @@ def rank(
     ranking = posterior.ranking(None)
     setting, gains = posterior.leave_out_needless(ranking.probability)
     setting = best if setting.keys() == best.keys() else rows.fitted(setting)
-    sensors, behind = rows.sensors(setting), hidden_rivals(rows, setting)
+    sensors, behind = rows.sensors(setting), rows.behind(setting)
     return FittedPosterior(posterior, ranking, setting, gains, (), sensors, behind)

@@ -2,18 +2,20 @@
 settings.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from ...dynamics.effects import Role, get, playing
-from ..logs.table import Array, ArrayMap, Pair
+from ..findings import LEAST_RIVAL
+from ..logs.table import Array, ArrayMap, Names, Pair
 from ..motion.smoothing import mean_square
 from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .coefficients import Effects, without
 from .column import Column, Part
-from .discrepancy import changing_columns, discrepancy_columns, joined, variables
+from .discrepancy import changing_columns, discrepancy_columns, variables
 from .flight_rows import delivered
 from .gusty_wind import gusts
 from .log_offsets import LAG_ASYMMETRY
@@ -26,7 +28,7 @@ from .priors import (
     prior_size,
 )
 from .regression import RegressedFlights
-from .row_noise import ROUNDS, RowNoise, fitted_noise
+from .row_noise import ROUNDS, RowNoise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
@@ -127,7 +129,7 @@ class RowLikelihood:
             right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
             z = np.linalg.solve(factor.T, right[:, None] + draws)
             left = [y - X[:, :, : len(known)] @ x for x in z[: len(known)].T]
-            noise = fitted_noise(np.concatenate(left), begins, fit, rows.least)
+            noise = RowNoise.fitted(np.concatenate(left), begins, fit, rows.least)
             noise = noise._replace(begins=rows.begins)
         return noise, z[:, 0]
 
@@ -176,17 +178,13 @@ class RowLikelihood:
         rows = self.rows
         flights = self.flights
         pieces = flights.pieces({})
-        states = []
-        for s in (p.signals for p in pieces):
-            rotors = delivered(s, flights.vehicle) / flights.inertias[2:]
-            # the acceleration is the rotors' alone, without disturbances
-            push = rotors[:, :1] * s.rotation[:, :, 2]
-            states.append(
-                FlightState(
-                    s.t, s.position, s.rotation, s.velocity, s.angular_velocity, push, rotors
-                )
-            )
-        whole, ends = joined(states)
+        names = ("t", "position", "rotation", "velocity", "angular_velocity")
+        seen = [np.concatenate([getattr(p.signals, x) for p in pieces]) for x in names]
+        delivery = [delivered(p.signals, flights.vehicle) for p in pieces]
+        rotors = np.concatenate(delivery) / flights.inertias[2:]
+        # the acceleration is the rotors' alone, without disturbances
+        whole = FlightState(*seen, rotors[:, :1] * seen[2][:, :, 2], rotors)
+        ends = np.cumsum([len(x) for x in delivery])[:-1]
         out = {}
         for column, made in discrepancy_columns(whole, ends, flights).items():
             x = made.whole
@@ -272,6 +270,25 @@ class RowLikelihood:
             for effect in among
             if np.abs(self.rows.residual(without(setting, effect)) - here).max() <= least
         }
+
+    def behind(self, best: Setting) -> dict[str, Names]:
+        """Return, for each effect of a set, possible effects hidden in the logs with as much
+        explained in its place.
+        """
+        flights = self.flights
+        unseen = sorted(flights.needs_pose - flights.without_trace - set(best))
+        hidden = [e for e in unseen if not flights.is_nonlinear(e)]
+        if not hidden or not best:
+            return {}
+        base = self.base(best, {}, [*best, *hidden])
+        m = base.marginal(base.asked, base.plain, self.power)
+
+        def explained(effects: set[str]) -> float:
+            return m.gain([c for c in m.place if c.effect in effects])
+
+        # up to the deviance of a rival's likelihood
+        whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
+        return {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
 
 
 def _named(columns: ArrayMap) -> dict[Column, Array]:

@@ -5,11 +5,8 @@ with measured rotors, of torques, with one noise for all sets. The likeliest set
 linearisation, and so is each next likeliest, until the likeliest is a fitted one.
 """
 
-import math
 from collections.abc import Callable, Sequence
 
-from ..findings import LEAST_RIVAL
-from ..logs.table import Names
 from .coefficients import without
 from .priors import Base, Setting
 from .regression import RegressedFlights
@@ -102,23 +99,3 @@ def search_by_rows(
     bases.pop(frozenset(best))  # the last base has the dictionary
     bases[frozenset(best)] = base(best, unknown=True)
     return likelihood, best, posterior()
-
-
-def hidden_rivals(likelihood: RowLikelihood, best: Setting) -> dict[str, Names]:
-    """Return, for each effect of a set, possible effects hidden in the logs with as much explained
-    in its place.
-    """
-    flights = likelihood.flights
-    unseen = sorted(flights.needs_pose - flights.without_trace - set(best))
-    hidden = [e for e in unseen if not flights.is_nonlinear(e)]
-    if not hidden or not best:
-        return {}
-    base = likelihood.base(best, {}, [*best, *hidden])
-    m = base.marginal(base.asked, base.plain, likelihood.power)
-
-    def explained(effects: set[str]) -> float:
-        return m.gain([c for c in m.place if c.effect in effects])
-
-    # up to the deviance of a rival's likelihood
-    whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
-    return {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}

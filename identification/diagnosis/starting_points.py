@@ -7,7 +7,6 @@ like the residual along the flights.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -27,7 +26,7 @@ TIME_STARTS = (0.3, 0.6, 1.2)
 SAMPLE_STEP = 20  # one of so many samples is enough to compare
 
 
-def starting_points(
+def _starting_points(
     effect: str,
     flights: RegressedFlights,
     residual: Array,
@@ -62,17 +61,8 @@ def starting_points(
     )
     if len(starts) <= MOST_TRIED:
         return starts
-    # an effect without a state or clock of its own does the same in the same sample, so a few
-    # samples are enough. To find out, one sample is repeated for a minute, in step with no whole Hz
     pieces = flights.pieces({})
-    one = pieces[0].signals.at(np.zeros(200, dtype=np.int64))
-    acts = flights.acting(replace(one, period=0.317), {effect: starts[0]})
-    steady = bool(np.all(acts == acts[0]))
     step = max(1, SAMPLE_STEP // int(np.diff(pieces[0].rows)[0]))
-    sampled = [
-        (p.signals.at(p.rows[::step]), slice(None)) if steady else (p.signals, p.rows[::step])
-        for p in pieces
-    ]
     chosen = np.concatenate([rows[::step] for rows in flights.runs])
     used = seen[chosen]
     target = residual[chosen[used]]
@@ -82,7 +72,7 @@ def starting_points(
         # the same starts are tried beside several sets
         key = str(setting) + effect
         if key not in flights.started:
-            parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
+            parts = [flights.acting(p.signals, setting)[p.rows[::step]] for p in pieces]
             flights.started[key] = np.concatenate(parts)[used]
         return np.asarray(flights.started[key] * scale)
 
@@ -116,7 +106,7 @@ def starts_of(
         elif flights.is_nonlinear(effect):
             stated = flights.stated(effect)
             for x in (setting, *others):
-                starts = starting_points(effect, flights, flights.residual(x), stated, beside)
+                starts = _starting_points(effect, flights, flights.residual(x), stated, beside)
                 own += [{**start, **stated} for start in starts]
         out |= {Column(effect, "", Part.START, i): start for i, start in enumerate(own)}
     return out

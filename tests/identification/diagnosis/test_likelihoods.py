@@ -23,13 +23,12 @@ from windwrench.identification.diagnosis.column import Product
 from windwrench.identification.diagnosis.evidence import (
     Marginal,
     evidence_of_one_more,
-    marginal,
     tempering,
 )
 from windwrench.identification.diagnosis.left_out import LeftOut
 from windwrench.identification.diagnosis.priors import Base
 from windwrench.identification.diagnosis.regression import RegressedFlights
-from windwrench.identification.diagnosis.row_noise import fitted_noise
+from windwrench.identification.diagnosis.row_noise import RowNoise
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
 
@@ -155,7 +154,7 @@ def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
     sizes = (0.1, 1.0)
     products = np.block([[normal, right[:, None]], [right, 0.0]])
     bounds = np.full(2, -inf), np.full(2, inf)
-    m = marginal([2, 3], bounds, products, np.array([2, 3]), np.array([0, 1]), np.ones(2))
+    m = Marginal.of([2, 3], bounds, products, np.array([2, 3]), np.array([0, 1]), np.ones(2))
     found = evidence_of_one_more(m, [0, 1], sizes)
     each = [evidence([0, 1, c], s) - evidence([0, 1], s) for c in (2, 3) for s in sizes]
     assert found == pytest.approx(np.logaddexp.reduce(each) - math.log(4.0))
@@ -272,7 +271,7 @@ def test_the_noise_of_an_autoregression_is_found():
         x[k] = lag @ x[k - 1] + root @ rng.standard_normal(2)
     begins = np.arange(len(x)) == 0
     begins[5000] = True
-    found = fitted_noise(x, begins, np.arange(len(x)) % 400 < 300, np.zeros(2))
+    found = RowNoise.fitted(x, begins, np.arange(len(x)) % 400 < 300, np.zeros(2))
     assert_allclose(found.lags[0], lag, atol=0.06)
     assert_allclose(found.covariance, root @ root.T, atol=0.06)
     assert_allclose(np.cov(found.white(x)[found.known].T), np.eye(2), atol=0.15)
