@@ -48,22 +48,18 @@ class PoseColumns:
         self.poses = poses
         self.track = track
         # each piece as the filter sees it between samples
-        self.signals = [
-            Signals(
-                track.t[at],
-                poses.period,
-                track.position[at],
-                track.rotation[at],
-                track.velocity[at],
-                track.acceleration[at, :3],
-                track.angular_velocity[at],
-                track.acceleration[at, 3:],
-                0.5 * (speeds + np.vstack([speeds[1:], speeds[-1:]])),
-                voltage if voltage.any() else None,
-            )
-            for at in poses.pieces
-            for speeds, voltage in [(poses.rotor_speeds[at], poses.voltage[at])]
-        ]
+        later = np.roll(poses.rotor_speeds, -1, axis=0)
+        later[poses.begins - 1] = poses.rotor_speeds[poses.begins - 1]
+        names = ("t", "position", "rotation", "velocity", "angular_velocity")
+        whole = Signals(
+            **{name: getattr(track, name) for name in names},
+            period=poses.period,
+            acceleration=track.acceleration[:, :3],
+            angular_acceleration=track.acceleration[:, 3:],
+            rotor_speeds=0.5 * (poses.rotor_speeds + later),
+            voltage=poses.voltage if poses.voltage.any() else None,
+        )
+        self.signals = [whole.at(at) for at in poses.pieces]
         self._base = self._accelerations(setting, self.signals)
         self.acting: Columns = {}
         self.posed: Columns = {}

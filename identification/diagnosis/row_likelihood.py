@@ -261,15 +261,12 @@ class RowLikelihood:
             )
         return out
 
-    def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
-        """Return the effects of a setting, among some, without any effect there."""
+    def is_idle(self, setting: Setting, among: Iterable[str]) -> bool:
+        """Return whether an effect of a setting, among some, does nothing there."""
         here = self.rows.residual(setting)
         least = 1e-6 * np.abs(here).max()
-        return {
-            effect
-            for effect in among
-            if np.abs(self.rows.residual(without(setting, effect)) - here).max() <= least
-        }
+        parts = (self.rows.residual(without(setting, e)) - here for e in among)
+        return any(np.abs(part).max() <= least for part in parts)
 
     def behind(self, best: Setting) -> dict[str, Names]:
         """Return, for each effect of a set, possible effects hidden in the logs with as much

@@ -60,7 +60,7 @@ def search_by_rows(
         fitted[key] = best = likelihood.fitted(setting)
         own = key - given
         possible = all(is_possible(flights, best, {}, e, plausible=True) for e in own)
-        if possible and not likelihood.idle(best, own):
+        if possible and not likelihood.is_idle(best, own):
             bases[key] = base(best)
 
     for effect in library:

@@ -93,6 +93,7 @@ def is_possible(
     )
 
 
+@dataclass(eq=False)
 class Posterior:
     """The evidence of sets, of all bases together.
 
@@ -101,33 +102,30 @@ class Posterior:
         library: names of effects.
         bases: the likelihood beside some sets. The first has the noise of nothing explained.
         power: of the likelihood.
-        given: effects in every set. Then all sets share one noise, and the base with most of a
-            set's effects judges it; a single base has them all. Without given effects each base has
+        among: effects in every set. Then all sets share one noise, and the base with most of a
+            set's effects judges it; a single base has them all. Without them each base has
             a noise of its own, and a set's likeliest counts.
         idle: sets to leave out: their best fit has an effect that does nothing.
     """
 
-    def __init__(
-        self,
-        flights: RegressedFlights,
-        library: Sequence[str],
-        bases: Sequence[Base],
-        power: float = 1.0,
-        given: Effects | None = None,
-        idle: Collection[Effects] = (),
-    ) -> None:
-        self.flights, self.library, self.bases, self.power = flights, library, bases, power
-        self.idle = idle
-        self.given = given or frozenset()
-        self.one_noise = given is not None
-        inclusion = min(EXPECTED / max(len(library) - len(self.given), 1), 0.5)
+    flights: RegressedFlights
+    library: Sequence[str]
+    bases: Sequence[Base]
+    power: float = 1.0
+    among: Effects | None = None
+    idle: Collection[Effects] = ()
+
+    def __post_init__(self) -> None:
+        self.given = self.among or frozenset()
+        self.one_noise = self.among is not None
+        inclusion = min(EXPECTED / max(len(self.library) - len(self.given), 1), 0.5)
         self.odds = math.log(inclusion / (1.0 - inclusion))  # before the flight, of an effect
         self.known: dict[Effects, _Candidate] = {}
         self.scores: dict[Effects, float] = {}
         # the likeliest set without needless effects, once asked
         self._needed: _Candidate | None = None
         # beside the noise of nothing explained no effect shows: only sets found elsewhere go there
-        for i in range(0 if self.one_noise else 1, len(bases)):
+        for i in range(0 if self.one_noise else 1, len(self.bases)):
             self._search(i)
         if not self.one_noise:
             self._search(0, [self.known[k].variants for k in self._ranked[:KEPT_ASKED]])

@@ -30,7 +30,6 @@ def _starting_points(
     effect: str,
     flights: RegressedFlights,
     residual: Array,
-    stated: Coefficients,
     beside: Iterable[str] = (),
 ) -> Sequence[Coefficients]:
     """Return the coefficients from which a fit of an effect starts.
@@ -39,14 +38,14 @@ def _starting_points(
         effect: its name. It declares starting points.
         flights: the searched flights.
         residual: the unexplained residual (rows, 6).
-        stated: coefficients fixed by the vehicle's file.
         beside: other effects in action.
     """
     declared = get(effect).starting_points
     assert declared is not None, f"{effect} declares no starting points"
     position = flights.at_rows("position")
+    stated = flights.stated(effect)
     seen = flights.fit_rows
-    starts = declared(
+    started = declared(
         Unexplained(
             flights.vehicle,
             typical_sizes(effect, flights.vehicle),
@@ -59,6 +58,7 @@ def _starting_points(
             residual[seen, 3:],
         )
     )
+    starts = [{**start, **stated} for start in started]
     if len(starts) <= MOST_TRIED:
         return starts
     pieces = flights.pieces({})
@@ -104,9 +104,7 @@ def starts_of(
             typical = typical_size(Column(effect, name), flights.vehicle)
             own = [{name: share * typical} for share in TIME_STARTS]
         elif flights.is_nonlinear(effect):
-            stated = flights.stated(effect)
             for x in (setting, *others):
-                starts = _starting_points(effect, flights, flights.residual(x), stated, beside)
-                own += [{**start, **stated} for start in starts]
+                own += _starting_points(effect, flights, flights.residual(x), beside)
         out |= {Column(effect, "", Part.START, i): start for i, start in enumerate(own)}
     return out

@@ -81,7 +81,7 @@ def test_of_many_starts_those_are_tried_that_resemble_the_flight(tmp_path):
     with joined(tmp_path):
         hose = EffectSetting("hose", {"a": 0.3, "w": 5.0})
         flights = RegressedFlights([fly_practice(VEHICLE, (hose,), "hover", 15.0, seed=1)], VEHICLE)
-        starts = _starting_points("hose", flights, flights.residual({}), {})
+        starts = _starting_points("hose", flights, flights.residual({}))
     assert len(starts) < 10
     assert abs(starts[0]["w"] - 5.0) < 0.19
 
@@ -89,7 +89,7 @@ def test_of_many_starts_those_are_tried_that_resemble_the_flight(tmp_path):
 @pytest.mark.parametrize("beside", [[], ["rotor_drag"]])
 def test_a_wind_may_act_on_another_drag_alone(beside):
     flights = RegressedFlights([recorded(seconds=12.0)], VEHICLE)
-    starts = _starting_points("wind", flights, flights.residual({}), {}, beside)
+    starts = _starting_points("wind", flights, flights.residual({}), beside)
     assert any(start["cd"] == 0.0 for start in starts) == bool(beside)
 
 

@@ -101,13 +101,11 @@ def said(*effects, unknown=0.1, **more):
     ("after", "told"),
     [
         ((0.0550, 0.0011), "torque error: 2.10 mNm before, 1.10 mNm after (noise floor 1.90 mNm)."),
-        ((0.0250, 0.0021), "force error: 55.1 mN before, 25.0 mN after (noise floor 19.0 mN)."),
         (
             (0.0250, 0.0005),
             "torque error: 2.10 mNm before, 0.500 mNm after (noise floor 1.90 mNm); "
             "force error: 55.1 mN before, 25.0 mN after (noise floor 19.0 mN).",
         ),
-        ((0.0550, 0.0021), "force error: 55.1 mN before, 55.0 mN after (noise floor 19.0 mN)."),
         ((0.0550, math.nan), "force error: 55.1 mN before, 55.0 mN after (noise floor 19.0 mN)."),
     ],
 )
