@@ -22,26 +22,20 @@ from .steady_filter import SteadyFilter
 
 
 @dataclass(frozen=True, eq=False)
-class FlightState:
-    """Pieces of flights, one after the other (n samples)."""
-
-    t: Array  # (n,) s
-    position: Array  # (n, 3) m, world
-    rotation: Array  # (n, 3, 3) body to world
-    velocity: Array  # (n, 3) m/s, world
-    angular_velocity: Array  # (n, 3) rad/s, body
-    acceleration: Array  # (n, 3) m/s2, world; of a track (n, 6), and rad/s2, body
-    rotors: Array  # (n, 4) accelerations by the rotors' thrust and torques: m/s2, rad/s2, body
-
-
-@dataclass(frozen=True, eq=False)
-class Track(FlightState):
+class Track:
     """Pieces of flights as the filter saw them, half a step on from sample k.
 
     Row k describes the step from sample k to k + 1; its predictions are of sample k. The
     acceleration includes the disturbance.
     """
 
+    t: Array  # (n,) s
+    position: Array  # (n, 3) m, world
+    rotation: Array  # (n, 3, 3) body to world
+    velocity: Array  # (n, 3) m/s, world
+    angular_velocity: Array  # (n, 3) rad/s, body
+    acceleration: Array  # (n, 6) m/s2, world; rad/s2, body
+    rotors: Array  # (n, 4) accelerations by the rotors' thrust and torques: m/s2, rad/s2, body
     model: Array  # (n, 6) acceleration of the model alone
     predicted: Array  # (n, 7) position and quaternion at sample k, from the samples before
     heading: Array  # (n, 2) cosine and sine, at sample k

@@ -9,9 +9,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..logs.table import Array, ArrayMap, NamedArrays, Rows, median_step
-from ..motion.signals import in_body
+from ..motion.signals import Signals, in_body
 from ..motion.smoothing import filtered
-from .causal_filter import FlightState
 from .coefficients import weight_and_torque
 from .column import Column, Columns, Part, Product, along_axis
 from .regression import RegressedFlights
@@ -32,16 +31,19 @@ def _scaled(x: Array) -> Array:
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(whole: FlightState, ends: Rows, flights: RegressedFlights) -> Columns:
+def discrepancy_columns(
+    whole: Signals, rotors: Array, ends: Rows, flights: RegressedFlights
+) -> Columns:
     """Return accelerations (n, 6) by column, each of a standard deviation of the weight, or of the
     weight times the arm.
 
     Args:
-        whole: all pieces.
+        whole: the signals of all pieces.
+        rotors: (n, 4) accelerations by the rotors' thrust and torques: m/s2, rad/s2, body.
         ends: the pieces' ends without the last.
         flights: the vehicle's flights.
     """
-    t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
+    t, position, rotation = whole.t, whole.position, whole.rotation
     rate = whole.angular_velocity
     body = in_body(whole.velocity, rotation)
     # from the sample before: later samples hold the poses' noise
@@ -115,7 +117,7 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Rows) -> Array:
     return np.concatenate([filtered(x, section / section[3]) for x in np.split(drive, ends)])
 
 
-def variables(whole: FlightState) -> NamedArrays:
+def variables(whole: Signals, rotors: Array) -> NamedArrays:
     """Return the variables (n,) of a changing coefficient by name, of mean zero and standard
     deviation one.
     """
@@ -132,7 +134,7 @@ def variables(whole: FlightState) -> NamedArrays:
         "heading's sine": np.sin(heading),
         "heading's cosine": np.cos(heading),
         "time": whole.t,
-        "thrust": whole.rotors[:, 0],
+        "thrust": rotors[:, 0],
         "yaw rate": whole.angular_velocity[:, 2],
     }
     return {name: z for name, x in raw.items() if (z := _scaled(x)).any()}

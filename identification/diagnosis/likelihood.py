@@ -99,7 +99,7 @@ class Likelihood:
         else:
             disturbed = np.array([gust.rms for gust in self.gusts()]) / flights.inertias
             columns.add_what_any_flight_may_have(self.answers, disturbed, self._rounding())
-        self.columns = columns
+        self.columns: PoseColumns = columns
         if self.gusty:
             columns.add_gusts()
             if not same_noise:
@@ -107,7 +107,6 @@ class Likelihood:
                 drawn = base.mode(base.plain, draw=True).items()
                 blown = {c: x for c, (x, _) in drawn if c.part == Part.GUST}
                 self._search_noise(columns.explained(blown))
-                columns.track = self.track
 
     def _see_rotors(self) -> None:
         """Take the rotors' innovations by a filter that follows the pose closely."""

@@ -51,7 +51,7 @@ class PoseColumns:
         later = np.roll(poses.rotor_speeds, -1, axis=0)
         later[poses.begins - 1] = poses.rotor_speeds[poses.begins - 1]
         names = ("t", "position", "rotation", "velocity", "angular_velocity")
-        whole = Signals(
+        self.whole = whole = Signals(
             **{name: getattr(track, name) for name in names},
             period=poses.period,
             acceleration=track.acceleration[:, :3],
@@ -76,7 +76,9 @@ class PoseColumns:
         if playing(Role.LAG, among=self.setting):
             self._add(LAG_ASYMMETRY)
         if unknown and not any(c.is_unknown for c in self.acting):
-            self.acting |= discrepancy_columns(self.track, self.poses.begins[1:], self.flights)
+            self.acting |= discrepancy_columns(
+                self.whole, self.track.rotors, self.poses.begins[1:], self.flights
+            )
             self._add_changing_coefficients()
         for c, start in starts.items():
             if c not in self.acting:
@@ -208,7 +210,7 @@ class PoseColumns:
 
     def _add_changing_coefficients(self) -> None:
         """Add the dictionary's columns: effects of the setting with changing coefficients."""
-        followed = variables(self.track)
+        followed = variables(self.whole, self.track.rotors)
         for effect, own in self.setting.items():
             if get(effect).kind == "sensing" and not is_delay(effect):
                 moved = [x * self._moved(Column(effect, name)) for name, x in own.items()]

@@ -4,14 +4,14 @@ settings.
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...dynamics.effects import Role, get, playing
 from ..findings import LEAST_RIVAL
-from ..logs.table import Array, ArrayMap, Names, Pair
+from ..logs.table import Array, ArrayMap, Data, Names, Pair
 from ..motion.smoothing import mean_square
-from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
 from .coefficients import Effects, without
 from .column import Column, Part
@@ -179,14 +179,15 @@ class RowLikelihood:
         flights = self.flights
         pieces = flights.pieces({})
         names = ("t", "position", "rotation", "velocity", "angular_velocity")
-        seen = [np.concatenate([getattr(p.signals, x) for p in pieces]) for x in names]
+        joined: Data = {x: np.concatenate([getattr(p.signals, x) for p in pieces]) for x in names}
         delivery = [delivered(p.signals, flights.vehicle) for p in pieces]
         rotors = np.concatenate(delivery) / flights.inertias[2:]
         # the acceleration is the rotors' alone, without disturbances
-        whole = FlightState(*seen, rotors[:, :1] * seen[2][:, :, 2], rotors)
+        joined["acceleration"] = rotors[:, :1] * joined["rotation"][:, :, 2]
+        whole = replace(pieces[0].signals, **joined)
         ends = np.cumsum([len(x) for x in delivery])[:-1]
         out = {}
-        for column, made in discrepancy_columns(whole, ends, flights).items():
+        for column, made in discrepancy_columns(whole, rotors, ends, flights).items():
             x = made.whole
             if rows.with_torques or x[:, :3].any():
                 parts = zip(np.split(x, ends), pieces, strict=True)
@@ -194,7 +195,7 @@ class RowLikelihood:
         here = rows.residual(setting)
         own = {e: rows.residual(without(setting, e)) - here for e in setting}
         at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
-        followed = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
+        followed = {name: rows.at_rows(x[at]) for name, x in variables(whole, rotors).items()}
         changing = changing_columns(own, followed)
         return out | {column: made.x[:, None] * made.y for column, made in changing.items()}
 

@@ -98,7 +98,7 @@ def starts_of(
     out: dict[Column, Values] = {}
     beside = [*setting, *(e.name for e in flights.vehicle.effects)]
     for effect in (e for e in library if e not in setting):
-        own = []
+        own: list[Values] = []
         if moves_time(effect) and get(effect).kind == "rotor input":
             name = get(effect).coefficients[0].name
             typical = typical_size(Column(effect, name), flights.vehicle)
