@@ -13,9 +13,10 @@ from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, NamedEffect
 from ..logs.table import Array, Pair, Values
 from ..motion.inertial_signals import pose_rate
+from .coefficients import CENTRAL, moves_time, unit_of_change
 from .column import Column
 from .log_offsets import ROTOR_TIME_OFFSET
-from .regression import CENTRAL, RegressedFlights, moves_time, unit_of_change
+from .regression import RegressedFlights
 from .worth import BY_CHANCE
 
 FILTERED = (

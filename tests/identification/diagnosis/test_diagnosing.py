@@ -18,7 +18,8 @@ from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
 from windwrench.evidence.trials.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.regression import RegressedFlights, held_out
+from windwrench.identification.diagnosis.flight_rows import held_out
+from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.settings import DiagnosisSettings
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log

@@ -7,7 +7,8 @@ from tests.support.data_paths import data_file
 from tests.support.imu_flights import pose_removed
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.causal_filter import Poses, Track
+from windwrench.identification.diagnosis.causal_filter import Track
+from windwrench.identification.diagnosis.raw_poses import Poses
 from windwrench.identification.diagnosis.rotor_innovations import LAGS, rotor_innovations
 from windwrench.identification.diagnosis.settings import DIAGNOSIS
 from windwrench.identification.diagnosis.unknown import beside_unknown, unknown
@@ -69,7 +70,7 @@ def test_rotors_that_answer_a_product_of_rates_have_no_innovation_by_it():
     heading = np.tile([1.0, 0.0], (n, 1))
     k = np.arange(n)
     t = 0.005 * k
-    poses = Poses(t, zeros[:, :3], heading, speeds, zeros[:, 0], zeros[:1], k, k, k)
+    poses = Poses(0.005, t, zeros[:, :3], heading, speeds, zeros[:, 0], zeros[:1], k, k, k)
     track = Track(
         t, zeros[:, :3], level, zeros[:, :3], rate, zeros, between**2 @ mix, zeros, zeros, heading,
         zeros, zeros,

@@ -19,18 +19,16 @@ from scipy.spatial.transform import Rotation
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.diagnosis.discrepancy import Product
+from windwrench.identification.diagnosis.column import Product
 from windwrench.identification.diagnosis.evidence import (
     Marginal,
     evidence_of_one_more,
-    marginal,
-    set_evidence,
     tempering,
 )
 from windwrench.identification.diagnosis.left_out import LeftOut
 from windwrench.identification.diagnosis.priors import Base
 from windwrench.identification.diagnosis.regression import RegressedFlights
-from windwrench.identification.diagnosis.row_noise import fitted_noise
+from windwrench.identification.diagnosis.row_noise import RowNoise
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.logs.flight_log import FlightLog
 
@@ -49,12 +47,9 @@ def by_numbers(normal, right, low, high):
 
 @pytest.mark.parametrize(("right", "low"), [(3.0, -inf), (-4.0, 0.0), (-0.5, -inf)])
 def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
-    found = set_evidence(
-        Marginal(np.array([[2.0]]), np.array([right]), 0.0, 0.0),
-        [0],
-        np.array([low]),
-        np.array([inf]),
-    )
+    bounds = np.array([low]), np.array([inf])
+    m = Marginal({0: 0}, *bounds, np.array([[2.0]]), np.array([right]), 0.0, 0.0)
+    found = m.evidence([0])
     assert found.log_evidence == pytest.approx(by_numbers(2.0, right, low, inf), abs=1e-6)
     assert found.mode[0] == pytest.approx(max(right / 3.0, low))
 
@@ -67,13 +62,15 @@ def test_the_mode_of_many_coefficients_is_the_best_within_bounds(seed):
     low = -np.abs(rng.standard_normal(9))
     high = np.where(rng.random(9) < 0.5, inf, 0.5 * np.abs(rng.standard_normal(9)))
     index = [8, 0, 3, 5, 1, 6]
-    found = set_evidence(Marginal(x.T @ x, x.T @ y, 0.0, 0.0), index, low, high)
+    place = dict(enumerate(range(len(low))))
+    found = Marginal(place, low, high, x.T @ x, x.T @ y, 0.0, 0.0).evidence(index)
     # least squares, with the prior as further rows
     A = np.vstack([x[:, index], np.eye(6)])
     best = lsq_linear(A, np.append(y, np.zeros(6)), (low[index], high[index]), tol=1e-14)
     assert_allclose(found.mode, best.x, rtol=1e-7, atol=1e-8)
     assert_allclose(found.std, np.sqrt(np.diag(np.linalg.inv(A.T @ A))), rtol=1e-9)
-    free = set_evidence(Marginal(x.T @ x, x.T @ y, 0.0, 0.0), index, 0 * low - inf, 0 * low + inf)
+    unbounded = Marginal(place, 0 * low - inf, 0 * low + inf, x.T @ x, x.T @ y, 0.0, 0.0)
+    free = unbounded.evidence(index)
     assert_allclose(free.mode, solve(A.T @ A, x[:, index].T @ y), rtol=1e-9)
     gained = 0.5 * free.mode @ (x[:, index].T @ y) - 0.5 * slogdet(A.T @ A)[1]
     assert free.log_evidence == pytest.approx(gained)
@@ -102,9 +99,10 @@ def test_deviations_hold_a_coefficient_that_changes(blocks):
 
 
 def test_columns_that_no_prior_tells_apart_have_no_evidence():
-    both = Marginal(np.full((2, 2), -2.0), np.ones(2), 0.0, 0.0)
+    bounds = np.full(2, -inf), np.full(2, inf)
+    both = Marginal({0: 0, 1: 1}, *bounds, np.full((2, 2), -2.0), np.ones(2), 0.0, 0.0)
     with pytest.raises(np.linalg.LinAlgError, match="tells columns of the set apart"):
-        set_evidence(both, [0, 1], np.full(2, -inf), np.full(2, inf))
+        both.evidence([0, 1])
 
 
 def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
@@ -132,8 +130,8 @@ def test_a_coefficient_helps_where_blocks_agree_on_it():
         blocks=blocks, flight=np.arange(12) % 3, single=[0, 1], plain=[], at=lambda c: [0, 1]
     )
     base.low, base.high = np.array([[-inf], [inf]]) * np.ones(2)
-    left_out = LeftOut(base, [], 1.0)
-    (steady, std), (erratic, spread) = (left_out.gain(np.array([i])) for i in (1, 0))
+    left_out = LeftOut(base, [0, 1], 1.0)
+    (steady, std), (erratic, spread) = (left_out.gain([i]) for i in (1, 0))
     assert steady > left_out.least * std
     assert erratic < left_out.least * spread
 
@@ -155,7 +153,8 @@ def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
 
     sizes = (0.1, 1.0)
     products = np.block([[normal, right[:, None]], [right, 0.0]])
-    m = marginal(products, np.array([2, 3]), np.array([0, 1]), np.ones(2))
+    bounds = np.full(2, -inf), np.full(2, inf)
+    m = Marginal.of([2, 3], bounds, products, np.array([2, 3]), np.array([0, 1]), np.ones(2))
     found = evidence_of_one_more(m, [0, 1], sizes)
     each = [evidence([0, 1, c], s) - evidence([0, 1], s) for c in (2, 3) for s in sizes]
     assert found == pytest.approx(np.logaddexp.reduce(each) - math.log(4.0))
@@ -273,7 +272,7 @@ def test_the_noise_of_an_autoregression_is_found():
         x[k] = lag @ x[k - 1] + root @ rng.standard_normal(2)
     begins = np.arange(len(x)) == 0
     begins[5000] = True
-    found = fitted_noise(x, begins, np.arange(len(x)) % 400 < 300, np.zeros(2))
+    found = RowNoise.fitted(x, begins, np.arange(len(x)) % 400 < 300, np.zeros(2))
     assert_allclose(found.lags[0], lag, atol=0.06)
     assert_allclose(found.covariance, root @ root.T, atol=0.06)
     assert_allclose(np.cov(found.white(x)[found.known].T), np.eye(2), atol=0.15)

@@ -16,7 +16,7 @@ from windwrench.evidence.trials.logged_poses import FILTERS
 from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.column import Column, Part
-from windwrench.identification.diagnosis.ranking import rank_by_rows
+from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
 from windwrench.identification.diagnosis.rows import Rows
@@ -85,7 +85,7 @@ def test_rows_hold_forces_and_torques(offset):
 
 
 def test_a_centre_of_mass_is_found_behind_a_filter(offset):
-    found = rank_by_rows(offset, LIBRARY, {}, {}, print)
+    found = rank(offset, LIBRARY, print)
     best = found.ranking.sets[0]
     assert best.effects == ("com_offset",)
     assert found.ranking.probability["com_offset"] > 0.95
@@ -94,7 +94,7 @@ def test_a_centre_of_mass_is_found_behind_a_filter(offset):
 
 
 def test_a_weak_rotor_is_found_by_an_imu_alone(weak):
-    found = rank_by_rows(weak, LIBRARY, {}, {}, print)
+    found = rank(weak, LIBRARY, print)
     best = found.ranking.sets[0]
     assert best.effects == ("rotor_efficiency",)
     assert best.coefficients["rotor_efficiency"]["e2"] == pytest.approx(
@@ -107,7 +107,7 @@ def test_a_bias_hides_steady_forces_along_the_body():
     """In a calm hover they show by little else, and torques do not look like a bias."""
     log = pose_removed(imu_flight(VEHICLE, seconds=15.0, trajectory="gentle"))
     flights = RegressedFlights([log], VEHICLE)
-    found = rank_by_rows(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {}, print)
+    found = rank(flights, [*LIBRARY, "thrust_axis_tilt"], print)
     assert found.ranking.sets[0].effects == ()
     biases = [c._replace(part=Part.NUISANCE) for c in flights.biases]
     shown = found.posterior.shown()
