@@ -115,8 +115,8 @@ class BenchmarkTask:
             **given: other arguments of the environment; None: not given.
 
         Raises:
-            InputError: as ``scenario`` and ``find_reward``, or the environment takes no such
-                argument.
+            InputError: as ``scenario`` and ``find_reward``, the environment takes no such argument,
+                or its actions are no box.
         """
         given = {name: value for name, value in given.items() if value is not None}
         if self.scenarios:
@@ -129,6 +129,11 @@ class BenchmarkTask:
                 env = gym.make(self.spec, disable_env_checker=True, **units, **given)
             except TypeError as error:
                 raise InputError(f"{self.name}: cannot be made: {error}") from error
+            if not isinstance(env.action_space, gym.spaces.Box):
+                raise InputError(
+                    f"{self.name}: expected actions in a Box, got {env.action_space}: control laws "
+                    "command real numbers"
+                )
         return env if reward is None else OwnReward(env, find_reward(reward))
 
     def make_many(self, count: int, scenario: str, **given: Any) -> gym.vector.VectorEnv:

@@ -97,6 +97,11 @@ def test_a_registered_task_without_an_error_is_flown_and_ranked_by_its_return(tm
     assert "RMSE" not in markdown(rows)
 
 
+def test_a_task_of_choices_is_refused():
+    with refused("CartPole-v1: expected actions in a Box, got Discrete"):
+        make_pilot("hover", "CartPole-v1")
+
+
 def test_a_class_of_a_file_is_a_task_and_has_the_laws_of_the_kit_s_task(tmp_path):
     name = written(tmp_path, "own_landing.py", LANDING) + ":Landing"
     known = task_of(name)
