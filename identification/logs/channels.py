@@ -12,6 +12,7 @@ rolls over, or a vehicle was switched on twice. Each group keeps its stamps in t
 
 from bisect import bisect_left
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -34,7 +35,6 @@ from .table import (
     Rows,
     SomeArray,
     Table,
-    among,
     finite_rows,
     lengths,
 )
@@ -128,7 +128,7 @@ class Stream:
         out = resampled(t, times, self.values)
         step = np.diff(times)
         after = np.searchsorted(times, t).clip(1, len(step))
-        there = (step[after - 1] <= LONGEST_STEPS * np.median(step)) | among(t, times)
+        there = (step[after - 1] <= LONGEST_STEPS * np.median(step)) | np.isin(t, times)
         out[~there | (t < times[0]) | (t > times[-1])] = nan
         return out
 
@@ -148,7 +148,7 @@ def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
     good = lengths(attitude.values) > 0.5  # False where NaN
     times, values = attitude.t[good], attitude.values[good]
     after = np.searchsorted(times, t)
-    exact = among(t, times)
+    exact = np.isin(t, times)
     if exact.all():
         return values[after]
     if len(times) < 2:
@@ -372,13 +372,9 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> C
     if len(raw) < 2:
         raise InputError(f"{where}: {len(raw)} time(s); expected at least two")
     # a channel with a value in every row has one time for each value
-    held = np.diff(raw) == 0.0
-    full = any(
-        np.isfinite(x).all() and np.diff(x)[held].any()  # else a row was written twice
-        for n, x in samples.columns.items()
-        if n not in clock.named
-    )
-    if full and (even := _even_times(raw)) is not None:
+    others = [x for name, x in samples.columns.items() if name not in clock.named]
+    full = any(np.isfinite(x).all() for x in others)
+    if full and (even := _even_times(raw, others)) is not None:
         rounded, raw = np.diff(np.unique(raw)).min(), even
         notes.append(
             f"column {clock.column}: rounded to {rounded:.3g} {unit}, with several rows a time; "
@@ -424,12 +420,15 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> C
     return samples
 
 
-def _even_times(raw: Array) -> SomeArray:
-    """Return even times (N,) of rows whose times (N,) were rounded; None: the rows are not even, or
-    a time repeats in fewer than a fifth of them.
+def _even_times(raw: Array, others: Sequence[Array]) -> SomeArray:
+    """Return even times (N,) of rows whose times (N,) were rounded; None: the rows are not even, a
+    time repeats in fewer than a fifth of them, or whole rows repeat, by the ``others`` (N,) each.
     """
     step = np.diff(raw)
     if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < 0.2:
+        return None
+    moves = np.diff(others).any(axis=0)
+    if moves.any() and not moves[step == 0.0].any():
         return None
     rows = np.arange(len(raw))
     even = np.polynomial.Polynomial.fit(rows, raw, 1)(rows)

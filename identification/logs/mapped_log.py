@@ -64,7 +64,6 @@ from .table import (
     Table,
     Texts,
     Wanted,
-    among,
     finite_rows,
     lengths,
     median_step,
@@ -305,7 +304,7 @@ def _pose(
             f"{path}: position and attitude do not overlap in time; expected both over the same "
             "flight"
         )
-    alone = (~among(t[placed], attitude.t)).sum()
+    alone = (~np.isin(t[placed], attitude.t)).sum()
     if turned is samples and alone:
         notes.append(
             f"{alone} of {placed.sum()} positions stand in rows without an attitude, which "

@@ -15,6 +15,7 @@ The answer tells more. No loop answers noise before the pose was measured. Rotor
 ahead of the noise's row prove a late pose, and no latency of the vehicle does the same.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -87,13 +88,13 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     log = excerpt(log)
     if log.valid.sum() < _FEWEST:
         return None
-    motion = _Motion(log, vehicle)
+    omega, noise, segments = _spectra(log, vehicle)
     late = 0.0
     for _ in range(10):  # a window over delayed signals cuts the two of them differently
-        both = motion.segments(late)
+        both = segments(late)
         if len(both[0]) < _FEWEST:
             return None
-        response = motion.response(*both)
+        response = _response(omega, noise, *both)
         step = response.likeliest()
         late = float(np.clip(late + step, -FARTHEST, FARTHEST))
         if step == 0.0:
@@ -107,7 +108,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     # gusts answered by the loop leave a response of another shape, and turn its phase by as much
     misfit = np.sqrt(left / (response.omega**2 * whole).sum())
     parts = zip(*(np.array_split(x, _PARTS) for x in both), strict=True)
-    scatter = np.std([motion.response(*part).likeliest() for part in parts])
+    scatter = np.std([_response(omega, noise, *part).likeliest() for part in parts])
     std = float(np.hypot(scatter / np.sqrt(_PARTS), misfit))
     # s: rotor speeds of flown vehicles act by up to 0.04 later (a flight loop falls over more), and
     # those that pass a filter of their own by up to 0.03 earlier
@@ -120,64 +121,62 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     return _PoseDelay(late, std, bool(best - as_good > 9.0 * scale))
 
 
-class _Motion:
-    """A flight's turns and its rotors' moments, ready for spectra at any delay.
+def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> _Response:
+    """Return the frequency response of some of the segments."""
+    xx, yy = ((abs(z) ** 2).mean(axis=0) + 1e-300 for z in (moment, turning))
+    xy = (np.conj(moment) * turning).mean(axis=0)
+    left = np.maximum(yy - abs(xy) ** 2 / xx, 1e-12 * yy)
+    # a half overlapping segment counts for 0.55 independent ones
+    variance = left / (1.1 * len(moment)) + noise
+    return _Response(omega, xy / xx, xx / variance)
 
-    Args:
-        log: the flight.
-        vehicle: as declared, or None.
+
+def _spectra(
+    log: FlightLog, vehicle: Vehicle | None
+) -> tuple[Array, Array, Callable[[float], Spectra]]:
+    """Return frequencies (f, 1) in rad/s, the power (f, 2) of the pose's noise, and a function that
+    returns transforms (2, n, f, 2) of moments and of turns in segments of a flight with the pose
+    moved so many s back.
     """
+    rows = np.flatnonzero(log.valid)
+    step = median_step(log.t[rows])
+    period = max(0.01, log.period)
+    count = max(2, round(_SEGMENT / period))
+    inertia = np.eye(3) if vehicle is None else vehicle.inertia
+    window = np.hanning(count)[:, None]
+    moments = running_integral(_moments(log, vehicle), log.t)
+    turns, noises = [], [0.0]
+    for piece in unbroken(log.t, rows, max(0.1, 3.5 * step), 60, _SEGMENT):
+        angles = _angles(log, piece)
+        # above a quarter of the poses' rate is noise alone
+        noises.append(robust_std(high_pass(angles, 0.25)))
+        turns.append((log.t[piece], running_integral(angles, log.t[piece])))
+    frequency = np.fft.rfftfreq(count, period).astype(float)
+    band = (frequency >= 0.8) & (frequency <= min(10.0, 0.4 / step))
+    frequency = frequency[band, None]
+    # white noise of the angles, through the mean over a period and two differences
+    passed = np.sinc(frequency * period) * (2.0 * np.sin(np.pi * frequency * period)) ** 2
+    mean = sum(noises) / max(1, len(turns))
+    noise = (passed / period**2 * mean * np.diag(inertia)[:2]) ** 2
+    noise *= step / period * (window**2).sum()
 
-    def __init__(self, log: FlightLog, vehicle: Vehicle | None) -> None:
-        rows = np.flatnonzero(log.valid)
-        step = median_step(log.t[rows])
-        self.period = period = max(0.01, log.period)
-        self.inertia = np.eye(3) if vehicle is None else vehicle.inertia
-        self.t, self.moments = log.t, running_integral(_moments(log, vehicle), log.t)
-        self.turns, noises = [], []  # times and sums of each piece of the flight
-        for piece in unbroken(log.t, rows, max(0.1, 3.5 * step), 60, _SEGMENT):
-            angles = _angles(log, piece)
-            # above a quarter of the poses' rate is noise alone
-            noises.append(robust_std(high_pass(angles, 0.25)))
-            self.turns.append((log.t[piece], running_integral(angles, log.t[piece])))
-        self.count = max(1, round(_SEGMENT / period))
-        self.window = np.hanning(self.count)[:, None]
-        frequency = np.fft.rfftfreq(self.count, period).astype(float)
-        self.band = (frequency >= 0.8) & (frequency <= min(10.0, 0.4 / step))
-        frequency = frequency[self.band, None]
-        self.omega = 2.0 * np.pi * frequency  # (f, 1) rad/s
-        # white noise of the angles, through the mean over a period and two differences
-        passed = np.sinc(frequency * period) * (2.0 * np.sin(np.pi * frequency * period)) ** 2
-        noise = passed / period**2 * np.mean(noises or [0.0]) * np.diag(self.inertia)[:2]
-        self.noise = noise**2 * step / period * (self.window**2).sum()  # power, (f, 2)
-
-    def segments(self, late: float) -> Spectra:
-        """Return transforms of moments and of turns (2, n, f, 2) in segments of the flight with the
-        pose moved ``late`` s back.
-        """
-        transforms, period = [], self.period
-        for t, sums in self.turns:
-            first = max(t[0], self.t[0] + late) + period
-            at = np.arange(first, min(t[-1], self.t[-1] + late) - period, period)
+    def segments(late: float) -> Spectra:
+        transforms = []
+        for t, sums in turns:
+            first = max(t[0], log.t[0] + late) + period
+            at = np.arange(first, min(t[-1], log.t[-1] + late) - period, period)
             turn = _means(at, period, t, sums)
             w = (turn[2:] - turn[:-2]) / (2.0 * period)
             alpha = np.diff(turn, n=2, axis=0) / period**2
-            needed = (alpha @ self.inertia + np.cross(w, w @ self.inertia))[:, :2]
-            both = np.stack([_means(at[1:-1] - late, period, self.t, self.moments), needed])
-            for begin in range(0, len(needed) - self.count + 1, self.count // 2):
-                part = both[:, begin : begin + self.count]
-                part = self.window * (part - part.mean(axis=1, keepdims=True))
-                transforms.append(np.fft.rfft(part, axis=1)[:, self.band])
-        return np.reshape(transforms, (len(transforms), 2, len(self.omega), 2)).swapaxes(0, 1)
+            needed = (alpha @ inertia + np.cross(w, w @ inertia))[:, :2]
+            both = np.stack([_means(at[1:-1] - late, period, log.t, moments), needed])
+            for begin in range(0, len(needed) - count + 1, count // 2):
+                part = both[:, begin : begin + count]
+                part = window * (part - part.mean(axis=1, keepdims=True))
+                transforms.append(np.fft.rfft(part, axis=1)[:, band])
+        return np.reshape(transforms, (len(transforms), 2, len(frequency), 2)).swapaxes(0, 1)
 
-    def response(self, moment: Spectra, turning: Spectra) -> _Response:
-        """Return the frequency response of some of the segments."""
-        xx, yy = ((abs(z) ** 2).mean(axis=0) + 1e-300 for z in (moment, turning))
-        xy = (np.conj(moment) * turning).mean(axis=0)
-        left = np.maximum(yy - abs(xy) ** 2 / xx, 1e-12 * yy)
-        # a half overlapping segment counts for 0.55 independent ones
-        variance = left / (1.1 * len(moment)) + self.noise
-        return _Response(self.omega, xy / xx, xx / variance)
+    return 2.0 * np.pi * frequency, noise, segments
 
 
 def _means(at: Array, width: float, t: Array, sums: Array) -> Array:

@@ -102,11 +102,6 @@ def finite_rows(values: Array) -> Mask:
     return np.asarray(np.isfinite(values).all(axis=1))
 
 
-def among(t: Array, times: Array) -> Mask:
-    """Return which of some times (M,) are among others (N,), which increase."""
-    return np.asarray(np.append(times, np.nan)[np.searchsorted(times, t)] == t)
-
-
 def lengths(vectors: Array) -> Array:
     """Return the lengths (N,) of vectors (N, k)."""
     return np.asarray(np.linalg.norm(vectors, axis=1))
