@@ -67,10 +67,8 @@ class ChannelGroup:
 
     def there(self, part: Columns) -> Mask:
         """Return the rows (N,) with all values of a section."""
-        there = np.isfinite(self.t)
-        for name in part.named:
-            there &= np.isfinite(self.columns[name])
-        return there
+        columns = [self.columns[name] for name in part.named]
+        return finite_rows(np.transpose([self.t, *columns]))
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""

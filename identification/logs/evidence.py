@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...dynamics.vehicle import Vehicle
 from ..motion.signals import LONGEST_GAP, SHORTEST_PIECE
 from ..motion.smoothing import (
     CUTOFFS,
@@ -35,7 +34,7 @@ from ..motion.smoothing import (
     turning,
     unbroken,
 )
-from .flight_log import FlightLog, excerpt
+from .flight_log import FlightLog, SomeVehicle, excerpt
 from .flight_phases import usual_thrust
 from .log_map import UNITS, Attitude
 from .readings import (
@@ -48,7 +47,7 @@ from .readings import (
     as_written,
     log_readings,
 )
-from .table import Array, ArrayPair, Pair, Rows, finite_rows, lengths, median_step
+from .table import Array, ArrayPair, Pair, Rows, SomeArray, finite_rows, lengths, median_step
 
 # Filters, and when a reading is certain.
 _FEWEST = 60  # samples in flight for a decision
@@ -118,11 +117,11 @@ class Evidence:
         self,
         t: Array,
         thrusts: Array,
-        position: Array | None = None,
-        attitude: Array | None = None,
-        gyro: Array | None = None,
-        along: Array | None = None,
-        vehicle: Vehicle | None = None,
+        position: SomeArray = None,
+        attitude: SomeArray = None,
+        gyro: SomeArray = None,
+        along: SomeArray = None,
+        vehicle: SomeVehicle = None,
         sides: Array = SIDES,
     ) -> None:
         self._t, self._position, self.attitude = t, position, attitude
@@ -143,7 +142,7 @@ class Evidence:
         self._moved = lru_cache(2)(self._balances)
 
     @classmethod
-    def of_log(cls, log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False) -> "Evidence":
+    def of_log(cls, log: FlightLog, vehicle: SomeVehicle, by_imu: bool = False) -> "Evidence":
         """Return the evidence of a log: by its pose, or by its IMU."""
         squares = log.rotor_speeds**2
         if by_imu:
@@ -402,7 +401,7 @@ def log_ranking(evidence: Evidence) -> RankedFits:
 
 
 def remedies(
-    log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False
+    log: FlightLog, vehicle: SomeVehicle, by_imu: bool = False
 ) -> tuple[list[Convention], bool]:
     """Return the equally good readings of a contradictory log, and whether each of them, applied,
     leaves a consistent log. No reading: the log is consistent as declared.

@@ -12,10 +12,10 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .column_names import WORDS, Group
-from .flight_log import FlightLog, parts_of
+from .flight_log import FlightLog, SomeVehicle, parts_of
 from .flight_phases import carrying, usual_thrust
 from .log_map import UNITS
-from .table import Array, Mask, Pair, finite_rows
+from .table import Array, Lines, Mask, Pair, finite_rows
 
 # sizes of a likely unit, and of a certain one: s of a row, V of a battery, m/s2 of gravity
 _LIKELY = {"time": (0.0002, 0.2), "battery": (2.7, 100.0), "accelerometer": (8.335, 11.278)}
@@ -76,7 +76,7 @@ def _thrust_by_weight(rotor_speeds: Array, vehicle: Vehicle) -> float:
     return usual if np.isfinite(usual := usual_thrust(thrust)) else 1.0
 
 
-def _carrying_units(thrust: float) -> list[str]:
+def _carrying_units(thrust: float) -> Lines:
     """Return the units of rotor speeds able to carry the vehicle, by the median thrust by weight of
     the numbers as rad/s.
     """
@@ -101,7 +101,7 @@ def rotor_doubt(thrust: float, vehicle: Vehicle) -> str:
     )
 
 
-def motor_doubts(log: FlightLog) -> list[str]:
+def motor_doubts(log: FlightLog) -> Lines:
     """Return doubts on four motors, whatever the vehicle: equal columns, uneven medians in flight,
     and rotors slower than any propeller in hover.
     """
@@ -133,7 +133,7 @@ def motor_doubts(log: FlightLog) -> list[str]:
 
 
 def motor_unit(
-    group: Group, values: Array, vehicle: Vehicle | None, power: float = np.nan
+    group: Group, values: Array, vehicle: SomeVehicle, power: float = np.nan
 ) -> tuple[str, str, bool, str]:
     """Return whether columns are rotors or commands, their unit, whether the unit is certain, and
     why. The first matching rule decides. The specific force grows with ``power`` of the columns;
@@ -203,7 +203,7 @@ def motor_unit(
     return next(rule[1:] for rule in rules if rule[0])
 
 
-def unit_doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
+def unit_doubts(log: FlightLog, vehicle: SomeVehicle) -> Lines:
     """Return doubts on a log's units by the sizes of its numbers.
 
     Raises:
@@ -247,7 +247,7 @@ def interpolated(log: FlightLog, broken: Mask) -> FlightLog:
     return replace(log, rotor_speeds=speeds)
 
 
-def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, list[str]]:
+def without_broken_speeds(log: FlightLog) -> tuple[FlightLog, Lines]:
     """Return a log without broken rotor speeds, and a doubt where there are some: no rotor triples
     its speed in a sample or two and falls back. Neighbours are interpolated.
     """

@@ -21,7 +21,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import (
     high_pass,
     resampled,
@@ -32,7 +31,7 @@ from ..motion.smoothing import (
     unbroken,
 )
 from .evidence import SIDES
-from .flight_log import FlightLog, excerpt
+from .flight_log import FlightLog, SomeVehicle, excerpt
 from .table import Array, Pair, Rows, median_step
 
 FARTHEST = 0.3  # s, of the search
@@ -78,7 +77,7 @@ class _Response(NamedTuple):
         return float(_DELAYS[self.explained(_DELAYS).argmax()])
 
 
-def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
+def pose_delay(log: FlightLog, vehicle: SomeVehicle) -> _PoseDelay | None:
     """Return the delay of a log's pose behind its rotor speeds; None: the flight does not show one.
 
     Args:
@@ -88,13 +87,13 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     log = excerpt(log)
     if log.valid.sum() < _FEWEST:
         return None
-    omega, noise, segments = _spectra(log, vehicle)
+    segments, response_of = _spectra(log, vehicle)
     late = 0.0
     for _ in range(10):  # a window over delayed signals cuts the two of them differently
         both = segments(late)
         if len(both[0]) < _FEWEST:
             return None
-        response = _response(omega, noise, *both)
+        response = response_of(*both)
         step = response.likeliest()
         late = float(np.clip(late + step, -FARTHEST, FARTHEST))
         if step == 0.0:
@@ -108,7 +107,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     # gusts answered by the loop leave a response of another shape, and turn its phase by as much
     misfit = np.sqrt(left / (response.omega**2 * whole).sum())
     parts = zip(*(np.array_split(x, _PARTS) for x in both), strict=True)
-    scatter = np.std([_response(omega, noise, *part).likeliest() for part in parts])
+    scatter = np.std([response_of(*part).likeliest() for part in parts])
     std = float(np.hypot(scatter / np.sqrt(_PARTS), misfit))
     # s: rotor speeds of flown vehicles act by up to 0.04 later (a flight loop falls over more), and
     # those that pass a filter of their own by up to 0.03 earlier
@@ -121,22 +120,11 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     return _PoseDelay(late, std, bool(best - as_good > 9.0 * scale))
 
 
-def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> _Response:
-    """Return the frequency response of some of the segments."""
-    xx, yy = ((abs(z) ** 2).mean(axis=0) + 1e-300 for z in (moment, turning))
-    xy = (np.conj(moment) * turning).mean(axis=0)
-    left = np.maximum(yy - abs(xy) ** 2 / xx, 1e-12 * yy)
-    # a half overlapping segment counts for 0.55 independent ones
-    variance = left / (1.1 * len(moment)) + noise
-    return _Response(omega, xy / xx, xx / variance)
-
-
 def _spectra(
-    log: FlightLog, vehicle: Vehicle | None
-) -> tuple[Array, Array, Callable[[float], Spectra]]:
-    """Return frequencies (f, 1) in rad/s, the power (f, 2) of the pose's noise, and a function that
-    returns transforms (2, n, f, 2) of moments and of turns in segments of a flight with the pose
-    moved so many s back.
+    log: FlightLog, vehicle: SomeVehicle
+) -> tuple[Callable[[float], Spectra], Callable[..., _Response]]:
+    """Return two functions: the transforms (2, n, f, 2) of moments and of turns in segments of a
+    flight with the pose moved so many s back; and the frequency response of some of the segments.
     """
     rows = np.flatnonzero(log.valid)
     step = median_step(log.t[rows])
@@ -154,8 +142,9 @@ def _spectra(
     frequency = np.fft.rfftfreq(count, period).astype(float)
     band = (frequency >= 0.8) & (frequency <= min(10.0, 0.4 / step))
     frequency = frequency[band, None]
+    omega = 2.0 * np.pi * frequency
     # white noise of the angles, through the mean over a period and two differences
-    passed = np.sinc(frequency * period) * (2.0 * np.sin(np.pi * frequency * period)) ** 2
+    passed = np.sinc(frequency * period) * (2.0 * np.sin(0.5 * omega * period)) ** 2
     mean = sum(noises) / max(1, len(turns))
     noise = (passed / period**2 * mean * np.diag(inertia)[:2]) ** 2
     noise *= step / period * (window**2).sum()
@@ -176,7 +165,15 @@ def _spectra(
                 transforms.append(np.fft.rfft(part, axis=1)[:, band])
         return np.reshape(transforms, (len(transforms), 2, len(frequency), 2)).swapaxes(0, 1)
 
-    return 2.0 * np.pi * frequency, noise, segments
+    def response(moment: Spectra, turning: Spectra) -> _Response:
+        xx, yy = ((abs(z) ** 2).mean(axis=0) + 1e-300 for z in (moment, turning))
+        xy = (np.conj(moment) * turning).mean(axis=0)
+        left = np.maximum(yy - abs(xy) ** 2 / xx, 1e-12 * yy)
+        # a half overlapping segment counts for 0.55 independent ones
+        variance = left / (1.1 * len(moment)) + noise
+        return _Response(omega, xy / xx, xx / variance)
+
+    return segments, response
 
 
 def _means(at: Array, width: float, t: Array, sums: Array) -> Array:
@@ -186,7 +183,7 @@ def _means(at: Array, width: float, t: Array, sums: Array) -> Array:
     return (resampled(at + 0.5 * width, t, sums) - resampled(at - 0.5 * width, t, sums)) / width
 
 
-def _moments(log: FlightLog, vehicle: Vehicle | None) -> Array:
+def _moments(log: FlightLog, vehicle: SomeVehicle) -> Array:
     """Return the rotors' roll and pitch moments (N, 2); without a vehicle, in no unit."""
     return log.rotor_speeds**2 @ (SIDES if vehicle is None else vehicle.mixing[1:3]).T
 
@@ -196,7 +193,7 @@ def _angles(log: FlightLog, piece: Rows) -> Array:
     return np.vstack([np.zeros(3), turned(log.quaternion[piece])])
 
 
-def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pair | None:
+def answer_to_noise(log: FlightLog, vehicle: SomeVehicle, late: float) -> Pair | None:
     """Return by how much (s) the rotor speeds answer the pose's noise ahead of its rows, and the
     width (s) of the differences. None: there is no answer, or the pose shows no white noise.
 

@@ -23,11 +23,11 @@ from ..motion.inertial_signals import imu_rows, inertial_pieces, reads_imu
 from ..motion.signals import SHORTEST_PIECE, longest_step, pose_pieces
 from ..motion.smoothing import CUTOFFS, low_pass, runs_of
 from .evidence import remedies
-from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, serves
+from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, NotedLog, SomeVehicle, serves
 from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import DOUBTFUL, interpolated, motor_doubts, rotor_doubt, time_doubt, within
-from .table import Array, Mask, Names, lengths, median_step
+from .table import Array, Mask, lengths, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
@@ -58,7 +58,7 @@ _Findings = Iterable[str]
 
 def screen_log(
     log: FlightLog, vehicle: Vehicle, least_seconds: float | None = LEAST_SECONDS
-) -> tuple[FlightLog, Names]:
+) -> NotedLog:
     """Return a log for a filter, and doubts, or refuse the log.
 
     Of equal poses to the last digit only the first is valid in the returned log: the others are no
@@ -115,7 +115,7 @@ def screen_log(
     return log, tuple(notes)
 
 
-def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
+def convention_doubt(log: FlightLog, vehicle: SomeVehicle) -> str:
     """Return the contradiction between a log's motion and its rotors, with the advice that leaves a
     consistent log; empty: none, or nothing to tell from. An estimate is refused for all but a
     delay.
@@ -125,11 +125,9 @@ def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
         vehicle: as declared; None: four rotors, front-left, rear-left, rear-right, front-right.
     """
     by_imu = reads_imu(log)
-    if not by_imu:
-        log = _without_leaps(log)
     if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
         return ""
-    advice, mends = remedies(log, vehicle, by_imu)
+    advice, mends = remedies(log if by_imu else _without_leaps(log), vehicle, by_imu)
     says = "; or ".join(dict.fromkeys(reading.says for reading in advice))
     if all(reading.late and not replace(reading, late=0.0).says for reading in advice):
         return _Fault(says)
@@ -301,11 +299,9 @@ def _without_leaps(log: FlightLog) -> FlightLog:
     """Return a log without the poses around its leaps: a leap is no acceleration, and tells no
     convention. Many leaps are of another unit.
     """
-    _, _, far, turned = _moves(log)
-    leaps = far | turned
-    if not leaps.any() or leaps.mean() > _MANY_LEAPS:
-        return log
-    at, reach = log.t[log.valid][1:][leaps], longest_step(log)
+    leaps = np.logical_or(*_moves(log)[2:])
+    at = log.t[log.valid][1:][leaps & (leaps.mean() <= _MANY_LEAPS)]
+    reach = longest_step(log)
     near = np.searchsorted(at, log.t - reach) < np.searchsorted(at, log.t + reach)
     return replace(log, valid=log.valid & ~near)
 

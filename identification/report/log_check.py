@@ -2,7 +2,6 @@
 
 import re
 import warnings
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -121,7 +120,9 @@ def check_log(
     ]
     vehicle = flown_vehicle(vehicle, log.vehicle)
     told = flew(log)
-    doubts = _doubts(log, told, guessed, vehicle)
+    if told[0] in ("no", "not shown"):
+        guessed.insert(0, f"the log does not show a flight: {told[1]}")
+    doubts = _doubts(log, guessed, vehicle)
     limits = [
         f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
         f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "
@@ -148,15 +149,10 @@ def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[
         raise UnreadLogError(str(refused), map_yaml(guess)) from refused
 
 
-def _doubts(
-    log: FlightLog, flown: tuple[str, str], guessed: Sequence[str], vehicle: Vehicle | None
-) -> Names:
-    """Return the doubts of a log's reading, the gravest first: no flight, guesses, a refusal by
-    a diagnosis, warnings.
+def _doubts(log: FlightLog, doubts: list[str], vehicle: Vehicle | None) -> Names:
+    """Return the doubts of a log's reading, the gravest first: the given ones, a refusal by a
+    diagnosis, warnings.
     """
-    answer, by = flown
-    grounded = [f"the log does not show a flight: {by}"] if answer in ("no", "not shown") else []
-    doubts = [*grounded, *guessed]
     told = warnings_in(log.notes)
     if vehicle is None:
         told += filter(None, [convention_doubt(log, None)])
