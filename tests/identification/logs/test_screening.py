@@ -91,6 +91,25 @@ def test_position_columns_along_any_axes_are_named(trajectory, columns, signs, e
         screen_log(replace(log, position=log.position[:, list(columns)] * signs), VEHICLE)
 
 
+def test_positions_in_feet_are_named():
+    log = flight()
+    with refused("px, py, pz look like feet; expected metres: divide them by 3.281"):
+        screen_log(replace(log, position=log.position / 0.3048), VEHICLE)
+
+
+def test_a_leap_of_the_position_is_no_other_convention():
+    """The position hangs for 3 s, or motion capture moves its origin: no column is swapped."""
+    log = flight("yaw")
+    for held in (0.0, 3.0):
+        position = log.position.copy()
+        position[(log.t > 6.0 - held) & (log.t <= 6.0), 0] = position[log.t > 6.0 - held][0, 0]
+        position[log.t > 6.0, 0] += 1.5
+        leaping = replace(log, position=position)
+        with refused("the pose leaps by .* m within 0.005 s at t = 6"):
+            screen_log(leaping, VEHICLE)
+        assert any("the pose leaps" in note for note in screen_log(leaping, VEHICLE, None)[1])
+
+
 @pytest.mark.parametrize("effect", mostly_slow(names(), SHOWN.__contains__))
 def test_an_undeclared_effect_is_no_wrong_convention(effect):
     # twice a typical delay in the loop is more than it can fly

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
+from tests.support.outcomes import refused
 from tests.support.programs import said
 from windwrench.identification.logs.flight_log import REQUIRED
 from windwrench.identification.logs.text_table import open_table
@@ -55,6 +56,11 @@ def test_units_behind_the_header_are_kept(opened):
     table = opened("t,x\n[s],[mm]\n0,1\n1,2\n")
     assert table.units == ("[s]", "[mm]")
     assert table.row(0) == "row 1 (line 3)"
+
+
+def test_decimal_commas_between_commas_are_refused_behind_a_whole_time(opened):
+    with refused("line 2 has 5 fields, the header 3; decimal commas"):
+        opened("t,x,y\n0,1,5,2,5\n0,1,2,5,3,5\n")
 
 
 def test_a_last_line_that_was_cut_off_is_left_out(opened):
