@@ -41,7 +41,7 @@ class Group:
     """Columns of one vector or of one set of motors."""
 
     columns: Names
-    key: str  # the common part of the names
+    key: str = ""  # the common part of the names
     unit: str = ""
     endings: Names = ()  # axes or numbers in the names, where known
 

@@ -346,7 +346,7 @@ class _Guessing:
         attitude = self.parts.get("attitude")
         if attitude is None or len(attitude.columns) == 3:
             return 0.0, ""
-        ranking = self.pose_fits(Group(columns, ""), attitude)
+        ranking = self.pose_fits(Group(columns), attitude)
         return _explained(ranking), "their acceleration follows the tilt"
 
     def pose(self, place: Group, group: Group) -> None:
