@@ -67,8 +67,7 @@ class ChannelGroup:
 
     def there(self, part: Columns) -> Mask:
         """Return the rows (N,) with all values of a section."""
-        columns = [self.columns[name] for name in part.named]
-        return finite_rows(np.transpose([self.t, *columns]))
+        return finite_rows(np.transpose([self.t, *map(self.columns.__getitem__, part.named)]))
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""
@@ -369,10 +368,8 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> C
         notes.append(f"{left} row(s) without a time were left out")
     if len(raw) < 2:
         raise InputError(f"{where}: {len(raw)} time(s); expected at least two")
-    # a channel with a value in every row has one time for each value
     others = [x for name, x in samples.columns.items() if name not in clock.named]
-    full = any(np.isfinite(x).all() for x in others)
-    if full and (even := _even_times(raw, others)) is not None:
+    if (even := _even_times(raw, others)) is not None:
         rounded, raw = np.diff(np.unique(raw)).min(), even
         notes.append(
             f"column {clock.column}: rounded to {rounded:.3g} {unit}, with several rows a time; "
@@ -420,13 +417,15 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> C
 
 def _even_times(raw: Array, others: Sequence[Array]) -> SomeArray:
     """Return even times (N,) of rows whose times (N,) were rounded; None: the rows are not even, a
-    time repeats in fewer than a fifth of them, or whole rows repeat, by the ``others`` (N,) each.
+    time repeats in fewer than a fifth of them, whole rows repeat, or none of the ``others`` (N,)
+    has a value in every row, and so a time for each.
     """
     step = np.diff(raw)
     if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < 0.2:
         return None
     moves = np.diff(others).any(axis=0)
-    if moves.any() and not moves[step == 0.0].any():
+    repeat = moves.any() and not moves[step == 0.0].any()
+    if repeat or not np.isfinite(others).all(axis=1).any():
         return None
     rows = np.arange(len(raw))
     even = np.polynomial.Polynomial.fit(rows, raw, 1)(rows)
