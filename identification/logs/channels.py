@@ -423,7 +423,7 @@ def _even_times(raw: Array, others: Sequence[Array]) -> SomeArray:
     step = np.diff(raw)
     if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < 0.2:
         return None
-    moves = np.diff(others).any(axis=0)
+    moves = np.asarray(np.diff(others).any(axis=0))
     repeat = moves.any() and not moves[step == 0.0].any()
     if repeat or not np.isfinite(others).all(axis=1).any():
         return None
