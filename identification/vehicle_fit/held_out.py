@@ -219,7 +219,7 @@ def _reason(errors: Errors) -> str:
             )
             for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True)
         ]
-    return f"not identifiable: torques predict the {max(said)[1]}"
+    return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"
 
 
 def _by_balance(fit: VehicleFit) -> HeldOut:
