@@ -226,8 +226,7 @@ class PredictionErrors(NamedTuple):
         horizon = min((part.horizon for part in parts), key=len)
         both = []
         for part in parts:
-            at = np.searchsorted(part.horizon, horizon - 0.5 * part.horizon[0])
-            at = np.minimum(at, len(part.horizon) - 1)
+            at = np.rint(horizon / part.horizon[0]).astype(int).clip(max=len(part.horizon)) - 1
             both.append((part.model[:, at], part.still[:, at]))
         starts = [part.starts for part in parts]
         return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))

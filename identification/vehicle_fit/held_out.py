@@ -100,11 +100,13 @@ def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -
         own = np.flatnonzero(number == i)
         part = logged_starts(log, vehicle, spans[own].tolist(), _HORIZON)
         starts.append(part._replace(segment=own[part.segment]))
-    refits = []
     folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
-    for where, fold in folds.items():
-        if np.ptp(fold) > 0:
-            refits += [(where, kept, part) for kept, part in refitted(fit, fold)]
+    refits = [
+        (where, *each)
+        for where, fold in folds.items()
+        if np.ptp(fold) > 0
+        for each in refitted(fit, fold)
+    ]
     return _HeldParts(starts, refits)
 
 
@@ -128,20 +130,28 @@ def held_out(
     """
     if not all(log.has_pose for log in logs):
         return _by_balance(fit)
-    parts = _held_parts(pieces, logs, fit, vehicle_of(fit, ""))
+    whole = vehicle_of(fit, "")
+    parts = _held_parts(pieces, logs, fit, whole)
     errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
-    if not errors:
-        return _by_own_flight(parts.starts, vehicle_of(fit, ""))
-    stands, why = standing(errors), ""
     loop: LoopFit | None = None
+    if not errors:
+        # torques that fail on the flight of their fit were off by up to 37 times the error of no
+        # change on others (10 Crazyflie flights of 9 s)
+        if any(len(of.rows) for of in parts.starts):
+            loop = fit_loop(parts.starts, whole, damped=True)
+            damped = replace(whole, closed_loop=loop.loop)
+            near, far = (of.model[:, -1] for of in errors_at(parts.starts, [damped, whole]))
+            loop = loop if np.log(near / far).mean() < 0.0 else None
+        return HeldOut({}, "", loop)
+    stands, why = standing(errors), ""
     if stands not in ("torque", WHOLE):
-        why, damped = _reason(errors), OTHER_FLIGHTS not in errors
-        fitted = loop = fit_loop(parts.starts, vehicle_of(fit, why), damped=damped)
+        why, alone = _reason(errors), OTHER_FLIGHTS not in errors
+        fitted = loop = fit_loop(parts.starts, vehicle_of(fit, why), damped=alone)
 
         def without(part: VehicleFit, kept: Mask) -> Models:
             vehicle = vehicle_of(part, why)
             starts = [of.those(kept[of.segment]) for of in parts.starts]
-            return loops_of(vehicle, fit_loop(starts, vehicle, fitted.loop, damped).loop)
+            return loops_of(vehicle, fit_loop(starts, vehicle, fitted.loop, alone).loop)
 
         further = parts.errors(without)
         errors = {where: {**each, **further[where]} for where, each in errors.items()}
@@ -151,18 +161,6 @@ def held_out(
         for where, each in errors.items()
     }
     return HeldOut(pooled, stands, loop, why)
-
-
-def _by_own_flight(starts: list[LoggedStarts], vehicle: Vehicle) -> HeldOut:
-    """Return the damped body in place of torques that fail on the flight of their fit: on others,
-    these were off by up to 37 times the error of no change (10 Crazyflie flights of 9 s).
-    """
-    if not any(len(of.rows) for of in starts):
-        return HeldOut({}, "")
-    loop = fit_loop(starts, vehicle, damped=True)
-    whole, damped = errors_at(starts, [vehicle, replace(vehicle, closed_loop=loop.loop)])
-    nearer = np.log(damped.model[:, -1] / whole.model[:, -1]).mean() < 0.0
-    return HeldOut({}, "", loop if nearer else None)
 
 
 def models_of(vehicle: Vehicle) -> Models:
@@ -221,7 +219,7 @@ def _reason(errors: Errors) -> str:
             )
             for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True)
         ]
-    return f"not identifiable: torques predict the {max(said)[1]}"
+    return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"
 
 
 def _by_balance(fit: VehicleFit) -> HeldOut:
