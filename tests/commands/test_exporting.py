@@ -80,9 +80,7 @@ def test_identify_writes_a_vehicle_that_loads_and_predicts_other_flights(call, l
         flown = FlightLog(**record_flight(known, trajectory="excite", seconds=12.0, seed=seed))
         write_log(flown, tmp_path / f"{seed}.csv")
     asked = ("identify", "1.csv:0.5-11", "--mass", known.mass, "--geometry", known.arm_l)
-    code, text, _ = call(
-        *asked, "--test", "2.csv:2-11", "--out", "mine.yaml", "--export", "gazebo"
-    )
+    code, text, _ = call(*asked, "--test", "2.csv:2-11", "--out", "mine.yaml", "--export", "gazebo")
     assert code == 0
     assert load_vehicle(tmp_path / "mine.yaml").mass == known.mass
     assert "<motorConstant>" in text
