@@ -23,7 +23,7 @@ def swept(tmp_path_factory):
 @pytest.fixture(scope="module")
 def calm(tmp_path_factory):
     path = tmp_path_factory.mktemp("calm") / "calm.csv.gz"
-    return recorded(path, "--trajectory", "sweep", "--seed", "4", seconds=40)
+    return recorded(path, "--trajectory", "sweep", "--seed", "4", seconds=64)
 
 
 def test_a_profile_becomes_a_law_that_is_flown(call, swept, tmp_path):

@@ -96,7 +96,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
 
 @pytest.mark.parametrize("turbulence", [0.0, 4.0])
 def test_gusts_of_a_steady_strength_are_no_pushes(turbulence):
-    log = fly_practice(VEHICLE, seconds=20.0, seed=5, turbulence=turbulence)
+    log = fly_practice(VEHICLE, seconds=40.0, seed=5, turbulence=turbulence)
     assert transient_disturbances(RegressedFlights([log], VEHICLE), {}) == []
 
 
