@@ -151,9 +151,7 @@ def test_an_unknown_way_to_draw_is_named(tmp_path):
     assert_one_line(done, b"MUJOCO_GL=bogus", b"expected egl, osmesa, glfw or disable")
 
 
-@pytest.mark.parametrize(
-    "delay", mostly_slow([0.0, 0.15, 0.45, 0.85, 1.35], {0.45}.__contains__)
-)
+@pytest.mark.parametrize("delay", mostly_slow([0.0, 0.15, 0.45, 0.85, 1.35], {0.45}.__contains__))
 def test_an_interrupt_ends_in_one_word_at_any_time(delay, tmp_path):
     words = ("benchmark", "--controllers", "hover", "--episodes", "500")
     child = started(*words, cwd=tmp_path, stderr=subprocess.PIPE)
