@@ -96,6 +96,10 @@ def test_identify_writes_a_vehicle_that_loads_and_predicts_other_flights(call, l
     for errors in (data["held_out_blocks"], data["prediction"]):
         assert errors["starts"] > 20
     assert (tmp_path / "mine.prediction.png").read_bytes()[:4] == b"\x89PNG"
+    vehicle = "--vehicle", "mine.yaml"
+    assert call("estimate", "2.csv", *vehicle, "--no-tune", "--out", "estimated")[0] == 0
+    law = "--task", "WindHover", "--controller", "lqg"
+    assert call("fly", *vehicle, *law, "--out", "flown")[0] == 0
     code, _, error = call(*asked, "--test", log, "--out", "other.yaml")
     assert code == 2
     assert "flight: no unbroken piece of pose is longer than 3 s" in error

@@ -101,6 +101,7 @@ def test_an_effect_of_ones_own_is_found_with_its_coefficient(
     assert "tether: k = 0.1" in capsys.readouterr().out
 
 
+@pytest.mark.slow  # of a drag's coefficient in tests/identification/diagnosis, once for each flight
 def test_a_coefficient_is_regressed_on_the_time_of_flights(example, tmp_path, capsys, monkeypatch):
     script = example("drift_over_flights")
     asks_for(monkeypatch, script, "rotor_drag")

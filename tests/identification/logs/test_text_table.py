@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
-from tests.support.outcomes import refused
 from tests.support.programs import said
 from windwrench.identification.logs.flight_log import REQUIRED
 from windwrench.identification.logs.text_table import open_table
@@ -56,11 +55,6 @@ def test_units_behind_the_header_are_kept(opened):
     table = opened("t,x\n[s],[mm]\n0,1\n1,2\n")
     assert table.units == ("[s]", "[mm]")
     assert table.row(0) == "row 1 (line 3)"
-
-
-def test_decimal_commas_between_commas_are_refused_behind_a_whole_time(opened):
-    with refused("line 2 has 5 fields, the header 3; decimal commas"):
-        opened("t,x,y\n0,1,5,2,5\n0,1,2,5,3,5\n")
 
 
 def test_a_last_line_that_was_cut_off_is_left_out(opened):
@@ -115,7 +109,7 @@ def test_the_memory_of_a_check_is_in_proportion_to_the_numbers_that_are_read(tmp
     columns[:, 11] += 12.0
     rest = [",".join(f"{x:.6g}" for x in row) for row in columns.tolist()]
     taken = {}
-    for rows in (1_000, 150_000):
+    for rows in (25_000, 75_000):
         lines = (f"{0.005 * i:.3f},{rest[i % 1000]}" for i in range(rows))
         path = tmp_path / f"{rows}.csv"
         path.write_text("\n".join([",".join(header), *lines]))
