@@ -22,7 +22,7 @@ from windwrench.reproduction.result import Comparison, Result
 from windwrench.runtime.provenance import commit, made_by
 
 SHORT = {  # seeds, settings, and constants of the figure's module
-    "fig3": (1, {"seconds": 15.0}, {}),
+    "fig3": (1, {"seconds": 8.0}, {}),
     "fig4": (2, {"sweep": (0.5, 1.0)}, {"_END": 14.0}),
     "fig5": (1, {"evaluations": 1}, {"_TUNING_SEEDS": (10_001,), "_RESAMPLES": 400}),
     "fig6": (1, {}, {}),

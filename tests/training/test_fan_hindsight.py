@@ -93,7 +93,7 @@ def test_the_left_is_learned_from_the_right():
     network = TaughtNetwork(2, 1, "gru", 8, [8], "relu")
     mirrored = np.array([-1.0, 1.0], dtype=np.float32)
     episodes = Sequences(seen, hidden, np.ones((20, 128), dtype=np.float32))
-    fit(network, episodes, 40, 16, (0.02, 0.0), torch.Generator().manual_seed(0), mirrored)
+    fit(network, episodes, 30, 32, (0.02, 0.0), torch.Generator().manual_seed(0), mirrored)
     with torch.no_grad():
         mean, _, _ = network(torch.from_numpy(seen * mirrored))
     assert abs(mean.numpy() + hidden)[5:].mean() < 0.05
