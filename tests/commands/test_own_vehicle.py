@@ -13,8 +13,7 @@ from tests.support.data_paths import excerpt
 from windwrench.dynamics import load_vehicle
 
 FLIGHTS = ("B2_circle_fast_rep3", "B5_helix_fast_rep2")
-# ``test_exporting.py`` does the same with simulated flights
-pytestmark = [pytest.mark.measured, pytest.mark.slow]
+pytestmark = pytest.mark.measured
 
 
 @pytest.fixture(scope="module")

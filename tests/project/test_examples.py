@@ -56,7 +56,6 @@ def test_stable_baselines3_trains_on_the_plain_environment(example):
     assert found["learned"] != found["hover"]
 
 
-@pytest.mark.slow  # its steps: test_own_vehicle, tests/training and tests/live/test_export_c
 @pytest.mark.measured
 def test_a_log_becomes_a_vehicle_and_two_controllers_in_c(example, monkeypatch):
     pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
