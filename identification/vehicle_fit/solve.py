@@ -242,8 +242,10 @@ def _newton(
     weighted = np.einsum("iac,acd->iad", rows, grams)
     known = {name: (model.scale.get(name, 1.0) / x) ** 2 for name, x in model.prior.items()}
     strength = np.array([known.get(name, 0.0) for name in model.free])
+    # the rotors' noise, taken off, can exceed a combination's power: such data tell nothing
+    told, axes = np.linalg.eigh(np.einsum("iad,jad->ij", weighted, rows))
     # parameters without excitation stay
-    information = np.einsum("iad,jad->ij", weighted, rows) + np.diag(strength + 1e-8)
+    information = (axes * np.maximum(told, 0.0)) @ axes.T + np.diag(strength + 1e-8)
     gradient = np.einsum("iad,ad->i", weighted, left) + theta * strength
     return np.linalg.solve(information, -gradient), information, rows, left
 
