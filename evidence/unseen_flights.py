@@ -105,7 +105,7 @@ def flown(name: str, data: Path) -> list[dict[str, Any]]:
     paths = [path for path in sorted(data.glob(kind.files)) if path.suffix != ".yaml"]
     logs = {path.name.split(".")[0]: read_log(path, kind.reader) for path in paths}
     logs = {n: log for n, log in logs.items() if pose_pieces(log)}
-    rows = []
+    rows: list[dict[str, Any]] = []
     for of, group in groups_of(list(logs), kind.few):
         try:
             known = identify([logs[n] for n in group], kind.mass, parse_geometry(kind.geometry))

@@ -49,6 +49,7 @@ _LEAST_VOLTAGE_RANGE = 0.03  # share: no exponent is fitted to a smaller range o
 _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
 _NO_OFFSET = 1e-6  # s, deviation of an absent time offset
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
+WITHOUT_FORCE = "an unchanged velocity predicts data outside the fit better than the force"
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 LOOP = "predictions of half a second from states of the flight: no part of the vehicle"
 
@@ -171,7 +172,8 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
         ):
             name, wide = f"closed_loop {c}", 1.96 * size
             if size > 0.0:
-                named[name] = Estimate(name, value, value - wide, value + wide, unit, stands, LOOP)
+                shows = stands if abs(value) > wide else NOTHING
+                named[name] = Estimate(name, value, value - wide, value + wide, unit, shows, LOOP)
     if not tested.stands:
         for name, e in named.items():
             if e.status == IDENTIFIED:
@@ -181,6 +183,10 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
         for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
             if effect not in flown.effects and name in named:
                 named[name] = named[name]._replace(status=REFUTED, how=WITHOUT_EFFECTS)
+    if flown.status.force == REFUTED:
+        for name, e in named.items():
+            if e.status == IDENTIFIED and name.startswith(("k", "thrust", "hover")):
+                named[name] = e._replace(status=REFUTED, how=WITHOUT_FORCE)
     known = {e.name: e.status for e in named.values() if e.status != NOTHING}
     return replace(flown, status=replace(flown.status, coefficients=known))
 
