@@ -8,9 +8,9 @@
 
 A vehicle is identified from each group: two neighbouring flights (racer one, brushless four), and
 every second flight. It predicts each flight outside its group from the logged state, every 0.25 s
-for 0.5 s. The logged state is the pose below 15 Hz with its derivatives, between take-off and
-landing. Flights without 3 s of unbroken pose are left out. A cell is one of four mean errors by the
-better one of no change and of the vehicle's thrust and drag. Cells of one flight or one vehicle are
+for 0.5 s, off the ground. The logged state is the pose below 15 Hz with its derivatives. Flights
+without 3 s of unbroken pose are left out. A cell is one of four mean errors by the better one of no
+change and of the vehicle's thrust and drag. Cells of one flight or one vehicle are
 not independent, so that intervals are too narrow.
 """
 
@@ -26,17 +26,15 @@ from scipy.spatial.transform import Rotation
 from windwrench import __version__
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.evidence.kept_results import DOCS
-from windwrench.evidence.nanodrone_benchmark import WAYS, errors_ahead, ways_of
+from windwrench.evidence.nanodrone_benchmark import WAYS, ways_of
 from windwrench.evidence.runner import start
 from windwrench.evidence.scoring import share
-from windwrench.identification.diagnosis.commanded_rotors import in_flight
-from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.table import Array
 from windwrench.identification.motion.signals import log_signals, pose_pieces
 from windwrench.identification.motion.smoothing import continuous, resampled
-from windwrench.identification.prediction import QUANTITIES
+from windwrench.identification.prediction import QUANTITIES, errors_at, logged_starts
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.result import IDENTIFIED
@@ -46,7 +44,7 @@ from windwrench.runtime.provenance import commit
 
 RESULTS = "results/unseen_flights.json"  # below docs/
 ALIKE = 1.02  # a cell up to this is no loss
-_EVERY = 0.25  # s, from start to start
+_HORIZON = 0.5  # s
 
 
 class FlightSet(NamedTuple):
@@ -91,12 +89,10 @@ def states_of(log: FlightLog) -> Array:
 
 def predicted(log: FlightLog, vehicle: Vehicle) -> dict[str, list[float]]:
     """Return the four mean errors after 0.5 s by each of ``WAYS``."""
-    flight = in_flight(with_commanded_speeds(log, vehicle), vehicle)
-    states, every = states_of(flight), max(1, round(_EVERY / flight.period))
-    return {
-        way: errors_ahead(flight, states, model, every)[:, -1].tolist()
-        for way, model in zip(WAYS, ways_of(vehicle), strict=True)
-    }
+    starts = logged_starts(log, vehicle, [(log.t[0], log.t[-1])], _HORIZON)
+    starts = starts._replace(states=states_of(starts.log))
+    errors = errors_at([starts], ways_of(vehicle))
+    return {way: e.model[:, -1].tolist() for way, e in zip(WAYS, errors, strict=True)}
 
 
 def flown(name: str, data: Path) -> list[dict[str, Any]]:
