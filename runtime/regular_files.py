@@ -33,7 +33,7 @@ def reading(path: Path, what: str) -> Iterator[None]:
 
     Args:
         path: the file.
-        what: it is, for the error.
+        what: the file's kind, for the error.
     """
     try:
         yield

@@ -38,7 +38,7 @@ _LATE = replace(
         dropout=(0.0, 0.1),
     ),
 )
-MIX, FAN_MIX = "wide-late", "wide"  # of the tasks in the wind, and of FanTracking
+MIX, FAN_MIX = "wide-late", "wide"  # tasks in the wind, and FanTracking
 # parts of the episodes in each scenario
 MIXES = {
     MIX: {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2}

@@ -6,8 +6,8 @@
 * Specific force along z: ``a`` times the sum of ``g``.
 
 The coefficients ``a`` are positive and otherwise free, so neither mass, inertia nor arm has to be
-known. Innovations of a column beginning at some time are worked out for all times at once, by
-filters that run backwards.
+known. Filters run backwards and give the innovations of a column for all times of its beginning at
+once.
 
 The noise of a channel is correlated, and larger while the rotors work unusually. The weights are
 the size of the model's own error: a share of the rotors' deviation from the mean. The correlation

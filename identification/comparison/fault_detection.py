@@ -79,7 +79,7 @@ def find_fault(channels: Channels) -> RotorFault:
     samples = sample(channels)
     tried = _search(samples, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
-    # of a jump at each row, by each ramp
+    # a jump at each row, by each ramp
     jumps = best.steps(best.rows, best.ramps)
     starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), samples.t[best.rows])
     evidence = logsumexp(jumps) - math.log(len(best.ramps) * len(samples.t))

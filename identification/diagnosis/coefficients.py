@@ -19,8 +19,8 @@ V = TypeVar("V")
 Setting = Mapping[str, Values]
 Effects = frozenset[str]
 STEP = 0.1  # typical sizes, of a derivative by a coefficient
-CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
-TORQUE_ARM = 0.25  # of the arm: times the weight, the unit of a torque
+CENTRAL = "central"  # the coefficient of effects on single rotors
+TORQUE_ARM = 0.25  # share of the arm: times the weight, the unit of a torque
 
 
 def without(setting: Mapping[str, V], effect: str) -> dict[str, V]:

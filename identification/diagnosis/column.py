@@ -75,7 +75,7 @@ class Product(NamedTuple):
 
     @property
     def whole(self) -> Array:
-        """All of it (n, 6)."""
+        """All rows and channels (n, 6)."""
         out = np.zeros((len(self.x), 6))
         out[:, self.first : self.first + self.y.shape[1]] = self.scale * self.x[:, None] * self.y
         return out

@@ -69,14 +69,14 @@ from .log_offsets import (
 
 ROWS_PER_CUTOFF = 5.0  # rows in a period of the residual's cut-off
 MARGIN = 0.6  # s at either end of a piece, where the filters lack half of their input
-# rounding steps by which rotor speeds must vary: with less, the rounding is no noise but looks like
-# an effect
+# least variation of rotor speeds in rounding steps: with less, the rounding is no noise but looks
+# like an effect
 LEAST_STEPS_OF_ROTOR_SPEED = 1.4
 BLOCK = 3.0  # s of flight held out, or left out in cross-validation, in one piece
 SHORT_BLOCK = 1.0  # s, the same of commanded flights of fewer than eight blocks
 BLOCKS_PER_HELD_OUT = 4  # one of so many blocks is held out
 MEMORY = 2**26  # bytes of cached pieces
-_Residual = Callable[[Setting], Array]  # of flights with a setting (rows, channels)
+_Residual = Callable[[Setting], Array]  # flights and a setting give (rows, channels)
 
 
 def delivered(signals: Signals, vehicle: Vehicle) -> Array:
@@ -125,10 +125,10 @@ class FlightRows:
         # torque is left out, and only the time in the air counts
         self.commanded = any(log.commanded for log in self.logs)
         posed = not (self.commanded or self.inertial)
-        if not posed:  # an IMU shows no height, and a ground that carries is no effect
+        if not posed:  # an IMU shows no height, and the ground's support is no effect
             flown_part = in_flight_by_thrust if self.inertial else in_flight
             self.logs = tuple(flown_part(log, vehicle) for log in self.logs)
-        # relative standard deviation of a command's thrust, which no curve of the vehicle states
+        # relative standard deviation of a command's thrust, without a curve in the vehicle's file
         assumed = self.commanded and vehicle.motor_curve is None
         self.thrust_std = UNSTATED_THRUST_STD if assumed else 0.0
         # a filtered pose hides its own noise, and the filter's delay and bandwidth take more away
@@ -141,12 +141,12 @@ class FlightRows:
         seconds = sum(np.ptp(log.t) for log in self.logs)
         self.logs = tuple(excerpt(log, seconds) for log in self.logs)
         self._fit_logs = len(logs)
-        self._drift: np.random.Generator | None = None  # of a copy with other errors of the fusion
+        self._drift: np.random.Generator | None = None  # a copy with other errors of the fusion
         self._fused: dict[FlightLog, list[InertialSignals]] = {}
         self._first: list[_FlightPiece] = []
         self._forget()
         self._lay_rows()
-        # errors of accelerometers from which the motion is read, and time offsets of all signals
+        # errors of accelerometers behind the motion, and time offsets of all signals
         self.biases = self._biases()
         self.offsets = self._timings() | self.biases
 
@@ -281,7 +281,7 @@ class FlightRows:
         return {ROTOR_TIME_OFFSET: rotors, **{c: TIMINGS[c] for c in others}}
 
     def _biases(self) -> dict[Column, Offset]:
-        """Return the possible biases of accelerometers from which the motion is read."""
+        """Return the possible biases of accelerometers behind the motion."""
         out: dict[Column, Offset] = {}
         for piece in self._first:
             if isinstance(s := piece.signals, InertialSignals) and piece.log < self._fit_logs:
@@ -301,12 +301,12 @@ class FlightRows:
         return {**self._declared, **setting}.get(effect, {})
 
     def value(self, setting: Setting, column: Column) -> float:
-        """Return one of these coefficients; 0 if nothing states it."""
+        """Return one of these coefficients; 0 if nowhere stated."""
         return self.coefficients(setting, column.effect).get(column.coefficient, 0.0)
 
     def stated(self, effect: str) -> Values:
         """Return the coefficients of an effect fixed by the vehicle's file: all stated ones, where
-        the file states some. All may have changed where it states all.
+        the file states some. All may have changed in a file with all.
         """
         own = self._declared.get(effect, {})
         return own if {c.name for c in get(effect).coefficients} - {CENTRAL, *own} else {}
@@ -331,8 +331,8 @@ class FlightRows:
     def residual(self, setting: Setting) -> Array:
         """Return the residual (rows, 6) with these effects.
 
-        It is an acceleration by the *declared* mass and inertia. A force would vanish with the
-        mass, noise and all. Nor does a coefficient multiply the noise of differentiation.
+        The residual is an acceleration by the *declared* mass and inertia. A force would vanish
+        with the mass, noise and all. Nor does a coefficient multiply the noise of differentiation.
         """
 
         def made() -> Array:
@@ -371,7 +371,7 @@ class FlightRows:
 
     def felt(self, setting: Setting) -> Array | None:
         """Return the accelerometers' force less the force of the poses' motion (rows, 3) N, world,
-        low-passed; None where a log has no accelerometer, or where the motion is read from it.
+        low-passed; None without an accelerometer, or where the accelerometer gives the motion.
         """
         felt = [piece.felt for piece in self.pieces(setting) if piece.felt is not None]
         return np.concatenate(felt) if len(felt) == len(self._first) else None
@@ -430,7 +430,7 @@ def _kept(memory: dict[str, V], key: str, make: Callable[[], V], most: int) -> V
     return memory[key]
 
 
-@lru_cache(maxsize=16)  # of several pieces, and again at each setting of sensing effects
+@lru_cache(maxsize=16)  # for several pieces, and again at each setting of sensing effects
 def _accelerometer(log: FlightLog) -> ArrayPair | None:
     """Return times (n,) s, evenly spaced, and the accelerometer's readings (n, 3) m/s2 with the
     pose's low-pass; None unless the readings span the log from beginning to end.

@@ -47,7 +47,7 @@ class PoseColumns:
         self.setting = setting
         self.poses = poses
         self.track = track
-        # each piece as the filter sees it between samples
+        # each piece as the filter sees the flight between samples
         later = np.roll(poses.rotor_speeds, -1, axis=0)
         later[poses.begins - 1] = poses.rotor_speeds[poses.begins - 1]
         names = ("t", "position", "rotation", "velocity", "angular_velocity")
@@ -65,7 +65,7 @@ class PoseColumns:
         self.posed: Columns = {}
 
     def take(self, other: "PoseColumns") -> None:
-        """Take the columns any flight may have, which change little with effects."""
+        """Take the columns of any flight; they change little with effects."""
         self.acting, self.posed = (
             {c: x for c, x in part.items() if not c.effect and not c.is_unknown}
             for part in (other.acting, other.posed)
@@ -150,7 +150,7 @@ class PoseColumns:
         return (self._accelerations(setting, self.signals) - self._base) / units
 
     def _add(self, column: Column) -> None:
-        """Add a coefficient's column, unless it is there already or no such vehicle is possible."""
+        """Add a coefficient's column, unless there already or no such vehicle is possible."""
         effect = column.effect
         if column in self.acting or column in self.posed:
             return
@@ -224,7 +224,7 @@ class PoseColumns:
         the flight loop's answer to the state.
 
         Rounding biases an expected torque low, by its share of the variance (errors in variables):
-        a hover holds little torque, and rounding hides it.
+        in a hover rounding hides the little torque.
         """
         rounded = 2.0 * np.square(rounding[3:])
         rotation = self.track.rotation

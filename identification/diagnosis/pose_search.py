@@ -21,7 +21,7 @@ from .regression import RegressedFlights
 from .sets import Posterior
 from .starting_points import starts_of
 
-ROUNDS = 6  # of fitting the noise beside the best set
+ROUNDS = 6  # fits of the noise beside the best set
 # standard deviations of its prior: largest step of a coefficient in the last of these rounds
 CLOSE = 0.1
 
@@ -57,7 +57,7 @@ def search_by_poses(
     if setting := posterior.best_setting(1):
         best = tried(setting, best)
         posterior = around(best)
-        # a similar effect counts as a disturbance beside it: each is judged beside its own noise
+        # a similar effect counts as a disturbance: each is judged beside its own noise
         # one after the other: each holds a tenth of a diagnosis' memory
         each = (tried(rival, best) for rival in posterior.rivals(setting))
         best = max(chain([best], each), key=_score)
@@ -79,7 +79,7 @@ def search_by_poses(
     whole = best.base(library, still, unknown=True)
     posterior = Posterior(flights, library, (loud, whole), posterior.tempering())
     column, size, gained = posterior.strangest()
-    # among so many columns one explains as much by chance, and no noise beside it is likelier
+    # among so many columns one explains as much by chance, with no likelier noise
     by_chance = 2.0 * math.log(len(whole.dictionary))
     return best, posterior, best.quieter({column: size}, still) if gained > by_chance else None
 
@@ -97,7 +97,7 @@ def _fitted(setting: Setting, near: Likelihood) -> Likelihood:
 def _settled(setting: Setting, near: Likelihood, gusty: bool = False) -> Likelihood:
     """Return the likelihood about the mode of a setting's effects, with the noise beside it."""
     flights = near.flights
-    # a slow disturbance does much of what a steady effect does: each is fitted beside the other
+    # a slow disturbance resembles a steady effect: each is fitted beside the other
     for _ in range(ROUNDS):
         try:
             near = Likelihood(flights, setting, near, gusty=gusty)

@@ -46,7 +46,7 @@ def rank(
 
     Args:
         flights: the vehicle's flights.
-        library: names of effects that these flights can show, with ``first``.
+        library: names of effects shown by these flights, with ``first``.
         report: called with a line of progress.
         first: effects of every set, with coefficients for the start of a fit; none with measured
             rotors.

@@ -31,7 +31,7 @@ class Poses:
     start: Array  # (p, 6) m/s, and rad/s, body: the velocities at the start of each piece
     sample: Rows  # (n,) number of the sample in its piece
     log: Rows  # (n,) index of its log among the flights
-    counted: Mask  # (n,) whether it is in the fit
+    counted: Mask  # (n,) whether in the fit
 
     @classmethod
     def read(cls, flights: RegressedFlights, vehicle: Vehicle, finer: Sequence[Array]) -> "Poses":
@@ -73,7 +73,7 @@ class Poses:
 
     @property
     def begins(self) -> Rows:
-        """Where each piece begins (p,)."""
+        """First row of each piece (p,)."""
         return np.flatnonzero(self.sample == 0)
 
     @property

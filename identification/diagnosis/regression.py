@@ -1,5 +1,5 @@
 """Flights as a regression on the coefficients of effects: the sensors' noise in rows and columns,
-and the effects hidden by it.
+and the effects hidden by this noise.
 """
 
 from collections.abc import Iterable

@@ -286,8 +286,8 @@ def _uneven_steps(log: FlightLog) -> _Findings:
 
 
 def _moves(log: FlightLog) -> tuple[Array, Array, Mask, Mask]:
-    """Return by how far (m) and how much (rad) the pose moves from row to row, and which moves are
-    beyond a quadrotor's speed.
+    """Return the pose's moves (m) and turns (rad) from row to row, and masks of both beyond a
+    quadrotor's speed.
     """
     q, step = log.quaternion[log.valid], np.diff(log.t[log.valid])
     way = lengths(np.diff(log.position[log.valid], axis=0))

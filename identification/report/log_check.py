@@ -35,7 +35,7 @@ class _LogCheck:
     channels: list[Channel]
     doubts: Names  # of the reading; the gravest first
     limits: Names  # not shown by the log
-    flew: tuple[str, str]  # and how it is known
+    flew: tuple[str, str]  # and the reason
     guess: Guess | None
     map_text: str  # the log's map as a YAML file; empty without one
 

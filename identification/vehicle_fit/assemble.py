@@ -24,7 +24,7 @@ from .parameters import FURTHER, QUANTITIES
 from .result import ASSUMED, IDENTIFIED, NOTHING, Estimated
 from .solve import VehicleFit
 
-# of the library's effects within a fit's reach
+# roles of the library's effects within a fit's reach
 ROLES = dict.fromkeys(further.role for further in FURTHER.values() if further.role)
 
 
@@ -40,7 +40,7 @@ def vehicle_of(
     have the lag behind them already: then no effect of the model has one.
     """
     model, geometry, arm, curve = fit.model, fit.model.geometry, estimates["arm_l"].value, None
-    # identified values whose interval excludes 0
+    # identified values with 0 outside the interval
     shown = {
         name: e.value
         for name, e in estimates.items()

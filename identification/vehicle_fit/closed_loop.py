@@ -31,7 +31,7 @@ _LOWEST = np.array([-np.inf if unit.endswith("(m/s)") else 0.0 for unit in UNITS
 _DAMPING = np.array(["damping" in name for name in UNITS])
 # a loop that damps within .2 s; the unmeasured moments' start is the model's own turning
 _BEGIN = LoopReaction(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
-# of a body whose rate decays, whatever its rotors do
+# the body's rate decays, whatever the rotors do
 _DAMPED = LoopReaction(0.0, 0.0, 0.0, 1e6, 4.0, 0.0, 0.0, 0.0, 4.0)
 _SIZES = np.array([0.5, 0.5, 0.5, 30.0, 10.0, 20.0, 10.0, 3.0, 5.0])  # of the coefficients
 # share of the loss: the prior's at a size from the start. Coefficients without excitation stay
@@ -47,7 +47,7 @@ _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 class LoopFit(NamedTuple):
     """The likeliest loop, and the standard deviations (9,) of its coefficients, by the scatter of
-    groups of starts (a sandwich); 0 of those that are not fitted.
+    groups of starts (a sandwich); 0 if not fitted.
     """
 
     loop: LoopReaction
@@ -79,7 +79,7 @@ def fit_loop(
     usual = replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))
     begin = np.array(astuple(_DAMPED if damped else usual))
     free, shares = _DAMPING | (not damped), np.arange(1, _TIMES + 1) / _TIMES
-    unit = np.diag(_SIZES)[free]  # of the fitted numbers x (p,)
+    unit = np.diag(_SIZES)[free]  # units of the fitted numbers x (p,)
 
     def loop(x: Array) -> LoopReaction:
         return LoopReaction(*np.maximum(begin + x @ unit, _LOWEST).tolist())

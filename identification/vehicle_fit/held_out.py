@@ -135,7 +135,7 @@ def held_out(
     errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
     loop: LoopFit | None = None
     if not errors:
-        # torques that fail on the flight of their fit were off by up to 37 times the error of no
+        # torques refuted on the flight of their fit were off by up to 37 times the error of no
         # change on others (10 Crazyflie flights of 9 s)
         if any(len(of.rows) for of in parts.starts):
             loop = fit_loop(parts.starts, whole, damped=True)

@@ -41,7 +41,7 @@ QUANTITIES: Data = read_yaml(Path(__file__).with_name("quantities.yaml"), "quant
 
 
 class Further(NamedTuple):
-    """An effect for logs that get much likelier; ``quantities.yaml`` explains each field."""
+    """An effect, kept if the logs get much likelier; ``quantities.yaml`` explains each field."""
 
     parameters: Data
     role: str = ""
@@ -56,7 +56,7 @@ FURTHER: dict[str, Further] = {n: Further(**row) for n, row in QUANTITIES["effec
 
 
 def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, Array]:
-    """Return a model with its parameters, the turning senses that yaw shows, and the start;
+    """Return a model with its parameters, the turning senses shown by yaw, and the start;
     ``nonlinear`` parameters start at 0.
 
     Raises:
