@@ -226,8 +226,8 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
         ),
         "assumed thrust": tuple(
             f"{effect}: the log holds motor commands and the vehicle file states no motor "
-            "curve, so how much thrust a command makes is an assumption, and this effect may "
-            "be its error alone. State motor_curve in the vehicle file, or log rotor speeds"
+            "curve, so a command's thrust is assumed, and this effect may be the assumption's "
+            "error alone. State motor_curve in the vehicle file, or log rotor speeds"
             for effect in playing(*THRUST_FACTORS, among=named)
             if flights.thrust_std > 0.0
         ),

@@ -346,7 +346,7 @@ class RankedFits:
     """
 
     def __init__(
-        self, fits: Iterable[Fit], left: str = "horizontal acceleration is left by the tilt"
+        self, fits: Iterable[Fit], left: str = "horizontal acceleration is not due to the tilt"
     ) -> None:
         self.ranked = sorted(fits, key=lambda fit: -fit.score)
         self.left = left
@@ -390,7 +390,7 @@ class RankedFits:
         other, lead = self.other(name)
         why = f"{self.fit.horizontal:.0%} of the {self.left}"
         if other is not None and lead > 0.0:
-            why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
+            why += f"; the log likelihood of {other} is {lead:.3g} lower"
         return attrgetter(name)(self.best), self.certain(name), why
 
 

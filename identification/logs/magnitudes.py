@@ -164,7 +164,7 @@ def motor_unit(
     if not np.isnan(power):
         between += f", and the specific force grows with their power of {power:.2g}"
     up_to = f"values up to {high:.6g}"
-    carries = f"in it the rotors carry the weight of {vehicle.name if vehicle else ''}"
+    carries = f"then the rotors carry the weight of {vehicle.name if vehicle else ''}"
     carries += f", though they may be {doubt}" if doubt else ""
     # the vehicle's weight may contradict a name, but poles of eRPM are unknown
     lifts = carrier and named in UNITS["rotors"] and named not in ("eRPM", carrier)

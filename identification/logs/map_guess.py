@@ -416,7 +416,7 @@ class _Guessing:
             )
             for way, left in zip(_GYROS, shares, strict=False)
         ]
-        return RankedFits(fits, "attitude's rate is left unexplained") if fits else None
+        return RankedFits(fits, "attitude's rate stays unexplained") if fits else None
 
     def turns_alike(self, columns: Names) -> Verdict:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
@@ -504,8 +504,8 @@ class _Guessing:
         is_sure = left <= GOOD_TORQUE and ranking.certain("rotors") and turns
         if is_sure or (names and left <= 0.9 and lead >= 1.0):
             why = (
-                f"{(*names, order_words(order))[0]}: {left:.0%} of the angular acceleration is "
-                f"left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
+                f"{(*names, order_words(order))[0]}: {left:.0%} of the angular acceleration "
+                f"stays unexplained; the log likelihood of the next best is {lead:.3g} lower"
             )
             return order, is_sure, why
         why = f"{hint}: no order is much likelier than all others"
@@ -516,8 +516,8 @@ class _Guessing:
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
             why = (
-                f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
-                "expected a vehicle file with these rotor_positions"
+                f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration stays "
+                "unexplained; expected a vehicle file with these rotor_positions"
             )
         return ORDERS[hint], False, why
 

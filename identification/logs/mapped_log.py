@@ -198,7 +198,7 @@ def sections_of(
             said += _command_notes(path, log_map, part, stream)
         elif isinstance(part, Battery) and part.late:
             streams[name] = replace(stream, t=stream.t - part.late)
-            said.append(f"battery voltage put {part.late:g} s sooner, by which it is logged late")
+            said.append(f"battery voltage moved {part.late:g} s earlier: the log delays it")
     if log_map.position is None:
         absent = [name for name in _IMU if readable(streams.get(name)) is None]
         if absent and (log_map.rows != "whole" or (poses and not log_map.is_own)):

@@ -258,8 +258,7 @@ def _air(fit: VehicleFit, arm: Interval) -> Estimates:
         value, deviation, least = (arm[0] * x for x in fit.hidden)
         wide = fit.width * deviation
         why = fit.doubt or (
-            f"moments that nothing measures hide it: it would show from {least:.2g} on. Fly "
-            "faster to and fro, and longer"
+            f"unmeasured moments hide values below {least:.2g}. Fly faster to and fro, and longer"
         )
         known = value, value - wide, value + wide
         yield _of_effect(Role.FLAPPING_MOMENT, 0, known, "", why)
