@@ -59,7 +59,7 @@ def test_what_cannot_show_a_fault_is_refused():
 def test_a_failing_rotor_is_named_with_its_time():
     found = find_fault(channels_of_log(failing_flight()))
     assert (found.likeliest, found.sure) == ("3", True)
-    assert found.onset[1] <= 9.0 <= found.onset[2]
+    assert found.onset[1] <= 6.0 <= found.onset[2]
     assert found.onset[2] - found.onset[1] < 0.1
     assert 0.2 < 1.0 - found.remaining[0] < 0.6
 
