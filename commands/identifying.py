@@ -49,7 +49,6 @@ def identify(
 
     Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
     """
-    from ..identification.logs.screening import convention_doubt
     from ..identification.prediction import errors_of_models
     from ..identification.vehicle_fit.exports import EXPORTS
     from ..identification.vehicle_fit.geometry import parse_geometry
@@ -58,6 +57,7 @@ def identify(
     from ..identification.vehicle_fit.report import (
         headline,
         identified_data,
+        reasons_of,
         table_of,
         use_of,
         write_identified,
@@ -84,14 +84,6 @@ def identify(
             models = identified.vehicle, models_of(identified.vehicle)[SIMPLEST]
             further = errors_of_models(unseen, models, windows=parts_of)
         identified = identified._replace(predicted={**identified.predicted, "prediction": further})
-    load = "a load is tracked: --mass is that of the vehicle with its load"
-    doubts = [
-        f"warning: {flight.name}: {text}"
-        for flight in flights
-        for text in (convention_doubt(flight, None), "payload_position" in flight.extra and load)
-        if text
-    ]
-    identified = identified._replace(notes=(*doubts, *identified.notes))
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
     log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
@@ -110,13 +102,7 @@ def identify(
             for e in identified.estimates.values()
         ],
     )
-    reasons: dict[str, list[str]] = {}
-    for e in identified.estimates.values():
-        if e.status in ("assumed", "not identifiable"):
-            reasons.setdefault(e.how.removeprefix("not identifiable: "), []).append(e.name)
-    for why, names in reasons.items():
-        console.print(f"{', '.join(names)}: {why}")
-    for line in identified.advice:
+    for line in (*reasons_of(identified), *identified.advice):
         console.print(line)
     for of, (vehicle, simplest) in identified.predicted.items():
         after = f"{vehicle.horizon[-1]:.2g} s after {vehicle.starts} starts"

@@ -362,7 +362,7 @@ class Vehicle:
         if voltage is not None and self.voltage_ref > 0.0:
             exponent = self.motor_curve.voltage_exponent
             thrust = thrust * np.power(voltage / self.voltage_ref, exponent)[:, None]
-        return np.where(np.asarray(command) > 0.0, np.maximum(thrust, 0.0), 0.0)
+        return np.maximum(thrust, 0.0) * (command > 0.0)
 
     def commanded_speeds(self, command: Array, voltage: Array | None = None) -> Array:
         """Return the rotor speeds (N, 4) in rad/s whose thrust is ``commanded_thrust``."""

@@ -8,7 +8,7 @@ are fixed by a named assumption, or left out.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, replace
 
 import numpy as np
@@ -17,8 +17,9 @@ from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
-from ..logs.flight_log import Logs
+from ..logs.flight_log import FlightLog, Logs
 from ..logs.magnitudes import motor_doubts
+from ..logs.screening import convention_doubt
 from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
 from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
@@ -82,7 +83,7 @@ def identify(
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = checked_pieces(logs, windows)
-    notes = []
+    notes = [f"warning: {log.name}: {text}" for log in logs for text in _doubts(log)]
     basic = Model(
         mass, geometry, sources, voltage_ref=_voltage(pieces), speed_noise=speed_noise(pieces)
     )
@@ -211,6 +212,14 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
         for wrong in motor_doubts(log):
             raise InputError(f"{log.name}: {wrong}")
     return pieces, sources
+
+
+def _doubts(log: FlightLog) -> Iterator[str]:
+    """Yield reasons to doubt the axes and the mass of a log."""
+    if text := convention_doubt(log, None):
+        yield text
+    if "payload_position" in log.extra:
+        yield "a load is tracked: --mass is that of the vehicle with its load"
 
 
 def _voltage(pieces: Pieces) -> float:

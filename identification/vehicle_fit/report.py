@@ -103,6 +103,15 @@ def use_of(identified: Identified) -> str:
     }[" ".join(parts)]
 
 
+def reasons_of(found: Identified) -> list[str]:
+    """Return why quantities are assumed or not identifiable, a line for each reason."""
+    names: dict[str, list[str]] = {}
+    for e in found.estimates.values():
+        if e.status in (ASSUMED, NOTHING):
+            names.setdefault(e.how.removeprefix(f"{NOTHING}: "), []).append(e.name)
+    return [f"{', '.join(of)}: {why}" for why, of in names.items()]
+
+
 def table_of(errors: PredictionErrors, simplest: PredictionErrors) -> list[Names]:
     """Return rows: quantity, mean error of the vehicle, of thrust and drag, of no change, unit."""
     ends = (of[:, -1] for of in (errors.model, simplest.model, errors.still))
