@@ -148,13 +148,6 @@ def section(result: Mapping[str, Any]) -> str:
         for way in rows[0]["sums"]:
             cells = " | ".join(f"{x:.3g}" for x in mean(rows, "sums", way))
             lines.append(f"| {path} | {way} | {cells} |")
-    loops = result["closed_loop"]
-    lines += ["", f"| closed loop without | {' | '.join(loops)} | unit |"]
-    lines.append("| --- " * (2 + len(loops)) + "|")
-    for name, unit in UNITS.items():
-        known = (loop.get(name) for loop in loops.values())
-        cells = " | ".join("–" if x is None else f"{x[0]:.3g} ± {x[1]:.2g}" for x in known)
-        lines.append(f"| {name} | {cells} | {unit} |")
     made = made_by("python -m evidence.nanodrone_benchmark", [result["commit"]], result["version"])
     return "\n".join([made, "", *lines, ""])
 
