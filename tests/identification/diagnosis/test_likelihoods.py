@@ -230,14 +230,6 @@ def test_a_wind_is_no_drag_and_no_tilt(swing):
 
 
 @pytest.mark.slow
-def test_in_still_air_nothing_is_sure():
-    found = diagnose([flown()], VEHICLE)
-    assert not [e.name for e in found.effects if not e.tentative]
-    assert "wind" not in found.probabilities.names
-    assert found.after.force_rms <= found.before.force_rms
-
-
-@pytest.mark.slow
 def test_a_drag_that_nobody_declared_is_sure():
     """On five of six flights; on one the gust looks like a part that swings."""
     bare = replace(VEHICLE, effects=())
@@ -249,13 +241,6 @@ def test_a_drag_that_nobody_declared_is_sure():
         sure += any(not e.tentative for e in drags)
         assert found.after.force_rms < 0.5 * found.before.force_rms
     assert sure > 1
-
-
-@pytest.mark.slow
-def test_a_short_flight_names_nothing_surely():
-    found = diagnose([flown(wind=(-4.0, 0.0, 0.0), seconds=9.0)], replace(VEHICLE, effects=()))
-    assert all(e.tentative for e in found.effects)
-    assert "short" in found.doubts
 
 
 def test_the_accelerometer_is_read_beside_the_pose():

@@ -44,7 +44,6 @@ from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
 from windwrench.identification.vehicle_fit.report import explained, use_of
-from windwrench.identification.vehicle_fit.result import IDENTIFIED, Estimate
 from windwrench.identification.vehicle_fit.solve import nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
@@ -176,14 +175,6 @@ def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
     for volt, known in ((3.535, empty), (4.165, full)):
         assert known.low < HOVER * (volt / 3.85) ** -0.6 < known.high
     assert found.vehicle.motor_curve.voltage_exponent == found.estimates["voltage_exponent"].value
-
-
-def test_without_a_discharge_voltage_and_curve_are_not_told_apart():
-    same = vehicles()["imu and commands"]
-    assert same.estimates["voltage_exponent"].status == "not identifiable"
-    assert "hardly changes" in same.estimates["voltage_exponent"].how
-    assert any("with a full and with an empty battery" in line for line in same.advice)
-    assert same.vehicle.motor_curve.voltage_exponent == 0.0
 
 
 def test_tapers_lose_what_the_intervals_add():
@@ -390,14 +381,11 @@ def test_a_part_that_is_too_short_is_refused(inertial, window):
         identify([inertial[0][0]], MASS, GIVEN, [window])
 
 
-LAG = Estimate("motor_lag", 0.05, 0.04, 0.06, "s", IDENTIFIED, "")
-
-
-def found(*effects, curve=None, lag=LAG, commands=False):
+def found(*effects, curve=None):
     """Return as much of a result as exports read."""
     vehicle = replace(CRAZYFLIE.with_effects(*effects), motor_curve=curve)
-    fit = SimpleNamespace(model=SimpleNamespace(commands=commands))
-    return SimpleNamespace(vehicle=vehicle, estimates={lag.name: lag}, fit=fit)
+    fit = SimpleNamespace(model=SimpleNamespace(commands=curve is not None))
+    return SimpleNamespace(vehicle=vehicle, estimates={}, fit=fit)
 
 
 def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
@@ -422,7 +410,7 @@ def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
 def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
     full = 0.15
     bend = 0.7
-    it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)), commands=True)
+    it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)))
     text = EXPORTS["px4"](it)
     set_to = {k: float(x) for k, x in re.findall(r"param set (\S+) (\S+)", text)}
     assert set_to["THR_MDL_FAC"] == pytest.approx(bend, rel=1e-3)
@@ -430,20 +418,3 @@ def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
     assert 4 * full * set_to["MPC_THR_HOVER"] == pytest.approx(it.vehicle.weight, rel=1e-3)
     assert "EKF2_MCOEF" not in set_to
     assert f"MOT_THST_EXPO,{bend:g}" in EXPORTS["ardupilot"](it)
-
-
-def test_rotorpy_makes_the_same_forces_and_torques():
-    it = found(EffectSetting("rotor_drag", {"kdx": 2e-6, "kdy": 3e-6}))
-    names = {"np": np}
-    exec(EXPORTS["rotorpy"](it), names)
-    p = names["quad_params"]
-    v = it.vehicle
-    speeds = np.array([1500.0, 1600.0, 1700.0, 1800.0])
-    thrust = v.k * speeds**2
-    place = np.array(list(p["rotor_pos"].values()))
-    torque = np.cross(place, np.column_stack([0 * thrust, 0 * thrust, thrust])).sum(axis=0)
-    torque[2] += p["k_m"] / p["k_eta"] * p["rotor_directions"] @ thrust
-    want = v.rotor_wrench(speeds)
-    assert [p["k_eta"] / v.k[0] * thrust.sum(), *torque] == pytest.approx(want, rel=1e-4)
-    assert p["tau_m"] == 0.05
-    assert p["k_d"] == pytest.approx(2.5e-6)
