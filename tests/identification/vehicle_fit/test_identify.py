@@ -59,7 +59,7 @@ def of_crazyflie(logs, windows=None):
 @pytest.fixture(scope="module")
 def commanded():
     lag = {"motor_lag": {"tau": 0.06}}
-    return [recorded(t, 15.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "shake", "yaw")]
+    return [recorded(t, 15.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "yaw")]
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +142,7 @@ def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
 
 
 def test_a_hover_does_not_show_what_it_does_not_excite():
-    found = of_crazyflie([recorded("hover", 10.0, vehicle=CRAZYFLIE)])
+    found = of_crazyflie([recorded("hover", 6.5, vehicle=CRAZYFLIE)])
     assert found.estimates["Jzz"].status == "assumed"
     assert found.estimates["motor_lag"].status == "not identifiable"
     assert any("Yaw at" in line for line in found.advice)
