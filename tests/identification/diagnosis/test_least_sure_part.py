@@ -80,7 +80,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
     """A third of it, 0.05 weights for half a second, in twice the noise: as steady gusts it is next
     to nothing.
     """
-    flown = practise(VEHICLE, "outsider", ("passing_wash",), "small", None, 3628941416, 40.0)
+    flown = practise(VEHICLE, "outsider", ("passing_wash",), "small", None, 3628941416)
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "random", ())
     (down,) = (push for push in found.pushes if push.channel == "Fz")
