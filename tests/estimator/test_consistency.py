@@ -68,7 +68,7 @@ def test_intervals_hold_what_they_say(source):
     """95 % of 80 flights of drawn vehicles, three axes each, yawing and with changing thrust."""
     vehicle = replace(VEHICLE, omega_source=source)
     runs = 80
-    steps = 400
+    steps = 240
     tuning = UKFTuning()
     error = np.empty((3, runs, 6))
     for r in range(runs):

@@ -59,11 +59,11 @@ def logarithms(tuning):
 
 @pytest.fixture(scope="module")
 def fits():
-    return [fit_noise(VEHICLE, *flight(seed=seed)) for seed in range(3)]
+    return [fit_noise(VEHICLE, *flight(seed=seed)) for seed in range(2)]
 
 
 def test_known_noise_is_found_back_within_its_uncertainty(fits):
-    """Over three flights the eight errors in their own deviations are like 24 normal numbers."""
+    """Over two flights the eight errors in their own deviations are like 16 normal numbers."""
     errors = np.array([(logarithms(fit.tuning) - logarithms(TRUE)) / fit.deviation for fit in fits])
     assert (np.abs(errors) < 3.5).all()
     assert 0.5 < rms(errors) < 1.5
@@ -73,7 +73,7 @@ def test_known_noise_is_found_back_within_its_uncertainty(fits):
         assert (fit.deviation[:4] < 0.4).all()
 
 
-def test_gusts_are_found_back_and_a_walk_stays_one(fits):
+def test_gusts_are_found_back_and_a_walk_stays_one():
     """A wrong thrust, steady, is no gust: along z the force walks."""
     true = replace(TRUE, force_time=(0.2, 0.2, inf), torque_time=0.3)
     fit = fit_noise(VEHICLE, *flight(true), settings=NoiseFitSettings(gusts=True))
@@ -83,9 +83,9 @@ def test_gusts_are_found_back_and_a_walk_stays_one(fits):
     assert abs(np.log(times[2] / 0.3)) < 3.5 * fit.deviation[10]
     assert "Correlation time of the force: " in str(fit)
     assert fit.as_dict()["force_time"][0] == times[0]
-    walk = fit_noise(VEHICLE, *flight(), settings=NoiseFitSettings(gusts=True))
-    assert np.isinf(walk.tuning.force_time)
-    assert_array_equal(walk.tuning.force_walk, fits[0].tuning.force_walk)
+    walk = flight(seconds=5.0)
+    alike = (fit_noise(VEHICLE, *walk, settings=NoiseFitSettings(gusts=x)).tuning for x in (1, 0))
+    assert_array_equal(*(tuning.force_walk for tuning in alike))
 
 
 def test_nis_is_in_its_band_after_the_fit_and_not_before(fits):
@@ -180,7 +180,7 @@ def test_short_logs_work_or_are_refused_in_one_line():
 
 
 def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
-    log = flight(seconds=20.0)
+    log = flight()
     fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=1400))
     assert fit.after.poses == len(log[0]) - 200  # figures are those of the whole log
     assert (abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation).all()

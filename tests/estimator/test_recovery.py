@@ -182,9 +182,8 @@ SLOW = (("crazyflie", 0.1), ("ardrone2", 0.05))
 LIVES = (
     *(
         (vehicle, kind, dt, gate, fault)
-        for vehicle, dt in (("ardrone2", 0.005), ("crazyflie", 0.01))
+        for (vehicle, dt), gate in ((("ardrone2", 0.005), 0.999), (("crazyflie", 0.01), None))
         for kind in FILTERS
-        for gate in (None, 0.999)
         for fault in POSES
     ),
     *(

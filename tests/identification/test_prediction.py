@@ -88,11 +88,8 @@ def test_a_delayed_pose_is_not_made_up_after_a_gap():
 @pytest.mark.parametrize(
     ("name", "trajectory", "ratio"),
     [
-        ("rotor_drag", "excite", 0.25),
-        ("ground_effect", "ground", 0.5),
         ("motor_lag", "excite", 0.3),  # rotors with a memory
         ("slung_payload", "excite", 0.3),  # a wrench with a state of its own
-        ("com_offset", "excite", 0.1),  # the body
         ("clock_offset", "excite", 0.3),  # the log
     ],
 )

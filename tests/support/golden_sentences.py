@@ -62,9 +62,7 @@ CASES = [
 ]
 QUICK = {  # one of each command, of little processor time; ``compare`` is in ``test_demo.py``
     "check hard_logs/motive_take.csv.gz",
-    "check hard_logs/ned_quaternion_swapped.csv.gz",
     "check hard_logs/px4_one_esc_low.ulg",
-    "diagnose hard_logs/healthy_pose_67hz_rows_200hz.csv.gz",
     "diagnose crazyswarm2_payload/csv/log165.csv",
     "identify hard_logs/same_motor_four_times.csv.gz",
     "identify motor_faults/TestCase_3_1000000002.ulg",

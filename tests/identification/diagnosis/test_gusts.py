@@ -35,7 +35,8 @@ def test_gusts_around_a_perfect_model_are_gusts(name, rms):
     assert 0.05 * rms < gust["tau_x"] < 0.2 * rms  # Nm
 
 
-@pytest.mark.parametrize("every", [pytest.param(0), pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("every", [0, 20])
 def test_gusts_around_a_perfect_model_are_gusts_without_its_pose(every):
     vehicle = load_vehicle("ardrone2")
     log = read_log(data_file("hard_logs/perfect_model_gusts_10mN_imu.csv.gz"), vehicle=vehicle)

@@ -40,27 +40,21 @@ def weak():
     return RegressedFlights([pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=20.0))], VEHICLE)
 
 
-@pytest.mark.parametrize(
-    ("trajectory", "missing"), [("excite", ()), ("hover", (EffectSetting("mass", {"dm": 0.03}),))]
-)
-def test_a_simulator_may_have_no_noise(trajectory, missing):
+def test_a_simulator_may_have_no_noise():
     """An exact pose looks like a filtered one; what is left of it counts for none."""
-    log = fly_practice(VEHICLE, missing, trajectory, 12.0, 1, turbulence=0.0, sensor=0.0)
-    found = diagnose([log], VEHICLE)
-    assert (found.verdict == "nothing to explain") == (not missing)
+    load = (EffectSetting("mass", {"dm": 0.03}),)
+    log = fly_practice(VEHICLE, load, "hover", 12.0, 1, turbulence=0.0, sensor=0.0)
     # of thrust and mass a flight shows the ratio
-    assert {e.name for e in found.effects} <= {"mass", "thrust_scale"}
-    assert len(found.effects) == len(missing)
+    (effect,) = diagnose([log], VEHICLE).effects
+    assert effect.name in ("mass", "thrust_scale")
 
 
-@pytest.mark.parametrize("turns", [0.0, 1e-9])
-def test_a_still_flight_without_noise_is_diagnosed(turns):
+def test_a_still_flight_without_noise_is_diagnosed():
     """Columns that do not vary carry nothing; what is known to the last digit is no more."""
     rng = default_rng(0)
     count = 2101
     place = [0.0, 0.0, 1.0] + 1e-9 * rng.standard_normal((count, 3))
-    attitude = [1.0, 0.0, 0.0, 0.0] + turns * rng.standard_normal((count, 4))
-    log = resting(0.005 * np.arange(count), position=place, quaternion=attitude)
+    log = resting(0.005 * np.arange(count), position=place)
     found = diagnose([log], VEHICLE)
     assert all(e.tentative for e in found.effects)
 

@@ -49,7 +49,7 @@ def test_a_measured_file_raises_the_doubts_that_it_raised(case):
 @pytest.mark.parametrize(
     ("case", "every"),
     [
-        ("hostile 0", 7),
+        ("hostile 0", 13),
         *(
             pytest.param(case, 1, marks=pytest.mark.slow)
             for case in GOLDEN

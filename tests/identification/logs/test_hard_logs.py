@@ -1,4 +1,4 @@
-"""Logs of kinds that were read wrongly, with their right readings."""
+"""Logs of kinds that were read wrongly, with what ``tests/golden/logs.json`` does not keep."""
 
 from dataclasses import replace
 
@@ -23,18 +23,10 @@ from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.report.log_check import check_log
 
 
-@pytest.mark.parametrize(
-    "name", ["actuator_only", "bf_erpm100_names.bbl", "px4_gz_rads_as_rpm.ulg", "matlab_struct.mat"]
-)
+@pytest.mark.parametrize("name", ["actuator_only", "matlab_struct.mat"])
 def test_rotor_speeds_are_in_rad_s(name):
     log = read_log(data_file(f"hard_logs/{name}"), vehicle=load_vehicle("ardrone2"))
     assert 360.0 < np.median(log.rotor_speeds) < 420.0
-
-
-def test_rounded_times_are_even():
-    log = read_log(data_file("hard_logs/time_two_decimals.csv.gz"))
-    assert np.ptp(np.diff(log.t)) < 1e-9
-    assert log.period == pytest.approx(0.005, rel=1e-3)
 
 
 def test_rounded_rotor_speeds_of_a_smooth_flight_come_with_each_row():
@@ -85,13 +77,6 @@ def test_an_imu_whose_clock_jumps_is_left_out(mended_log):
     assert "s in turn against the pose" in notes[0]
 
 
-def test_a_late_pose_is_found_at_its_reading():
-    vehicle = load_vehicle("ardrone2")
-    log = read_log(data_file("hard_logs/pose_late_80.csv.gz"), vehicle=vehicle)
-    (note,) = (note for note in log.notes if "the pose is" in note)
-    assert float(note.split(" s late")[0].split()[-1]) == pytest.approx(0.08, abs=0.003)
-
-
 def test_a_simulation_that_blew_up_is_no_flight_in_milli_g():
     log = read_log(data_file("hard_logs/perfect_model_gusts_10mN_imu.csv.gz"))
     growth = 0.3 * np.exp(np.minimum(log.t, 12.0))
@@ -127,7 +112,7 @@ def test_an_advice_leaves_a_consistent_log(change, expected):
     vehicle = load_vehicle("ardrone2")
     log = read_log(data_file("hard_logs/perfect_model_gusts_10mN.csv.gz"), vehicle=vehicle)
     with refused(expected):
-        screen_log(change(log), vehicle)
+        screen_log(change(with_rows(log, log.t < 15.0)), vehicle)
 
 
 @pytest.mark.parametrize(

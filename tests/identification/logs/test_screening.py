@@ -13,13 +13,11 @@ from numpy.linalg import norm
 from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
-from tests.support.data_paths import crazyswarm2_file
 from tests.support.flown import VEHICLE, noisy, recorded, resting, without_pose
 from tests.support.hostile_conventions import permuted
 from tests.support.outcomes import refused
 from tests.support.parameters import mostly_slow
 from tests.support.sizes import rms
-from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.dynamics.vehicle import ModelStatus
 from windwrench.evidence.trials.practice_flights import practise
@@ -126,19 +124,6 @@ def test_a_quiet_hover_decides_nothing():
     log = replace(log, position=position, quaternion=quaternion)
     assert screen_log(log, VEHICLE)[1] == ()
     assert Evidence.of_log(log, VEHICLE).fit(DECLARED).torque > 0.5  # there is nothing to tell
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize(
-    "number",
-    mostly_slow(
-        [100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204], {100, 176}.__contains__
-    ),
-)
-def test_short_measured_flights_pass_where_short_is_enough(number):
-    vehicle = load_vehicle("crazyflie")
-    log = read_log(crazyswarm2_file(number), "crazyswarm2", vehicle)
-    screen_log(log, vehicle, least_seconds=3.0)
 
 
 def jumped_clock(log):

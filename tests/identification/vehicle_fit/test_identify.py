@@ -44,13 +44,11 @@ from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
 from windwrench.identification.vehicle_fit.report import explained, use_of
-from windwrench.identification.vehicle_fit.result import IDENTIFIED, Estimate
 from windwrench.identification.vehicle_fit.solve import nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
 
 GIVEN = parse_geometry(str(ARM))
-GAZEBO = parse_geometry("0.1262")
 HOVER = np.sqrt(MASS * 9.81 / (4 * K)) / FULL  # command
 
 
@@ -61,7 +59,7 @@ def of_crazyflie(logs, windows=None):
 @pytest.fixture(scope="module")
 def commanded():
     lag = {"motor_lag": {"tau": 0.06}}
-    return [recorded(t, 15.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "shake", "yaw")]
+    return [recorded(t, 15.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "yaw")]
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +142,7 @@ def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
 
 
 def test_a_hover_does_not_show_what_it_does_not_excite():
-    found = of_crazyflie([recorded("hover", 10.0, vehicle=CRAZYFLIE)])
+    found = of_crazyflie([recorded("hover", 6.5, vehicle=CRAZYFLIE)])
     assert found.estimates["Jzz"].status == "assumed"
     assert found.estimates["motor_lag"].status == "not identifiable"
     assert any("Yaw at" in line for line in found.advice)
@@ -177,14 +175,6 @@ def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
     for volt, known in ((3.535, empty), (4.165, full)):
         assert known.low < HOVER * (volt / 3.85) ** -0.6 < known.high
     assert found.vehicle.motor_curve.voltage_exponent == found.estimates["voltage_exponent"].value
-
-
-def test_without_a_discharge_voltage_and_curve_are_not_told_apart():
-    same = vehicles()["imu and commands"]
-    assert same.estimates["voltage_exponent"].status == "not identifiable"
-    assert "hardly changes" in same.estimates["voltage_exponent"].how
-    assert any("with a full and with an empty battery" in line for line in same.advice)
-    assert same.vehicle.motor_curve.voltage_exponent == 0.0
 
 
 def test_tapers_lose_what_the_intervals_add():
@@ -273,17 +263,16 @@ def test_a_model_stands_on_each_flight():
         assert standing({OTHER_FLIGHTS: errors}) == stands
 
 
-@pytest.mark.parametrize("off", [0.5, 2.0])
-def test_torques_that_fail_on_their_own_flight_turn_no_prediction(commanded, monkeypatch, off):
+def test_torques_that_fail_on_their_own_flight_turn_no_prediction(commanded, monkeypatch):
     """12 times the error of no change, on flights of 9 s of which nothing can be held out."""
 
     def errors(_, vehicles):
-        return [of(*4 * [off if v.closed_loop is None else 1.0]) for v in vehicles]
+        return [of(*4 * [2.0 if v.closed_loop is None else 1.0]) for v in vehicles]
 
     monkeypatch.setattr("windwrench.identification.vehicle_fit.held_out.errors_at", errors)
     found = of_crazyflie(commanded[:1], [(2.0, 9.0)])
     assert found.vehicle.status.torque == "assumed"
-    assert ("closed_loop damping" in found.estimates) == (off > 1.0)
+    assert "closed_loop damping" in found.estimates
 
 
 def test_a_vehicle_that_is_refuted_keeps_its_motion(commanded):
@@ -328,7 +317,6 @@ def test_an_inertia_that_no_body_has_moves_to_the_nearest(identified):
 @pytest.mark.parametrize(
     ("name", "line"),
     [
-        ("same_motor_four_times.csv.gz", "motors 1 and 2 are equal in every row"),
         ("ardupilot_rpm_tenth.bin", r"speeds in flight are 39, 39.5, 39.3, 39.3 rad/s; .* 100"),
         ("px4_one_esc_low.ulg", "are 390, 395, 393, 70.7 rad/s; expected a ratio of at most 1.5"),
     ],
@@ -339,20 +327,6 @@ def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):
         flight = read_log(log)
     with refused(line):
         identify([flight], 1.5, parse_geometry("0.17"))
-
-
-def test_a_rotor_that_reads_half_its_speed_is_refused():
-    """As on two public flights of a Crazyflie, 922 and 928 beside 1680 to 1770 rad/s."""
-    log = read_log(data_file("hard_logs/healthy_pose_50hz_rows_200hz.csv.gz"))
-    half = log.rotor_speeds * [1.0, 0.54, 1.0, 1.0]
-    with refused("expected a ratio of at most 1.5"):
-        identify([replace(log, rotor_speeds=half)], 0.465, parse_geometry("0.126"))
-
-
-def test_rad_per_second_in_a_channel_of_rpm_are_read_right():
-    """PX4 in Gazebo: k came out 91 times too large, identified to .6 %."""
-    found = identify([read_log(data_file("hard_logs/px4_gz_rads_as_rpm.ulg"))], 0.465, GAZEBO)
-    check(found, "k", 8.05e-6, 0.02)
 
 
 def test_rotors_in_another_order_are_refused(inertial):
@@ -407,14 +381,11 @@ def test_a_part_that_is_too_short_is_refused(inertial, window):
         identify([inertial[0][0]], MASS, GIVEN, [window])
 
 
-LAG = Estimate("motor_lag", 0.05, 0.04, 0.06, "s", IDENTIFIED, "")
-
-
-def found(*effects, curve=None, lag=LAG, commands=False):
+def found(*effects, curve=None):
     """Return as much of a result as exports read."""
     vehicle = replace(CRAZYFLIE.with_effects(*effects), motor_curve=curve)
-    fit = SimpleNamespace(model=SimpleNamespace(commands=commands))
-    return SimpleNamespace(vehicle=vehicle, estimates={lag.name: lag}, fit=fit)
+    fit = SimpleNamespace(model=SimpleNamespace(commands=curve is not None))
+    return SimpleNamespace(vehicle=vehicle, estimates={}, fit=fit)
 
 
 def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
@@ -439,7 +410,7 @@ def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
 def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
     full = 0.15
     bend = 0.7
-    it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)), commands=True)
+    it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)))
     text = EXPORTS["px4"](it)
     set_to = {k: float(x) for k, x in re.findall(r"param set (\S+) (\S+)", text)}
     assert set_to["THR_MDL_FAC"] == pytest.approx(bend, rel=1e-3)
@@ -447,20 +418,3 @@ def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
     assert 4 * full * set_to["MPC_THR_HOVER"] == pytest.approx(it.vehicle.weight, rel=1e-3)
     assert "EKF2_MCOEF" not in set_to
     assert f"MOT_THST_EXPO,{bend:g}" in EXPORTS["ardupilot"](it)
-
-
-def test_rotorpy_makes_the_same_forces_and_torques():
-    it = found(EffectSetting("rotor_drag", {"kdx": 2e-6, "kdy": 3e-6}))
-    names = {"np": np}
-    exec(EXPORTS["rotorpy"](it), names)
-    p = names["quad_params"]
-    v = it.vehicle
-    speeds = np.array([1500.0, 1600.0, 1700.0, 1800.0])
-    thrust = v.k * speeds**2
-    place = np.array(list(p["rotor_pos"].values()))
-    torque = np.cross(place, np.column_stack([0 * thrust, 0 * thrust, thrust])).sum(axis=0)
-    torque[2] += p["k_m"] / p["k_eta"] * p["rotor_directions"] @ thrust
-    want = v.rotor_wrench(speeds)
-    assert [p["k_eta"] / v.k[0] * thrust.sum(), *torque] == pytest.approx(want, rel=1e-4)
-    assert p["tau_m"] == 0.05
-    assert p["k_d"] == pytest.approx(2.5e-6)
