@@ -26,7 +26,6 @@ from tests.support.exported_c.compiled import (
     take,
     write,
 )
-from tests.support.exported_c.flights import flight, vehicle_of
 from tests.support.exported_c.hostile import PERIOD, hostile
 from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
@@ -40,6 +39,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names, parse_setting
 from windwrench.envs import FanTrackingEnv
 from windwrench.envs.closed_loop import Stage
+from windwrench.envs.recording import record_flight
 from windwrench.envs.vector import SETTLE_TICKS
 from windwrench.envs.wind_tasks import WindTrajectoryEnv
 from windwrench.estimator import UKFTuning
@@ -50,7 +50,6 @@ from windwrench.runtime.errors import InputError
 from windwrench.training.run import flight_of
 
 LARGEST = 0.01  # of a standard deviation
-TURNING = "ardrone2, turning"
 POLICY = ROOT / "training" / "policies" / "sac-0.npz"
 
 pytestmark = needs_gcc
@@ -184,7 +183,7 @@ def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, steps, 
 # a model has room for 16 of a kind; the constant gain does not converge under a slung payload
 @pytest.mark.parametrize(("estimator", "half"), [("ukf", 0), ("constant-gain", 1)])
 def test_every_effect_works_as_in_python_to_the_bit(estimator, half, tmp_path):
-    model = declaring(replace(vehicle_of(TURNING), ceiling_z=3.0), *names()[half::2])
+    model = declaring(replace(VEHICLE, ceiling_z=3.0), *names()[half::2])
     exported = export_c(model, estimator, precision="double")
     c = CompiledFilter(exported, tmp_path)
     flown = {name: values[:400] for name, values in hostile(VEHICLE, 1).items()}
@@ -313,7 +312,10 @@ def test_the_example_finds_the_force_that_it_is_given(tmp_path):
 def test_on_a_cortex_m4_it_says_the_same_within_its_limits(built, tmp_path):
     """Code, memory and instructions of every filter on the board that qemu imitates."""
     needs(*firmware.TOOLS)
-    flown = flight(TURNING, 150)
+    log, dt = record_flight(VEHICLE, (), "yaw", 0.75), default_rng(0).uniform(0.0049, 0.0051, 150)
+    columns = "rotor_speeds", "position", "quaternion"
+    flown = {name: np.float32(log[name][:150]).astype(float) for name in columns}
+    flown |= {"dt": np.float32(dt).astype(float)}
     for estimator, ram, instructions in (
         ("constant-gain", 3_200, 8_400),
         ("ukf", 6_144, 96_000),
