@@ -186,7 +186,6 @@ def test_registered_laws_and_scenarios_and_a_law_with_gains(tmp_path, monkeypatc
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("WindHove", "unknown task 'WindHove'; expected one of .* Did you mean 'WindHover'"),
         ("me/Absent-v0", "unknown task 'me/Absent-v0'; expected an id registered .*--import FILE"),
         ("absent.py:Land", "absent.py: there is no such file; expected a Python file with the cla"),
         ("own_bad.py:Damped", "Damped is no task; expected a Python file with the class of a Gym"),
