@@ -92,7 +92,7 @@ def test_an_effect_of_ones_own_is_found_with_its_coefficient(
         assert "tether" not in library.names()
         script = example("custom_effect")
         asks_for(monkeypatch, script, "tether", "constant_force", "rotor_drag")
-        found = script.main(seconds=10.5, stiffness=0.12, seed=1)
+        found = script.main(seconds=14.0, stiffness=0.12, seed=1)
     assert found.verdict == "explained"
     assert [effect.name for effect in found.effects] == ["tether"]
     assert found.effects[0].coefficients["k"] == pytest.approx(0.12, rel=0.08)
