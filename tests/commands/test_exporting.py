@@ -2,12 +2,11 @@
 
 import json
 import math
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
-from tests.identification.vehicle_fit.flown import inertial_flights
 from tests.support.paths import ROOT
 from windwrench.commands.identifying import parse_window
 from windwrench.commands.tuning_file import load_tuning, save_tuning
@@ -66,15 +65,7 @@ def test_declared_effects_are_in_it_unless_none_are_wanted(call, tmp_path):
         assert (out / "core/effects/rotor_drag.hpp").exists() == bool(effects)
 
 
-@pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    path = tmp_path_factory.mktemp("flights") / "flight.csv.gz"
-    ((flight, speeds),) = inertial_flights(range(3, 4), 12.0)
-    write_log(replace(flight, command=None, rotor_speeds=speeds), path)
-    return path
-
-
-def test_identify_writes_a_vehicle_that_loads_and_predicts_other_flights(call, log, tmp_path):
+def test_identify_writes_a_vehicle_that_loads_and_predicts_other_flights(call, tmp_path):
     known = load_vehicle("ardrone2")
     for seed in (1, 2):
         flown = FlightLog(**record_flight(known, trajectory="excite", seconds=12.0, seed=seed))
@@ -96,14 +87,6 @@ def test_identify_writes_a_vehicle_that_loads_and_predicts_other_flights(call, l
     for errors in (data["held_out_blocks"], data["prediction"]):
         assert errors["starts"] > 20
     assert (tmp_path / "mine.prediction.png").read_bytes()[:4] == b"\x89PNG"
-    vehicle = "--vehicle", "mine.yaml"
-    assert call("estimate", "2.csv", *vehicle, "--no-tune", "--out", "estimated")[0] == 0
-    law = "--task", "WindHover", "--controller", "lqg"
-    assert call("fly", *vehicle, *law, "--out", "flown")[0] == 0
-    code, _, error = call(*asked, "--test", log, "--out", "other.yaml")
-    assert code == 2
-    assert "flight: no unbroken piece of pose is longer than 3 s" in error
-    assert not (tmp_path / "other.yaml").exists()
 
 
 def test_a_part_of_a_log():

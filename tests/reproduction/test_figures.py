@@ -23,9 +23,9 @@ from windwrench.runtime.provenance import commit, made_by
 
 SHORT = {  # seeds, settings, and constants of the figure's module
     "fig3": (1, {"seconds": 8.0}, {}),
-    "fig4": (2, {"sweep": (0.5, 1.0)}, {"_END": 14.0}),
+    "fig4": (1, {"sweep": (0.5, 1.0)}, {"_END": 14.0}),
     "fig5": (1, {"evaluations": 1}, {"_TUNING_SEEDS": (10_001,), "_RESAMPLES": 400}),
-    "fig6": (1, {}, {}),
+    "fig6": (1, {}, {"HOVER": 3.0}),
     "fig7": (
         2,
         {},
@@ -34,6 +34,7 @@ SHORT = {  # seeds, settings, and constants of the figure's module
             "SHOWN_GAINS": (18.0,),
             "RISE_TIMES": (0.45,),
             "FAN_SPEEDS": (0.2,),
+            "NOISES": ("gusts",),
             "HALVINGS": 3,
             "REPEATS": 2,
         },
